@@ -1,0 +1,38 @@
+# How the core is compiled: shared by the library and by the Python side's build of the same sources.
+
+# Without these the compiler may fuse a*b+c or reassociate, and the bits are no longer those of the twin.
+set(PVID_CORE_OPTIONS -ffp-contract=off -fno-fast-math)
+
+# Strict C99 (or what CMAKE_C_STANDARD names), without GNU extensions: ISO mode itself forbids excess
+# precision.
+function(pvid_compile_as_core target)
+  target_compile_options(${target} PRIVATE ${PVID_CORE_OPTIONS})
+  if(NOT CMAKE_C_STANDARD)
+    set_target_properties(${target} PROPERTIES C_STANDARD 99)
+  endif()
+  set_target_properties(${target} PROPERTIES C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+endfunction()
+
+set(PVID_DEVELOPER_WARNINGS
+  -Werror
+  -Wall
+  -Wextra
+  -Wpedantic
+  -Wcast-align
+  -Wcast-qual
+  -Wconversion
+  -Wdouble-promotion
+  -Wfloat-equal
+  -Wmissing-prototypes
+  -Wshadow
+  -Wstrict-prototypes
+  -Wundef
+  -Wvla
+)
+
+# With PVID_DEVELOPER: the warnings above are errors. A user's newer compiler is not to fail on one.
+function(pvid_developer_warnings target)
+  if(PVID_DEVELOPER)
+    target_compile_options(${target} PRIVATE ${PVID_DEVELOPER_WARNINGS})
+  endif()
+endfunction()

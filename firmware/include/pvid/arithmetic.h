@@ -1,0 +1,16 @@
+/* pvid/arithmetic.h - does this build compute the bits that were promised?
+ *
+ * Bit-exactness needs IEEE-754 binary32, round to nearest even, no fused multiply-add, no flushing
+ * of subnormals. Compiler flags can silently take each of these away; a board can ask at start-up.
+ */
+#ifndef PVID_ARITHMETIC_H
+#define PVID_ARITHMETIC_H
+
+#include <stdint.h>
+
+/* 0 when float32 behaves as promised, else the sum of:
+ *   1 products and sums are fused   2 subnormals are flushed   4 not rounding to nearest even
+ *   8 sqrtf is not correctly rounded   16 division is not correctly rounded */
+uint32_t pvid_arithmetic_faults_f32(void);
+
+#endif

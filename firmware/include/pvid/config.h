@@ -1,0 +1,61 @@
+/* pvid/config.h - compile-time bounds of the core.
+ *
+ * Every array of the library is sized by one of these macros: no heap, no VLA. Override with -D
+ * or put the definitions into a header of your own and name it with -DPVID_CONFIG_HEADER="my.h".
+ * They change the layout of the state structs: library and application must agree (the CMake
+ * target passes them on to whoever links it).
+ */
+#ifndef PVID_CONFIG_H
+#define PVID_CONFIG_H
+
+#ifdef PVID_CONFIG_HEADER
+#include PVID_CONFIG_HEADER
+#endif
+
+/* Longest window of a differentiator [samples]: 2 * half * stride + 1. RAM: 4 bytes each, twice. */
+#ifndef PVID_MAX_WINDOW
+#define PVID_MAX_WINDOW 321
+#endif
+#if PVID_MAX_WINDOW < 5 || PVID_MAX_WINDOW > 8191
+#error "PVID_MAX_WINDOW must lie in 5..8191"
+#endif
+
+/* Largest number of entries of theta (11: the strong form of Kapitza's pendulum). */
+#ifndef PVID_MAX_THETA
+#define PVID_MAX_THETA 11
+#endif
+#if PVID_MAX_THETA < 11 || PVID_MAX_THETA > 32
+#error "PVID_MAX_THETA must lie in 11..32"
+#endif
+
+/* Largest number of free parameters p. */
+#ifndef PVID_MAX_P
+#define PVID_MAX_P 4
+#endif
+#if PVID_MAX_P < 3 || PVID_MAX_P > 8
+#error "PVID_MAX_P must lie in 3..8"
+#endif
+
+/* Largest number of distinct entries of M that a model keeps: 45 for Kapitza's strong form;
+ * a model without repeated entries needs n_theta (n_theta + 1) / 2. */
+#ifndef PVID_MAX_MOMENTS
+#define PVID_MAX_MOMENTS 45
+#endif
+#if PVID_MAX_MOMENTS < 45 || PVID_MAX_MOMENTS > 528
+#error "PVID_MAX_MOMENTS must lie in 45..528"
+#endif
+
+/* Called on misuse (NULL where an object is needed). Replace it by your own trap or reset. */
+#ifndef PVID_ASSERT
+#define PVID_ASSERT(condition) ((void)(condition))
+#endif
+
+/* The bits promised need IEEE-754 binary32 evaluated as such: no excess precision, no fast-math. */
+#if defined(__FAST_MATH__)
+#error "pvid must be compiled without -ffast-math: its results would not be reproducible"
+#endif
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16
+#error "pvid needs float arithmetic without excess precision (on x87: -msse2 -mfpmath=sse)"
+#endif
+
+#endif

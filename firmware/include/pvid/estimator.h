@@ -1,0 +1,126 @@
+/* pvid/estimator.h - parameters with constraints, driven by pseudo-velocities.
+ *
+ * Takes rows (Y, N) of a model and moves its few free parameters p (MATH.md 4, equation (5)):
+ *
+ *   S = C^T M C,   F = C^T (B - M theta),   (S + H0) dp = (1 - g) sum C^T N e + g F,   p += dp
+ *
+ * with e = Y - N^T theta. g = 0 is the paper's law, literally; g = 1 is one Gauss-Newton step on
+ * the sums (they do not depend on p, so re-linearising loses nothing). H0 is the information the
+ * start brings along. Solved by an equilibrated Cholesky factorisation of order n_p.
+ *
+ *   static pvid_estimator_f32 estimator;
+ *   pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;   (then model, start, ...)
+ *   if (pvid_estimator_init_f32(&estimator, &config) != PVID_OK) ...
+ *   each tick:  reason = pvid_estimator_step_f32(&estimator, n, y);
+ *   to publish: pvid_estimator_assess_f32(&estimator, &estimate);
+ *
+ * Total and bounded: whatever the rows, p stays finite and inside its bounds. A row or a step that
+ * cannot be used is counted and leaves the state as it was. Not thread-safe.
+ *
+ * How B is kept. A model with a `project` of its own gets B = sum N Y. Without one, B and yy are
+ * kept relative to the estimate, b = B - M theta and rr = sum (Y - N^T theta)^2, moved along by
+ * b -= M dtheta at every step: the same quantities without the cancellation, so that the residual
+ * variance stays honest in float32 even when the residual is 1e-4 of Y.
+ */
+#ifndef PVID_ESTIMATOR_H
+#define PVID_ESTIMATOR_H
+
+#include <stdint.h>
+
+#include "pvid/information.h"
+#include "pvid/model.h"
+#include "pvid/status.h"
+
+typedef enum {
+    PVID_LAW_STATIONARY = 0, /* with the feedback of F: converges to the least-squares estimate */
+    PVID_LAW_PSEUDOVELOCITY  /* equation (5) alone */
+} pvid_law;
+
+typedef struct {
+    const pvid_model_f32 *model;
+    float start[PVID_MAX_P];    /* where p starts [units of p], within the bounds */
+    float start_sd[PVID_MAX_P]; /* its standard deviation [units of p], > 0: H0 = (row_sd / start_sd)^2 */
+    float lower[PVID_MAX_P];    /* bounds of p [units of p]; > 0 where the model says positive */
+    float upper[PVID_MAX_P];
+    float row_sd;               /* expected standard deviation of Y - N^T theta [units of Y], > 0 */
+    float update_rate_hz;       /* groups of rows a second, 1e-6..1e6 */
+    float forgetting_s;         /* time constant of forgetting; 0: none; else at least 4 groups */
+    float feedback_hz;          /* stationary law: g = feedback_hz * time between solves, at most 1;
+                                   0: g = 1, a Gauss-Newton step at every solve */
+    float correlation;          /* rows that carry the information of one independent row, >= 1:
+                                   widens the standard errors when filters overlap */
+    float step_limit;           /* largest |dp/p| (|dp|/start_sd where p may be zero), 0 < . <= 0.9 */
+    float kappa_min;            /* no step while kappa of S + H0 is below this, 0..1 */
+    pvid_law law;
+    uint16_t divider;           /* groups of rows a solve, 1.. */
+} pvid_estimator_config_f32;
+
+/* Defaults: stationary law, Gauss-Newton at every tick, no forgetting, step_limit 0.3,
+ * kappa_min 1e-5. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
+extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
+
+typedef struct {
+    uint32_t rows;               /* rows taken in */
+    uint32_t updates;            /* steps of p */
+    uint32_t limited;            /* of those, shortened to step_limit */
+    uint32_t bounded;            /* of those, stopped at a bound */
+    uint32_t held_not_excited;
+    uint32_t held_pivot;
+    uint32_t rejected_not_finite;
+    uint32_t rejected_saturated;
+} pvid_counters; /* each stops at 2^32 - 1 */
+
+/* State; only the functions below write to it. */
+typedef struct {
+    const pvid_model_f32 *model;
+    pvid_information_f32 information;
+    float p[PVID_MAX_P];
+    float theta[PVID_MAX_THETA];  /* f(p); only for models without functions of their own */
+    float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
+    float prior[PVID_MAX_P];      /* diagonal of H0 */
+    float start_sd[PVID_MAX_P];
+    float lower[PVID_MAX_P];
+    float upper[PVID_MAX_P];
+    float row_variance;
+    float gain;                   /* g */
+    float correlation;
+    float step_limit;
+    float kappa_min;
+    uint16_t divider;
+    uint16_t phase;               /* groups since the last solve */
+    pvid_counters counters;
+} pvid_estimator_f32;
+
+/* What is published. Always finite. */
+typedef struct {
+    float p[PVID_MAX_P];
+    float se[PVID_MAX_P];                      /* standard errors; start_sd where data say nothing */
+    float covariance[PVID_MAX_P][PVID_MAX_P];  /* of p, symmetric */
+    float kappa;       /* part of p[0]'s information that the other parameters cannot imitate, 0..1 */
+    float residual_sd; /* of Y - N^T theta [units of Y] */
+    float weight;      /* rows remembered */
+} pvid_estimate_f32;
+
+/* Prepares `self`. Fails iff a field of config is not as described there; the status names it. */
+pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config);
+
+/* Takes one row in, ends the group and solves: add and update in one, for one row a tick. Returns
+ * what they return. */
+pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], float y);
+
+/* Takes one row of a group in. Returns PVID_ACCUMULATED, or PVID_REJECTED_NOT_FINITE or
+ * PVID_REJECTED_SATURATED with the state untouched but for the counter. */
+pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y);
+
+/* Ends a group of rows and, when the divider says so, solves and moves p. Returns PVID_UPDATED,
+ * PVID_ACCUMULATED (not due), PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT. */
+pvid_reason pvid_estimator_update_f32(pvid_estimator_f32 *self);
+
+/* One more Gauss-Newton step on the same sums, without ending a group. Same answers. */
+pvid_reason pvid_estimator_iterate_f32(pvid_estimator_f32 *self);
+
+/* Standard errors, kappa and residual of the present estimate, from (S / s^2 + 1 / start_sd^2)^-1
+ * with s^2 = correlation * residual sum / (weight - n_p). Costs about two solves; changes nothing. */
+void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate);
+
+#endif

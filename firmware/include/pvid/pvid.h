@@ -1,0 +1,30 @@
+/* pvid.h - identifies the parameters of a mechanism on the microcontroller that drives it.
+ *
+ * C99, float32, static memory, no library but sqrtf. Start at strong.h (samples in, parameters
+ * out) or at estimator.h and model.h (rows of a model of yours in). */
+#ifndef PVID_PVID_H
+#define PVID_PVID_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#include "pvid/arithmetic.h"
+#include "pvid/differentiator.h"
+#include "pvid/estimator.h"
+#include "pvid/fnv.h"
+#include "pvid/information.h"
+#include "pvid/kapitza.h"
+#include "pvid/model.h"
+#include "pvid/status.h"
+#include "pvid/strong.h"
+
+#define PVID_VERSION_MAJOR 0
+#define PVID_VERSION_MINOR 1
+#define PVID_VERSION_PATCH 0
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,39 @@
+/* pvid/status.h - what the library answers: init statuses and the reason codes of a tick. */
+#ifndef PVID_STATUS_H
+#define PVID_STATUS_H
+
+/* Answer of every init. Each code names the field of the configuration that was refused. */
+typedef enum {
+    PVID_OK = 0,
+    PVID_BAD_MODEL,           /* NULL, or larger than the PVID_MAX_ bounds */
+    PVID_BAD_SAMPLE_RATE,     /* not finite or outside 1e-3..1e6 Hz */
+    PVID_BAD_BANK,            /* NULL weights, half < 2, stride < 1, window over PVID_MAX_WINDOW,
+                                 or a weight that is not finite */
+    PVID_BAD_LENGTH,          /* l1 not finite or not positive */
+    PVID_BAD_START,           /* start not finite, not positive where the model asks, or out of bounds */
+    PVID_BAD_START_SD,        /* not finite or not positive */
+    PVID_BAD_BOUNDS,          /* not finite, lower >= upper, or lower <= 0 where p must be positive */
+    PVID_BAD_ROW_SD,          /* not finite or not positive */
+    PVID_BAD_UPDATE_RATE,     /* not finite or outside 1e-6..1e6 Hz */
+    PVID_BAD_FORGETTING,      /* not finite, negative, or shorter than 4 updates */
+    PVID_BAD_FEEDBACK,        /* not finite or negative */
+    PVID_BAD_LAW,             /* not one of pvid_law */
+    PVID_BAD_DIVIDER,         /* 0 */
+    PVID_BAD_STEP_LIMIT,      /* not finite or outside (0, 0.9] */
+    PVID_BAD_KAPPA_MIN,       /* not finite or outside [0, 1) */
+    PVID_BAD_CORRELATION      /* not finite or below 1 */
+} pvid_status;
+
+/* What became of a tick. An estimate never travels without one. */
+typedef enum {
+    PVID_UPDATED = 0,            /* the parameters took a step */
+    PVID_WARMING_UP,             /* the window of the differentiator is not full yet */
+    PVID_ACCUMULATED,            /* data taken in, no solve due at this tick (divider) */
+    PVID_HELD_NOT_EXCITED,       /* kappa below its threshold: the data say nothing of w */
+    PVID_HELD_PIVOT,             /* the system could not be solved, or its solution was not finite */
+    PVID_REJECTED_NOT_FINITE,    /* NaN or infinity in the sample or in its row */
+    PVID_REJECTED_OUTLIER,       /* reserved for the outlier gate */
+    PVID_REJECTED_SATURATED      /* a row beyond PVID_ROW_LIMIT */
+} pvid_reason;
+
+#endif

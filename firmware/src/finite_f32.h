@@ -1,0 +1,34 @@
+/* Is a float a number? By its bits: <math.h>'s isfinite may be folded away by fast-math builds. */
+#ifndef PVID_FINITE_F32_H
+#define PVID_FINITE_F32_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+static inline uint32_t pvid_bits_f32(float x)
+{
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+static inline float pvid_from_bits_f32(uint32_t bits)
+{
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+static inline bool pvid_finite_f32(float x)
+{
+    return (pvid_bits_f32(x) & 0x7F800000u) != 0x7F800000u;
+}
+
+/* finite and low <= x <= high */
+static inline bool pvid_within_f32(float x, float low, float high)
+{
+    return pvid_finite_f32(x) && (x >= low) && (x <= high);
+}
+
+#endif

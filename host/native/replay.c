@@ -1,0 +1,91 @@
+/* The C side of pvid.native: replays a run through the shipped core and records every tick.
+ *
+ * Host only. The core is compiled from the same sources with the same flags as on a device; this
+ * file adds loops that Python would be slow at, and a table of sizes that Python checks at load.
+ */
+#include "replay.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define FIELD(type, field) (uint32_t) offsetof(type, field)
+
+const uint32_t pvid_native_layout[] = {
+    (uint32_t)sizeof(pvid_fir_bank_f32),
+    FIELD(pvid_fir_bank_f32, weights),
+    (uint32_t)sizeof(pvid_estimator_config_f32),
+    FIELD(pvid_estimator_config_f32, start),
+    FIELD(pvid_estimator_config_f32, row_sd),
+    FIELD(pvid_estimator_config_f32, law),
+    FIELD(pvid_estimator_config_f32, divider),
+    (uint32_t)sizeof(pvid_strong_config_f32),
+    FIELD(pvid_strong_config_f32, bank),
+    FIELD(pvid_strong_config_f32, estimator),
+    (uint32_t)sizeof(pvid_counters),
+    (uint32_t)sizeof(pvid_estimate_f32),
+    FIELD(pvid_estimate_f32, kappa),
+    (uint32_t)sizeof(pvid_estimator_f32),
+    FIELD(pvid_estimator_f32, counters),
+    (uint32_t)sizeof(pvid_strong_f32),
+    FIELD(pvid_strong_f32, estimator),
+    PVID_MAX_P,
+    PVID_MAX_THETA,
+    PVID_MAX_SUMS,
+    PVID_MAX_WINDOW,
+};
+const uint32_t pvid_native_layout_length = sizeof pvid_native_layout / sizeof pvid_native_layout[0];
+
+const char *pvid_native_build(void)
+{
+    return PVID_NATIVE_BUILD;
+}
+
+static void record_tick(const pvid_record_f32 *record, uint32_t tick, const pvid_estimator_f32 *estimator,
+                        pvid_reason reason)
+{
+    const uint32_t n_p = estimator->model->n_p;
+    const uint32_t n_sums = estimator->information.n_moments + estimator->information.n_theta + 2u;
+    if (record->p != NULL) {
+        memcpy(&record->p[(size_t)tick * n_p], estimator->p, n_p * sizeof(float));
+    }
+    if (record->sums != NULL) {
+        pvid_information_read_f32(&estimator->information, &record->sums[(size_t)tick * n_sums]);
+    }
+    if (record->reason != NULL) {
+        record->reason[tick] = (uint8_t)reason;
+    }
+    if (record->hash != NULL) {
+        *record->running_hash = pvid_fnv_estimator_f32(*record->running_hash, estimator, reason);
+        record->hash[tick] = *record->running_hash;
+    }
+    if ((record->estimate != NULL) && ((tick % record->estimate_every) == 0u)) {
+        pvid_estimator_assess_f32(estimator, &record->estimate[tick / record->estimate_every]);
+    }
+}
+
+void pvid_replay_strong_f32(pvid_strong_f32 *self, uint32_t ticks, const float phi[], const float y[],
+                            const pvid_record_f32 *record)
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_strong_step_f32(self, phi[tick], y[tick]);
+        record_tick(record, tick, &self->estimator, reason);
+    }
+}
+
+void pvid_replay_rows_f32(pvid_estimator_f32 *self, uint32_t ticks, const float n[], const float y[],
+                          const pvid_record_f32 *record)
+{
+    const uint32_t n_theta = self->model->n_theta;
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_estimator_step_f32(self, &n[(size_t)tick * n_theta], y[tick]);
+        record_tick(record, tick, self, reason);
+    }
+}
+
+void pvid_replay_strong_rows_f32(uint32_t ticks, const float phi[], const float u[], float n[], float y[])
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        pvid_kapitza_strong_row_f32(&phi[(size_t)tick * PVID_ORDERS], &u[(size_t)tick * 3u], &y[tick],
+                                    &n[(size_t)tick * PVID_KAPITZA_STRONG_THETA]);
+    }
+}

@@ -1,0 +1,38 @@
+/* What pvid.native calls besides the core itself. */
+#ifndef PVID_REPLAY_H
+#define PVID_REPLAY_H
+
+#include <stdint.h>
+
+#include "pvid/pvid.h"
+
+/* Where a replay writes; NULL: not recorded. Rows stand one after the other, without padding. */
+typedef struct {
+    float *p;               /* [ticks][n_p] */
+    float *sums;            /* [ticks][n_moments + n_theta + 2] */
+    uint8_t *reason;        /* [ticks] */
+    uint32_t *hash;         /* [ticks] running hash after the tick */
+    uint32_t *running_hash; /* in and out; needed with hash */
+    pvid_estimate_f32 *estimate; /* [ticks / estimate_every, rounded up] */
+    uint32_t estimate_every;
+} pvid_record_f32;
+
+/* Sizes and offsets of every struct that Python mirrors, in the order of native.py. */
+extern const uint32_t pvid_native_layout[];
+extern const uint32_t pvid_native_layout_length;
+
+/* Compiler and flags this library was built with. */
+const char *pvid_native_build(void);
+
+/* Steps an initialised identifier through a run. */
+void pvid_replay_strong_f32(pvid_strong_f32 *self, uint32_t ticks, const float phi[], const float y[],
+                            const pvid_record_f32 *record);
+
+/* Steps an initialised estimator through given rows n[ticks][n_theta], y[ticks]. */
+void pvid_replay_rows_f32(pvid_estimator_f32 *self, uint32_t ticks, const float n[], const float y[],
+                          const pvid_record_f32 *record);
+
+/* Rows of the strong form from phi[ticks][5] and u[ticks][3]. */
+void pvid_replay_strong_rows_f32(uint32_t ticks, const float phi[], const float u[], float n[], float y[]);
+
+#endif

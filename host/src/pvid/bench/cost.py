@@ -1,0 +1,93 @@
+"""What one tick costs: instructions by callgrind on the host, split by stage, beside recursive least squares.
+
+Instructions, not time: identical on repeat, whatever else the machine does. Each stage runs in tests/cost/tick_cost.c;
+its cost is the difference between two numbers of ticks, so that start-up falls out.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from pvid.errors import PvidError
+from pvid.native import Native
+
+STAGES = {
+    "differentiator": "two channels, five points, orders 0 to 4",
+    "row": "Y and N from the derivatives",
+    "add": "checks, innovation, sums of M, B, yy",
+    "project": "C^T M C and C^T (B - M theta)",
+    "estimator": "the estimator's whole step: add, project, factor, solve, move p",
+    "tick": "samples in, parameters out",
+    "assess": "standard errors and kappa (only when published)",
+    "rls": "plain packed RLS of the same 11 parameters",
+}
+
+_FEW, _MANY = 640, 1280  # multiples of the fold's block of 64 ticks
+
+
+RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32)
+
+
+def default_binary() -> Path:
+    """Where tools/test builds the harness."""
+    return Path(__file__).resolve().parents[4] / "build" / "gcc" / "tests" / "cost" / "tick_cost"
+
+
+def state_bytes(native: Native) -> dict[str, int]:
+    """Bytes of state beside the baseline's."""
+    return {
+        "estimator (two-level sums, counters, settings)": native.state_bytes["estimator"],
+        "identifier with windows of 321 samples": native.state_bytes["strong"],
+        "plain packed RLS of 11 parameters": RLS_STATE_BYTES,
+    }
+
+
+@dataclass(frozen=True)
+class StageCost:
+    """Instructions of one stage per tick, the harness's own subtracted."""
+
+    stage: str
+    instructions: int
+
+
+def _instructions(binary: Path, stage: str, ticks: int) -> int:
+    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(binary), stage, str(ticks)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    counted = re.search(r"Collected : (\d+)", done.stderr)
+    if done.returncode != 0 or counted is None:
+        raise PvidError(f"counting {stage} failed: {done.stderr.strip().splitlines()[-1] if done.stderr else 'no output'}")
+    return int(counted.group(1))
+
+
+def stage_costs(binary: Path) -> list[StageCost]:
+    """Costs of every stage of the given tick_cost binary.
+
+    Raises
+    ------
+    PvidError
+        When valgrind or the binary is missing.
+    """
+    if shutil.which("valgrind") is None:
+        raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
+    if not binary.is_file():
+        raise PvidError(f"{binary} is not built: run ./tools/test once")
+
+    def per_tick(stage: str) -> int:
+        return round((_instructions(binary, stage, _MANY) - _instructions(binary, stage, _FEW)) / (_MANY - _FEW))
+
+    harness = per_tick("nothing")
+    return [StageCost(stage, per_tick(stage) - harness) for stage in STAGES]
+
+
+def as_markdown(costs: list[StageCost], state: dict[str, int]) -> str:
+    """The README's table."""
+    lines = ["| stage | instructions a tick | what it does |", "|---|---:|---|"]
+    lines += [f"| {cost.stage} | {cost.instructions} | {STAGES[cost.stage]} |" for cost in costs]
+    lines.append("")
+    lines += ["| state | bytes |", "|---|---:|"]
+    lines += [f"| {name} | {size} |" for name, size in state.items()]
+    return "\n".join(lines)

@@ -1,0 +1,365 @@
+"""The command line: `./tools/pvid COMMAND`.
+
+Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage (one sentence), 3 nothing identified.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from pvid import __version__
+from pvid.capture import read_run, write_run
+from pvid.compare import Comparison, compare_run
+from pvid.errors import PvidError
+from pvid.identify import LINEAR, PHYSICAL, UNITS, Identification, identify
+from pvid.native import Native
+from pvid.rig import (
+    STANDARD_DRIVE,
+    STANDARD_DURATION,
+    STANDARD_PENDULUM,
+    STANDARD_RELEASE,
+    STANDARD_SAMPLE_RATE,
+    Drive,
+    Pendulum,
+    Tone,
+    simulate,
+    standard_sensors,
+    standard_start,
+)
+from pvid.rigfile import RigFile, load
+from pvid.setup import strong_config
+
+DONE, DIFFERENT, BAD_INPUT, NOTHING_IDENTIFIED = 0, 1, 2, 3
+
+messages = Console(stderr=True)
+
+
+def main() -> None:
+    """Runs a command and turns every refusal into one sentence and its exit code."""
+    try:
+        code = commands.main(prog_name="pvid", standalone_mode=False)
+    except click.exceptions.Abort:
+        messages.print("pvid: interrupted")
+        code = 130
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        help_hint = f" (see {context.command_path} --help)" if context is not None else ""
+        click.echo(f"pvid: {error.format_message()}{help_hint}", err=True)
+        code = BAD_INPUT
+    except PvidError as error:
+        click.echo(f"pvid: {error}", err=True)
+        code = BAD_INPUT
+    sys.exit(code if isinstance(code, int) else DONE)
+
+
+@contextmanager
+def progress_bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A bar on a terminal, nothing elsewhere; yields the function to call with the work done so far."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=messages, transient=True, disable=not messages.is_terminal) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.update(task, completed=done)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="pvid", message="%(prog)s %(version)s")
+def commands() -> None:
+    """Identifies the parameters of a mechanism, and proves the C core bit for bit."""
+
+
+# ---- demo
+
+
+@commands.command()
+@click.option("--figure", type=click.Path(path_type=Path), default=Path("pvid-demo.png"), help="Where the figure goes.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
+@click.option("--bits", default=20, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
+@click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
+def demo(figure: Path, seed: int, bits: int, truth: str) -> int:
+    """Simulates the standard rig, identifies it in the C core, compares every bit with numpy."""
+    native = Native()
+    simulation = simulate(sensors=standard_sensors(bits), truth=truth, seed=seed)  # type: ignore[arg-type]
+    run = simulation.run
+    rig = RigFile.standard()
+    start = standard_start(seed)
+    messages.print(
+        f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
+        f"start {', '.join(f'{100 * (s / p - 1):+.0f} %' for s, p in zip(start, simulation.p, strict=True))} off"
+    )
+    result = identify(run, rig, native, start=start)
+    truths = _truths(simulation.pendulum)
+    _print_result(result, truths)
+    with progress_bar("comparing with the twin", len(run.t)) as advance:
+        comparison = compare_run(native, strong_config(rig, run.sample_rate, start), run.phi, run.y, advance)
+    _print_comparison(comparison)
+    _write_figure(result, figure, truths)
+    return DONE if comparison.equal else DIFFERENT
+
+
+def _write_figure(result: Identification, path: Path, truths: dict[str, float] | None) -> None:
+    from pvid.figures import convergence  # matplotlib takes half a second that other commands need not wait for
+
+    convergence(result, path, truth=truths)
+    click.echo(f"figure: {path}")
+
+
+def _truths(pendulum: Pendulum) -> dict[str, float]:
+    w, d1, d2 = pendulum.linear
+    return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2}
+
+
+def _print_result(result: Identification, truths: dict[str, float] | None = None) -> None:
+    table = Table(title=f"{result.form} form, {result.law} law, core {result.core} on {result.on}")
+    table.add_column("parameter")
+    if truths:
+        table.add_column("truth", justify="right")
+    table.add_column("estimate", justify="right")
+    table.add_column("standard error", justify="right")
+    if truths:
+        table.add_column("error %", justify="right")
+    for name in (*PHYSICAL, *LINEAR):
+        if name not in result.value:
+            continue
+        label = f"{name} [{UNITS[name]}]" if UNITS[name] else name
+        cells = [f"{result.value[name]:.6g}", f"{result.se[name]:.2g}"]
+        if truths:
+            cells.insert(0, f"{truths[name]:.6g}")
+            cells.append(f"{100 * (result.value[name] / truths[name] - 1):+.4f}")
+        table.add_row(label, *cells)
+    Console().print(table)
+    click.echo(
+        f"status {result.status}; kappa {result.kappa:.2g}; {result.ticks} ticks, {result.updates} updates, "
+        f"{result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"
+    )
+
+
+def _print_comparison(comparison: Comparison, label: str = "C core against the numpy twin") -> None:
+    if comparison.equal:
+        click.echo(f"{label}: {comparison.ticks} ticks equal in every bit, hash {comparison.twin_hash:08x}")
+    else:
+        click.echo(f"{label}: DIFFERENT at {comparison.difference}")
+
+
+# ---- simulate
+
+
+def _tone(text: str) -> Tone:
+    try:
+        amplitude, frequency, phase = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} is not AMPLITUDE_M,FREQUENCY_HZ,PHASE_RAD") from error
+    return Tone(amplitude, frequency, phase)
+
+
+@commands.command(name="simulate")
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--duration", default=STANDARD_DURATION, show_default=True, help="Length [s].")
+@click.option("--rate", default=STANDARD_SAMPLE_RATE, show_default=True, help="Sample rate [Hz].")
+@click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
+@click.option("--bits", default=14, show_default=True, type=click.IntRange(4, 32), help="Encoder resolution.")
+@click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no zero.")
+@click.option("--noise", type=float, help="White noise of the encoder [LSB].  [default: 0.5]")
+@click.option("--zero", default=0.0, show_default=True, help="Zero error of the encoder [rad].")
+@click.option("--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s].")
+@click.option("--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable.")
+@click.option("--release", nargs=2, type=float, default=STANDARD_RELEASE, show_default=True, help="phi1, phi1+phi [rad].")
+@click.option("--l1", default=STANDARD_PENDULUM.l1, show_default=True, help="[m]")
+@click.option("--l2", default=STANDARD_PENDULUM.l2, show_default=True, help="[m]")
+@click.option("--rho2", default=STANDARD_PENDULUM.rho2, show_default=True, help="[m]")
+@click.option("--gravity", default=STANDARD_PENDULUM.g, show_default=True, help="Gravity [m/s^2].")
+@click.option("--tilt", default=0.0, show_default=True, help="Tilt of the plane of motion [rad].")
+@click.option("--damping", default=0.0, show_default=True, help="Viscous friction of both joints per unit mass [m^2/s].")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
+def simulate_command(**options: Any) -> int:
+    """Simulates a rig into OUT (.csv, .csv.gz, .npz, .parquet) and writes the rig file that goes with it."""
+    pendulum = Pendulum.tilted(
+        options["l1"],
+        options["l2"],
+        options["rho2"],
+        options["gravity"],
+        options["tilt"],
+        options["damping"],
+        options["damping"],
+    )
+    sensors = standard_sensors(options["bits"])
+    if options["exact"]:
+        sensors = replace(
+            sensors, phi_lsb=0.0, phi_noise_lsb=0.0, y_lsb=0.0, y_noise_lsb=0.0, random_offset=False
+        )
+    if options["noise"] is not None:
+        sensors = replace(sensors, phi_noise_lsb=options["noise"])
+    sensors = replace(sensors, phi_zero=options["zero"], skew_s=options["skew"])
+    drive = Drive(tuple(_tone(text) for text in options["tones"])) if options["tones"] else STANDARD_DRIVE
+    simulation = simulate(
+        pendulum=pendulum,
+        drive=drive,
+        sensors=sensors,
+        sample_rate=options["rate"],
+        duration=options["duration"],
+        release=tuple(options["release"]),
+        truth=options["truth"],
+        seed=options["seed"],
+    )
+    out: Path = options["out"]
+    write_run(out, simulation.run)
+    rig_path: Path = options["rig_out"] or _rig_path(out)
+    standard = RigFile.standard()
+    rig = replace(
+        standard,
+        l1=pendulum.l1,
+        sample_rate=options["rate"],
+        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb or 1e-9, y_lsb=sensors.y_lsb or 1e-12),
+    )
+    rig.write(rig_path)
+    largest = float(np.abs(simulation.run.phi).max())
+    messages.print(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
+    return DONE
+
+
+def _rig_path(out: Path) -> Path:
+    name = out.name.removesuffix(".gz")
+    return out.with_name(Path(name).stem + ".toml")
+
+
+# ---- identify and compare
+
+
+def _rig_options(function: Callable[..., int]) -> Callable[..., int]:
+    options = [
+        click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML)."),
+        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."),
+        click.option("--form", type=click.Choice(["weak", "strong"]), help="Overrides the rig file."),
+    ]
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def _load_rig(path: Path, **overrides: str | None) -> RigFile:
+    rig = load(path)
+    given = {name: value for name, value in overrides.items() if value is not None}
+    return replace(rig, identifier=replace(rig.identifier, **given)) if given else rig  # type: ignore[arg-type]
+
+
+@commands.command(name="identify")
+@click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@_rig_options
+@click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Overrides the rig file.")
+@click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
+@click.option("--figure", type=click.Path(path_type=Path), help="Writes the convergence (png, svg, pdf).")
+def identify_command(
+    run_path: Path,
+    rig_path: Path,
+    law: str | None,
+    form: str | None,
+    core: str | None,
+    as_json: bool,
+    figure: Path | None,
+) -> int:
+    """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m]."""
+    rig = _load_rig(rig_path, law=law, form=form, core=core)
+    run = read_run(run_path, rig.sample_rate)
+    result = identify(run, rig, Native())
+    if as_json:
+        click.echo(json.dumps(result.as_json()))
+    else:
+        _print_result(result)
+    if figure is not None:
+        _write_figure(result, figure, None)
+    if not result.identified:
+        click.echo(f"pvid: nothing identified: {result.status}", err=True)
+        return NOTHING_IDENTIFIED
+    return DONE
+
+
+@commands.command(name="compare")
+@click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@_rig_options
+def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str | None) -> int:
+    """Compares the C core with its numpy twin on RUN, after every tick, in every bit."""
+    rig = _load_rig(rig_path, form=form)
+    run = read_run(run_path, rig.sample_rate)
+    native = Native()
+    table = Table("core", "form", "law", "ticks", "hash", "verdict")
+    failed = False
+    for one in [law] if law else ["stationary", "pseudovelocity"]:
+        chosen = replace(rig, identifier=replace(rig.identifier, law=one))  # type: ignore[arg-type]
+        with progress_bar(f"{one} law", len(run.t)) as advance:
+            outcome = compare_run(native, strong_config(chosen, run.sample_rate), run.phi, run.y, advance)
+        verdict = "equal" if outcome.equal else f"DIFFERENT: {outcome.difference}"
+        table.add_row(
+            "f32", chosen.identifier.form, one, str(outcome.ticks), f"{outcome.core_hash:08x}", verdict
+        )
+        failed |= not outcome.equal
+    Console(width=None if sys.stdout.isatty() else 140).print(table)
+    return DIFFERENT if failed else DONE
+
+
+# ---- bench
+
+
+@commands.group()
+def bench() -> None:
+    """Measures what the README claims and prints it as tables."""
+
+
+def _update_readme(readme: Path | None, marker: str, text: str) -> None:
+    """Replaces what stands between <!-- marker --> and <!-- /marker -->, or prints it when no file is given."""
+    if readme is None:
+        click.echo(text)
+        return
+    old = readme.read_text(encoding="utf-8")
+    opening, closing = f"<!-- {marker} -->", f"<!-- /{marker} -->"
+    if opening not in old or closing not in old:
+        raise PvidError(f"{readme} has no place for this table: the lines {opening} and {closing}")
+    head, rest = old.split(opening, 1)
+    tail = rest.split(closing, 1)[1]
+    readme.write_text(f"{head}{opening}\n{text}\n{closing}{tail}", encoding="utf-8")
+    messages.print(f"{readme}: table {marker} written")
+
+
+_UPDATE = click.option(
+    "--update", type=click.Path(path_type=Path, exists=True), help="Write the table into this file's place for it."
+)
+
+
+@bench.command(name="laws")
+@_UPDATE
+def bench_laws(update: Path | None) -> int:
+    """Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."""
+    from pvid.bench import laws
+
+    rows = []
+    with progress_bar("laws", laws.NUMBER_OF_ROWS) as advance:
+        rows = [row.cells() for row in laws.laws_table(Native(), advance)]
+    _update_readme(update, "laws", _markdown(laws.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="cost")
+@_UPDATE
+def bench_cost(update: Path | None) -> int:
+    """Instructions a tick by stage, by callgrind, beside recursive least squares (needs valgrind)."""
+    from pvid.bench import cost
+
+    costs = cost.stage_costs(cost.default_binary())
+    _update_readme(update, "cost", cost.as_markdown(costs, cost.state_bytes(Native())))
+    return DONE
+
+
+def _markdown(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])

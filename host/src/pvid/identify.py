@@ -1,0 +1,243 @@
+"""One run through one core: the answer that `pvid identify` prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid import oracle
+from pvid.capture import Run
+from pvid.errors import PvidError
+from pvid.native import Native, Reason, StrongConfig
+from pvid.rigfile import RigFile
+from pvid.setup import bank_of, strong_config
+
+Float = npt.NDArray[np.float64]
+
+LINEAR = ("w", "d1", "d2")
+PHYSICAL = ("g", "l2", "rho2")
+UNITS = {"w": "1/s^2", "d1": "", "d2": "", "g": "m/s^2", "l2": "m", "rho2": "m"}
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Estimates over time, for a figure: t [n] in s, p and se [n, 3]; physical and its errors [n, 3], NaN outside
+    the physical region."""
+
+    t: Float
+    p: Float
+    se: Float
+    physical: Float
+    physical_se: Float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a run told.
+
+    `value` and `se` map w, d1, d2 [1/s^2, -, -] and, inside the physical region, g, l2, rho2 [m/s^2, m, m].
+    `lost` counts samples that were rejected; `hash` is None where the core has none (f64).
+    """
+
+    value: dict[str, float]
+    se: dict[str, float]
+    kappa: float
+    status: str
+    ticks: int
+    updates: int
+    lost: int
+    hash: int | None
+    core: str
+    form: str
+    law: str
+    on: str
+    trajectory: Trajectory
+
+    @property
+    def identified(self) -> bool:
+        """Whether the data moved the estimate at all and the last word is not a refusal."""
+        return self.updates > 0 and self.status in ("updated", "accumulated")
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (DESIGN.md)."""
+        names = (*LINEAR, *PHYSICAL)
+        parameters = {
+            name: {"value": self.value[name], "se": self.se[name]} if name in self.value else None for name in names
+        }
+        return {
+            **parameters,
+            "kappa": self.kappa,
+            "status": self.status,
+            "ticks": self.ticks,
+            "updates": self.updates,
+            "lost": self.lost,
+            "hash": None if self.hash is None else f"{self.hash:08x}",
+            "core": self.core,
+            "form": self.form,
+            "law": self.law,
+            "on": self.on,
+        }
+
+
+def identify(
+    run: Run, rig: RigFile, native: Native, *, start: npt.ArrayLike | None = None, points: int = 400
+) -> Identification:
+    """Identifies a run with the core, form and law of the rig file.
+
+    Parameters
+    ----------
+    run, rig
+        The samples and the rig they come from.
+    native
+        The C core, used by core "f32".
+    start
+        p = (w, d1, d2) to start from; the rig file's nominal by default.
+    points
+        Number of points of the trajectory.
+
+    Raises
+    ------
+    PvidError
+        When the run is shorter than the window, or the settings do not fit the core.
+    """
+    config = strong_config(rig, run.sample_rate, start)
+    if len(run.t) <= 2 * config.delay:
+        raise PvidError(
+            f"the run has {len(run.t)} samples and the differentiator's window {2 * config.delay + 1}: "
+            f"nothing can be identified; record longer or shorten window_s"
+        )
+    every = max(1, len(run.t) // points)
+    if rig.identifier.core == "f64":
+        return _in_float64(run, rig, config, every)
+    if rig.identifier.core != "f32":
+        raise PvidError(f"core {rig.identifier.core} is not built yet: use f32 or f64")
+    return _in_float32(run, rig, config, every, native)
+
+
+def _in_float32(run: Run, rig: RigFile, config: StrongConfig, every: int, native: Native) -> Identification:
+    identifier = native.strong(config)
+    record = identifier.run(run.phi, run.y, sums=False, estimate_every=every)
+    counters = identifier.counters
+    last = identifier.assess()
+    estimates = record.estimate
+    trajectory = _trajectory(
+        run.t[::every],
+        estimates["p"][:, :3].astype(np.float64),
+        estimates["covariance"][:, :3, :3].astype(np.float64),
+        rig.l1,
+    )
+    return _identification(
+        rig,
+        p=last["p"][:3].astype(np.float64),
+        covariance=last["covariance"][:3, :3].astype(np.float64),
+        kappa=float(last["kappa"]),
+        status=_final_status(record.reason),
+        ticks=len(run.t),
+        updates=counters["updates"],
+        lost=counters["rejected_not_finite"] + counters["rejected_saturated"],
+        running_hash=identifier.running_hash,
+        trajectory=trajectory,
+    )
+
+
+def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Identification:
+    bank = bank_of(rig, run.sample_rate)
+    d_phi = bank.apply(run.phi, run.sample_rate).T
+    d_y = bank.apply(run.y, run.sample_rate).T
+    n, y = oracle.strong_rows(d_phi, d_y[:, 2:5] / rig.l1)
+    settings = config.estimator
+    result = oracle.identify_strong(
+        n,
+        y,
+        oracle.Settings(
+            start=settings.start.astype(np.float64),
+            start_sd=settings.start_sd.astype(np.float64),
+            lower=settings.lower.astype(np.float64),
+            upper=settings.upper.astype(np.float64),
+            row_sd=settings.row_sd,
+            rate=run.sample_rate,
+            law=rig.identifier.law,
+            feedback_hz=settings.feedback_hz,
+            forgetting_s=settings.forgetting_s,
+            correlation=settings.correlation,
+            step_limit=settings.step_limit,
+            kappa_min=settings.kappa_min,
+            divider=settings.divider,
+        ),
+        estimate_every=every,
+    )
+    first_row = 2 * config.delay
+    times = np.array([run.t[first_row + tick] for tick, _ in result.estimates])
+    moved_at_end = bool(result.updated[-settings.divider :].any())
+    return _identification(
+        rig,
+        p=result.last.p,
+        covariance=result.last.covariance,
+        kappa=result.last.kappa,
+        status="updated" if moved_at_end else "held not excited",
+        ticks=len(run.t),
+        updates=int(result.updated.sum()),
+        lost=0,
+        running_hash=None,
+        trajectory=_trajectory(
+            times,
+            np.array([estimate.p for _, estimate in result.estimates]),
+            np.array([estimate.covariance for _, estimate in result.estimates]),
+            rig.l1,
+        ),
+    )
+
+
+def _trajectory(t: Float, p: Float, covariance: Float, l1: float) -> Trajectory:
+    return Trajectory(
+        t=t,
+        p=p,
+        se=np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)),
+        physical=oracle.physical(p, l1),
+        physical_se=oracle.physical_errors(p, covariance, l1),
+    )
+
+
+def _final_status(reasons: npt.NDArray[np.uint8]) -> str:
+    """The last reason in words; with a divider, the last one that followed a solve."""
+    solved = reasons[reasons != Reason.ACCUMULATED]
+    return Reason(int(solved[-1])).text if len(solved) else Reason.ACCUMULATED.text
+
+
+def _identification(
+    rig: RigFile,
+    *,
+    p: Float,
+    covariance: Float,
+    kappa: float,
+    status: str,
+    ticks: int,
+    updates: int,
+    lost: int,
+    running_hash: int | None,
+    trajectory: Trajectory,
+) -> Identification:
+    values = dict(zip(LINEAR, map(float, p), strict=True))
+    errors = dict(zip(LINEAR, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    physical = oracle.physical(p, rig.l1)
+    if np.isfinite(physical).all():
+        values.update(zip(PHYSICAL, map(float, physical), strict=True))
+        errors.update(zip(PHYSICAL, map(float, oracle.physical_errors(p, covariance, rig.l1)), strict=True))
+    return Identification(
+        value=values,
+        se=errors,
+        kappa=kappa,
+        status=status,
+        ticks=ticks,
+        updates=updates,
+        lost=lost,
+        hash=running_hash,
+        core=rig.identifier.core,
+        form=rig.identifier.form,
+        law=rig.identifier.law,
+        on="host",
+        trajectory=trajectory,
+    )

@@ -1,0 +1,497 @@
+"""The shipped C core, called through a shared library built from the same sources with the same flags.
+
+The structs of the public headers are mirrored here; every size and offset is checked when the library is
+loaded, so a mismatch is a sentence and never a wrong number.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.errors import PvidError
+
+Float32 = npt.NDArray[np.float32]
+
+MAX_P = 4
+MAX_THETA = 11
+MAX_MOMENTS = 45
+MAX_SUMS = MAX_MOMENTS + MAX_THETA + 2
+MAX_WINDOW = 321
+
+
+class Reason(IntEnum):
+    """What became of a tick (pvid_reason)."""
+
+    UPDATED = 0
+    WARMING_UP = 1
+    ACCUMULATED = 2
+    HELD_NOT_EXCITED = 3
+    HELD_PIVOT = 4
+    REJECTED_NOT_FINITE = 5
+    REJECTED_OUTLIER = 6
+    REJECTED_SATURATED = 7
+
+    @property
+    def text(self) -> str:
+        """The reason in words."""
+        return self.name.lower().replace("_", " ")
+
+
+class Status(IntEnum):
+    """Answer of an init (pvid_status)."""
+
+    OK = 0
+    BAD_MODEL = 1
+    BAD_SAMPLE_RATE = 2
+    BAD_BANK = 3
+    BAD_LENGTH = 4
+    BAD_START = 5
+    BAD_START_SD = 6
+    BAD_BOUNDS = 7
+    BAD_ROW_SD = 8
+    BAD_UPDATE_RATE = 9
+    BAD_FORGETTING = 10
+    BAD_FEEDBACK = 11
+    BAD_LAW = 12
+    BAD_DIVIDER = 13
+    BAD_STEP_LIMIT = 14
+    BAD_KAPPA_MIN = 15
+    BAD_CORRELATION = 16
+
+
+class Law(IntEnum):
+    """pvid_law."""
+
+    STATIONARY = 0
+    PSEUDOVELOCITY = 1
+
+
+class FirBankStruct(ctypes.Structure):
+    """pvid_fir_bank_f32."""
+
+    _fields_ = [
+        ("half", ctypes.c_uint16),
+        ("stride", ctypes.c_uint16),
+        ("weights", ctypes.POINTER(ctypes.c_float)),
+    ]
+
+
+class EstimatorConfigStruct(ctypes.Structure):
+    """pvid_estimator_config_f32."""
+
+    _fields_ = [
+        ("model", ctypes.c_void_p),
+        ("start", ctypes.c_float * MAX_P),
+        ("start_sd", ctypes.c_float * MAX_P),
+        ("lower", ctypes.c_float * MAX_P),
+        ("upper", ctypes.c_float * MAX_P),
+        ("row_sd", ctypes.c_float),
+        ("update_rate_hz", ctypes.c_float),
+        ("forgetting_s", ctypes.c_float),
+        ("feedback_hz", ctypes.c_float),
+        ("correlation", ctypes.c_float),
+        ("step_limit", ctypes.c_float),
+        ("kappa_min", ctypes.c_float),
+        ("law", ctypes.c_int),
+        ("divider", ctypes.c_uint16),
+    ]
+
+
+class StrongConfigStruct(ctypes.Structure):
+    """pvid_strong_config_f32."""
+
+    _fields_ = [
+        ("sample_rate_hz", ctypes.c_float),
+        ("l1", ctypes.c_float),
+        ("bank", FirBankStruct),
+        ("estimator", EstimatorConfigStruct),
+    ]
+
+
+class CountersStruct(ctypes.Structure):
+    """pvid_counters."""
+
+    _fields_ = [
+        (name, ctypes.c_uint32)
+        for name in (
+            "rows",
+            "updates",
+            "limited",
+            "bounded",
+            "held_not_excited",
+            "held_pivot",
+            "rejected_not_finite",
+            "rejected_saturated",
+        )
+    ]
+
+
+class EstimateStruct(ctypes.Structure):
+    """pvid_estimate_f32."""
+
+    _fields_ = [
+        ("p", ctypes.c_float * MAX_P),
+        ("se", ctypes.c_float * MAX_P),
+        ("covariance", (ctypes.c_float * MAX_P) * MAX_P),
+        ("kappa", ctypes.c_float),
+        ("residual_sd", ctypes.c_float),
+        ("weight", ctypes.c_float),
+    ]
+
+
+class RecordStruct(ctypes.Structure):
+    """pvid_record_f32."""
+
+    _fields_ = [
+        ("p", ctypes.c_void_p),
+        ("sums", ctypes.c_void_p),
+        ("reason", ctypes.c_void_p),
+        ("hash", ctypes.c_void_p),
+        ("running_hash", ctypes.c_void_p),
+        ("estimate", ctypes.c_void_p),
+        ("estimate_every", ctypes.c_uint32),
+    ]
+
+
+ESTIMATE_DTYPE = np.dtype(
+    [
+        ("p", np.float32, (MAX_P,)),
+        ("se", np.float32, (MAX_P,)),
+        ("covariance", np.float32, (MAX_P, MAX_P)),
+        ("kappa", np.float32),
+        ("residual_sd", np.float32),
+        ("weight", np.float32),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class EstimatorConfig:
+    """Settings of the estimator, as in estimator.h; arrays have one entry a free parameter."""
+
+    start: Float32
+    start_sd: Float32
+    lower: Float32
+    upper: Float32
+    row_sd: float
+    forgetting_s: float = 0.0
+    feedback_hz: float = 0.0
+    correlation: float = 1.0
+    step_limit: float = 0.3
+    kappa_min: float = 1e-5
+    law: Law = Law.STATIONARY
+    divider: int = 1
+
+
+@dataclass(frozen=True)
+class StrongConfig:
+    """Settings of the strong-form identifier, as in strong.h.
+
+    `weights` is the folded bank, float32 [5, half]; see pvid.differentiation.
+    """
+
+    sample_rate: float
+    l1: float
+    weights: Float32
+    stride: int
+    estimator: EstimatorConfig
+
+    @property
+    def half(self) -> int:
+        """Points on each side of the window's centre."""
+        return int(self.weights.shape[1])
+
+    @property
+    def delay(self) -> int:
+        """Ticks between a sample and the derivatives that refer to its instant."""
+        return self.half * self.stride
+
+
+@dataclass
+class Record:
+    """What a replay left, one entry a tick.
+
+    p float32 [ticks, n_p]; sums float32 [ticks, n_moments + n_theta + 2] (M, B, yy, weight);
+    reason uint8 [ticks]; hash uint32 [ticks]; estimate: structured [ticks / estimate_every].
+    """
+
+    p: Float32
+    sums: Float32
+    reason: npt.NDArray[np.uint8]
+    hash: npt.NDArray[np.uint32]
+    estimate: npt.NDArray[np.void]
+    estimate_every: int
+
+
+def _struct_layout() -> list[int]:
+    """The same list as pvid_native_layout in host/native/replay.c."""
+
+    def at(struct: type[ctypes.Structure], name: str) -> int:
+        return int(getattr(struct, name).offset)
+
+    return [
+        ctypes.sizeof(FirBankStruct),
+        at(FirBankStruct, "weights"),
+        ctypes.sizeof(EstimatorConfigStruct),
+        at(EstimatorConfigStruct, "start"),
+        at(EstimatorConfigStruct, "row_sd"),
+        at(EstimatorConfigStruct, "law"),
+        at(EstimatorConfigStruct, "divider"),
+        ctypes.sizeof(StrongConfigStruct),
+        at(StrongConfigStruct, "bank"),
+        at(StrongConfigStruct, "estimator"),
+        ctypes.sizeof(CountersStruct),
+        ctypes.sizeof(EstimateStruct),
+        at(EstimateStruct, "kappa"),
+    ]
+
+
+def default_library() -> Path:
+    """Where the build leaves the shared library; PVID_NATIVE_LIBRARY overrides it."""
+    named = os.environ.get("PVID_NATIVE_LIBRARY")
+    if named:
+        return Path(named)
+    return Path(__file__).resolve().parents[3] / "build" / "host" / "host" / "native" / "libpvid_native.so"
+
+
+class Native:
+    """One build of the C core.
+
+    Parameters
+    ----------
+    path
+        The shared library; by default the one tools/pvid builds.
+
+    Raises
+    ------
+    PvidError
+        When the library is missing or was built from other headers than this module mirrors.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        path = path or default_library()
+        try:
+            self._lib = ctypes.CDLL(str(path))
+        except OSError as error:
+            raise PvidError(f"cannot load the C core {path}: {error}; build it with ./tools/pvid") from error
+        self._lib.pvid_native_build.restype = ctypes.c_char_p
+        length = ctypes.c_uint32.in_dll(self._lib, "pvid_native_layout_length").value
+        layout = list((ctypes.c_uint32 * length).in_dll(self._lib, "pvid_native_layout"))
+        mirrored = _struct_layout()
+        estimator_size, counters_at, strong_size, estimator_at, *bounds = layout[len(mirrored) :]
+        if layout[: len(mirrored)] != mirrored or bounds != [MAX_P, MAX_THETA, MAX_SUMS, MAX_WINDOW]:
+            raise PvidError(f"the C core {path} was built with other struct sizes than this package: {layout}")
+        self._estimator_size = estimator_size
+        self._counters_at = counters_at
+        self._strong_size = strong_size
+        self._estimator_at = estimator_at
+
+    @property
+    def build(self) -> str:
+        """Compiler and flags of this build."""
+        return str(self._lib.pvid_native_build().decode())
+
+    @property
+    def state_bytes(self) -> dict[str, int]:
+        """Bytes of the state structs on this machine."""
+        return {"estimator": self._estimator_size, "strong": self._strong_size}
+
+    def arithmetic_faults(self) -> int:
+        """pvid_arithmetic_faults_f32: 0 when float32 behaves as the bits need."""
+        return int(self._lib.pvid_arithmetic_faults_f32())
+
+    def strong(self, config: StrongConfig) -> StrongIdentifier:
+        """An initialised strong-form identifier."""
+        return StrongIdentifier(self, config)
+
+    def estimator(self, config: EstimatorConfig, update_rate: float) -> RowEstimator:
+        """An initialised estimator of the strong form that is fed rows."""
+        return RowEstimator(self, config, update_rate)
+
+    def strong_rows(self, phi: npt.ArrayLike, u: npt.ArrayLike) -> tuple[Float32, Float32]:
+        """Rows of the strong form: N [ticks, 11], Y [ticks] from phi [ticks, 5], u [ticks, 3]."""
+        phi32 = np.ascontiguousarray(phi, np.float32)
+        u32 = np.ascontiguousarray(u, np.float32)
+        n = np.empty((len(phi32), MAX_THETA), np.float32)
+        y = np.empty(len(phi32), np.float32)
+        self._lib.pvid_replay_strong_rows_f32(
+            ctypes.c_uint32(len(phi32)), _pointer(phi32), _pointer(u32), _pointer(n), _pointer(y)
+        )
+        return n, y
+
+    def physical(
+        self, p: npt.ArrayLike, covariance: npt.ArrayLike, l1: float
+    ) -> tuple[Float32, Float32] | None:
+        """pvid_kapitza_physical_f32: (g, l2, rho2) and standard errors, None outside the physical region."""
+        p32 = np.ascontiguousarray(p, np.float32)
+        cov32 = np.zeros((MAX_P, MAX_P), np.float32)
+        given = np.asarray(covariance, np.float32)
+        cov32[: given.shape[0], : given.shape[1]] = given
+        value = np.empty(3, np.float32)
+        se = np.empty(3, np.float32)
+        function = self._lib.pvid_kapitza_physical_f32
+        function.restype = ctypes.c_bool
+        ok = function(_pointer(p32), _pointer(cov32), ctypes.c_float(l1), _pointer(value), _pointer(se))
+        return (value, se) if ok else None
+
+
+def _pointer(array: npt.NDArray[Any]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def _estimator_struct(config: EstimatorConfig) -> EstimatorConfigStruct:
+    struct = EstimatorConfigStruct()
+    for name in ("start", "start_sd", "lower", "upper"):
+        values = np.asarray(getattr(config, name), np.float32)
+        getattr(struct, name)[: len(values)] = [float(v) for v in values]
+    for name in ("row_sd", "forgetting_s", "feedback_hz", "correlation", "step_limit", "kappa_min"):
+        setattr(struct, name, float(getattr(config, name)))
+    struct.law = int(config.law)
+    struct.divider = config.divider
+    return struct
+
+
+@dataclass
+class _Stepper:
+    """A state block in C memory and the replay function that steps it."""
+
+    native: Native
+    n_p: int = 3
+    n_sums: int = MAX_SUMS
+    _hash: npt.NDArray[np.uint32] = field(default_factory=lambda: np.array([0x811C9DC5], np.uint32))
+    _state: Any = None
+    _estimator_at: int = 0
+
+    def _replay(
+        self, symbol: str, first: Float32, second: Float32, want_sums: bool, want_hash: bool, estimate_every: int
+    ) -> Record:
+        ticks = len(second)
+        estimates = -(-ticks // estimate_every) if estimate_every else 0
+        record = Record(
+            p=np.empty((ticks, self.n_p), np.float32),
+            sums=np.empty((ticks if want_sums else 0, self.n_sums), np.float32),
+            reason=np.empty(ticks, np.uint8),
+            hash=np.empty(ticks if want_hash else 0, np.uint32),
+            estimate=np.empty(estimates, ESTIMATE_DTYPE),
+            estimate_every=estimate_every,
+        )
+        struct = RecordStruct(
+            p=record.p.ctypes.data,
+            sums=record.sums.ctypes.data if want_sums else None,
+            reason=record.reason.ctypes.data,
+            hash=record.hash.ctypes.data if want_hash else None,
+            running_hash=self._hash.ctypes.data,
+            estimate=record.estimate.ctypes.data if estimates else None,
+            estimate_every=estimate_every,
+        )
+        getattr(self.native._lib, symbol)(
+            self._state, ctypes.c_uint32(ticks), _pointer(first), _pointer(second), ctypes.byref(struct)
+        )
+        return record
+
+    @property
+    def running_hash(self) -> int:
+        """FNV-1a after the last recorded tick."""
+        return int(self._hash[0])
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """pvid_counters by name."""
+        start = self._estimator_at + self.native._counters_at
+        struct = CountersStruct.from_buffer(self._state, start)
+        return {name: int(getattr(struct, name)) for name, *_ in CountersStruct._fields_}
+
+    def assess(self) -> npt.NDArray[np.void]:
+        """pvid_estimator_assess_f32 at the present state, dtype ESTIMATE_DTYPE, shape ()."""
+        out = np.empty((), ESTIMATE_DTYPE)
+        estimator = ctypes.c_void_p(ctypes.addressof(self._state) + self._estimator_at)
+        self.native._lib.pvid_estimator_assess_f32(estimator, _pointer(out))
+        return out
+
+
+class StrongIdentifier(_Stepper):
+    """pvid_strong_f32. State persists between calls of `run`, so a run may come in pieces."""
+
+    def __init__(self, native: Native, config: StrongConfig) -> None:
+        super().__init__(native)
+        self._weights = np.ascontiguousarray(config.weights, np.float32)
+        bank = FirBankStruct(
+            half=config.half,
+            stride=config.stride,
+            weights=self._weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float)),
+        )
+        struct = StrongConfigStruct(
+            sample_rate_hz=config.sample_rate, l1=config.l1, bank=bank, estimator=_estimator_struct(config.estimator)
+        )
+        self._state = ctypes.create_string_buffer(native._strong_size)
+        self._estimator_at = native._estimator_at
+        status = Status(native._lib.pvid_strong_init_f32(self._state, ctypes.byref(struct)))
+        if status is not Status.OK:
+            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
+
+    def run(
+        self,
+        phi: npt.ArrayLike,
+        y: npt.ArrayLike,
+        *,
+        sums: bool = True,
+        hashes: bool = True,
+        estimate_every: int = 0,
+    ) -> Record:
+        """Steps through phi [rad] and y [m], both [ticks], converted to float32 as a board would read them."""
+        return self._replay(
+            "pvid_replay_strong_f32",
+            np.ascontiguousarray(phi, np.float32),
+            np.ascontiguousarray(y, np.float32),
+            sums,
+            hashes,
+            estimate_every,
+        )
+
+
+class RowEstimator(_Stepper):
+    """pvid_estimator_f32 on the strong form's model, fed rows."""
+
+    def __init__(self, native: Native, config: EstimatorConfig, update_rate: float) -> None:
+        super().__init__(native)
+        struct = _estimator_struct(config)
+        struct.model = ctypes.addressof(ctypes.c_char.in_dll(native._lib, "pvid_kapitza_strong_f32"))
+        struct.update_rate_hz = update_rate
+        self._state = ctypes.create_string_buffer(native._estimator_size)
+        status = Status(native._lib.pvid_estimator_init_f32(self._state, ctypes.byref(struct)))
+        if status is not Status.OK:
+            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
+
+    def run(
+        self,
+        n: npt.ArrayLike,
+        y: npt.ArrayLike,
+        *,
+        sums: bool = True,
+        hashes: bool = True,
+        estimate_every: int = 0,
+    ) -> Record:
+        """Steps through rows N [ticks, 11] and Y [ticks]."""
+        return self._replay(
+            "pvid_replay_rows_f32",
+            np.ascontiguousarray(n, np.float32),
+            np.ascontiguousarray(y, np.float32),
+            sums,
+            hashes,
+            estimate_every,
+        )
+
+
+def chunks(ticks: int, size: int) -> Iterator[slice]:
+    """Slices that cover range(ticks) in pieces of at most `size`."""
+    for start in range(0, ticks, size):
+        yield slice(start, min(start + size, ticks))

@@ -1,0 +1,302 @@
+"""The rig file: what a user knows of a rig and wants of the identifier, in TOML.
+
+    l1 = 0.30                 # m; the only key without a default
+    sample_rate = 1000        # Hz
+    [sensor]
+    phi_lsb = 3.835e-4        # rad
+    [nominal]
+    l2 = 0.1                  # m
+    [identifier]
+    law = "stationary"
+
+Every key is a field of the dataclasses below, which hold its unit, range and default. A wrong key or value
+becomes a PvidError that names it.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from pvid.errors import PvidError
+
+Form = Literal["weak", "strong"]
+Law = Literal["stationary", "pseudovelocity"]
+Core = Literal["f32", "q31", "f64"]
+Differentiator = Literal["savitzky-golay", "finite-difference"]
+
+# A window of one slow period or so for the weak form; for the strong form the widest that the core holds at 1 kHz.
+_WINDOW_S: dict[Form, float] = {"weak": 1.0, "strong": 0.321}
+
+
+def _number(default: Any, unit: str, low: float, high: float) -> Any:
+    """A field that holds a number from low to high; an int where the default is one."""
+    metadata = {"unit": unit, "low": low, "high": high}
+    return field(default=default, metadata=metadata)
+
+
+def _choice(default: str, choices: Any) -> Any:
+    return field(default=default, metadata={"choices": get_args(choices)})
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Resolutions, for the scaling of fixed-point cores and for predicted errors; 0: exact.
+
+    Attributes
+    ----------
+    phi_lsb : angle sensor [rad]; default 14 bits a turn
+    y_lsb : pivot sensor [m]
+    """
+
+    phi_lsb: float = _number(2.0 * math.pi / 2**14, "rad", 0.0, 1.0)
+    y_lsb: float = _number(5e-6, "m", 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[sensor] ")
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A rough guess of the unknowns: start of the estimate, centre of its bounds, whitening.
+
+    Attributes
+    ----------
+    g : the part of gravity that lies in the plane of motion [m/s^2]
+    l2 : joint to the centre of mass of body 2 [m]; l1/3 when the file does not say
+    rho2 : radius of gyration of body 2 [m]; l1/3 when the file does not say
+    """
+
+    l2: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
+    rho2: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
+    g: float = _number(9.8, "m/s^2", 1e-3, 1e3)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[nominal] ")
+
+
+@dataclass(frozen=True)
+class Identifier:
+    """How to identify.
+
+    Attributes
+    ----------
+    form : "weak" (integrals, for real encoders) or "strong" (the paper's derivatives, for 20 bits and more)
+    law : "stationary" (with feedback, converges) or "pseudovelocity" (the paper's equation (5), literally)
+    core : "f32", "q31" (fixed point) or "f64" (the oracle)
+    window_s : length of the weak form's or of the differentiator's window [s]; 0: the form's own, see `window`
+    differentiator : of the strong form
+    degree : of its Savitzky-Golay polynomial
+    stride : samples between the differentiator's points
+    test_functions : of the weak form, per window
+    decimation : of the weak form, samples in per sample used
+    forgetting_s : time constant of forgetting [s]; 0: nothing is forgotten
+    feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at
+        every solve
+    divider : ticks (strong form) or windows (weak form) a solve
+    full_angle : correct the weak form for sines and cosines
+    damping : two regressors more, for viscous friction
+    zero : the encoder's zero is unknown, a fourth parameter of the weak form
+    kappa_min : hold the estimate while less than this part of w's information is its own
+    """
+
+    form: Form = _choice("weak", Form)
+    law: Law = _choice("stationary", Law)
+    core: Core = _choice("f32", Core)
+    window_s: float = _number(0.0, "s", 0.0, 1e6)
+    differentiator: Differentiator = _choice("savitzky-golay", Differentiator)
+    degree: int = _number(10, "", 4, 12)
+    stride: int = _number(1, "samples", 1, 65535)
+    test_functions: int = _number(12, "", 3, 64)
+    decimation: int = _number(8, "samples", 1, 65535)
+    forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
+    feedback_hz: float = _number(0.0, "1/s", 0.0, 1e12)
+    divider: int = _number(1, "", 1, 65535)
+    full_angle: bool = False
+    damping: bool = False
+    zero: bool = True
+    kappa_min: float = _number(1e-5, "", 0.0, 0.999)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[identifier] ")
+
+    @property
+    def window(self) -> float:
+        """Length of the window [s]: window_s, or the form's own length when that is 0."""
+        return self.window_s if self.window_s > 0.0 else _WINDOW_S[self.form]
+
+
+@dataclass(frozen=True)
+class RigFile:
+    """A rig and the way to identify it.
+
+    Attributes
+    ----------
+    l1 : length of rod 1 [m]
+    nominal, sensor, identifier : the file's tables
+    sample_rate : [Hz]; None: whatever the run says
+    """
+
+    l1: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
+    nominal: Nominal
+    sensor: Sensor = field(default_factory=Sensor)
+    identifier: Identifier = field(default_factory=Identifier)
+    sample_rate: float | None = _number(None, "Hz", 1e-3, 1e6)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "")
+
+    @classmethod
+    def standard(cls) -> RigFile:
+        """The standard rig of MATH.md 6, as a user who knows only l1 and the sensors would write it."""
+        return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sample_rate=1000.0)
+
+    @classmethod
+    def parse(cls, text: str) -> RigFile:
+        """From TOML text; PvidError names the key that is unknown, missing, of a wrong type or out of range."""
+        try:
+            document = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise PvidError(f"is not TOML: {error}") from error
+        except RecursionError as error:
+            raise PvidError("is not a rig file: its tables are nested too deeply") from error
+        top = _known(cls, document, "")
+        if "l1" not in top:
+            raise PvidError("l1 is missing: the length of rod 1 [m]")
+        tables = {name: _table(top.pop(name, {}), name) for name in _TABLES}
+        top = _without_integers(cls, top)
+        _check_value(_field(cls, "l1"), top["l1"], "")
+        third = top["l1"] / 3.0
+        guess = {"l2": third, "rho2": third, **tables["nominal"]}
+        return cls(
+            nominal=Nominal(**guess),
+            sensor=Sensor(**tables["sensor"]),
+            identifier=Identifier(**tables["identifier"]),
+            **top,
+        )
+
+    def text(self) -> str:
+        """TOML text with every key and its unit; `parse` gives the same rig back."""
+        lines = _lines(self)
+        for name in ("sensor", "nominal", "identifier"):
+            lines += ["", f"[{name}]", *_lines(getattr(self, name))]
+        return "\n".join(lines) + "\n"
+
+    def write(self, path: str | Path) -> None:
+        """Writes `text` to a file."""
+        try:
+            Path(path).write_text(self.text(), encoding="utf-8")
+        except OSError as error:
+            raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def load(path: str | Path) -> RigFile:
+    """Reads a rig file; PvidError names the file and the key."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise PvidError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise PvidError(f"{path}: is not UTF-8 text") from error
+    try:
+        return RigFile.parse(text)
+    except PvidError as error:
+        raise PvidError(f"{path}: {error}") from error
+
+
+_TABLES: dict[str, type] = {"sensor": Sensor, "nominal": Nominal, "identifier": Identifier}
+
+
+def _field(owner: type, name: str) -> Field[Any]:
+    return next(f for f in fields(owner) if f.name == name)
+
+
+def _known(owner: type, given: Mapping[str, Any], place: str) -> dict[str, Any]:
+    """The keys of a table, refused when the dataclass has no such field."""
+    names = [f.name for f in fields(owner)]
+    for key in given:
+        if key not in names:
+            raise PvidError(f"{place}{key!a} is not a key of a rig file; here are known {', '.join(names)}")
+    return dict(given)
+
+
+def _table(given: Any, name: str) -> dict[str, Any]:
+    if not isinstance(given, dict):
+        raise PvidError(f"{name} must be a table, [{name}], not {_shown(given)}")
+    return _without_integers(_TABLES[name], _known(_TABLES[name], given, f"[{name}] "))
+
+
+def _without_integers(owner: type, given: dict[str, Any]) -> dict[str, Any]:
+    """1000 stands for 1000.0 where a float is wanted."""
+
+    def converted(name: str, value: Any) -> Any:
+        if type(value) is int and not _wants_integer(_field(owner, name)) and abs(value) < 2**53:
+            return float(value)
+        return value
+
+    return {name: converted(name, value) for name, value in given.items()}
+
+
+def _wants_integer(key: Field[Any]) -> bool:
+    return key.default is not MISSING and type(key.default) is int
+
+
+def _check_fields(owner: Any, place: str) -> None:
+    for key in fields(owner):
+        if key.metadata or key.type == "bool":
+            _check_value(key, getattr(owner, key.name), place)
+
+
+def _check_value(key: Field[Any], value: Any, place: str) -> None:
+    """Refuses a value of the wrong type or out of the range in the field's metadata."""
+    name = f"{place}{key.name}"
+    if "choices" in key.metadata:
+        if value not in key.metadata["choices"]:
+            known = " or ".join(f'"{choice}"' for choice in key.metadata["choices"])
+            raise PvidError(f"{name} must be {known}, not {_shown(value)}")
+        return
+    if key.type == "bool":
+        if type(value) is not bool:
+            raise PvidError(f"{name} must be true or false, not {_shown(value)}")
+        return
+    if value is None and key.default is None:
+        return
+    wanted = int if _wants_integer(key) else float
+    if type(value) is not wanted and not (wanted is float and type(value) is int):
+        kind = "a whole number" if wanted is int else "a number"
+        raise PvidError(f"{name} must be {kind}, not {_shown(value)}")
+    low, high, unit = key.metadata["low"], key.metadata["high"], key.metadata["unit"]
+    if not low <= value <= high:
+        raise PvidError(
+            f"{name} must be from {low:g} to {high:g}{' ' + unit if unit else ''}, not {_shown(value)}"
+        )
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = ascii(value)
+    return text if len(text) <= 40 else text[:40] + "..."
+
+
+def _lines(owner: Any) -> list[str]:
+    """`key = value  # unit` for each field that holds a value."""
+    lines = []
+    for key in fields(owner):
+        value = getattr(owner, key.name)
+        if key.name in _TABLES or value is None:
+            continue
+        shown = (
+            f'"{value}"'
+            if isinstance(value, str)
+            else str(value).lower()
+            if isinstance(value, bool)
+            else repr(value)
+        )
+        unit = key.metadata.get("unit", "")
+        lines.append(f"{key.name} = {shown}" + (f"  # {unit}" if unit else ""))
+    return lines

@@ -1,0 +1,74 @@
+"""From a rig file to the settings of the core: the one place where defaults meet a rig."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid import oracle
+from pvid.differentiation import FirBank, finite_difference, savitzky_golay
+from pvid.errors import PvidError
+from pvid.native import MAX_WINDOW, EstimatorConfig, Law, StrongConfig
+from pvid.rigfile import RigFile
+
+# The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
+START_RELATIVE_SD = 0.5
+BOUND_FACTOR = 20.0
+
+# Rough size of Y - N^T theta relative to w^4 [rad/s^8]: only the first ticks feel it, through H0.
+ROW_SD_OF_W4 = 0.1
+
+LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
+
+
+def nominal_start(rig: RigFile) -> npt.NDArray[np.float64]:
+    """p = (w, d1, d2) of the rig file's rough guess."""
+    return oracle.linear(rig.nominal.g, rig.nominal.l2, rig.nominal.rho2, rig.l1)
+
+
+def bank_of(rig: RigFile, sample_rate: float) -> FirBank:
+    """The FIR bank a rig file asks for at `sample_rate` [Hz]."""
+    settings = rig.identifier
+    if settings.differentiator == "finite-difference":
+        bank = finite_difference(settings.stride)
+    else:
+        points = max(round(settings.window_s * sample_rate / settings.stride), settings.degree + 1)
+        bank = savitzky_golay(points | 1, settings.degree, settings.stride)
+    if bank.window > MAX_WINDOW:
+        raise PvidError(
+            f"the differentiator's window is {bank.window} samples at {sample_rate:g} Hz and the core holds "
+            f"{MAX_WINDOW} (PVID_MAX_WINDOW): shorten window_s or the stride"
+        )
+    return bank
+
+
+def estimator_config(rig: RigFile, bank: FirBank, start: npt.ArrayLike | None = None) -> EstimatorConfig:
+    """Settings of the strong form's estimator; `start` overrides the nominal p."""
+    settings = rig.identifier
+    p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
+    return EstimatorConfig(
+        start=p.astype(np.float32),
+        start_sd=(START_RELATIVE_SD * p).astype(np.float32),
+        lower=(p / BOUND_FACTOR).astype(np.float32),
+        upper=(p * BOUND_FACTOR).astype(np.float32),
+        row_sd=ROW_SD_OF_W4 * float(p[0]) ** 4,
+        forgetting_s=settings.forgetting_s,
+        feedback_hz=settings.feedback_hz,
+        # rows closer than the bank's reach share samples: count half a window as one row
+        correlation=float(max(bank.half, 1)),
+        kappa_min=settings.kappa_min,
+        law=LAWS[settings.law],
+        divider=settings.divider,
+    )
+
+
+def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig:
+    """Settings of the strong-form identifier for samples at `sample_rate` [Hz]."""
+    bank = bank_of(rig, sample_rate)
+    return StrongConfig(
+        sample_rate=sample_rate,
+        l1=rig.l1,
+        weights=bank.weights32,
+        stride=bank.stride,
+        estimator=estimator_config(rig, bank, start),
+    )

@@ -1,0 +1,167 @@
+/* Runs one stage of the strong form's tick a given number of times, for an instruction counter.
+ *
+ *   tick_cost STAGE TICKS      the difference between two values of TICKS is the stage's cost
+ *
+ * Inputs are a fixed pseudo-random sequence; no stage's path depends on them once warm.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pvid/pvid.h"
+#include "rls_f32.h"
+
+static uint32_t generator = 1u;
+
+static float noise(void)
+{
+    generator = (generator * 1664525u) + 1013904223u;
+    return ((float)(generator >> 8) / 8388608.0f) - 1.0f;
+}
+
+#define SAMPLES 1024u
+static float phi_samples[SAMPLES], y_samples[SAMPLES];
+static float derivatives_phi[SAMPLES][PVID_ORDERS], derivatives_u[SAMPLES][3];
+static float rows[SAMPLES][PVID_KAPITZA_STRONG_THETA], row_y[SAMPLES];
+
+static pvid_strong_f32 identifier;
+static rls_f32 rls;
+
+static void prepare(void)
+{
+    static const float scale_phi[PVID_ORDERS] = {0.1f, 1.0f, 24.0f, 300.0f, 13000.0f};
+    static const float scale_u[3] = {8.0f, 150.0f, 3000.0f};
+    for (uint32_t i = 0; i < SAMPLES; i++) {
+        const float x = (float)i / (float)SAMPLES; /* a parabola: smooth enough to be differentiated */
+        phi_samples[i] = 0.1f * x * (1.0f - x);
+        y_samples[i] = 0.006f * x * (x - 0.5f);
+        for (uint32_t k = 0; k < PVID_ORDERS; k++) {
+            derivatives_phi[i][k] = scale_phi[k] * noise();
+        }
+        for (uint32_t k = 0; k < 3u; k++) {
+            derivatives_u[i][k] = scale_u[k] * noise();
+        }
+        pvid_kapitza_strong_row_f32(derivatives_phi[i], derivatives_u[i], &row_y[i], rows[i]);
+    }
+    pvid_strong_config_f32 config = {
+        .sample_rate_hz = 1000.0f,
+        .l1 = 0.3f,
+        .bank = {.half = 2, .stride = 1, .weights = pvid_five_points_f32},
+        .estimator = pvid_estimator_defaults_f32,
+    };
+    const float start[3] = {30.0f, 9.0f, 5.0f};
+    for (int i = 0; i < 3; i++) {
+        config.estimator.start[i] = start[i];
+        config.estimator.start_sd[i] = start[i];
+        config.estimator.lower[i] = 0.01f;
+        config.estimator.upper[i] = 1.0e4f;
+    }
+    config.estimator.row_sd = 1000.0f;
+    config.estimator.feedback_hz = 10.0f;
+    config.estimator.forgetting_s = 10.0f;
+    if (pvid_strong_init_f32(&identifier, &config) != PVID_OK) {
+        exit(2);
+    }
+    rls_init_f32(&rls, 0.9999f, 1.0e6f);
+}
+
+static volatile float sink;
+
+static void nothing(uint32_t i)
+{
+    sink = rows[i][0];
+}
+
+static void differentiator(uint32_t i)
+{
+    float d[PVID_ORDERS];
+    (void)pvid_differentiator_step_f32(&identifier.phi, phi_samples[i], d);
+    (void)pvid_differentiator_step_f32(&identifier.y, y_samples[i], d);
+    sink = d[0];
+}
+
+static void row(uint32_t i)
+{
+    float n[PVID_KAPITZA_STRONG_THETA];
+    float y;
+    pvid_kapitza_strong_row_f32(derivatives_phi[i], derivatives_u[i], &y, n);
+    sink = y + n[0];
+}
+
+static void add(uint32_t i)
+{
+    (void)pvid_estimator_add_f32(&identifier.estimator, rows[i], row_y[i]);
+    sink = rows[i][0];
+}
+
+static void estimator(uint32_t i)
+{
+    sink = (float)pvid_estimator_step_f32(&identifier.estimator, rows[i], row_y[i]);
+}
+
+static void read_sums(uint32_t i)
+{
+    float sums[PVID_MAX_SUMS];
+    pvid_information_read_f32(&identifier.estimator.information, sums);
+    sink = sums[i % 4u];
+}
+
+static void project(uint32_t i)
+{
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float f[PVID_MAX_P];
+    const float *m = identifier.estimator.information.high;
+    pvid_kapitza_strong_f32.project(identifier.estimator.p, m, &m[45], s, f);
+    sink = s[0][0] + f[i % 3u];
+}
+
+static void tick(uint32_t i)
+{
+    sink = (float)pvid_strong_step_f32(&identifier, phi_samples[i], y_samples[i]);
+}
+
+static void assess(uint32_t i)
+{
+    pvid_estimate_f32 estimate;
+    pvid_estimator_assess_f32(&identifier.estimator, &estimate);
+    sink = estimate.se[i % 3u];
+}
+
+static void rls_step(uint32_t i)
+{
+    rls_step_f32(&rls, rows[i], row_y[i]);
+    sink = rls.theta[0];
+}
+
+static const struct {
+    const char *name;
+    void (*run)(uint32_t i);
+} stages[] = {
+    {"nothing", nothing},     {"differentiator", differentiator}, {"row", row},   {"add", add},
+    {"read", read_sums},      {"project", project},               {"tick", tick}, {"estimator", estimator},
+    {"assess", assess},       {"rls", rls_step},
+};
+
+int main(int argc, char **argv)
+{
+    if (argc != 3) {
+        fprintf(stderr, "usage: tick_cost STAGE TICKS\n");
+        return 2;
+    }
+    prepare();
+    for (uint32_t i = 0; i < SAMPLES; i++) { /* warm: windows full, S positive */
+        (void)pvid_strong_step_f32(&identifier, phi_samples[i], y_samples[i]);
+        (void)pvid_estimator_step_f32(&identifier.estimator, rows[i], row_y[i]);
+    }
+    for (uint32_t s = 0; s < sizeof stages / sizeof stages[0]; s++) {
+        if (strcmp(argv[1], stages[s].name) == 0) {
+            const uint32_t ticks = (uint32_t)strtoul(argv[2], NULL, 10);
+            for (uint32_t i = 0; i < ticks; i++) {
+                stages[s].run(i % SAMPLES);
+            }
+            return 0;
+        }
+    }
+    fprintf(stderr, "tick_cost: no stage %s\n", argv[1]);
+    return 2;
+}

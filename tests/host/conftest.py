@@ -1,0 +1,33 @@
+"""What several tests share: the builds of the core and the standard rig, made once a session."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pvid.native import Native
+from pvid.rig import Simulation, simulate, standard_sensors
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def native() -> Native:
+    """The build that tools/pvid uses."""
+    return Native()
+
+
+@pytest.fixture(scope="session")
+def matrix() -> dict[str, Native]:
+    """The core at -O0, -O2 and -O3 by gcc and by clang, by name (gcc-O0 ...)."""
+    done = subprocess.run([ROOT / "tools" / "build-matrix"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return {Path(line).parent.name: Native(Path(line)) for line in done.stdout.split()}
+
+
+@pytest.fixture(scope="session")
+def standard_20_bits() -> Simulation:
+    """The standard rig, linear truth, 20-bit encoder, 40.5 s at 1 kHz."""
+    return simulate(sensors=standard_sensors(20), truth="linear", duration=40.5, seed=1)

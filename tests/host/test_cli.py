@@ -1,0 +1,136 @@
+"""End to end through the command line: what a user types, what comes back, and the exit code."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pvid.capture import write_run
+from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.rigfile import RigFile
+
+
+def pvid(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "pvid", *map(str, arguments)], capture_output=True, text=True, cwd=cwd, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a good run (run.csv, 20 bits, 12 s) and its rig file (run.toml)."""
+    folder = tmp_path_factory.mktemp("cli")
+    done = pvid("simulate", "run.csv", "--duration", "12", "--bits", "20", "--truth", "linear", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def strong(*arguments: str) -> tuple[str, ...]:
+    return (*arguments, "--rig", "run.toml", "--form", "strong")
+
+
+def test_simulate_writes_a_run_and_its_rig_file(place: Path) -> None:
+    assert (place / "run.csv").read_text(encoding="utf-8").splitlines()[0].startswith("t,phi,y")
+    assert (place / "run.toml").is_file()
+
+
+def test_identify_json_has_what_design_promises(place: Path) -> None:
+    done = pvid(*strong("identify", "run.csv", "--json"), cwd=place)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    names = {"w", "d1", "d2", "g", "l2", "rho2", "kappa", "status", "ticks", "updates", "lost", "hash"}
+    assert names | {"core", "form", "law", "on"} <= set(answer)
+    assert answer["ticks"] == 12_001
+    assert answer["g"]["value"] == pytest.approx(STANDARD_PENDULUM.g, rel=0.02)
+    assert answer["g"]["se"] > 0
+    assert answer["status"] == "updated"
+
+
+def test_both_cores_agree(place: Path) -> None:
+    single = json.loads(pvid(*strong("identify", "run.csv", "--json", "--core", "f32"), cwd=place).stdout)
+    double = json.loads(pvid(*strong("identify", "run.csv", "--json", "--core", "f64"), cwd=place).stdout)
+    assert double["hash"] is None
+    for name in ("w", "d1", "d2"):
+        # float32 differentiates with about 1e-6 relative noise of its own: far below a standard error
+        assert abs(single[name]["value"] - double[name]["value"]) < 0.5 * double[name]["se"]
+
+
+def test_the_law_can_be_chosen(place: Path) -> None:
+    answers = [
+        json.loads(pvid(*strong("identify", "run.csv", "--json", "--law", law), cwd=place).stdout)
+        for law in ("stationary", "pseudovelocity")
+    ]
+    assert [answer["law"] for answer in answers] == ["stationary", "pseudovelocity"]
+    assert answers[0]["hash"] != answers[1]["hash"]
+
+
+def test_compare_finds_both_laws_equal(place: Path) -> None:
+    done = pvid(*strong("compare", "run.csv"), cwd=place)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("equal") == 2
+
+
+def test_demo_prints_its_table_and_draws_its_figure(tmp_path: Path) -> None:
+    done = pvid("demo", "--figure", "demo.png", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for word in ("g [m/s^2]", "l2 [m]", "rho2 [m]", "truth", "standard error", "error %", "equal in every bit"):
+        assert word in done.stdout
+    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_run_without_motion_is_not_identified(tmp_path: Path) -> None:
+    run = simulate(sensors=standard_sensors(20), truth="linear", duration=3.0, release=(0.0, 0.0)).run
+    run.phi[:] = 0.0
+    write_run(tmp_path / "still.csv", run)
+    RigFile.standard().write(tmp_path / "run.toml")
+    done = pvid(*strong("identify", "still.csv"), cwd=tmp_path)
+    assert done.returncode == 3
+    assert "nothing identified" in done.stderr
+
+
+BAD_RUNS = {
+    "empty": "",
+    "header only": "t,phi,y\n",
+    "wrong columns": "time,angle,pivot\n0,0,0\n0.001,0,0\n",
+    "text in numbers": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,fast,0\n",
+    "not a number": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,nan,0\n",
+    "gap": "t,phi,y\n" + "".join(f"{(k + (k > 200) * 50) / 1000},0.1,0\n" for k in range(400)),
+    "clock not uniform": "t,phi,y\n" + "".join(f"{(k + 0.3 * (k % 2)) / 1000},0.1,0\n" for k in range(400)),
+    "truncated": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,0.",
+    "too short": "t,phi,y\n0,0.1,0\n0.001,0.1,0\n0.002,0.1,0\n",
+}
+
+
+@pytest.mark.parametrize("case", BAD_RUNS)
+def test_a_bad_run_is_one_sentence_and_exit_code_2(case: str, place: Path, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text(BAD_RUNS[case], encoding="utf-8")
+    done = pvid("identify", bad, "--rig", place / "run.toml", "--form", "strong", cwd=tmp_path)
+    assert done.returncode == 2, done.stdout
+    assert done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert "bad.csv" in done.stderr or case == "too short"
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("identify", "absent.csv", "--rig", "run.toml"), "absent.csv"),
+        (("identify", "run.csv", "--rig", "absent.toml"), "absent.toml"),
+        (("identify", "run.csv"), "--rig"),
+        (("identify", "run.csv", "--rig", "run.toml", "--core", "f16"), "f16"),
+        (("simulate", "out.csv", "--tone", "loud"), "loud"),
+        (("simulate", "out.csv", "--duration", "-1"), "duration"),
+        (("nonsense",), "nonsense"),
+    ],
+)
+def test_bad_usage_is_one_sentence_that_names_it(arguments: tuple[str, ...], named: str, place: Path) -> None:
+    done = pvid(*arguments, cwd=place)
+    assert done.returncode == 2, done.stdout
+    assert named in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr

@@ -1,0 +1,213 @@
+# shellcheck shell=bash
+# Sourced by tools/pvid and tools/test: on Debian or Ubuntu it installs what is missing, keeps a virtual
+# environment in build/venv and the C core in build/host, and costs next to nothing when all is there.
+#
+# Standard output belongs to the program; everything here speaks on standard error, one line a step, and
+# leaves the full output of each step in build/log.
+
+root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd)
+build=$root/build
+venv=$build/venv
+python=$venv/bin/python
+unset PYTHONHOME PYTHONPATH # they would reach into the environment, or replace it
+trap 'exit 130' INT # also where the step that was interrupted, like pip, turns it into a failure of its own
+
+say() { printf 'pvid: %s\n' "$*" >&2; }
+
+die() {
+    say "$*"
+    exit 2
+}
+
+# logged NAME COMMAND...: runs a step; its output goes to build/log/NAME.log, the end of it to the terminal
+# when the step fails.
+logged() {
+    local log=$build/log/${1//\//-}.log
+    shift
+    if ! "$@" >"$log" 2>&1 </dev/null; then
+        tail -n 30 "$log" >&2
+        return 1
+    fi
+}
+
+# One preparation at a time; the program itself runs unlocked.
+lock() {
+    mkdir -p "$build/log" || die "cannot write $build"
+    exec 9>"$build/.lock"
+    flock -n 9 || {
+        say "waiting for another run to finish its preparation"
+        flock 9
+    }
+}
+
+unlock() { exec 9>&-; }
+
+# ---- Debian packages ----
+
+# The packages of PROFILE (pvid or test) that are missing, judged by what they bring, so that a tool
+# installed in another way counts.
+missing_packages() {
+    local missing=()
+    need() { # need PACKAGE CHECK...
+        local package=$1
+        shift
+        "$@" >/dev/null 2>&1 || missing+=("$package")
+    }
+    if ! environment_is_ready; then
+        need python3 command -v python3
+        local candidate
+        candidate=$(system_python)
+        need python3-venv "${candidate:-false}" -c 'import ensurepip, venv'
+    fi
+    need gcc command -v gcc
+    need libc6-dev test -e /usr/include/stdio.h
+    need cmake command -v cmake
+    need ninja-build command -v ninja
+    if [[ $1 == test ]]; then
+        need binutils command -v readelf
+        need clang command -v clang
+        need libclang-rt-dev links_with clang -fsanitize=address,undefined
+        need libcmocka-dev test -e /usr/include/cmocka.h
+        need pkg-config command -v pkg-config
+        need shellcheck command -v shellcheck
+        need valgrind command -v valgrind
+        if [[ $(uname -m) == x86_64 ]]; then
+            need gcc-multilib links_with gcc -m32
+        fi
+    fi
+    printf '%s' "${missing[*]}"
+}
+
+# links_with COMPILER OPTION...: whether a program that includes a system header compiles and links.
+links_with() {
+    printf '#include <stdio.h>\nint main(void) { return 0; }\n' | "$@" -x c - -o /dev/null
+}
+
+as_root() {
+    if ((EUID == 0)); then "$@"; else sudo -n "$@"; fi
+}
+
+apt_get() {
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=200 "$@"
+}
+
+install_packages() { # install_packages PROFILE
+    local missing packages
+    missing=$(missing_packages "$1")
+    [[ -n $missing ]] || return 0
+    command -v apt-get >/dev/null || die "missing: $missing (Debian's names); install them and try again"
+    if ((EUID != 0)) && ! sudo -n true 2>/dev/null; then
+        die "missing packages; run as root: apt-get install -y --no-install-recommends $missing"
+    fi
+    say "installing Debian packages: $missing"
+    read -ra packages <<<"$missing"
+    if ! logged apt apt_get install --no-install-recommends "${packages[@]}" 2>/dev/null; then
+        # No lists of packages, or old ones; or an installation that was interrupted.
+        say "updating the lists of Debian packages"
+        as_root dpkg --configure -a >"$build/log/dpkg.log" 2>&1 </dev/null || true
+        logged apt-update apt_get update || die "apt-get update failed; its output is above"
+        logged apt apt_get install --no-install-recommends "${packages[@]}" ||
+            die "apt-get install failed; its output is above"
+    fi
+    hash -r
+    missing=$(missing_packages "$1")
+    [[ -z $missing ]] || die "still missing after the installation: $missing"
+}
+
+# ---- the virtual environment ----
+
+# The system's own interpreter first: one that a version manager puts in front may vanish with its settings.
+system_python() {
+    local candidate
+    for candidate in /usr/bin/python3 python3 python3.14 python3.13 python3.12 python3.11; do
+        if "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+            command -v "$candidate"
+            return
+        fi
+    done
+}
+
+# What the environment hangs on: where it stands and which interpreter it was made with.
+environment_identity() { printf '%s\n%s' "$root" "$(readlink -f "$python")"; }
+
+environment_is_ready() {
+    [[ -x $python && -f $venv/made && $(<"$venv/made") == "$(environment_identity)" ]]
+}
+
+# write_stamp FILE TEXT: whole or not at all.
+write_stamp() {
+    printf '%s' "$2" >"$1.new"
+    mv "$1.new" "$1"
+}
+
+make_environment() {
+    environment_is_ready && return
+    local interpreter
+    interpreter=$(system_python)
+    [[ -n $interpreter ]] || die "Python 3.11 or later is needed; $(python3 --version 2>&1) is too old"
+    say "making the virtual environment build/venv with $("$interpreter" --version)"
+    rm -rf "$venv"
+    logged venv "$interpreter" -m venv "$venv" || die "python3 -m venv failed; its output is above"
+    write_stamp "$venv/made" "$(environment_identity)"
+}
+
+install_requirements() { # install_requirements PROFILE
+    local pinned stamp extras=parquet
+    pinned=$(sha256sum <"$root/host/pyproject.toml")
+    for stamp in "$venv/installed-test" "$venv/installed-$1"; do
+        [[ -f $stamp && $(<"$stamp") == "$pinned" ]] && return
+    done
+    [[ $1 == test ]] && extras+=,test
+    say "installing Python packages: pvid[$extras] of host/pyproject.toml"
+    rm -f "$venv"/installed-*
+    # From inside host/: pip reads a path in front of [extras] as a URL, which spaces break.
+    (cd "$root/host" && logged pip "$python" -m pip install --disable-pip-version-check --no-input -e ".[$extras]") ||
+        die "pip install failed; its output is above"
+    write_stamp "$venv/installed-$1" "$pinned"
+}
+
+# ---- the C core ----
+
+# build_tree NAME CMAKE_OPTION...: configures build/NAME when it is new or was configured otherwise, and
+# builds what has changed.
+build_tree() {
+    local name=$1 tree=$build/$1
+    shift
+    local wanted="$root $*"
+    if [[ ! -f $tree/build.ninja || ! -f $tree/configured || $(<"$tree/configured") != "$wanted" ]]; then
+        say "configuring build/$name"
+        rm -rf "$tree"
+        logged "configure-$name" cmake -S "$root" -B "$tree" -G Ninja "$@" || return 1
+        write_stamp "$tree/configured" "$wanted"
+    fi
+    logged "build-$name" ninja -C "$tree"
+}
+
+# took_effect LIBRARY OPTIONS: the compilers' own record in it (-frecord-gcc-switches) shows, for every object,
+# each of OPTIONS and the one that keeps a*b+c from being fused.
+took_effect() {
+    local wanted option commands reached
+    read -ra wanted <<<"-ffp-contract=off $2"
+    commands=$(readelf -p .GCC.command.line "$1" | grep -E '^ +\[') || true
+    for option in "${wanted[@]}"; do
+        reached=$(grep -c -E -e " $option( |\$)" <<<"$commands") || true
+        if ((reached != $(wc -l <<<"$commands"))); then
+            say "$1: $option did not reach the compiler"
+            return 1
+        fi
+    done
+}
+
+build_core() {
+    build_tree host -DCMAKE_C_COMPILER=gcc -DPVID_BUILD_TESTS=OFF || die "the C core did not build; see above"
+}
+
+# prepare PROFILE: pvid (what it takes to run) or test (and what it takes to test).
+prepare() {
+    lock
+    install_packages "$1"
+    make_environment
+    install_requirements "$1"
+    build_core
+    unlock
+}
