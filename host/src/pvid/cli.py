@@ -27,12 +27,10 @@ from pvid.identify import LINEAR, PHYSICAL, UNITS, Identification, identify
 from pvid.native import Native
 from pvid.rig import (
     STANDARD_DRIVE,
-    STANDARD_DURATION,
     STANDARD_PENDULUM,
     STANDARD_RELEASE,
-    STANDARD_SAMPLE_RATE,
-    Drive,
     Pendulum,
+    Sensors,
     Tone,
     simulate,
     standard_sensors,
@@ -165,8 +163,8 @@ def _tone(text: str) -> Tone:
 
 @commands.command(name="simulate")
 @click.argument("out", type=click.Path(path_type=Path))
-@click.option("--duration", default=STANDARD_DURATION, show_default=True, help="Length [s].")
-@click.option("--rate", default=STANDARD_SAMPLE_RATE, show_default=True, help="Sample rate [Hz].")
+@click.option("--duration", default=40.0, show_default=True, help="Length [s].")
+@click.option("--rate", default=1000.0, show_default=True, help="Sample rate [Hz].")
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(4, 32), help="Encoder resolution.")
 @click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no zero.")
@@ -185,24 +183,21 @@ def _tone(text: str) -> Tone:
 @click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
 def simulate_command(**options: Any) -> int:
     """Simulates a rig into OUT (.csv, .csv.gz, .npz, .parquet) and writes the rig file that goes with it."""
-    pendulum = Pendulum.tilted(
-        options["l1"],
-        options["l2"],
-        options["rho2"],
-        options["gravity"],
-        options["tilt"],
-        options["damping"],
-        options["damping"],
-    )
+    pendulum = Pendulum(
+        l1=options["l1"],
+        l2=options["l2"],
+        rho2=options["rho2"],
+        g=options["gravity"],
+        damping1=options["damping"],
+        damping2=options["damping"],
+    ).tilted(options["tilt"])
     sensors = standard_sensors(options["bits"])
     if options["exact"]:
-        sensors = replace(
-            sensors, phi_lsb=0.0, phi_noise_lsb=0.0, y_lsb=0.0, y_noise_lsb=0.0, random_offset=False
-        )
+        sensors = Sensors()
     if options["noise"] is not None:
         sensors = replace(sensors, phi_noise_lsb=options["noise"])
     sensors = replace(sensors, phi_zero=options["zero"], skew_s=options["skew"])
-    drive = Drive(tuple(_tone(text) for text in options["tones"])) if options["tones"] else STANDARD_DRIVE
+    drive = tuple(_tone(text) for text in options["tones"]) or STANDARD_DRIVE
     simulation = simulate(
         pendulum=pendulum,
         drive=drive,
@@ -221,7 +216,7 @@ def simulate_command(**options: Any) -> int:
         standard,
         l1=pendulum.l1,
         sample_rate=options["rate"],
-        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb or 1e-9, y_lsb=sensors.y_lsb or 1e-12),
+        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())

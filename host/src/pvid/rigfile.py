@@ -29,8 +29,8 @@ Law = Literal["stationary", "pseudovelocity"]
 Core = Literal["f32", "q31", "f64"]
 Differentiator = Literal["savitzky-golay", "finite-difference"]
 
-# A window of one slow period or so for the weak form; for the strong form the widest that the core holds at 1 kHz.
-_WINDOW_S: dict[Form, float] = {"weak": 1.0, "strong": 0.321}
+# The weak form wants about one slow period; the strong form, with degree 12 and a 20-bit encoder, is least wrong here.
+_WINDOW_S: dict[Form, float] = {"weak": 1.25, "strong": 0.241}
 
 
 def _number(default: Any, unit: str, low: float, high: float) -> Any:
@@ -104,17 +104,17 @@ class Identifier:
     kappa_min : hold the estimate while less than this part of w's information is its own
     """
 
-    form: Form = _choice("weak", Form)
+    form: Form = _choice("strong", Form)
     law: Law = _choice("stationary", Law)
     core: Core = _choice("f32", Core)
     window_s: float = _number(0.0, "s", 0.0, 1e6)
     differentiator: Differentiator = _choice("savitzky-golay", Differentiator)
-    degree: int = _number(10, "", 4, 12)
+    degree: int = _number(12, "", 4, 12)
     stride: int = _number(1, "samples", 1, 65535)
     test_functions: int = _number(12, "", 3, 64)
     decimation: int = _number(8, "samples", 1, 65535)
     forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
-    feedback_hz: float = _number(0.0, "1/s", 0.0, 1e12)
+    feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)
     divider: int = _number(1, "", 1, 65535)
     full_angle: bool = False
     damping: bool = False

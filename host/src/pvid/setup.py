@@ -32,12 +32,12 @@ def bank_of(rig: RigFile, sample_rate: float) -> FirBank:
     if settings.differentiator == "finite-difference":
         bank = finite_difference(settings.stride)
     else:
-        points = max(round(settings.window_s * sample_rate / settings.stride), settings.degree + 1)
+        points = max(round(settings.window * sample_rate / settings.stride), settings.degree + 1)
         bank = savitzky_golay(points | 1, settings.degree, settings.stride)
     if bank.window > MAX_WINDOW:
         raise PvidError(
             f"the differentiator's window is {bank.window} samples at {sample_rate:g} Hz and the core holds "
-            f"{MAX_WINDOW} (PVID_MAX_WINDOW): shorten window_s or the stride"
+            f"{MAX_WINDOW} (PVID_MAX_WINDOW): shorten window_s or raise stride"
         )
     return bank
 

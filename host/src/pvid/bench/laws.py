@@ -9,9 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.native import EstimatorConfig, Law, Native
-from pvid.rig import STANDARD_PENDULUM, STANDARD_SAMPLE_RATE, simulate, standard_start
+from pvid.rig import STANDARD_PENDULUM, simulate, standard_start
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, estimator_config
+
+STANDARD_SAMPLE_RATE = 1000.0  # Hz
 
 Float32 = npt.NDArray[np.float32]
 
