@@ -57,6 +57,9 @@ missing_packages() {
         need python3 command -v python3
         local candidate
         candidate=$(system_python)
+        if [[ -z $candidate ]] && command -v python3 >/dev/null; then
+            die "Python 3.11 or later is needed; $(python3 --version 2>&1) is too old"
+        fi
         need python3-venv "${candidate:-false}" -c 'import ensurepip, venv'
     fi
     need gcc command -v gcc
@@ -160,8 +163,8 @@ install_requirements() { # install_requirements PROFILE
     [[ $1 == test ]] && extras+=,test
     say "installing Python packages: pvid[$extras] of host/pyproject.toml"
     rm -f "$venv"/installed-*
-    # From inside host/: pip reads a path in front of [extras] as a URL, which spaces break.
-    (cd "$root/host" && logged pip "$python" -m pip install --disable-pip-version-check --no-input -e ".[$extras]") ||
+    # From inside host/: a path in front of [extras] is read as a URL, which spaces break.
+    logged pip env -C "$root/host" "$python" -m pip install --disable-pip-version-check --no-input -e ".[$extras]" ||
         die "pip install failed; its output is above"
     write_stamp "$venv/installed-$1" "$pinned"
 }

@@ -340,6 +340,14 @@ static void take_step(pvid_estimator_f32 *self, const float dp[], float size)
     }
 }
 
+/* Whether the data speak of p[0]: what of its information no other parameter can imitate is a part
+ * kappa of its diagonal entry, and more than the start brought along. */
+static bool is_excited(const pvid_estimator_f32 *self, float kappa, float diagonal)
+{
+    const bool own = (kappa * diagonal) >= (2.0f * self->prior[0]);
+    return (kappa >= self->kappa_min) && (own || !(self->kappa_min > 0.0f));
+}
+
 /* One step of p from the sums; `gain` is g of estimator.h. */
 static pvid_reason solve(pvid_estimator_f32 *self, float gain, const float sums[])
 {
@@ -357,7 +365,7 @@ static pvid_reason solve(pvid_estimator_f32 *self, float gain, const float sums[
         count(&self->counters.held_pivot);
         return PVID_HELD_PIVOT;
     }
-    if (factor.first_pivot < self->kappa_min) {
+    if (!is_excited(self, factor.first_pivot, s[0][0])) {
         count(&self->counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }

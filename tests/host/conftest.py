@@ -24,7 +24,7 @@ def matrix() -> dict[str, Native]:
     """The core at -O0, -O2 and -O3 by gcc and by clang, by name (gcc-O0 ...)."""
     done = subprocess.run([ROOT / "tools" / "build-matrix"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return {Path(line).parent.name: Native(Path(line)) for line in done.stdout.split()}
+    return {Path(line).parent.name: Native(Path(line)) for line in done.stdout.splitlines()}
 
 
 @pytest.fixture(scope="session")

@@ -24,6 +24,7 @@ STRONG = replace(STANDARD, identifier=replace(STANDARD.identifier, form="strong"
 def exact_rows(native: Native) -> tuple[np.ndarray, np.ndarray]:
     """Rows of the standard rig from exact derivatives: N [40001, 11], Y, float32."""
     exact = simulate(truth="linear").exact
+    assert exact is not None
     return native.strong_rows(exact.phi, exact.u)
 
 
@@ -63,7 +64,9 @@ def test_twenty_bit_sensor_savitzky_golay_within_a_tenth_of_a_percent_in_w(nativ
         assert abs(result.value["w"] / TRUTH[0] - 1) < 1e-3
 
 
-def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, standard_20_bits: Simulation) -> None:
+def test_core_is_as_near_the_oracle_as_its_conditioning_allows(
+    native: Native, standard_20_bits: Simulation
+) -> None:
     """Final p of float32 against the float64 solution of the same rows.
 
     Each sum is exact to about 2 ulp (two levels), each entry of F to a few ulp of its largest term t, so F is known
@@ -87,7 +90,9 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
     assert (bound < 0.05 * reference).all()  # the bound itself says something
 
 
-def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standard_20_bits: Simulation) -> None:
+def test_standard_errors_and_kappa_agree_with_the_oracle(
+    native: Native, standard_20_bits: Simulation
+) -> None:
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0)
     identifier = native.strong(config)
@@ -98,7 +103,13 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standar
     y = y32[ready].astype(np.float64)
     p = last["p"][:3].astype(np.float64)
     estimate = oracle.assess(
-        p, n.T @ n, n.T @ y, float(y @ y), float(len(y)), config.estimator.start_sd, config.estimator.correlation
+        p,
+        n.T @ n,
+        n.T @ y,
+        float(y @ y),
+        float(len(y)),
+        config.estimator.start_sd,
+        config.estimator.correlation,
     )
     # s^2 is a difference of sums that agree to about 1e-3: float32 keeps four digits of it
     np.testing.assert_allclose(last["se"][:3], estimate.se, rtol=0.02)

@@ -10,16 +10,16 @@ import pytest
 from pvid.compare import compare_lanes, compare_run, first_difference
 from pvid.native import EstimatorConfig, Law, Native, StrongConfig
 from pvid.rig import Simulation, standard_start
-from pvid.rigfile import RigFile
+from pvid.rigfile import Differentiator, RigFile
 from pvid.setup import strong_config
 from pvid.twin.strong import StrongTwin, lanes_of
 
 STARTS = 20
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
-DIFFERENTIATORS = ("finite-difference", "savitzky-golay")
+DIFFERENTIATORS: tuple[Differentiator, ...] = ("finite-difference", "savitzky-golay")
 
 
-def configuration(differentiator: str) -> StrongConfig:
+def configuration(differentiator: Differentiator) -> StrongConfig:
     rig = RigFile.standard()
     settings = replace(rig.identifier, form="strong", differentiator=differentiator, stride=1)
     return strong_config(replace(rig, identifier=settings), 1000.0)
@@ -42,7 +42,7 @@ def test_the_matrix_holds_what_its_names_say(matrix: dict[str, Native]) -> None:
 
 @pytest.mark.parametrize("differentiator", DIFFERENTIATORS)
 def test_whole_identifier_equals_the_twin_in_every_build(
-    differentiator: str, matrix: dict[str, Native], standard_20_bits: Simulation
+    differentiator: Differentiator, matrix: dict[str, Native], standard_20_bits: Simulation
 ) -> None:
     run = standard_20_bits.run
     config = configuration(differentiator)
@@ -59,7 +59,7 @@ def test_whole_identifier_equals_the_twin_in_every_build(
 
 @pytest.mark.parametrize("differentiator", DIFFERENTIATORS)
 def test_twenty_starts_equal_the_twin_in_every_build(
-    differentiator: str, matrix: dict[str, Native], standard_20_bits: Simulation
+    differentiator: Differentiator, matrix: dict[str, Native], standard_20_bits: Simulation
 ) -> None:
     run = standard_20_bits.run
     config = configuration(differentiator)
@@ -68,7 +68,9 @@ def test_twenty_starts_equal_the_twin_in_every_build(
     starts = [standard_start(seed) for seed in range(STARTS)]
     lanes = [lane for variant in variants(config.estimator) for lane in lanes_of(variant, starts)]
     differing = compare_lanes([matrix[name] for name in BUILDS], lanes, n[ready], y[ready], 1000.0)
-    assert not differing, [(native.build, lane, str(difference)) for native, lane, difference in differing[:3]]
+    assert not differing, [
+        (native.build, lane, str(difference)) for native, lane, difference in differing[:3]
+    ]
 
 
 def test_a_changed_bit_is_found_and_named(native: Native, standard_20_bits: Simulation) -> None:

@@ -42,9 +42,7 @@ def worst_tap_error(bank: FirBank, order: int) -> float:
     return float(max(errors) / largest)
 
 
-@pytest.mark.parametrize(
-    ("window", "degree"), [(5, 4), (7, 4), (13, 12), (21, 6), (61, 6), (321, 10), (401, 12)]
-)
+@pytest.mark.parametrize(("window", "degree"), [(5, 4), (7, 4), (13, 12), (21, 6), (61, 6), (321, 10), (401, 12)])
 def test_savitzky_golay_equals_rational_arithmetic(window: int, degree: int) -> None:
     bank = savitzky_golay(window, degree)
     for order in range(ORDERS):

@@ -1,7 +1,7 @@
-"""The misprints of the paper (MATH.md 3), each with a proof: the corrected statement holds, the printed one does not.
+"""The misprints of the paper (MATH.md 3), each with a proof: the correction holds, the print does not.
 
-The eliminated equation is derived here from the equations of motion (1); nothing is taken from MATH.md but the
-statements under test.
+The eliminated equation is derived here from the equations of motion (1); nothing is taken from MATH.md but
+the statements under test.
 """
 
 import pytest
@@ -9,7 +9,7 @@ import sympy as sp
 
 t = sp.Symbol("t", real=True)
 l1, l2, rho2, w = sp.symbols("l1 l2 rho2 w", positive=True)
-phi1, phi, u = (sp.Function(name)(t) for name in ("phi1", "phi", "u"))
+phi, u = (sp.Function(name)(t) for name in ("phi", "u"))
 
 G = w + u
 LAMBDA1 = l1 / l2
@@ -17,8 +17,8 @@ LAMBDA2_SQUARED = (l2 / rho2) ** 2
 D1 = 1 + LAMBDA2_SQUARED * (1 + LAMBDA1)
 D2 = LAMBDA1 * LAMBDA2_SQUARED
 
-# Derivatives as free symbols: an identity in them is an identity along every motion, since initial values and the
-# drive are arbitrary.
+# Derivatives as free symbols: an identity in them is an identity along every motion, since the initial values
+# and the drive are arbitrary.
 F = sp.symbols("phi0:5")
 U = sp.symbols("u0:3")
 d1, d2 = sp.symbols("d1 d2", positive=True)
@@ -39,14 +39,11 @@ def with_symbols(expression: sp.Expr) -> sp.Expr:
 
 
 def eliminated_from_the_motion() -> sp.Expr:
-    """Equation (1) without phi1: an expression that vanishes along every motion, scaled to G^2 phi''''."""
-    accelerated = {
-        d(phi1, 2): -G * phi1 + LAMBDA2_SQUARED * G * phi,
-    }
-    # phi'' = G phi1 - lambda2^2 (1 + lambda1) G phi, solved for phi1 and differentiated twice:
+    """Equation (1) without phi1, times G^3: an expression that vanishes along every motion."""
+    # phi'' = G phi1 - lambda2^2 (1 + lambda1) G phi, solved for phi1:
     hidden = phi.diff(t, 2) / G + LAMBDA2_SQUARED * (1 + LAMBDA1) * phi
-    identity = d(hidden, 2) - accelerated[d(phi1, 2)].subs(phi1, hidden)
-    return sp.expand(sp.together(with_symbols(sp.expand(identity * G**3)) / G0))
+    acceleration = -G * hidden + LAMBDA2_SQUARED * G * phi
+    return sp.expand(sp.simplify(with_symbols((hidden.diff(t, 2) - acceleration).doit() * G**3)))
 
 
 @pytest.fixture(scope="module")
@@ -123,9 +120,7 @@ def test_3_regressor(truth: sp.Expr, entry: int, printed: sp.Expr) -> None:
 def test_4_pseudovelocities_are_rates() -> None:
     """C of the paper's (4) turns the RATES of theta_1, theta_3, theta_7 into d theta/dt, not their values."""
     estimate = [sp.Function(name)(t) for name in ("w", "d1", "d2")]
-    theta = sp.Matrix(
-        [entry.subs(dict(zip((w, d1, d2), estimate, strict=True)), simultaneous=True) for entry in THETA]
-    )
+    theta = sp.Matrix([entry.subs(dict(zip((w, d1, d2), estimate, strict=True)), simultaneous=True) for entry in THETA])
     jacobian = theta.jacobian(estimate)
     first = [1, 2 * w, 0, d1, 2 * d1 * w, 3 * d1 * w**2, 0, d2, 2 * d2 * w, 3 * d2 * w**2, 4 * d2 * w**3]
     second = [0, 0, 1, w, w**2, w**3, 0, 0, 0, 0, 0]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from conftest import ROOT
 
-from pvid.rig import STANDARD_PENDULUM, simulate
+from pvid.rig import STANDARD_PENDULUM, Sensors, simulate
 
 
 def example() -> str:
@@ -27,7 +27,7 @@ def test_the_example_identifies_the_standard_rig(tmp_path: Path) -> None:
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", include]
     subprocess.run(["gcc", *flags, str(source), *core, "-o", str(binary), "-lm"], check=True)
     # exact samples: what is tested is the program, not the differentiator's noise
-    run = simulate(truth="linear", duration=20.0).run
+    run = simulate(sensors=Sensors(), truth="linear", duration=20.0).run
     samples = "\n".join(f"{phi:.9g} {y:.9g}" for phi, y in zip(run.phi, run.y, strict=True))
     printed = subprocess.run([str(binary)], input=samples, capture_output=True, text=True, check=True).stdout
     numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", printed)]

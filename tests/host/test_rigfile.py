@@ -40,11 +40,10 @@ def test_the_example_of_the_design_is_the_standard_rig() -> None:
 
 
 def test_the_window_is_the_forms_own_unless_given() -> None:
-    standard = RigFile.standard().identifier
-    assert standard.form == "weak"
-    assert standard.window == 1.0
-    assert replace(standard, form="strong").window == 0.321
-    assert replace(standard, form="strong", window_s=0.2).window == 0.2
+    weak, strong = Identifier(form="weak"), Identifier(form="strong")
+    assert weak.window > strong.window > 0.0
+    assert replace(weak, form="strong").window == strong.window
+    assert replace(weak, window_s=0.2).window == replace(strong, window_s=0.2).window == 0.2
 
 
 @pytest.mark.parametrize(
@@ -52,8 +51,8 @@ def test_the_window_is_the_forms_own_unless_given() -> None:
     [
         ("", "l1 is missing"),
         ("[sensor]\nphi_lsb = 1e-4", "l1 is missing"),
-        ("l1 = ", "is not TOML: .*line 1"),
-        ("l1 = 0.3\nl1 = 0.4", "is not TOML: .*line 2"),
+        ("l1 = ", "^is not TOML: Invalid value"),
+        ("l1 = 0.3\nl1 = 0.4", "^is not TOML: Cannot overwrite a value"),
         ('l1 = "0.3"', "^l1 must be a number, not '0.3'"),
         ("l1 = true", "^l1 must be a number, not true"),
         ("l1 = 0", "^l1 must be from 1e-06 to 1e\\+06 m, not 0"),

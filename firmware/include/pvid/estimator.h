@@ -50,7 +50,8 @@ typedef struct {
     float correlation;          /* rows that carry the information of one independent row, >= 1:
                                    widens the standard errors when filters overlap */
     float step_limit;           /* largest |dp/p| (|dp|/start_sd where p may be zero), 0 < . <= 0.9 */
-    float kappa_min;            /* no step while kappa of S + H0 is below this, 0..1 */
+    float kappa_min;            /* no step while kappa of S + H0 is below this, or while the data say
+                                   less of p[0] than the start does, 0..1; 0: always step */
     pvid_law law;
     uint16_t divider;           /* groups of rows a solve, 1.. */
 } pvid_estimator_config_f32;

@@ -13,6 +13,7 @@
 
 #include <stdbool.h>
 
+#include "pvid/estimator.h"
 #include "pvid/model.h"
 
 #define PVID_KAPITZA_P 3
@@ -29,11 +30,11 @@ typedef struct {
 /* p[3] of a pendulum with rod l1 [m]. All lengths and g positive and finite. */
 void pvid_kapitza_linear_f32(const pvid_kapitza_f32 *physical, float l1, float p[PVID_KAPITZA_P]);
 
-/* Physical parameters of p and their standard errors by the delta method, from the covariance of
- * p (pvid_estimate_f32.covariance). Returns false, and leaves
- * value and se unwritten, iff p lies outside the physical region or the result is not finite. */
-bool pvid_kapitza_physical_f32(const float p[PVID_KAPITZA_P], const float covariance[][PVID_MAX_P], float l1,
-                               pvid_kapitza_f32 *value, pvid_kapitza_f32 *se);
+/* Physical parameters of an estimate and their standard errors by the delta method. Returns false,
+ * and leaves value and se unwritten, iff p lies outside the physical region or a result is not
+ * finite. */
+bool pvid_kapitza_physical_f32(const pvid_estimate_f32 *estimate, float l1, pvid_kapitza_f32 *value,
+                               pvid_kapitza_f32 *se);
 
 /* One row of the strong form (MATH.md 2) from phi[k] = d^k phi / dt^k, k = 0..4, and
  * u = y_A''/l1, u', u'' [1/s^2 ..]. Writes Y and N[11] in the order of MATH.md, with one liberty:

@@ -1,8 +1,8 @@
 """Recorded runs on disk: CSV (plain or gzip), NPZ and Parquet, with every check a stranger's file needs.
 
-A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order, and may have more. ``t`` is uniform: a
-gap is reported, never bridged. Whatever is wrong with a file is told in one sentence, as a `PvidError`, that names the
-file and, where there is one, the line and the column.
+A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order, and may have more. ``t`` is uniform:
+a gap is reported, never bridged. Whatever is wrong with a file is told in one sentence, as a `PvidError`, that
+names the file and, where there is one, the line and the column.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import csv
 import gzip
 import importlib
 import io
-import math
 import os
 import re
 import zipfile
@@ -36,8 +35,8 @@ UNITS = {"t": "s", "phi": "rad", "y": "m"}
 MIN_ROWS = 5
 # A step of t longer than this many periods is a gap: a sample is missing.
 _GAP_PERIODS = 1.5
-# Largest departure of t from a uniform clock [periods]: on the standard rig at 1 kHz (phi' up to 1.6 rad/s) it is
-# worth 1.6e-4 rad, the encoder's own noise, and it leaves room for time stamps with few decimals.
+# Largest departure of t from a uniform clock [periods]. On the standard rig at 1 kHz (phi' up to 1 rad/s) it is
+# worth 1e-4 rad, half the encoder's noise, and it leaves room for time stamps with few decimals.
 _JITTER_PERIODS = 0.1
 # w is proportional to the square of the sample rate: 1e-4 costs 0.02 %, what a good run's standard error is.
 _RATE_TOLERANCE = 1e-4
@@ -101,14 +100,15 @@ class _Table:
 def read_run(path: str | os.PathLike[str], rate: float | None = None) -> Run:
     """Read a run from ``.csv``, ``.csv.gz``, ``.npz`` or ``.parquet``.
 
-    Columns other than t, phi and y are kept in `Run.columns` when they hold one number a row (an empty cell is NaN),
-    and left out otherwise.
+    Columns other than t, phi and y are kept in `Run.columns` when they hold one number a row (an empty cell is
+    NaN), and left out otherwise.
 
     Parameters
     ----------
     path : path
     rate : float, optional
-        The sample rate the rig file promises [Hz]. It must agree with t within 1e-4, and is then the run's rate.
+        The sample rate the rig file promises [Hz]. It must agree with t within 1e-4 (relative), and is then
+        the run's rate.
 
     Raises
     ------
@@ -172,11 +172,13 @@ def write_run(path: str | os.PathLike[str], run: Run) -> None:
         raise PvidError(f"{path} cannot be written: {_reason(error)}.") from error
 
 
-# --- checks shared by all formats -----------------------------------------------------------------------------------
+# --- checks shared by all formats ---------------------------------------------------------------------------
 
 
 def _check(table: _Table, rate: float | None) -> float:
     """Refuse what is no uniform, finite run; return its sample rate [Hz]."""
+    if rate is not None and not 0 < rate < float("inf"):
+        raise PvidError(f"The sample rate must be a positive number of Hz, not {rate:g}.")
     rows = table.columns["t"].size
     if rows < MIN_ROWS:
         raise PvidError(f"{table.path} has {rows} rows of data; a run needs at least {MIN_ROWS}.")
@@ -186,13 +188,13 @@ def _check(table: _Table, rate: float | None) -> float:
         if not finite.all():
             row = int(np.argmin(finite))
             raise table.error(row, name, f"{data[row]} is not a finite number")
-    return _check_clock(table, rate)
+    with np.errstate(over="ignore", invalid="ignore"):  # times near the end of float64's range
+        return _check_clock(table, rate)
 
 
 def _check_clock(table: _Table, rate: float | None) -> float:
     t = table.columns["t"]
-    with np.errstate(over="ignore", invalid="ignore"):
-        steps = np.diff(t)
+    steps = np.diff(t)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0)) + 1
         what = "repeats" if steps[row - 1] == 0 else "runs back from"
@@ -203,14 +205,14 @@ def _check_clock(table: _Table, rate: float | None) -> float:
         raise table.error(
             row,
             "t",
-            f"a gap of {steps[row - 1] / period:.4g} periods ({steps[row - 1]:.6g} s) comes before this sample",
+            f"a gap of {steps[row - 1]:.6g} s, {steps[row - 1] / period:.4g} periods, comes before it",
         )
     span = float(t[-1]) - float(t[0])
     measured = (t.size - 1) / span
     low, high = _RATE_RANGE_HZ
     if not low <= measured <= high:
         raise PvidError(
-            f"{table.path}, column t: a sample rate of {measured:.6g} Hz is out of range (t must be in seconds)."
+            f"{table.path}, column t: a sample rate of {measured:.6g} Hz is out of range (is t in seconds?)."
         )
     departure = np.abs((t - t[0]) * measured - np.arange(t.size))
     if departure.max() > _JITTER_PERIODS:
@@ -218,20 +220,21 @@ def _check_clock(table: _Table, rate: float | None) -> float:
         raise table.error(
             row,
             "t",
-            f"the clock is not uniform, this sample is {departure[row]:.3g} periods off (at most {_JITTER_PERIODS:g})",
+            f"the clock is not uniform, {t[row]!s} s is {departure[row]:.3g} periods off the others",
         )
     if rate is None:
         return _shortest_decimal(measured, 1e-9 + 4 * float(np.spacing(np.abs(t).max())) / span)
     # t is trusted only to within the jitter at each end.
     if not abs(measured / rate - 1) <= _RATE_TOLERANCE + 2 * _JITTER_PERIODS / (t.size - 1):
         raise PvidError(
-            f"{table.path}, column t: the samples come at {measured:.6g} Hz, but the rig's sample rate is {rate:.6g} Hz."
+            f"{table.path}, column t: the samples come at {measured:.6g} Hz, "
+            f"but the rig's sample rate is {rate:.6g} Hz."
         )
     return float(rate)
 
 
 def _shortest_decimal(value: float, tolerance: float) -> float:
-    """The number with the fewest digits within a relative ``tolerance``: 1000 rather than 1000.0000000000001."""
+    """The shortest number within a relative ``tolerance``: 1000 rather than 1000.0000000000001."""
     for digits in range(1, 17):
         candidate = float(f"{value:.{digits}g}")
         if abs(candidate - value) <= tolerance * value:
@@ -269,7 +272,7 @@ def _reason(error: BaseException) -> str:
     return " ".join(str(text).split()).rstrip(".")
 
 
-# --- CSV ------------------------------------------------------------------------------------------------------------
+# --- CSV ----------------------------------------------------------------------------------------------------
 
 
 def _read_csv(path: Path, content: bytes) -> _Table:
@@ -281,9 +284,7 @@ def _read_csv(path: Path, content: bytes) -> _Table:
     if len(header) == 1:
         for separator, called in ((";", "semicolons"), ("\t", "tabs")):
             if separator in lines[0]:
-                raise PvidError(
-                    f"{path}, line 1: the columns are separated by {called}, where commas are wanted."
-                )
+                raise PvidError(f"{path}, line 1: the columns are separated by {called}, not by commas.")
     if all(_is_number(name) for name in header):
         raise PvidError(f"{path}, line 1: a header (t,phi,y) is wanted, these are numbers.")
     _check_names(path, header, ", line 1")
@@ -298,16 +299,13 @@ def _read_csv(path: Path, content: bytes) -> _Table:
                 f"{path}, {_line_place(row)}: {len(cells)} columns where the header has {width}"
                 f"{' (the file may be truncated)' if last else ''}."
             )
-    cells_by_name = {
-        name: column for name, column in zip(header, zip(*body, strict=True), strict=True) if name
-    }
     if not terminated and len(body) > 1:
         _check_last_cell(path, header[-1], [cells[-1].strip() for cells in body])
     columns = {}
-    for name, column in cells_by_name.items():
+    for name, column in zip(header, zip(*body, strict=True), strict=True):
         if name in REQUIRED:
             columns[name] = _csv_numbers(path, name, column)
-        else:
+        elif name:
             with contextlib.suppress(ValueError):
                 columns[name] = _numbers(cell.strip() or "nan" for cell in column)
     return _Table(path, columns, _line_place)
@@ -322,10 +320,8 @@ def _csv_lines(path: Path, content: bytes) -> tuple[list[str], bool]:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise PvidError(
-            f"{path}, line {line}: byte 0x{content[error.start]:02x} is not UTF-8 text."
-        ) from error
+        line = _line_of(content, error.start)
+        raise PvidError(f"{path}, line {line}: this is not UTF-8 text (byte {error.start}).") from error
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     lines = text.split("\n")
     terminated = not lines[-1].strip()
@@ -334,8 +330,8 @@ def _csv_lines(path: Path, content: bytes) -> tuple[list[str], bool]:
     return lines, terminated
 
 
-def _line_of(content: bytes, byte: bytes) -> int:
-    return content.count(b"\n", 0, content.index(byte)) + 1
+def _line_of(content: bytes, position: int) -> int:
+    return content.count(b"\n", 0, position) + 1
 
 
 def _csv_rows(path: Path, lines: list[str]) -> list[list[str]]:
@@ -347,7 +343,7 @@ def _csv_rows(path: Path, lines: list[str]) -> list[list[str]]:
                 rows.append(next(csv.reader([line], strict=True)))
             except csv.Error as error:
                 raise PvidError(
-                    f"{path}, line {number}: a quoted cell is malformed ({_reason(error)})."
+                    f"{path}, line {number}: a malformed quoted cell ({_reason(error)})."
                 ) from error
         elif line and not line.isspace():
             rows.append(line.split(","))
@@ -359,14 +355,14 @@ def _csv_rows(path: Path, lines: list[str]) -> list[list[str]]:
 def _check_last_cell(path: Path, name: str, cells: list[str]) -> None:
     """Refuse a file that stops in the middle of its last number.
 
-    The last line may lack its end (RFC 4180). But a cell shorter than all others of its column is then taken for what
-    was left of a number when the file was cut.
+    The last line may lack its end (RFC 4180). But a cell shorter than all others of its column is then taken for
+    what was left of a number when the file was cut.
     """
     lengths = [len(cell.lstrip("+-")) for cell in cells]
     if lengths[-1] < min(lengths[:-1]):
         raise PvidError(
-            f"{path}, line {len(cells) + 1}, column {name}: the last line is not ended and {_shown(cells[-1])} is "
-            f"shorter than any number before it, so the file seems truncated (if not, end the line)."
+            f"{path}, line {len(cells) + 1}, column {name}: the file seems truncated, its last line has no end "
+            f"and {_shown(cells[-1])} is shorter than every number before it (if it is whole, end the line)."
         )
 
 
@@ -417,7 +413,7 @@ def _write_csv_gz(path: Path, named: dict[str, FloatArray]) -> bytes:
     return gzip.compress(_write_csv(path, named), compresslevel=6, mtime=0)
 
 
-# --- binary formats -------------------------------------------------------------------------------------------------
+# --- binary formats -----------------------------------------------------------------------------------------
 
 
 def _array_table(path: Path, names: list[str], column: Callable[[str], npt.NDArray[Any]]) -> _Table:
@@ -429,9 +425,7 @@ def _array_table(path: Path, names: list[str], column: Callable[[str], npt.NDArr
         if data.dtype.kind not in "iuf":
             raise PvidError(f"{path}, column {name}: real numbers are wanted, not {data.dtype}.")
         if data.ndim != 1:
-            raise PvidError(
-                f"{path}, column {name}: one row of numbers is wanted, not the shape {data.shape}."
-            )
+            raise PvidError(f"{path}, column {name}: one number a sample is wanted, not shape {data.shape}.")
         columns[name] = data.astype(np.float64)
     sizes = [columns[name].size for name in REQUIRED]
     if len(set(sizes)) > 1:

@@ -16,6 +16,7 @@ from typing import Any
 import click
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -81,9 +82,13 @@ def commands() -> None:
 
 
 @commands.command()
-@click.option("--figure", type=click.Path(path_type=Path), default=Path("pvid-demo.png"), help="Where the figure goes.")
+@click.option(
+    "--figure", type=click.Path(path_type=Path), default=Path("pvid-demo.png"), help="Where the figure goes."
+)
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
-@click.option("--bits", default=20, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
+@click.option(
+    "--bits", default=20, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder."
+)
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
 def demo(figure: Path, seed: int, bits: int, truth: str) -> int:
     """Simulates the standard rig, identifies it in the C core, compares every bit with numpy."""
@@ -107,7 +112,9 @@ def demo(figure: Path, seed: int, bits: int, truth: str) -> int:
 
 
 def _write_figure(result: Identification, path: Path, truths: dict[str, float] | None) -> None:
-    from pvid.figures import convergence  # matplotlib takes half a second that other commands need not wait for
+    from pvid.figures import (
+        convergence,
+    )  # matplotlib takes half a second that other commands need not wait for
 
     convergence(result, path, truth=truths)
     click.echo(f"figure: {path}")
@@ -130,7 +137,7 @@ def _print_result(result: Identification, truths: dict[str, float] | None = None
     for name in (*PHYSICAL, *LINEAR):
         if name not in result.value:
             continue
-        label = f"{name} [{UNITS[name]}]" if UNITS[name] else name
+        label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
         cells = [f"{result.value[name]:.6g}", f"{result.se[name]:.2g}"]
         if truths:
             cells.insert(0, f"{truths[name]:.6g}")
@@ -170,17 +177,32 @@ def _tone(text: str) -> Tone:
 @click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no zero.")
 @click.option("--noise", type=float, help="White noise of the encoder [LSB].  [default: 0.5]")
 @click.option("--zero", default=0.0, show_default=True, help="Zero error of the encoder [rad].")
-@click.option("--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s].")
-@click.option("--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable.")
-@click.option("--release", nargs=2, type=float, default=STANDARD_RELEASE, show_default=True, help="phi1, phi1+phi [rad].")
+@click.option(
+    "--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s]."
+)
+@click.option(
+    "--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable."
+)
+@click.option(
+    "--release",
+    nargs=2,
+    type=float,
+    default=STANDARD_RELEASE,
+    show_default=True,
+    help="phi1, phi1+phi [rad].",
+)
 @click.option("--l1", default=STANDARD_PENDULUM.l1, show_default=True, help="[m]")
 @click.option("--l2", default=STANDARD_PENDULUM.l2, show_default=True, help="[m]")
 @click.option("--rho2", default=STANDARD_PENDULUM.rho2, show_default=True, help="[m]")
 @click.option("--gravity", default=STANDARD_PENDULUM.g, show_default=True, help="Gravity [m/s^2].")
 @click.option("--tilt", default=0.0, show_default=True, help="Tilt of the plane of motion [rad].")
-@click.option("--damping", default=0.0, show_default=True, help="Viscous friction of both joints per unit mass [m^2/s].")
+@click.option(
+    "--damping", default=0.0, show_default=True, help="Viscous friction of both joints per unit mass [m^2/s]."
+)
 @click.option("--seed", default=0, show_default=True)
-@click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
+@click.option(
+    "--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]"
+)
 def simulate_command(**options: Any) -> int:
     """Simulates a rig into OUT (.csv, .csv.gz, .npz, .parquet) and writes the rig file that goes with it."""
     pendulum = Pendulum(
@@ -220,7 +242,9 @@ def simulate_command(**options: Any) -> int:
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())
-    messages.print(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
+    messages.print(
+        f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}"
+    )
     return DONE
 
 
@@ -234,8 +258,12 @@ def _rig_path(out: Path) -> Path:
 
 def _rig_options(function: Callable[..., int]) -> Callable[..., int]:
     options = [
-        click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML)."),
-        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."),
+        click.option(
+            "--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML)."
+        ),
+        click.option(
+            "--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."
+        ),
         click.option("--form", type=click.Choice(["weak", "strong"]), help="Overrides the rig file."),
     ]
     for option in reversed(options):
@@ -327,7 +355,9 @@ def _update_readme(readme: Path | None, marker: str, text: str) -> None:
 
 
 _UPDATE = click.option(
-    "--update", type=click.Path(path_type=Path, exists=True), help="Write the table into this file's place for it."
+    "--update",
+    type=click.Path(path_type=Path, exists=True),
+    help="Write the table into this file's place for it.",
 )
 
 

@@ -59,17 +59,17 @@ def _words(values: npt.NDArray[np.float32]) -> npt.NDArray[np.uint32]:
 
 
 def first_difference(
-    record: Record, p: npt.NDArray[np.float32], sums: npt.NDArray[np.float32], reason: npt.NDArray[np.uint8]
+    record: Record,
+    p: npt.NDArray[np.float32],
+    sums: npt.NDArray[np.float32],
+    reason: npt.NDArray[np.uint8],
 ) -> Difference | None:
     """The first difference between a replay of the core and one lane of the twin, p before sums before status."""
+    names: list[Callable[[int], str]] = [P_NAMES.__getitem__, sum_name, lambda _: "status"]
+    cores = [_words(record.p), _words(record.sums), record.reason[:, None].astype(np.uint32)]
+    twins = [_words(p), _words(sums), reason[:, None].astype(np.uint32)]
     found: list[tuple[int, int, str, int, int]] = []
-    for order, (core, twin, name) in enumerate(
-        [
-            (_words(record.p), _words(p), lambda i: P_NAMES[i]),
-            (_words(record.sums), _words(sums), sum_name),
-            (record.reason[:, None].astype(np.uint32), reason[:, None].astype(np.uint32), lambda _: "status"),
-        ]
-    ):
+    for order, (core, twin, name) in enumerate(zip(cores, twins, names, strict=True)):
         ticks, places = np.nonzero(core != twin)
         if len(ticks):
             tick, place = int(ticks[0]), int(places[0])
@@ -131,9 +131,10 @@ def compare_lanes(
                 )
                 if difference is not None and (build, lane) not in differing:
                     shifted = Difference(
-                        first + difference.tick, difference.variable, difference.core_word, difference.twin_word
+                        first + difference.tick,
+                        difference.variable,
+                        difference.core_word,
+                        difference.twin_word,
                     )
                     differing[build, lane] = shifted
     return [(natives[build], lane, difference) for (build, lane), difference in sorted(differing.items())]
-
-

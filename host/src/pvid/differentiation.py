@@ -75,9 +75,7 @@ class FirBank:
         samples = np.asarray(x, np.float64)
         count = samples.size - 2 * self.delay
         if count <= 0:
-            raise PvidError(
-                f"{samples.size} samples do not fill the differentiator's window of {self.window}"
-            )
+            raise PvidError(f"{samples.size} samples do not fill the differentiator's window of {self.window}")
         centre = samples[self.delay : self.delay + count]
         out = np.zeros((ORDERS, count))
         for i in range(1, self.half + 1):
@@ -131,9 +129,7 @@ def savitzky_golay(window: int, degree: int, stride: int = 1) -> FirBank:
     if not 4 <= degree <= MAX_DEGREE:
         raise PvidError(f"a Savitzky-Golay polynomial must have degree 4 to {MAX_DEGREE}, not {degree}")
     if window % 2 == 0 or window <= degree:
-        raise PvidError(
-            f"a Savitzky-Golay window must be odd and above the degree {degree}, not {window} points"
-        )
+        raise PvidError(f"a Savitzky-Golay window must be odd and above the degree {degree}, not {window} points")
     half = (window - 1) // 2
     weights = np.empty((ORDERS, half))
     for parity in (0, 1):

@@ -4,6 +4,5 @@
 class PvidError(Exception):
     """Bad input or usage, told in one clear sentence.
 
-    The command line prints the sentence on stderr and exits with code 2; a traceback would tell the user nothing
-    more.
+    The command line prints the sentence on stderr and exits with code 2; a traceback would tell no more.
     """

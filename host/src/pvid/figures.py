@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import matplotlib
@@ -10,9 +11,12 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+import numpy.typing as npt
 
 from pvid.errors import PvidError
 from pvid.identify import PHYSICAL, UNITS, Identification
+
+Float = npt.NDArray[np.float64]
 
 _LABELS = {
     "g": "gravity in the plane g*",
@@ -21,7 +25,22 @@ _LABELS = {
 }
 
 
-def convergence(result: Identification, path: Path, *, truth: dict[str, float] | None = None, title: str = "") -> None:
+def _interesting(value: Float, band: Float) -> tuple[float, float]:
+    """Limits that show where the estimate ends and how it got there: twice the last band, and the last 3/4."""
+    known = np.flatnonzero(np.isfinite(value) & np.isfinite(band))
+    if not len(known):
+        return math.nan, math.nan
+    last = known[-1]
+    settled = value[known[len(known) // 4 :]]
+    low = min(float(settled.min()), float(value[last] - 2 * band[last]))
+    high = max(float(settled.max()), float(value[last] + 2 * band[last]))
+    margin = 0.05 * (high - low)
+    return low - margin, high + margin
+
+
+def convergence(
+    result: Identification, path: Path, *, truth: dict[str, float] | None = None, title: str = ""
+) -> None:
     """Writes the estimates of g*, l2 and rho2 over time with a +-2 s.e. band; the truth as a line if known.
 
     The format follows the suffix of `path` (png, svg, pdf). Raises PvidError when it cannot be written.
@@ -33,14 +52,12 @@ def convergence(result: Identification, path: Path, *, truth: dict[str, float] |
         band = 2 * trajectory.physical_se[:, column]
         axis.fill_between(trajectory.t, value - band, value + band, alpha=0.25, color="C0", label="±2 s.e.")
         axis.plot(trajectory.t, value, color="C0", linewidth=1.2, label="estimate")
-        settled = value[len(value) // 4 :]
-        low, high = np.nanmin(settled, initial=np.inf), np.nanmax(settled, initial=-np.inf)
+        low, high = _interesting(value, band)
         if truth is not None:
             axis.axhline(truth[name], color="C3", linestyle="--", linewidth=1.2, label="truth")
             low, high = min(low, truth[name]), max(high, truth[name])
-        if np.isfinite([low, high]).all():
-            margin = max(0.5 * (high - low), 0.02 * abs(high))
-            axis.set_ylim(low - margin, high + margin)
+        if math.isfinite(low) and low < high:
+            axis.set_ylim(low, high)
         axis.set_ylabel(f"{_LABELS[name]} [{UNITS[name]}]")
         axis.grid(alpha=0.3)
     axes[0].legend(loc="upper right", ncols=3)

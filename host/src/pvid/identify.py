@@ -65,7 +65,8 @@ class Identification:
         """The object of `identify --json` (DESIGN.md)."""
         names = (*LINEAR, *PHYSICAL)
         parameters = {
-            name: {"value": self.value[name], "se": self.se[name]} if name in self.value else None for name in names
+            name: {"value": self.value[name], "se": self.se[name]} if name in self.value else None
+            for name in names
         }
         return {
             **parameters,

@@ -289,7 +289,9 @@ class Native:
         mirrored = _struct_layout()
         estimator_size, counters_at, strong_size, estimator_at, *bounds = layout[len(mirrored) :]
         if layout[: len(mirrored)] != mirrored or bounds != [MAX_P, MAX_THETA, MAX_SUMS, MAX_WINDOW]:
-            raise PvidError(f"the C core {path} was built with other struct sizes than this package: {layout}")
+            raise PvidError(
+                f"the C core {path} was built with other struct sizes than this package: {layout}"
+            )
         self._estimator_size = estimator_size
         self._counters_at = counters_at
         self._strong_size = strong_size
@@ -328,19 +330,14 @@ class Native:
         )
         return n, y
 
-    def physical(
-        self, p: npt.ArrayLike, covariance: npt.ArrayLike, l1: float
-    ) -> tuple[Float32, Float32] | None:
+    def physical(self, estimate: npt.NDArray[np.void], l1: float) -> tuple[Float32, Float32] | None:
         """pvid_kapitza_physical_f32: (g, l2, rho2) and standard errors, None outside the physical region."""
-        p32 = np.ascontiguousarray(p, np.float32)
-        cov32 = np.zeros((MAX_P, MAX_P), np.float32)
-        given = np.asarray(covariance, np.float32)
-        cov32[: given.shape[0], : given.shape[1]] = given
+        one = np.ascontiguousarray(estimate, ESTIMATE_DTYPE)
         value = np.empty(3, np.float32)
         se = np.empty(3, np.float32)
         function = self._lib.pvid_kapitza_physical_f32
         function.restype = ctypes.c_bool
-        ok = function(_pointer(p32), _pointer(cov32), ctypes.c_float(l1), _pointer(value), _pointer(se))
+        ok = function(_pointer(one), ctypes.c_float(l1), _pointer(value), _pointer(se))
         return (value, se) if ok else None
 
 
@@ -372,7 +369,13 @@ class _Stepper:
     _estimator_at: int = 0
 
     def _replay(
-        self, symbol: str, first: Float32, second: Float32, want_sums: bool, want_hash: bool, estimate_every: int
+        self,
+        symbol: str,
+        first: Float32,
+        second: Float32,
+        want_sums: bool,
+        want_hash: bool,
+        estimate_every: int,
     ) -> Record:
         ticks = len(second)
         estimates = -(-ticks // estimate_every) if estimate_every else 0
@@ -430,7 +433,10 @@ class StrongIdentifier(_Stepper):
             weights=self._weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float)),
         )
         struct = StrongConfigStruct(
-            sample_rate_hz=config.sample_rate, l1=config.l1, bank=bank, estimator=_estimator_struct(config.estimator)
+            sample_rate_hz=config.sample_rate,
+            l1=config.l1,
+            bank=bank,
+            estimator=_estimator_struct(config.estimator),
         )
         self._state = ctypes.create_string_buffer(native._strong_size)
         self._estimator_at = native._estimator_at

@@ -20,7 +20,7 @@ Law = Literal["stationary", "pseudovelocity"]
 N_THETA = 11
 N_P = 3
 
-# The core keeps the binomial coefficients in theta instead of N (kapitza.h): N of MATH.md = BINOMIAL * N of the core.
+# The core keeps the binomial coefficients in theta, not in N (kapitza.h): MATH.md's N = BINOMIAL * the core's.
 BINOMIAL = np.array([1, 1, 1, 3, 3, 1, 1, 4, 6, 4, 1], np.float64)
 
 
@@ -119,9 +119,10 @@ def kappa_of(s: Float) -> float:
         d = 1 / np.sqrt(np.diag(s))
         scaled = s * np.outer(d, d)
         try:
-            return float(1 - scaled[0, 1:] @ np.linalg.solve(scaled[1:, 1:], scaled[1:, 0]))
+            value = float(1 - scaled[0, 1:] @ np.linalg.solve(scaled[1:, 1:], scaled[1:, 0]))
         except np.linalg.LinAlgError:
             return 0.0
+        return value if math.isfinite(value) else 0.0
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,13 @@ class Estimate:
 
 
 def assess(
-    p: Float, m: Float, b: Float, yy: float, weight: float, start_sd: npt.ArrayLike, correlation: float = 1.0
+    p: Float,
+    m: Float,
+    b: Float,
+    yy: float,
+    weight: float,
+    start_sd: npt.ArrayLike,
+    correlation: float = 1.0,
 ) -> Estimate:
     """Standard errors at p from the sums: (S / s^2 + 1 / start_sd^2)^-1, s^2 = correlation * residual / (weight - 3).
 
@@ -144,7 +151,7 @@ def assess(
     """
     c, t = jacobian(p), theta(p)
     s = c.T @ m @ c
-    variance = max(yy - 2 * b @ t + t @ m @ t, 0.0) / (weight - N_P)
+    variance = max(float(yy - 2 * b @ t + t @ m @ t), 0.0) / (weight - N_P)
     wide = variance * correlation
     information = s + np.diag(wide / np.asarray(start_sd, np.float64) ** 2)
     d = 1 / np.sqrt(np.diag(information))
@@ -217,12 +224,11 @@ def identify_strong(n: Float, y: Float, settings: Settings, estimate_every: int 
             s = c.T @ m @ c + np.diag(prior)
             rhs = gain * (c.T @ (b - m @ t)) + (1 - gain) * innovation
             innovation = np.zeros(N_P)
-            if kappa_of(s) >= settings.kappa_min:
+            kappa = kappa_of(s)
+            if kappa >= settings.kappa_min and (settings.kappa_min == 0 or kappa * s[0, 0] >= 2 * prior[0]):
                 dp = _solve(s, rhs)
-                size = np.max(np.abs(dp / p))
-                p = np.clip(
-                    p + dp * min(1.0, settings.step_limit / max(size, 1e-300)), settings.lower, settings.upper
-                )
+                size = float(np.max(np.abs(dp / p)))
+                p = np.clip(p + dp * min(1.0, settings.step_limit / max(size, 1e-300)), settings.lower, settings.upper)
                 updated[tick] = True
         trajectory[tick] = p
         if estimate_every and tick % estimate_every == 0 and weight > N_P + 1:
@@ -247,15 +253,17 @@ def constrained_least_squares(m: Float, b: Float, start: npt.ArrayLike, iteratio
         t = theta(q)
         return float(t @ m @ t - 2 * b @ t)
 
+    previous = math.inf
     for _ in range(iterations):
         c = jacobian(p)
         dp = _solve(c.T @ m @ c, c.T @ (b - m @ theta(p)))
-        if np.max(np.abs(dp / p)) < 1e-13:
-            return p + dp
-        factor = min(1.0, 0.5 / np.max(np.abs(dp / p)))
-        while cost(p + factor * dp) > cost(p) and factor > 1e-6:
-            factor /= 2
-        if factor <= 1e-6:  # rounding of the cost, not a wrong direction: the step is already negligible
+        size = float(np.max(np.abs(dp / p)))
+        if size < 1e-6 and size > previous / 2:  # no longer shrinking: the rounding of F is reached
             return p
+        factor = min(1.0, 0.5 / size) if size > 0 else 1.0
+        # Rounding hides the cost of relative steps below sqrt(eps / kappa), 1e-6: ask it well above.
+        while size > 1e-4 and factor > 1e-6 and cost(p + factor * dp) > cost(p):
+            factor /= 2
         p = p + factor * dp
+        previous = size
     raise PvidError("constrained least squares did not converge")

@@ -1,6 +1,6 @@
 """Simulated rigs: the two-link pendulum on a driven pivot (MATH.md, sections 1 and 6) and its sensors.
 
-The truth is integrated once with DOP853 and cached, so that many seeds of the sensor noise cost one integration.
+The truth is integrated once (DOP853) and cached, so that many seeds of the sensors' noise cost one integration.
 Angles in the state are absolute (from the vertical): ``a1 = phi1``, ``a2 = phi1 + phi``.
 """
 
@@ -44,7 +44,8 @@ class Pendulum:
     g : float
         Part of gravity that lies in the plane of motion, g* [m/s^2], > 0.
     damping1, damping2 : float
-        Viscous torque per unit of body 2's mass and angular rate, at the pivot and at the joint [m^2/s], >= 0.
+        Viscous torque at the pivot and at the joint, per unit of angular rate and of body 2's mass [m^2/s],
+        >= 0. The linear parameters do not contain it.
     """
 
     l1: float
@@ -83,7 +84,7 @@ class Pendulum:
         w, d1, d2 = (float(value) for value in p)
         if not is_physical((w, d1, d2)):
             raise PvidError(
-                f"No pendulum has w = {w:g}, d1 = {d1:g}, d2 = {d2:g}: w, d2 and d1 - d2 - 1 must be > 0."
+                f"No pendulum has w = {w:g}, d1 = {d1:g}, d2 = {d2:g}: w, d2 and d1 - d2 - 1 must be positive."
             )
         ratio2 = d1 - d2 - 1.0
         l2 = l1 * ratio2 / d2
@@ -118,8 +119,8 @@ class Tone:
             )
 
 
-# Smoothstep of degree 9, highest power first, and its derivatives 1..4. It runs from 0 to 1 over 0..1 with four
-# derivatives vanishing at both ends; its coefficients are integers, so it is exactly 0 and 1 there.
+# Smoothstep of degree 9, highest power first, and its derivatives 1..4. It runs from 0 to 1 over 0..1, and its
+# first four derivatives vanish at both ends: exactly, since the coefficients are integers.
 _SMOOTHSTEP: tuple[FloatArray, ...] = tuple(
     np.polyder(np.array([70.0, -315.0, 540.0, -420.0, 126.0, 0.0, 0.0, 0.0, 0.0, 0.0]), order)
     for order in range(5)
@@ -131,9 +132,10 @@ _ALWAYS = ((-math.inf, math.inf),)
 class Drive:
     """Vertical motion of the pivot y(t): tones, and the intervals during which they are on.
 
-    Outside the intervals the pivot stands at y = 0. At each finite end of an interval the tones' common amplitude
-    is ramped, inside the interval, by a smoothstep of degree 9, so that y and its derivatives up to the fourth are
-    continuous and `Simulation.exact` holds through the ramps. The tones' phases run on while the drive is off.
+    Outside the intervals the pivot stands at y = 0. At each finite end of an interval the tones' common
+    amplitude is ramped, inside the interval, by a smoothstep of degree 9, so that y and its derivatives up to
+    the fourth are continuous and `Simulation.exact` holds through the ramps. The tones' phases run on while the
+    drive is off.
 
     Parameters
     ----------
@@ -225,9 +227,7 @@ class Sensors:
         if not math.isfinite(self.phi_zero + self.skew_s + self.outlier_rad):
             raise PvidError("The sensors' phi_zero, skew_s and outlier_rad must be finite.")
         if not 0 <= self.outlier_fraction <= 1:
-            raise PvidError(
-                f"The sensors' outlier_fraction must be from 0 to 1, not {self.outlier_fraction:g}."
-            )
+            raise PvidError(f"The sensors' outlier_fraction must be in 0..1, not {self.outlier_fraction:g}.")
 
     def measure(self, phi: FloatArray, y: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:
         """Measured angle [rad] and pivot position [m] from the true ones, both of shape (n,).
@@ -235,7 +235,7 @@ class Sensors:
         Every random number is drawn whatever the settings, so that one seed gives one noise for all of them.
         """
         random = np.random.default_rng(seed)
-        offset = random.uniform(-0.5, 0.5) if self.random_offset else 0.0 * random.uniform(-0.5, 0.5)
+        offset = random.uniform(-0.5, 0.5) * self.random_offset
         phi_noise = self.phi_noise_lsb * random.standard_normal(phi.size)
         y_noise = self.y_noise_lsb * random.standard_normal(y.size)
         if self.phi_lsb > 0:
@@ -372,7 +372,7 @@ def _check_request(
         raise PvidError(f"The sample rate must be a positive number of Hz, not {sample_rate:g}.")
     if not (math.isfinite(duration) and 1 <= round(duration * sample_rate) <= _MAX_SAMPLES):
         raise PvidError(
-            f"The duration of {duration:g} s must hold from 1 to {_MAX_SAMPLES} samples at {sample_rate:g} Hz."
+            f"A run of {duration:g} s at {sample_rate:g} Hz must hold from 1 to {_MAX_SAMPLES} samples."
         )
     if not all(math.isfinite(angle) for angle in release):
         raise PvidError("The angles of release must be finite.")
@@ -380,9 +380,7 @@ def _check_request(
         raise PvidError(f"The seed must be zero or a positive integer, not {seed}.")
     for tone in drive.tones:
         if tone.frequency_hz > sample_rate / 2:
-            raise PvidError(
-                f"A tone of {tone.frequency_hz:g} Hz needs a sample rate above {sample_rate:g} Hz."
-            )
+            raise PvidError(f"A tone of {tone.frequency_hz:g} Hz cannot be sampled at {sample_rate:g} Hz.")
 
 
 def _sample_times(sample_rate: float, duration: float) -> FloatArray:
@@ -426,7 +424,7 @@ def _truth(
 
 
 def _pivot_acceleration(drive: Drive) -> Callable[[float], float]:
-    """y''(t) [m/s^2] for a scalar t: the same as ``drive.derivatives``, ten times as fast one instant at a time."""
+    """y''(t) [m/s^2] of ``drive.derivatives``, ten times as fast for one instant at a time."""
     tones = [(tone.amplitude_m, 2 * math.pi * tone.frequency_hz, tone.phase_rad) for tone in drive.tones]
     always = drive.on == _ALWAYS
     accelerations = [(amplitude * rate * rate, rate, phase) for amplitude, rate, phase in tones]
@@ -491,7 +489,10 @@ def _equations_of_motion(
 
 
 def _exact_derivatives(pendulum: Pendulum, state: FloatArray, pivot: FloatArray) -> Exact:
-    """Differentiate M a'' + D a' + (g + y'') K a = 0 as often as needed (Leibniz), from the state and y^(0..4)."""
+    """Derivatives of order 0..4, from the state and y^(0..4).
+
+    M a'' + D a' + (g + y'') K a = 0 is differentiated by Leibniz's rule.
+    """
     l1, l2 = pendulum.l1, pendulum.l2
     c1, c2 = pendulum.damping1, pendulum.damping2
     inverse_mass = np.linalg.inv(np.array([[l1 * l1, l1 * l2], [l1 * l2, l2 * l2 + pendulum.rho2**2]]))

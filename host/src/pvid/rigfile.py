@@ -29,7 +29,7 @@ Law = Literal["stationary", "pseudovelocity"]
 Core = Literal["f32", "q31", "f64"]
 Differentiator = Literal["savitzky-golay", "finite-difference"]
 
-# The weak form wants about one slow period; the strong form, with degree 12 and a 20-bit encoder, is least wrong here.
+# The weak form wants about one slow period; the strong form is least wrong here with degree 12 and 20 bits.
 _WINDOW_S: dict[Form, float] = {"weak": 1.25, "strong": 0.241}
 
 
@@ -88,7 +88,7 @@ class Identifier:
     form : "weak" (integrals, for real encoders) or "strong" (the paper's derivatives, for 20 bits and more)
     law : "stationary" (with feedback, converges) or "pseudovelocity" (the paper's equation (5), literally)
     core : "f32", "q31" (fixed point) or "f64" (the oracle)
-    window_s : length of the weak form's or of the differentiator's window [s]; 0: the form's own, see `window`
+    window_s : window of the weak form or of the differentiator [s]; 0: the form's own, see `window`
     differentiator : of the strong form
     degree : of its Savitzky-Golay polynomial
     stride : samples between the differentiator's points
@@ -157,7 +157,7 @@ class RigFile:
 
     @classmethod
     def parse(cls, text: str) -> RigFile:
-        """From TOML text; PvidError names the key that is unknown, missing, of a wrong type or out of range."""
+        """From TOML text; PvidError names the key that is unknown, missing, of wrong type or out of range."""
         try:
             document = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -271,9 +271,8 @@ def _check_value(key: Field[Any], value: Any, place: str) -> None:
         raise PvidError(f"{name} must be {kind}, not {_shown(value)}")
     low, high, unit = key.metadata["low"], key.metadata["high"], key.metadata["unit"]
     if not low <= value <= high:
-        raise PvidError(
-            f"{name} must be from {low:g} to {high:g}{' ' + unit if unit else ''}, not {_shown(value)}"
-        )
+        wide = f"from {low:g} to {high:g} {unit}".rstrip()
+        raise PvidError(f"{name} must be {wide}, not {_shown(value)}")
 
 
 def _shown(value: Any) -> str:
@@ -291,11 +290,7 @@ def _lines(owner: Any) -> list[str]:
         if key.name in _TABLES or value is None:
             continue
         shown = (
-            f'"{value}"'
-            if isinstance(value, str)
-            else str(value).lower()
-            if isinstance(value, bool)
-            else repr(value)
+            f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)
         )
         unit = key.metadata.get("unit", "")
         lines.append(f"{key.name} = {shown}" + (f"  # {unit}" if unit else ""))

@@ -55,11 +55,20 @@ class StageCost:
 
 
 def _instructions(binary: Path, stage: str, ticks: int) -> int:
-    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(binary), stage, str(ticks)]
+    command = [
+        "valgrind",
+        "--tool=callgrind",
+        "--callgrind-out-file=/dev/null",
+        str(binary),
+        stage,
+        str(ticks),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     counted = re.search(r"Collected : (\d+)", done.stderr)
     if done.returncode != 0 or counted is None:
-        raise PvidError(f"counting {stage} failed: {done.stderr.strip().splitlines()[-1] if done.stderr else 'no output'}")
+        raise PvidError(
+            f"counting {stage} failed: {done.stderr.strip().splitlines()[-1] if done.stderr else 'no output'}"
+        )
     return int(counted.group(1))
 
 
@@ -77,7 +86,9 @@ def stage_costs(binary: Path) -> list[StageCost]:
         raise PvidError(f"{binary} is not built: run ./tools/test once")
 
     def per_tick(stage: str) -> int:
-        return round((_instructions(binary, stage, _MANY) - _instructions(binary, stage, _FEW)) / (_MANY - _FEW))
+        return round(
+            (_instructions(binary, stage, _MANY) - _instructions(binary, stage, _FEW)) / (_MANY - _FEW)
+        )
 
     harness = per_tick("nothing")
     return [StageCost(stage, per_tick(stage) - harness) for stage in STAGES]

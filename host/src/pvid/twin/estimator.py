@@ -110,7 +110,8 @@ class Estimator:
         rhs = self.gain * force + (np.float32(1) - self.gain) * self.innovation
         self.innovation = np.where(due, np.float32(0), self.innovation)
         f = cholesky.factor(s)
-        excited = ~(f.first_pivot < self.kappa_min)
+        own = (f.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
+        excited = (f.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
         dp = cholesky.solve(f, rhs)
         ratio = dp / self.p
         size = np.zeros(len(due), np.float32)

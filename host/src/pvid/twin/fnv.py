@@ -17,7 +17,10 @@ def fold_bytes(running: int, data: bytes) -> int:
 
 
 def running_hashes(
-    p: npt.NDArray[np.float32], sums: npt.NDArray[np.float32], reason: npt.NDArray[np.uint8], start: int = START
+    p: npt.NDArray[np.float32],
+    sums: npt.NDArray[np.float32],
+    reason: npt.NDArray[np.uint8],
+    start: int = START,
 ) -> npt.NDArray[np.uint32]:
     """Hash after every tick of one lane, over p [ticks, n_p], sums [ticks, n] and reason [ticks].
 

@@ -37,7 +37,8 @@ _LEFT = np.array([a for a, _ in _pairs()])
 _RIGHT = np.array([b for _, b in _pairs()])
 
 AA, AE, EE = 0, 1, 2
-_SEQUENCES_2 = np.array([[3, 4, 5, 6], [7, 8, 9, 10], [MOMENTS + j for j in _PHI2]])  # A, E, Y times -u^k phi''
+# A, E and Y times -u^k phi'' (and -u^k phi), by descending k
+_SEQUENCES_2 = np.array([[3, 4, 5, 6], [7, 8, 9, 10], [MOMENTS + j for j in _PHI2]])
 _SEQUENCES_0 = np.array([[*range(11, 16)], [*range(16, 21)], [MOMENTS + j for j in _PHI0]])
 _PHI2_PHI2, _PHI2_PHI0, _PHI0_PHI0 = 21, 28, 36
 
@@ -69,7 +70,8 @@ def rows(phi: Float32, u: Float32) -> tuple[Float32, Float32]:
 def terms(n: Float32, y: Float32) -> Float32:
     """What a row adds to the sums: [SUMS, lanes] from N [11, lanes] and Y [lanes]."""
     extended = np.concatenate([n, y[None], np.ones_like(y)[None]])
-    return extended[_LEFT] * extended[_RIGHT]
+    product: Float32 = extended[_LEFT] * extended[_RIGHT]
+    return product
 
 
 def _shift(sequence: Float32, coefficients: list[Float32], w: Float32, orders: int) -> list[Float32]:

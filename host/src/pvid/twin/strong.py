@@ -14,6 +14,7 @@ from pvid.twin.differentiator import derivatives
 from pvid.twin.estimator import Estimator
 
 Float32 = npt.NDArray[np.float32]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass
@@ -40,7 +41,7 @@ class StrongTwin:
         self.config = config
         self.estimator = Estimator(estimators or [config.estimator], config.sample_rate)
 
-    def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, npt.NDArray[np.bool_], Float32]:
+    def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, Mask, Mask]:
         """N [ticks, 11], Y [ticks], whether a tick has a row, and whether its sample was finite."""
         phi32 = np.asarray(phi, np.float32)
         y32 = np.asarray(y, np.float32)
@@ -70,8 +71,8 @@ def run_rows(
     n: Float32,
     y: Float32,
     *,
-    ready: npt.NDArray[np.bool_] | None = None,
-    finite: npt.NDArray[np.bool_] | None = None,
+    ready: Mask | None = None,
+    finite: Mask | None = None,
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
 ) -> TwinRecord:
