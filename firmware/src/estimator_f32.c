@@ -144,19 +144,22 @@ pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimat
 
 /* ---- rows ---- */
 
-/* One integer comparison an entry: the bits of |x| order as |x| does, infinities and NaN last. */
-static pvid_reason row_is_usable(uint8_t n_theta, const float n[], float y)
+/* The sum of squares of a row is within its limit only if every entry is a number of reasonable size:
+ * one comparison for all of them. Which it was that broke the rule is asked only afterwards. */
+static pvid_reason row_is_usable(size_t n_theta, const float n[], float y)
 {
-    const uint32_t limit = pvid_bits_f32(PVID_ROW_LIMIT);
-    uint32_t largest = pvid_bits_f32(y) & 0x7FFFFFFFu;
+    float squares = y * y;
     for (size_t i = 0; i < n_theta; i++) {
-        const uint32_t magnitude = pvid_bits_f32(n[i]) & 0x7FFFFFFFu;
-        largest = (magnitude > largest) ? magnitude : largest;
+        squares += n[i] * n[i];
     }
-    if (largest >= 0x7F800000u) {
-        return PVID_REJECTED_NOT_FINITE;
+    if (squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {
+        return PVID_ACCUMULATED;
     }
-    return (largest > limit) ? PVID_REJECTED_SATURATED : PVID_ACCUMULATED;
+    bool finite = pvid_finite_f32(y);
+    for (size_t i = 0; i < n_theta; i++) {
+        finite = finite && pvid_finite_f32(n[i]);
+    }
+    return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
 }
 
 /* out[n_p] = C^T x for the non-zeros c of C. */
@@ -261,7 +264,7 @@ static void project_by_pattern(const pvid_model_f32 *model, const float c[], con
 
 /* S = C^T M C and F = C^T (B - M theta) at the present p. Returns what to add to yy for the sum of
  * squared residuals. */
-static float project(const pvid_estimator_f32 *self, const float sums[], float s[][PVID_MAX_P], float f[])
+static inline float project(const pvid_estimator_f32 *self, const float sums[], float s[][PVID_MAX_P], float f[])
 {
     const pvid_model_f32 *model = self->model;
     const float *b = &sums[model->n_moments];
@@ -301,17 +304,17 @@ static void follow_estimate(pvid_estimator_f32 *self, const float sums[])
 }
 
 /* How far dp goes, as a part of what each parameter is measured by: its own value where it is
- * positive, else the standard deviation of its start. Not finite if dp is not. */
+ * positive, else the standard deviation of its start. Not finite if dp is not: the bits of |x| order
+ * as |x| does, infinity and NaN last. */
 static float relative_size(const pvid_estimator_f32 *self, const float dp[])
 {
-    float largest = 0.0f;
+    uint32_t largest = 0;
     for (size_t a = 0; a < self->model->n_p; a++) {
-        const float reference = is_positive(self->model, a) ? self->p[a] : self->start_sd[a];
-        const float ratio = dp[a] / reference;
-        const float size = (ratio < 0.0f) ? -ratio : ratio;
-        largest = (size <= largest) ? largest : size; /* lets NaN through, and keeps it */
+        const float *reference = is_positive(self->model, a) ? self->p : self->start_sd;
+        const uint32_t bits = pvid_bits_f32(dp[a] / reference[a]) & 0x7FFFFFFFu;
+        largest = (bits > largest) ? bits : largest;
     }
-    return largest;
+    return pvid_from_bits_f32(largest);
 }
 
 /* p += dp, shortened to the step limit, within the bounds. */
@@ -349,7 +352,7 @@ static bool is_excited(const pvid_estimator_f32 *self, float kappa, float diagon
 }
 
 /* One step of p from the sums; `gain` is g of estimator.h. */
-static pvid_reason solve(pvid_estimator_f32 *self, float gain, const float sums[])
+static inline pvid_reason solve(pvid_estimator_f32 *self, float gain, const float sums[])
 {
     float s[PVID_MAX_P][PVID_MAX_P];
     float rhs[PVID_MAX_P];

@@ -19,6 +19,19 @@ static float noise(void)
     return ((float)(generator >> 8) / 8388608.0f) - 1.0f;
 }
 
+/* x[k+1] = 2 c x[k] - x[k-1]: a cosine without libm. */
+typedef struct {
+    float cosine, now, before;
+} oscillator;
+
+static float tone(oscillator *self)
+{
+    const float next = (2.0f * self->cosine * self->now) - self->before;
+    self->before = self->now;
+    self->now = next;
+    return self->before;
+}
+
 #define SAMPLES 1024u
 static float phi_samples[SAMPLES], y_samples[SAMPLES];
 static float derivatives_phi[SAMPLES][PVID_ORDERS], derivatives_u[SAMPLES][3];
@@ -29,12 +42,16 @@ static rls_f32 rls;
 
 static void prepare(void)
 {
+    /* cos(2 pi f / 1000) for the rig's modes and two of its tones: smooth enough to be differentiated */
+    oscillator slow = {0.9999891f, 1.0f, 0.9999891f};
+    oscillator fast = {0.9998706f, 1.0f, 0.9998706f};
+    oscillator pivot_slow = {0.9999761f, 1.0f, 0.9999761f};
+    oscillator pivot_fast = {0.9996682f, 1.0f, 0.9996682f};
     static const float scale_phi[PVID_ORDERS] = {0.1f, 1.0f, 24.0f, 300.0f, 13000.0f};
     static const float scale_u[3] = {8.0f, 150.0f, 3000.0f};
     for (uint32_t i = 0; i < SAMPLES; i++) {
-        const float x = (float)i / (float)SAMPLES; /* a parabola: smooth enough to be differentiated */
-        phi_samples[i] = 0.1f * x * (1.0f - x);
-        y_samples[i] = 0.006f * x * (x - 0.5f);
+        phi_samples[i] = (0.08f * tone(&slow)) + (0.02f * tone(&fast));
+        y_samples[i] = (0.006f * tone(&pivot_slow)) + (0.004f * tone(&pivot_fast));
         for (uint32_t k = 0; k < PVID_ORDERS; k++) {
             derivatives_phi[i][k] = scale_phi[k] * noise();
         }

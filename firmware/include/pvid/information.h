@@ -18,7 +18,7 @@
 /* Layout of the sums: n_moments of M, n_theta of B, yy, weight. */
 #define PVID_MAX_SUMS (PVID_MAX_MOMENTS + PVID_MAX_THETA + 2)
 
-/* No entry of a row may exceed this: 2^32 rows at the limit still fit into float32. */
+/* The root of a row's sum of squares may not exceed this: 2^32 such rows still fit into float32. */
 #define PVID_ROW_LIMIT 1.0e14f
 
 typedef struct {
@@ -35,8 +35,8 @@ typedef struct {
  * 0 for none (else at least 4). */
 void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model, float forgetting_groups);
 
-/* Adds one row and writes the values of the sums with it, as pvid_information_read_f32 would: every
- * |n[i]| and |y| must be at most PVID_ROW_LIMIT. Cost: a product and two additions a sum. */
+/* Adds one row and writes the values of the sums with it, as pvid_information_read_f32 would: the
+ * row must be within PVID_ROW_LIMIT. Cost: a product and two additions a sum. */
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS]);
 

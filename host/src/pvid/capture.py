@@ -1,8 +1,8 @@
 """Recorded runs on disk: CSV (plain or gzip), NPZ and Parquet, with every check a stranger's file needs.
 
-A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order, and may have more. ``t`` is uniform:
-a gap is reported, never bridged. Whatever is wrong with a file is told in one sentence, as a `PvidError`, that
-names the file and, where there is one, the line and the column.
+A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order, and may have more. ``t`` is
+uniform: a gap is reported, never bridged. Whatever is wrong with a file is told in one sentence, as a
+`PvidError`, that names the file and, where there is one, the line and the column.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ UNITS = {"t": "s", "phi": "rad", "y": "m"}
 MIN_ROWS = 5
 # A step of t longer than this many periods is a gap: a sample is missing.
 _GAP_PERIODS = 1.5
-# Largest departure of t from a uniform clock [periods]. On the standard rig at 1 kHz (phi' up to 1 rad/s) it is
-# worth 1e-4 rad, half the encoder's noise, and it leaves room for time stamps with few decimals.
+# Largest departure of t from a uniform clock [periods]. On the standard rig at 1 kHz (phi' up to 1 rad/s) it
+# is worth 1e-4 rad, half the encoder's noise, and it leaves room for time stamps with few decimals.
 _JITTER_PERIODS = 0.1
 # w is proportional to the square of the sample rate: 1e-4 costs 0.02 %, what a good run's standard error is.
 _RATE_TOLERANCE = 1e-4
@@ -100,8 +100,8 @@ class _Table:
 def read_run(path: str | os.PathLike[str], rate: float | None = None) -> Run:
     """Read a run from ``.csv``, ``.csv.gz``, ``.npz`` or ``.parquet``.
 
-    Columns other than t, phi and y are kept in `Run.columns` when they hold one number a row (an empty cell is
-    NaN), and left out otherwise.
+    Columns other than t, phi and y are kept in `Run.columns` when they hold one number a row (an empty cell
+    is NaN), and left out otherwise.
 
     Parameters
     ----------
@@ -316,7 +316,8 @@ def _csv_lines(path: Path, content: bytes) -> tuple[list[str], bool]:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise PvidError(f"{path} is UTF-16 text, where UTF-8 is wanted.")
     if b"\x00" in content:
-        raise PvidError(f"{path} is not a text file (it holds a zero byte).")
+        line = _line_of(content, content.index(b"\x00"))
+        raise PvidError(f"{path}, line {line}: a zero byte, so this is not a text file.")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -342,9 +343,7 @@ def _csv_rows(path: Path, lines: list[str]) -> list[list[str]]:
             try:
                 rows.append(next(csv.reader([line], strict=True)))
             except csv.Error as error:
-                raise PvidError(
-                    f"{path}, line {number}: a malformed quoted cell ({_reason(error)})."
-                ) from error
+                raise PvidError(f"{path}, line {number}: a malformed quoted cell ({_reason(error)}).") from error
         elif line and not line.isspace():
             rows.append(line.split(","))
         else:
@@ -355,14 +354,14 @@ def _csv_rows(path: Path, lines: list[str]) -> list[list[str]]:
 def _check_last_cell(path: Path, name: str, cells: list[str]) -> None:
     """Refuse a file that stops in the middle of its last number.
 
-    The last line may lack its end (RFC 4180). But a cell shorter than all others of its column is then taken for
-    what was left of a number when the file was cut.
+    The last line may lack its end (RFC 4180). But a cell shorter than all others of its column is then taken
+    for what was left of a number when the file was cut.
     """
     lengths = [len(cell.lstrip("+-")) for cell in cells]
     if lengths[-1] < min(lengths[:-1]):
         raise PvidError(
-            f"{path}, line {len(cells) + 1}, column {name}: the file seems truncated, its last line has no end "
-            f"and {_shown(cells[-1])} is shorter than every number before it (if it is whole, end the line)."
+            f"{path}, line {len(cells) + 1}, column {name}: the file seems truncated, its last line has no "
+            f"end and {_shown(cells[-1])} is shorter than every number before it (if it is whole, end the line)."
         )
 
 

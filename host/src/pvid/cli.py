@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -380,7 +381,8 @@ def bench_cost(update: Path | None) -> int:
     """Instructions a tick by stage, by callgrind, beside recursive least squares (needs valgrind)."""
     from pvid.bench import cost
 
-    costs = cost.stage_costs(cost.default_binary())
+    with tempfile.TemporaryDirectory() as folder:
+        costs = cost.stage_costs(cost.build(Path(folder)))
     _update_readme(update, "cost", cost.as_markdown(costs, cost.state_bytes(Native())))
     return DONE
 

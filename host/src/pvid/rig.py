@@ -1,6 +1,6 @@
 """Simulated rigs: the two-link pendulum on a driven pivot (MATH.md, sections 1 and 6) and its sensors.
 
-The truth is integrated once (DOP853) and cached, so that many seeds of the sensors' noise cost one integration.
+The truth is integrated once (DOP853) and cached: many seeds of the sensors' noise cost one integration.
 Angles in the state are absolute (from the vertical): ``a1 = phi1``, ``a2 = phi1 + phi``.
 """
 
@@ -83,9 +83,7 @@ class Pendulum:
         """
         w, d1, d2 = (float(value) for value in p)
         if not is_physical((w, d1, d2)):
-            raise PvidError(
-                f"No pendulum has w = {w:g}, d1 = {d1:g}, d2 = {d2:g}: w, d2 and d1 - d2 - 1 must be positive."
-            )
+            raise PvidError(f"No pendulum has w = {w:g}, d1 = {d1:g}, d2 = {d2:g}: w, d2 and d1 - d2 - 1 must be > 0.")
         ratio2 = d1 - d2 - 1.0
         l2 = l1 * ratio2 / d2
         return cls(l1=l1, l2=l2, rho2=l2 / math.sqrt(ratio2), g=w * l1)
@@ -119,11 +117,10 @@ class Tone:
             )
 
 
-# Smoothstep of degree 9, highest power first, and its derivatives 1..4. It runs from 0 to 1 over 0..1, and its
+# Smoothstep of degree 9, highest power first, and its derivatives 1..4. It runs from 0 to 1 over 0..1; its
 # first four derivatives vanish at both ends: exactly, since the coefficients are integers.
 _SMOOTHSTEP: tuple[FloatArray, ...] = tuple(
-    np.polyder(np.array([70.0, -315.0, 540.0, -420.0, 126.0, 0.0, 0.0, 0.0, 0.0, 0.0]), order)
-    for order in range(5)
+    np.polyder(np.array([70.0, -315.0, 540.0, -420.0, 126.0, 0.0, 0.0, 0.0, 0.0, 0.0]), order) for order in range(5)
 )
 _ALWAYS = ((-math.inf, math.inf),)
 
@@ -134,8 +131,8 @@ class Drive:
 
     Outside the intervals the pivot stands at y = 0. At each finite end of an interval the tones' common
     amplitude is ramped, inside the interval, by a smoothstep of degree 9, so that y and its derivatives up to
-    the fourth are continuous and `Simulation.exact` holds through the ramps. The tones' phases run on while the
-    drive is off.
+    the fourth are continuous and `Simulation.exact` holds through the ramps. The tones' phases run on while
+    the drive is off.
 
     Parameters
     ----------
@@ -295,9 +292,7 @@ STANDARD_RELEASE = (0.06, 0.14)
 
 def standard_sensors(bits: int = 14) -> Sensors:
     """Sensors of the standard rig (MATH.md section 6) with an encoder of ``bits`` bits a turn."""
-    return Sensors(
-        phi_lsb=2 * math.pi / 2**bits, phi_noise_lsb=0.5, random_offset=True, y_lsb=5e-6, y_noise_lsb=0.4
-    )
+    return Sensors(phi_lsb=2 * math.pi / 2**bits, phi_noise_lsb=0.5, random_offset=True, y_lsb=5e-6, y_noise_lsb=0.4)
 
 
 def standard_start(seed: int) -> FloatArray:
@@ -371,9 +366,7 @@ def _check_request(
     if not (math.isfinite(sample_rate) and sample_rate > 0):
         raise PvidError(f"The sample rate must be a positive number of Hz, not {sample_rate:g}.")
     if not (math.isfinite(duration) and 1 <= round(duration * sample_rate) <= _MAX_SAMPLES):
-        raise PvidError(
-            f"A run of {duration:g} s at {sample_rate:g} Hz must hold from 1 to {_MAX_SAMPLES} samples."
-        )
+        raise PvidError(f"A run of {duration:g} s at {sample_rate:g} Hz must hold from 1 to {_MAX_SAMPLES} samples.")
     if not all(math.isfinite(angle) for angle in release):
         raise PvidError("The angles of release must be finite.")
     if seed < 0:

@@ -32,9 +32,27 @@ _FEW, _MANY = 640, 1280  # multiples of the fold's block of 64 ticks
 RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32)
 
 
-def default_binary() -> Path:
-    """Where tools/test builds the harness."""
-    return Path(__file__).resolve().parents[4] / "build" / "gcc" / "tests" / "cost" / "tick_cost"
+def build(folder: Path, compiler: str = "gcc", level: str = "-O2") -> Path:
+    """Compiles tests/cost with the core as a device does, into `folder`; returns the binary.
+
+    Raises
+    ------
+    PvidError
+        When the compiler is missing or refuses.
+    """
+    root = Path(__file__).resolve().parents[4]
+    sources = sorted([*(root / "firmware" / "src").glob("*.c"), *(root / "tests" / "cost").glob("*.c")])
+    binary = folder / "tick_cost"
+    command = [compiler, "-std=c99", level, "-ffp-contract=off", f"-I{root / 'firmware' / 'include'}"]
+    try:
+        done = subprocess.run(
+            [*command, *map(str, sources), "-o", str(binary), "-lm"], capture_output=True, text=True, check=False
+        )
+    except OSError as error:
+        raise PvidError(f"cannot run {compiler}: {error.strerror}") from error
+    if done.returncode != 0:
+        raise PvidError(f"{compiler} refused the cost harness: {done.stderr.strip()[:200]}")
+    return binary
 
 
 def state_bytes(native: Native) -> dict[str, int]:
@@ -78,12 +96,10 @@ def stage_costs(binary: Path) -> list[StageCost]:
     Raises
     ------
     PvidError
-        When valgrind or the binary is missing.
+        When valgrind is missing or the binary fails.
     """
     if shutil.which("valgrind") is None:
         raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
-    if not binary.is_file():
-        raise PvidError(f"{binary} is not built: run ./tools/test once")
 
     def per_tick(stage: str) -> int:
         return round(

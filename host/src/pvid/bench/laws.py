@@ -82,12 +82,10 @@ def run_law(
     n: Float32,
     y: Float32,
     starts: npt.NDArray[np.float64],
-    law: str,
-    setting: str,
-    start: str,
-    **changes: object,
+    labels: tuple[str, str, str],
+    changes: dict[str, object],
 ) -> LawRow:
-    """One row of the table: every start of `starts` [runs, 3] with the settings in `changes`."""
+    """One row of the table, labelled (law, setting, start): every start [runs, 3] with the settings in `changes`."""
     truth = STANDARD_PENDULUM.linear
     last, settled = [], []
     for one in starts:
@@ -100,9 +98,7 @@ def run_law(
     errors = np.array(last)
     good = errors < 0.01
     return LawRow(
-        law,
-        setting,
-        start,
+        *labels,
         len(starts),
         int(good.sum()),
         int((errors < 1e-4).sum()),
@@ -140,7 +136,7 @@ def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None)
         )
     for done, (starts, law, setting, off, changes) in enumerate(jobs):
         progress(done)
-        yield run_law(native, n, y, starts, law, setting, off, **changes)
+        yield run_law(native, n, y, starts, (law, setting, off), changes)
 
 
 NUMBER_OF_ROWS = len(PRIORS) + len(FEEDBACKS_HZ) + 1 + 2 * len(START_ERRORS)

@@ -16,7 +16,6 @@ Float32 = npt.NDArray[np.float32]
 
 ROW_LIMIT = np.float32(1.0e14)
 RESIDUAL_FLOOR = np.float32(4.8e-7)
-_LARGEST_BITS = np.uint32(0x7F800000)
 _COUNTERS = (
     "rows",
     "updates",
@@ -77,9 +76,12 @@ class Estimator:
             return self._step(n, y)
 
     def _step(self, n: Float32, y: Float32) -> npt.NDArray[np.uint8]:
-        largest = np.abs(np.concatenate([n, y[None]])).view(np.uint32).max(axis=0)
-        not_finite = largest >= _LARGEST_BITS
-        saturated = ~not_finite & (largest > ROW_LIMIT.view(np.uint32))
+        squares = y * y
+        for entry in n:
+            squares = squares + entry * entry
+        usable = squares <= ROW_LIMIT * ROW_LIMIT
+        not_finite = ~usable & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
+        saturated = ~usable & ~not_finite
         taken = ~not_finite & ~saturated
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
         reason[not_finite] = Reason.REJECTED_NOT_FINITE
