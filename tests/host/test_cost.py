@@ -6,6 +6,7 @@ import platform
 import subprocess
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import ROOT
@@ -16,9 +17,11 @@ from pvid.native import Native
 
 ALLOWANCE = 1.02
 
+Budget = dict[str, dict[str, Any]]
+
 
 @pytest.fixture(scope="module")
-def budget() -> dict[str, dict[str, int]]:
+def budget() -> Budget:
     return tomllib.loads((ROOT / "tests" / "budget.toml").read_text(encoding="utf-8"))
 
 
@@ -37,7 +40,7 @@ def test_the_estimators_whole_step_is_cheaper_than_recursive_least_squares(costs
     assert costs["estimator"] < costs["rls"]
 
 
-def test_no_stage_exceeds_its_budget(costs: dict[str, int], budget: dict[str, dict[str, int]]) -> None:
+def test_no_stage_exceeds_its_budget(costs: dict[str, int], budget: Budget) -> None:
     allowed = dict(budget["instructions"])
     compiler = allowed.pop("compiler")
     if platform.machine() != "x86_64" or compiler != f"gcc {gcc_major()}":
@@ -46,13 +49,13 @@ def test_no_stage_exceeds_its_budget(costs: dict[str, int], budget: dict[str, di
     assert not over
 
 
-def test_no_state_exceeds_its_budget(native: Native, budget: dict[str, dict[str, int]]) -> None:
+def test_no_state_exceeds_its_budget(native: Native, budget: Budget) -> None:
     assert set(native.state_bytes) == set(budget["state_bytes"])
     over = {name: size for name, size in native.state_bytes.items() if size > ALLOWANCE * budget["state_bytes"][name]}
     assert not over
 
 
-def test_the_readme_shows_what_is_measured(costs: dict[str, int], budget: dict[str, dict[str, int]]) -> None:
+def test_the_readme_shows_what_is_measured(costs: dict[str, int], budget: Budget) -> None:
     if budget["instructions"]["compiler"] != f"gcc {gcc_major()}":
         return
     readme = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -16,6 +16,7 @@ import os
 import re
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -244,9 +245,9 @@ def _shortest_decimal(value: float, tolerance: float) -> float:
 
 def _check_names(path: Path, names: list[str], where: str) -> None:
     """Refuse missing and repeated names; an empty name (a row index) may repeat, it is never kept."""
-    for name in names:
-        if name and names.count(name) > 1:
-            raise PvidError(f"{path}{where}: column {_shown(name)} appears {names.count(name)} times.")
+    for name, times in Counter(names).items():
+        if name and times > 1:
+            raise PvidError(f"{path}{where}: column {_shown(name)} appears {times} times.")
     missing = [name for name in REQUIRED if name not in names]
     if missing:
         found = ", ".join(_shown(name) for name in names[:8]) + (", ..." if len(names) > 8 else "")

@@ -26,6 +26,9 @@ Truth = Literal["linear", "full"]
 # 1e-7 of a 14-bit encoder's LSB.
 _RTOL = 1e-12
 _ATOL = 1e-14
+# The standard rig takes 700 evaluations of its equations a second. A motion that takes 30 times as many is no
+# rig's, and would keep the user waiting for ever.
+_MAX_EVALUATIONS_PER_S = 20_000
 _MAX_SAMPLES = 10_000_000  # 10 hours at 278 Hz; beyond, the request is a slip of units
 
 
@@ -392,9 +395,19 @@ def _truth(
 ) -> tuple[FloatArray, Exact | None]:
     """State (n, 4) at the sample times and, for the linear truth, its exact derivatives; all read-only."""
     t = _sample_times(sample_rate, duration)
+    equations = _equations_of_motion(pendulum, drive, truth)
+    left = math.ceil(_MAX_EVALUATIONS_PER_S * (1.0 + duration))
+
+    def counted(t: float, x: FloatArray) -> tuple[float, float, float, float]:
+        nonlocal left
+        left -= 1
+        if left < 0 or not math.isfinite(x.sum()):
+            raise PvidError("The simulated motion grows without bound: choose a weaker drive or other tones.")
+        return equations(t, x)
+
     with np.errstate(over="ignore", invalid="ignore"):
         solution = solve_ivp(
-            _equations_of_motion(pendulum, drive, truth),
+            counted,
             (0.0, t[-1]),
             [release[0], release[1], 0.0, 0.0],
             method="DOP853",
