@@ -70,9 +70,7 @@ def test_twenty_starts_equal_the_twin_in_every_build(
     starts = [standard_start(seed) for seed in range(STARTS)]
     lanes = [lane for variant in variants(config.estimator) for lane in lanes_of(variant, starts)]
     differing = compare_lanes([matrix[name] for name in BUILDS], lanes, n[ready], y[ready], 1000.0)
-    assert not differing, [
-        (native.build, lane, str(difference)) for native, lane, difference in differing[:3]
-    ]
+    assert not differing, [(native.build, lane, str(difference)) for native, lane, difference in differing[:3]]
 
 
 def test_a_changed_bit_is_found_and_named(native: Native, standard_20_bits: Simulation) -> None:

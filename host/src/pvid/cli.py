@@ -24,6 +24,8 @@ from rich.table import Table
 from pvid import __version__
 from pvid.capture import read_run, write_run
 from pvid.compare import Comparison, compare_run
+from pvid.ctables import bank_header
+from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
 from pvid.identify import LINEAR, PHYSICAL, UNITS, Identification, identify
 from pvid.native import Native
@@ -83,13 +85,9 @@ def commands() -> None:
 
 
 @commands.command()
-@click.option(
-    "--figure", type=click.Path(path_type=Path), default=Path("pvid-demo.png"), help="Where the figure goes."
-)
+@click.option("--figure", type=click.Path(path_type=Path), default=Path("pvid-demo.png"), help="Where the figure goes.")
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
-@click.option(
-    "--bits", default=20, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder."
-)
+@click.option("--bits", default=20, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
 def demo(figure: Path, seed: int, bits: int, truth: str) -> int:
     """Simulates the standard rig, identifies it in the C core, compares every bit with numpy."""
@@ -178,12 +176,8 @@ def _tone(text: str) -> Tone:
 @click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no zero.")
 @click.option("--noise", type=float, help="White noise of the encoder [LSB].  [default: 0.5]")
 @click.option("--zero", default=0.0, show_default=True, help="Zero error of the encoder [rad].")
-@click.option(
-    "--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s]."
-)
-@click.option(
-    "--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable."
-)
+@click.option("--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s].")
+@click.option("--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable.")
 @click.option(
     "--release",
     nargs=2,
@@ -201,9 +195,7 @@ def _tone(text: str) -> Tone:
     "--damping", default=0.0, show_default=True, help="Viscous friction of both joints per unit mass [m^2/s]."
 )
 @click.option("--seed", default=0, show_default=True)
-@click.option(
-    "--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]"
-)
+@click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
 def simulate_command(**options: Any) -> int:
     """Simulates a rig into OUT (.csv, .csv.gz, .npz, .parquet) and writes the rig file that goes with it."""
     pendulum = Pendulum(
@@ -243,9 +235,7 @@ def simulate_command(**options: Any) -> int:
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())
-    messages.print(
-        f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}"
-    )
+    messages.print(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
     return DONE
 
 
@@ -259,12 +249,8 @@ def _rig_path(out: Path) -> Path:
 
 def _rig_options(function: Callable[..., int]) -> Callable[..., int]:
     options = [
-        click.option(
-            "--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML)."
-        ),
-        click.option(
-            "--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."
-        ),
+        click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML)."),
+        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."),
         click.option("--form", type=click.Choice(["weak", "strong"]), help="Overrides the rig file."),
     ]
     for option in reversed(options):
@@ -324,12 +310,36 @@ def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str |
         with progress_bar(f"{one} law", len(run.t)) as advance:
             outcome = compare_run(native, strong_config(chosen, run.sample_rate), run.phi, run.y, advance)
         verdict = "equal" if outcome.equal else f"DIFFERENT: {outcome.difference}"
-        table.add_row(
-            "f32", chosen.identifier.form, one, str(outcome.ticks), f"{outcome.core_hash:08x}", verdict
-        )
+        table.add_row("f32", chosen.identifier.form, one, str(outcome.ticks), f"{outcome.core_hash:08x}", verdict)
         failed |= not outcome.equal
     Console(width=None if sys.stdout.isatty() else 140).print(table)
     return DIFFERENT if failed else DONE
+
+
+# ---- tables for the core
+
+
+@commands.command(name="fir-table")
+@click.option("--points", default=241, show_default=True, help="Points of the Savitzky-Golay window, odd.")
+@click.option("--degree", default=12, show_default=True, help="Degree of its polynomial, 4 to 12.")
+@click.option("--difference", is_flag=True, help="Five-point central differences instead.")
+@click.option("--stride", default=1, show_default=True, help="Samples between points.")
+@click.option("--name", default="fir_bank", show_default=True, help="Name of the array in C.")
+@click.option("--check", type=click.Path(path_type=Path), help="Only tell whether this file is what would be printed.")
+def fir_table(points: int, degree: int, difference: bool, stride: int, name: str, check: Path | None) -> int:
+    """Prints a bank of derivative filters as a C header for pvid_fir_bank_f32."""
+    bank = finite_difference(stride) if difference else savitzky_golay(points, degree, stride)
+    kind = "--difference" if difference else f"--points {points} --degree {degree}"
+    header = bank_header(bank, name, f"pvid fir-table {kind} --stride {stride} --name {name}")
+    if check is None:
+        click.echo(header, nl=False)
+        return DONE
+    try:
+        same = check.read_text(encoding="utf-8") == header
+    except (OSError, UnicodeDecodeError) as error:
+        raise PvidError(f"cannot read {check}: {error}") from error
+    click.echo(f"{check}: {'as generated' if same else 'DIFFERENT from what this command generates'}")
+    return DONE if same else DIFFERENT
 
 
 # ---- bench

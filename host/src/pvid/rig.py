@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from pvid.capture import Run
+from pvid.capture import MIN_ROWS, Run
 from pvid.errors import PvidError
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,9 +26,10 @@ Truth = Literal["linear", "full"]
 # 1e-7 of a 14-bit encoder's LSB.
 _RTOL = 1e-12
 _ATOL = 1e-14
-# The standard rig takes 700 evaluations of its equations a second. A motion that takes 30 times as many is no
-# rig's, and would keep the user waiting for ever.
-_MAX_EVALUATIONS_PER_S = 20_000
+# The standard rig takes 2300 evaluations of its equations a second, 560 a period of its fastest tone. A motion
+# that takes ever more is running away, and would keep the user waiting for ever.
+_MAX_EVALUATIONS_PER_S = 50_000
+_MAX_EVALUATIONS_PER_PERIOD = 2_000
 _MAX_SAMPLES = 10_000_000  # 10 hours at 278 Hz; beyond, the request is a slip of units
 
 
@@ -368,8 +369,10 @@ def _check_request(
         raise PvidError(f"The truth must be 'linear' or 'full', not {truth!r}.")
     if not (math.isfinite(sample_rate) and sample_rate > 0):
         raise PvidError(f"The sample rate must be a positive number of Hz, not {sample_rate:g}.")
-    if not (math.isfinite(duration) and 1 <= round(duration * sample_rate) <= _MAX_SAMPLES):
-        raise PvidError(f"A run of {duration:g} s at {sample_rate:g} Hz must hold from 1 to {_MAX_SAMPLES} samples.")
+    if not (math.isfinite(duration) and MIN_ROWS <= round(duration * sample_rate) <= _MAX_SAMPLES):
+        raise PvidError(
+            f"A run of {duration:g} s at {sample_rate:g} Hz must hold {MIN_ROWS} to {_MAX_SAMPLES} samples."
+        )
     if not all(math.isfinite(angle) for angle in release):
         raise PvidError("The angles of release must be finite.")
     if seed < 0:
@@ -396,7 +399,8 @@ def _truth(
     """State (n, 4) at the sample times and, for the linear truth, its exact derivatives; all read-only."""
     t = _sample_times(sample_rate, duration)
     equations = _equations_of_motion(pendulum, drive, truth)
-    left = math.ceil(_MAX_EVALUATIONS_PER_S * (1.0 + duration))
+    fastest = max((tone.frequency_hz for tone in drive.tones), default=0.0)
+    left = math.ceil((_MAX_EVALUATIONS_PER_S + _MAX_EVALUATIONS_PER_PERIOD * fastest) * (1.0 + duration))
 
     def counted(t: float, x: FloatArray) -> tuple[float, float, float, float]:
         nonlocal left
