@@ -1,0 +1,127 @@
+/* Derivatives of polynomials are exact, at the window's centre, whatever the stride. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "pvid/pvid.h"
+
+static const double coefficients[5] = {0.7, -1.3, 2.1, 0.9, -0.4}; /* of t^k / k! */
+
+static double polynomial(int order, double t)
+{
+    double sum = 0.0;
+    double term = 1.0;
+    for (int k = order; k < 5; k++) {
+        sum += coefficients[k] * term;
+        term *= t / (double)(k - order + 1);
+    }
+    return sum;
+}
+
+static void quartic_is_differentiated_exactly_at_the_centre(void **state)
+{
+    (void)state;
+    for (uint16_t stride = 1; stride <= 8; stride++) {
+        const float rate = 64.0f; /* a power of two: sample times are exact */
+        const pvid_fir_bank_f32 bank = {.half = 2, .stride = stride, .weights = pvid_five_points_f32};
+        pvid_differentiator_f32 self;
+        assert_int_equal(pvid_differentiator_init_f32(&self, &bank, rate), PVID_OK);
+        const int delay = 2 * stride;
+        for (int tick = 0; tick < 100; tick++) {
+            const double t = (tick - 50) / 64.0;
+            float out[PVID_ORDERS];
+            const bool ready = pvid_differentiator_step_f32(&self, (float)polynomial(0, t), out);
+            assert_int_equal(ready, tick >= 2 * delay);
+            for (int order = 0; ready && (order < PVID_ORDERS); order++) {
+                const double h = stride / 64.0;
+                double expected = polynomial(order, t - (delay / 64.0));
+                double scale = 1.0;
+                for (int k = 0; k < order; k++) {
+                    scale /= h;
+                }
+                /* samples of size 2 are rounded to 2^-24 of it; the bank's gain is at most 16 / h^order */
+                const double error = (double)out[order] - expected;
+                assert_true((error < 4.0e-6 * scale) && (error > -4.0e-6 * scale));
+            }
+        }
+    }
+}
+
+static void constant_has_no_derivative_not_even_by_rounding(void **state)
+{
+    (void)state;
+    const pvid_fir_bank_f32 bank = {.half = 2, .stride = 3, .weights = pvid_five_points_f32};
+    pvid_differentiator_f32 self;
+    assert_int_equal(pvid_differentiator_init_f32(&self, &bank, 1000.0f), PVID_OK);
+    float out[PVID_ORDERS] = {0.0f};
+    for (int tick = 0; tick < 40; tick++) {
+        (void)pvid_differentiator_step_f32(&self, 0.1f, out);
+    }
+    assert_true(out[0] >= 0.1f && out[0] <= 0.1f);
+    for (int order = 1; order < PVID_ORDERS; order++) {
+        assert_true(out[order] >= 0.0f && out[order] <= 0.0f);
+    }
+}
+
+static void reset_equals_a_fresh_start(void **state)
+{
+    (void)state;
+    const pvid_fir_bank_f32 bank = {.half = 2, .stride = 2, .weights = pvid_five_points_f32};
+    pvid_differentiator_f32 used;
+    pvid_differentiator_f32 fresh;
+    assert_int_equal(pvid_differentiator_init_f32(&used, &bank, 100.0f), PVID_OK);
+    assert_int_equal(pvid_differentiator_init_f32(&fresh, &bank, 100.0f), PVID_OK);
+    float a[PVID_ORDERS];
+    float b[PVID_ORDERS];
+    for (int tick = 0; tick < 13; tick++) {
+        (void)pvid_differentiator_step_f32(&used, (float)(tick * tick), a);
+    }
+    pvid_differentiator_reset_f32(&used);
+    for (int tick = 0; tick < 30; tick++) {
+        const float x = (float)((tick * 7) % 11);
+        const bool ready = pvid_differentiator_step_f32(&used, x, a);
+        assert_int_equal(ready, pvid_differentiator_step_f32(&fresh, x, b));
+        if (ready) {
+            assert_memory_equal(a, b, sizeof a);
+        }
+    }
+}
+
+static void every_bad_bank_and_rate_is_refused(void **state)
+{
+    (void)state;
+    const float infinity = 3.4e38f * 10.0f;
+    static float weights[PVID_ORDERS * 2];
+    pvid_differentiator_f32 self;
+    const pvid_fir_bank_f32 good = {.half = 2, .stride = 1, .weights = weights};
+    assert_int_equal(pvid_differentiator_init_f32(&self, &good, 1000.0f), PVID_OK);
+    pvid_fir_bank_f32 bad[4] = {good, good, good, good};
+    bad[0].half = 1;
+    bad[1].stride = 0;
+    bad[2].stride = (PVID_MAX_WINDOW / 4) + 1;
+    bad[3].weights = NULL;
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(pvid_differentiator_init_f32(&self, &bad[i], 1000.0f), PVID_BAD_BANK);
+    }
+    weights[7] = infinity - infinity;
+    assert_int_equal(pvid_differentiator_init_f32(&self, &good, 1000.0f), PVID_BAD_BANK);
+    weights[7] = 0.0f;
+    const float rates[5] = {0.0f, -1.0f, infinity, infinity - infinity, 2.0e6f};
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(pvid_differentiator_init_f32(&self, &good, rates[i]), PVID_BAD_SAMPLE_RATE);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(quartic_is_differentiated_exactly_at_the_centre),
+        cmocka_unit_test(constant_has_no_derivative_not_even_by_rounding),
+        cmocka_unit_test(reset_equals_a_fresh_start),
+        cmocka_unit_test(every_bad_bank_and_rate_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

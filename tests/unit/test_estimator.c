@@ -1,0 +1,415 @@
+/* The estimator: what it refuses, what it counts, what it never does, and a model of the user's own. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "pvid/pvid.h"
+
+#define INFINITE (3.4e38f * 10.0f)
+#define NOT_A_NUMBER (INFINITE - INFINITE)
+
+static uint32_t generator;
+
+static float noise(void)
+{
+    generator = (generator * 1664525u) + 1013904223u;
+    return ((float)(generator >> 8) / 8388608.0f) - 1.0f;
+}
+
+/* ---- a model of the user's own: y = a x1 + a^2 x2 + b x3, through the generic path ---- */
+
+static void own_theta(const float p[], float theta[])
+{
+    theta[0] = p[0];
+    theta[1] = p[0] * p[0];
+    theta[2] = p[1];
+}
+
+static void own_jacobian(const float p[], float c[])
+{
+    c[0] = 1.0f;
+    c[1] = 2.0f * p[0];
+    c[2] = 1.0f;
+}
+
+static const uint8_t own_row[3] = {0, 1, 2};
+static const uint8_t own_column[3] = {0, 0, 1};
+
+static const pvid_model_f32 own_model = {
+    .n_theta = 3,
+    .n_p = 2,
+    .n_moments = 6,
+    .n_c = 3,
+    .positive = 1u, /* a is positive, b is not */
+    .c_row = own_row,
+    .c_column = own_column,
+    .theta = own_theta,
+    .jacobian = own_jacobian,
+};
+
+static const float own_truth[2] = {2.0f, -0.5f};
+
+static float own_sample(float n[3])
+{
+    for (int i = 0; i < 3; i++) {
+        n[i] = noise();
+    }
+    return (own_truth[0] * n[0]) + (own_truth[0] * own_truth[0] * n[1]) + (own_truth[1] * n[2]);
+}
+
+static pvid_estimator_config_f32 own_config(void)
+{
+    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
+    config.model = &own_model;
+    config.start[0] = 1.2f;
+    config.start[1] = 0.3f;
+    config.start_sd[0] = 1.0f;
+    config.start_sd[1] = 1.0f;
+    config.lower[0] = 0.1f;
+    config.lower[1] = -10.0f;
+    config.upper[0] = 10.0f;
+    config.upper[1] = 10.0f;
+    config.row_sd = 0.1f;
+    config.update_rate_hz = 100.0f;
+    return config;
+}
+
+static pvid_estimator_f32 started(const pvid_estimator_config_f32 *config)
+{
+    pvid_estimator_f32 estimator;
+    generator = 11u;
+    assert_int_equal(pvid_estimator_init_f32(&estimator, config), PVID_OK);
+    return estimator;
+}
+
+static void feed(pvid_estimator_f32 *estimator, int rows)
+{
+    for (int i = 0; i < rows; i++) {
+        float n[3];
+        const float y = own_sample(n);
+        (void)pvid_estimator_step_f32(estimator, n, y);
+    }
+}
+
+static void own_model_is_identified(void **state)
+{
+    (void)state;
+    const pvid_law laws[2] = {PVID_LAW_STATIONARY, PVID_LAW_PSEUDOVELOCITY};
+    const float within[2] = {1.0e-5f, 0.05f}; /* float32's rounding; (5) alone keeps part of its first error */
+    for (int i = 0; i < 2; i++) {
+        pvid_estimator_config_f32 config = own_config();
+        config.law = laws[i];
+        pvid_estimator_f32 estimator = started(&config);
+        feed(&estimator, 2000);
+        assert_float_equal(estimator.p[0], own_truth[0], within[i]);
+        assert_float_equal(estimator.p[1], own_truth[1], within[i]);
+    }
+}
+
+static void standard_errors_of_own_model_match_the_noise(void **state)
+{
+    (void)state;
+    /* y with uniform noise of +-0.05: sd 0.05/sqrt(3). With rows uniform in +-1, M = rows/3 I, so
+     * se(b) = sd sqrt(3/rows) and se(a) = that / sqrt(1 + 4 a^2) */
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    const int rows = 5000;
+    for (int i = 0; i < rows; i++) {
+        float n[3];
+        const float y = own_sample(n);
+        (void)pvid_estimator_step_f32(&estimator, n, y + (0.05f * noise()));
+    }
+    pvid_estimate_f32 estimate;
+    pvid_estimator_assess_f32(&estimator, &estimate);
+    assert_float_equal(estimate.residual_sd, 0.028868f, 0.0012f); /* 4 %: four times 1/sqrt(2 rows) */
+    assert_float_equal(estimate.se[1], 0.028868f * 0.024495f, 0.00004f); /* 6 %: M itself is random */
+    assert_float_equal(estimate.se[0], 0.028868f * 0.024495f / 4.1231f, 0.00001f);
+    assert_float_equal(estimate.p[1], own_truth[1], 4.0f * estimate.se[1]);
+}
+
+static void b_follows_the_estimate(void **state)
+{
+    (void)state;
+    /* b = sum N (Y - N^T theta) at the present theta: kept by moving, checked by summing again in double */
+    enum { ROWS = 500 };
+    static float n[ROWS][3], y[ROWS];
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    for (int i = 0; i < ROWS; i++) {
+        y[i] = own_sample(n[i]) + (0.3f * noise());
+        (void)pvid_estimator_step_f32(&estimator, n[i], y[i]);
+    }
+    float theta[3];
+    own_theta(estimator.p, theta);
+    double b[3] = {0.0}, rr = 0.0;
+    for (int i = 0; i < ROWS; i++) {
+        double e = (double)y[i];
+        for (int k = 0; k < 3; k++) {
+            e -= (double)n[i][k] * (double)theta[k];
+        }
+        rr += e * e;
+        for (int k = 0; k < 3; k++) {
+            b[k] += (double)n[i][k] * e;
+        }
+    }
+    float sums[PVID_MAX_SUMS];
+    pvid_information_read_f32(&estimator.information, sums);
+    for (int k = 0; k < 3; k++) {
+        /* 500 rows of size 1 moved 500 times: 500 sqrt(500) 2^-24 at random, with a margin of 4 */
+        assert_float_equal(sums[6 + k], (float)b[k], 0.003f);
+    }
+    assert_float_equal(sums[9], (float)rr, 0.003f);
+}
+
+/* ---- what it refuses ---- */
+
+typedef struct {
+    pvid_status status;
+    size_t offset;
+    float bad[5];
+} bad_field;
+
+static void every_bad_field_has_its_own_status(void **state)
+{
+    (void)state;
+    static const bad_field fields[] = {
+        {PVID_BAD_START, offsetof(pvid_estimator_config_f32, start), {INFINITE, -1.0f, 0.0f, 20.0f, 0.05f}},
+        {PVID_BAD_START_SD, offsetof(pvid_estimator_config_f32, start_sd), {INFINITE, -1.0f, 0.0f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, lower), {INFINITE, -1.0f, 0.0f, 20.0f, -INFINITE}},
+        {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, upper), {INFINITE, -1.0f, 0.0f, 0.05f, -INFINITE}},
+        {PVID_BAD_ROW_SD, offsetof(pvid_estimator_config_f32, row_sd), {INFINITE, -1.0f, 0.0f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_UPDATE_RATE, offsetof(pvid_estimator_config_f32, update_rate_hz), {INFINITE, -1.0f, 0.0f, 1.0e9f, 1.0e-9f}},
+        {PVID_BAD_FORGETTING, offsetof(pvid_estimator_config_f32, forgetting_s), {INFINITE, -1.0f, 0.03f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_FEEDBACK, offsetof(pvid_estimator_config_f32, feedback_hz), {INFINITE, -1.0f, -1.0e-9f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_CORRELATION, offsetof(pvid_estimator_config_f32, correlation), {INFINITE, -1.0f, 0.0f, 0.5f, 1.0e30f}},
+        {PVID_BAD_STEP_LIMIT, offsetof(pvid_estimator_config_f32, step_limit), {INFINITE, -1.0f, 0.0f, 1.0f, -INFINITE}},
+        {PVID_BAD_KAPPA_MIN, offsetof(pvid_estimator_config_f32, kappa_min), {INFINITE, -1.0f, -1.0e-9f, 1.0f, 2.0f}},
+    };
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
+        for (int k = 0; k < 6; k++) {
+            const float bad = (k < 5) ? fields[i].bad[k] : NOT_A_NUMBER;
+            pvid_estimator_config_f32 config = own_config();
+            pvid_estimator_f32 estimator;
+            memcpy((char *)&config + fields[i].offset, &bad, sizeof bad);
+            assert_int_equal(pvid_estimator_init_f32(&estimator, &config), fields[i].status);
+        }
+    }
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator;
+    config.divider = 0;
+    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_DIVIDER);
+    config = own_config();
+    config.law = (pvid_law)7;
+    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_LAW);
+}
+
+static void every_bad_model_is_refused(void **state)
+{
+    (void)state;
+    pvid_model_f32 bad[8];
+    for (int i = 0; i < 8; i++) {
+        bad[i] = own_model;
+    }
+    bad[0].n_theta = PVID_MAX_THETA + 1;
+    bad[1].n_p = PVID_MAX_P + 1;
+    bad[2].n_p = 0;
+    bad[3].n_moments = 5;
+    bad[4].c_row = NULL;
+    bad[5].theta = NULL;
+    bad[6].jacobian = NULL;
+    bad[7].project = pvid_kapitza_strong_f32.project; /* one optional function without the others */
+    pvid_estimator_f32 estimator;
+    pvid_estimator_config_f32 config = own_config();
+    for (int i = 0; i < 8; i++) {
+        config.model = &bad[i];
+        assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_MODEL);
+    }
+    config.model = NULL;
+    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_MODEL);
+}
+
+static void unusable_row_changes_nothing_but_its_counter(void **state)
+{
+    (void)state;
+    const float bad[4] = {INFINITE, -INFINITE, NOT_A_NUMBER, 2.0e14f};
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    feed(&estimator, 100);
+    for (int place = 0; place < 4; place++) {
+        for (int k = 0; k < 4; k++) {
+            float n[4] = {0.1f, 0.2f, 0.3f, 0.4f};
+            n[place] = bad[k];
+            pvid_estimator_f32 before = estimator;
+            const pvid_reason reason = pvid_estimator_step_f32(&estimator, n, n[3]);
+            if (k < 3) {
+                assert_int_equal(reason, PVID_REJECTED_NOT_FINITE);
+                before.counters.rejected_not_finite++;
+            } else {
+                assert_int_equal(reason, PVID_REJECTED_SATURATED);
+                before.counters.rejected_saturated++;
+            }
+            assert_memory_equal(&before, &estimator, sizeof estimator);
+        }
+    }
+}
+
+/* ---- what it does ---- */
+
+static void divider_solves_every_third_row(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    config.divider = 3;
+    config.kappa_min = 0.0f;
+    pvid_estimator_f32 estimator = started(&config);
+    for (int i = 1; i <= 30; i++) {
+        float n[3];
+        const float y = own_sample(n);
+        const pvid_reason reason = pvid_estimator_step_f32(&estimator, n, y);
+        assert_int_equal(reason, ((i % 3) == 0) ? PVID_UPDATED : PVID_ACCUMULATED);
+    }
+    assert_int_equal(estimator.counters.updates, 10);
+    assert_int_equal(estimator.counters.rows, 30);
+}
+
+static void add_and_update_have_the_bits_of_step(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    config.forgetting_s = 1.0f;
+    pvid_estimator_f32 one = started(&config);
+    pvid_estimator_f32 two = one;
+    for (int i = 0; i < 500; i++) {
+        float n[3];
+        const float y = own_sample(n);
+        (void)pvid_estimator_step_f32(&one, n, y);
+        assert_int_equal(pvid_estimator_add_f32(&two, n, y), PVID_ACCUMULATED);
+        (void)pvid_estimator_update_f32(&two);
+    }
+    assert_memory_equal(&one, &two, sizeof one);
+}
+
+static void iterating_goes_on_to_the_least_squares_solution(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    config.divider = 100; /* one solve at the end, then more on the same sums */
+    pvid_estimator_f32 estimator = started(&config);
+    feed(&estimator, 100);
+    const float first = estimator.p[0];
+    for (int i = 0; i < 20; i++) {
+        assert_int_equal(pvid_estimator_iterate_f32(&estimator), PVID_UPDATED);
+    }
+    assert_true((first - own_truth[0] > 1.0e-3f) || (first - own_truth[0] < -1.0e-3f));
+    assert_float_equal(estimator.p[0], own_truth[0], 1.0e-5f); /* float32's rounding */
+    assert_int_equal(estimator.counters.rows, 100);
+}
+
+static void no_step_is_longer_than_its_limit_and_none_leaves_the_bounds(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    config.kappa_min = 0.0f;
+    config.step_limit = 0.05f;
+    config.upper[0] = 1.5f; /* the truth is out of reach */
+    pvid_estimator_f32 estimator = started(&config);
+    for (int i = 0; i < 200; i++) {
+        const float before[2] = {estimator.p[0], estimator.p[1]};
+        feed(&estimator, 1);
+        const float a = (estimator.p[0] - before[0]) / before[0];
+        const float b = estimator.p[1] - before[1]; /* start_sd[1] is 1 */
+        assert_true((a <= 0.0501f) && (a >= -0.0501f) && (b <= 0.0501f) && (b >= -0.0501f));
+        assert_true(estimator.p[0] <= 1.5f);
+    }
+    assert_true(estimator.counters.limited > 0);
+    assert_true(estimator.counters.bounded > 0);
+    assert_float_equal(estimator.p[0], 1.5f, 1.0e-6f);
+}
+
+static void without_excitation_the_start_is_held(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    const float zero[3] = {0.0f, 0.0f, 0.0f};
+    const float only_b[3] = {0.0f, 0.0f, 1.0f};
+    for (int i = 0; i < 1000; i++) {
+        assert_int_equal(pvid_estimator_step_f32(&estimator, zero, 0.0f), PVID_HELD_NOT_EXCITED);
+        assert_int_equal(pvid_estimator_step_f32(&estimator, only_b, 5.0f), PVID_HELD_NOT_EXCITED);
+    }
+    assert_memory_equal(estimator.p, config.start, 2 * sizeof(float));
+    assert_int_equal(estimator.counters.held_not_excited, 2000);
+    feed(&estimator, 50); /* and it resumes */
+    assert_true(estimator.counters.updates > 0);
+}
+
+static void estimate_is_finite_before_any_data_and_says_what_the_start_said(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    for (int rows = 0; rows < 8; rows++) {
+        const pvid_estimator_f32 before = estimator;
+        pvid_estimate_f32 estimate;
+        pvid_estimator_assess_f32(&estimator, &estimate);
+        assert_memory_equal(&before, &estimator, sizeof estimator);
+        for (int a = 0; a < 2; a++) {
+            assert_true((estimate.se[a] >= 0.0f) && (estimate.se[a] <= config.start_sd[a]));
+        }
+        if (rows == 0) {
+            assert_memory_equal(estimate.se, config.start_sd, 2 * sizeof(float));
+        }
+        feed(&estimator, 1);
+    }
+}
+
+static void counters_stop_at_their_end(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    memset(&estimator.counters, 0xFF, sizeof estimator.counters);
+    const pvid_counters full = estimator.counters;
+    const float bad[3] = {NOT_A_NUMBER, 0.0f, 0.0f};
+    feed(&estimator, 100);
+    (void)pvid_estimator_step_f32(&estimator, bad, 0.0f);
+    assert_memory_equal(&estimator.counters, &full, sizeof full);
+}
+
+static void a_new_init_equals_a_fresh_object(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    static pvid_estimator_f32 used;
+    static pvid_estimator_f32 fresh;
+    used = started(&config);
+    feed(&used, 777);
+    assert_int_equal(pvid_estimator_init_f32(&used, &config), PVID_OK);
+    assert_int_equal(pvid_estimator_init_f32(&fresh, &config), PVID_OK);
+    assert_memory_equal(&used, &fresh, sizeof used);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(own_model_is_identified),
+        cmocka_unit_test(standard_errors_of_own_model_match_the_noise),
+        cmocka_unit_test(b_follows_the_estimate),
+        cmocka_unit_test(every_bad_field_has_its_own_status),
+        cmocka_unit_test(every_bad_model_is_refused),
+        cmocka_unit_test(unusable_row_changes_nothing_but_its_counter),
+        cmocka_unit_test(divider_solves_every_third_row),
+        cmocka_unit_test(add_and_update_have_the_bits_of_step),
+        cmocka_unit_test(iterating_goes_on_to_the_least_squares_solution),
+        cmocka_unit_test(no_step_is_longer_than_its_limit_and_none_leaves_the_bounds),
+        cmocka_unit_test(without_excitation_the_start_is_held),
+        cmocka_unit_test(estimate_is_finite_before_any_data_and_says_what_the_start_said),
+        cmocka_unit_test(counters_stop_at_their_end),
+        cmocka_unit_test(a_new_init_equals_a_fresh_object),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
