@@ -38,6 +38,7 @@ static float derivatives_phi[SAMPLES][PVID_ORDERS], derivatives_u[SAMPLES][3];
 static float rows[SAMPLES][PVID_KAPITZA_STRONG_THETA], row_y[SAMPLES];
 
 static pvid_strong_f32 identifier;
+static pvid_estimator_f32 newton; /* feedback_hz = 0: a Gauss-Newton step at every tick */
 static rls_f32 rls;
 
 static void prepare(void)
@@ -79,6 +80,12 @@ static void prepare(void)
     if (pvid_strong_init_f32(&identifier, &config) != PVID_OK) {
         exit(2);
     }
+    config.estimator.model = &pvid_kapitza_strong_f32;
+    config.estimator.update_rate_hz = config.sample_rate_hz;
+    config.estimator.feedback_hz = 0.0f;
+    if (pvid_estimator_init_f32(&newton, &config.estimator) != PVID_OK) {
+        exit(2);
+    }
     rls_init_f32(&rls, 0.9999f, 1.0e6f);
 }
 
@@ -114,6 +121,11 @@ static void add(uint32_t i)
 static void estimator(uint32_t i)
 {
     sink = (float)pvid_estimator_step_f32(&identifier.estimator, rows[i], row_y[i]);
+}
+
+static void gauss_newton(uint32_t i)
+{
+    sink = (float)pvid_estimator_step_f32(&newton, rows[i], row_y[i]);
 }
 
 static void read_sums(uint32_t i)
@@ -156,7 +168,7 @@ static const struct {
 } stages[] = {
     {"nothing", nothing},     {"differentiator", differentiator}, {"row", row},   {"add", add},
     {"read", read_sums},      {"project", project},               {"tick", tick}, {"estimator", estimator},
-    {"assess", assess},       {"rls", rls_step},
+    {"assess", assess},       {"rls", rls_step},                  {"gauss-newton", gauss_newton},
 };
 
 int main(int argc, char **argv)
@@ -169,6 +181,7 @@ int main(int argc, char **argv)
     for (uint32_t i = 0; i < SAMPLES; i++) { /* warm: windows full, S positive */
         (void)pvid_strong_step_f32(&identifier, phi_samples[i], y_samples[i]);
         (void)pvid_estimator_step_f32(&identifier.estimator, rows[i], row_y[i]);
+        (void)pvid_estimator_step_f32(&newton, rows[i], row_y[i]);
     }
     for (uint32_t s = 0; s < sizeof stages / sizeof stages[0]; s++) {
         if (strcmp(argv[1], stages[s].name) == 0) {

@@ -378,10 +378,21 @@ def bench_laws(update: Path | None) -> int:
     """Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."""
     from pvid.bench import laws
 
-    rows = []
     with progress_bar("laws", laws.NUMBER_OF_ROWS) as advance:
         rows = [row.cells() for row in laws.laws_table(Native(), advance)]
     _update_readme(update, "laws", _markdown(laws.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="strong")
+@_UPDATE
+def bench_strong(update: Path | None) -> int:
+    """Errors of the strong form by encoder resolution and differentiator."""
+    from pvid.bench import strong
+
+    with progress_bar("strong form", len(strong.CASES)) as advance:
+        rows = list(strong.strong_table(Native(), advance))
+    _update_readme(update, "strong", _markdown(strong.HEADER, rows))
     return DONE
 
 
@@ -392,7 +403,7 @@ def bench_cost(update: Path | None) -> int:
     from pvid.bench import cost
 
     with tempfile.TemporaryDirectory() as folder:
-        costs = cost.stage_costs(cost.build(Path(folder)))
+        costs = {level: cost.stage_costs(cost.build(Path(folder), level=level)) for level in ("-O2", "-O3")}
     _update_readme(update, "cost", cost.as_markdown(costs, cost.state_bytes(Native())))
     return DONE
 

@@ -21,6 +21,7 @@ STAGES = {
     "add": "checks, innovation, sums of M, B, yy",
     "project": "C^T M C and C^T (B - M theta)",
     "estimator": "the estimator's whole step: add, project, factor, solve, move p",
+    "gauss-newton": "the same with feedback_hz = 0, which needs no innovation",
     "tick": "samples in, parameters out",
     "assess": "standard errors and kappa (only when published)",
     "rls": "plain packed RLS of the same 11 parameters",
@@ -102,18 +103,20 @@ def stage_costs(binary: Path) -> list[StageCost]:
         raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
 
     def per_tick(stage: str) -> int:
-        return round(
-            (_instructions(binary, stage, _MANY) - _instructions(binary, stage, _FEW)) / (_MANY - _FEW)
-        )
+        return round((_instructions(binary, stage, _MANY) - _instructions(binary, stage, _FEW)) / (_MANY - _FEW))
 
     harness = per_tick("nothing")
     return [StageCost(stage, per_tick(stage) - harness) for stage in STAGES]
 
 
-def as_markdown(costs: list[StageCost], state: dict[str, int]) -> str:
-    """The README's table."""
-    lines = ["| stage | instructions a tick | what it does |", "|---|---:|---|"]
-    lines += [f"| {cost.stage} | {cost.instructions} | {STAGES[cost.stage]} |" for cost in costs]
+def as_markdown(by_level: dict[str, list[StageCost]], state: dict[str, int]) -> str:
+    """The README's table from the costs at each level of optimisation."""
+    levels = list(by_level)
+    lines = ["| stage | " + " | ".join(f"gcc {level}" for level in levels) + " | what it does |"]
+    lines.append("|---|" + "---:|" * len(levels) + "---|")
+    for costs in zip(*by_level.values(), strict=True):
+        figures = " | ".join(str(cost.instructions) for cost in costs)
+        lines.append(f"| {costs[0].stage} | {figures} | {STAGES[costs[0].stage]} |")
     lines.append("")
     lines += ["| state | bytes |", "|---|---:|"]
     lines += [f"| {name} | {size} |" for name, size in state.items()]

@@ -1,0 +1,19 @@
+/* C^T M C and its relatives for a C known by its non-zeros and an M kept as its packed upper
+ * triangle by rows. Private to the core; every function is a few loops of fixed length. */
+#ifndef PVID_PATTERN_F32_H
+#define PVID_PATTERN_F32_H
+
+#include <stddef.h>
+
+#include "pvid/model.h"
+
+/* out[n_p] = C^T x for the non-zeros c of C. */
+void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const float x[], float out[]);
+
+/* Row a of S = C^T M C from the diagonal on: s[b] = c_b^T (M c_a), a <= b < n_p. */
+void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], const float m[], size_t a, float s[]);
+
+/* Entry i of M x, x[n]. */
+float pvid_pattern_times_f32(size_t n, const float m[], size_t i, const float x[]);
+
+#endif
