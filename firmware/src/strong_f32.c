@@ -4,11 +4,22 @@
 
 #include "finite_f32.h"
 
+/* Counters stop at their end. */
+static void count(uint32_t *counter)
+{
+    if (*counter < UINT32_MAX) {
+        (*counter)++;
+    }
+}
+
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
     if (!pvid_within_f32(config->l1, 1.0e-6f, 1.0e6f)) {
         return PVID_BAD_LENGTH;
+    }
+    if (!pvid_within_f32(config->drive_min, 0.0f, 1.0e9f)) {
+        return PVID_BAD_DRIVE_MIN;
     }
     pvid_status status = pvid_differentiator_init_f32(&self->phi, &config->bank, config->sample_rate_hz);
     if (status != PVID_OK) {
@@ -19,6 +30,9 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
         return status;
     }
     self->inverse_l1 = 1.0f / config->l1;
+    self->drive = 0.0f;
+    self->drive_forgetting = (config->sample_rate_hz > 1.0f) ? (1.0f / config->sample_rate_hz) : 1.0f;
+    self->drive_min = config->drive_min * config->drive_min;
     pvid_estimator_config_f32 estimator = config->estimator;
     estimator.model = &pvid_kapitza_strong_f32;
     estimator.update_rate_hz = config->sample_rate_hz;
@@ -35,9 +49,7 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
 {
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
         pvid_strong_gap_f32(self);
-        if (self->estimator.counters.rejected_not_finite < UINT32_MAX) {
-            self->estimator.counters.rejected_not_finite++;
-        }
+        count(&self->estimator.counters.rejected_not_finite);
         return PVID_REJECTED_NOT_FINITE;
     }
     float d_phi[PVID_ORDERS];
@@ -48,6 +60,12 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
         return PVID_WARMING_UP;
     }
     const float u[3] = {d_y[2] * self->inverse_l1, d_y[3] * self->inverse_l1, d_y[4] * self->inverse_l1};
+    const float drive = self->drive + (self->drive_forgetting * ((u[0] * u[0]) - self->drive));
+    self->drive = pvid_finite_f32(drive) ? drive : self->drive;
+    if (self->drive < self->drive_min) {
+        count(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
     float n[PVID_KAPITZA_STRONG_THETA];
     float row_y;
     pvid_kapitza_strong_row_f32(d_phi, u, &row_y, n);

@@ -19,6 +19,7 @@ const uint32_t pvid_native_layout[] = {
     FIELD(pvid_estimator_config_f32, law),
     FIELD(pvid_estimator_config_f32, divider),
     (uint32_t)sizeof(pvid_strong_config_f32),
+    FIELD(pvid_strong_config_f32, drive_min),
     FIELD(pvid_strong_config_f32, bank),
     FIELD(pvid_strong_config_f32, estimator),
     (uint32_t)sizeof(pvid_counters),

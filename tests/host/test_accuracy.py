@@ -9,9 +9,9 @@ import pytest
 
 from pvid import oracle
 from pvid.identify import identify
-from pvid.native import EstimatorConfig, Law, Native
+from pvid.native import EstimatorConfig, Law, Native, Reason
 from pvid.rig import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
-from pvid.rigfile import RigFile
+from pvid.rigfile import Core, RigFile
 from pvid.setup import bank_of, estimator_config, strong_config
 from pvid.twin.strong import StrongTwin
 
@@ -64,9 +64,7 @@ def test_twenty_bit_sensor_savitzky_golay_within_a_tenth_of_a_percent_in_w(nativ
         assert abs(result.value["w"] / TRUTH[0] - 1) < 1e-3
 
 
-def test_core_is_as_near_the_oracle_as_its_conditioning_allows(
-    native: Native, standard_20_bits: Simulation
-) -> None:
+def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, standard_20_bits: Simulation) -> None:
     """Final p of float32 against the float64 solution of the same rows.
 
     Each sum is exact to about 2 ulp (two levels), each entry of F to a few ulp of its largest term t, so F is known
@@ -75,7 +73,8 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(
     """
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0, standard_start(3))
-    n32, y32, ready, _ = StrongTwin(config).rows(run.phi, run.y)
+    n32, y32, fate = StrongTwin(config).rows(run.phi, run.y)
+    ready = fate == Reason.ACCUMULATED
     n, y = n32[ready].astype(np.float64), y32[ready].astype(np.float64)
     n = n * oracle.BINOMIAL
     m, b = n.T @ n, n.T @ y
@@ -90,15 +89,14 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(
     assert (bound < 0.05 * reference).all()  # the bound itself says something
 
 
-def test_standard_errors_and_kappa_agree_with_the_oracle(
-    native: Native, standard_20_bits: Simulation
-) -> None:
+def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standard_20_bits: Simulation) -> None:
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0)
     identifier = native.strong(config)
     identifier.run(run.phi, run.y, sums=False, hashes=False)
     last = identifier.assess()
-    n32, y32, ready, _ = StrongTwin(config).rows(run.phi, run.y)
+    n32, y32, fate = StrongTwin(config).rows(run.phi, run.y)
+    ready = fate == Reason.ACCUMULATED
     n = n32[ready].astype(np.float64) * oracle.BINOMIAL
     y = y32[ready].astype(np.float64)
     p = last["p"][:3].astype(np.float64)
@@ -114,3 +112,18 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(
     # s^2 is a difference of sums that agree to about 1e-3: float32 keeps four digits of it
     np.testing.assert_allclose(last["se"][:3], estimate.se, rtol=0.02)
     np.testing.assert_allclose(last["kappa"], estimate.kappa, rtol=0.01)
+
+
+@pytest.mark.parametrize("core", ["f32", "f64"])
+@pytest.mark.parametrize("bits", [14, 20])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_without_a_drive_the_start_is_held_and_said_to_be(native: Native, core: Core, bits: int, seed: int) -> None:
+    """The noise of a still pivot sensor, differentiated, must not pass for a drive: w came out 93 % off, confidently."""
+    rig = replace(STRONG, identifier=replace(STRONG.identifier, core=core))
+    run = simulate(drive=(), sensors=standard_sensors(bits), truth="linear", duration=6.0, seed=seed).run
+    start = standard_start(seed)
+    result = identify(run, rig, native, start=start)
+    assert not result.identified
+    assert result.status == "held not excited"
+    np.testing.assert_array_equal([result.value[name] for name in ("w", "d1", "d2")], start.astype(np.float32))
+    assert result.se["w"] == pytest.approx(0.5 * start[0], rel=1e-6)

@@ -165,3 +165,11 @@ def test_a_run_shorter_than_the_window_is_refused() -> None:
         savitzky_golay(21, 6).apply(x, 1000.0)
     with pytest.raises(PvidError, match="stride"):
         finite_difference(0)
+
+
+def test_the_cores_tables_are_the_rounded_contiguous_ones() -> None:
+    bank = savitzky_golay(31, 6)
+    assert bank.weights32.shape == (ORDERS, 15) and bank.weights32.dtype == np.float32
+    assert bank.weights32.flags.c_contiguous
+    # Rounding to nearest: half an ulp, 2^-24 relative.
+    np.testing.assert_allclose(bank.weights32, bank.weights, rtol=2.0**-24)

@@ -283,3 +283,91 @@ def test_standard_errors_fall_back_to_the_start_where_data_say_nothing() -> None
 def test_too_few_rows_are_refused() -> None:
     with pytest.raises(PvidError, match="4 rows are too few"):
         oracle.identify_strong(np.ones((4, 11)), np.ones(4), around(TRUTH))
+
+
+def settings_of(**changes: object) -> oracle.Settings:
+    plain = oracle.Settings(TRUTH, 0.5 * TRUTH, TRUTH / 20.0, 20.0 * TRUTH, row_sd=1.0, rate=100.0)
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def noisy_rows(count: int, sd: float, seed: int = 0) -> tuple[Float, Float]:
+    random = np.random.default_rng(seed)
+    n = random.standard_normal((count, 11)) / np.abs(oracle.theta(TRUTH))
+    return n, n @ oracle.theta(TRUTH) + sd * random.standard_normal(count)
+
+
+def test_assess_by_its_definition() -> None:
+    n, y = noisy_rows(12, 0.1)
+    m, b, yy, sd = n.T @ n, n.T @ y, float(y @ y), 3.0 * TRUTH
+    estimate = oracle.assess(TRUTH, m, b, yy, 12.0, sd, correlation=7.0)
+    variance = float(np.sum((y - n @ oracle.theta(TRUTH)) ** 2)) / (12 - 3)
+    c = oracle.jacobian(TRUTH)
+    expected = np.linalg.inv(c.T @ m @ c / (7.0 * variance) + np.diag(sd**-2.0))
+    # yy - 2 B theta + theta M theta cancels to 1e-3 of yy here: a few 1e-13.
+    assert estimate.residual_sd == pytest.approx(np.sqrt(variance), rel=1e-10)
+    np.testing.assert_allclose(estimate.covariance, expected, rtol=1e-9)
+    np.testing.assert_allclose(estimate.se, np.sqrt(np.diag(expected)), rtol=1e-9)
+
+
+def test_all_sums_forget_alike() -> None:
+    """The published residual is that of the rows remembered, each with its weight."""
+    n, y = noisy_rows(60, 0.1)
+    y[:20] += 5.0  # an old disturbance, so that forgetting matters
+    result = oracle.identify_strong(n, y, settings_of(forgetting_s=0.1))
+    weights = np.exp(-np.arange(59, -1, -1) / 10.0)
+    residual = weights @ (y - n @ oracle.theta(result.last.p)) ** 2
+    assert result.last.residual_sd == pytest.approx(np.sqrt(residual / (weights.sum() - 3.0)), rel=1e-9)
+
+
+def test_a_gain_between_0_and_1_mixes_both_right_sides() -> None:
+    n, y = noisy_rows(9, 0.1)
+    settings = settings_of(feedback_hz=10.0, divider=3, kappa_min=0.0, start=1.1 * TRUTH, step_limit=0.9)
+    assert settings.gain == pytest.approx(0.3)
+    result = oracle.identify_strong(n, y, settings)
+    p, m, b, prior = settings.start, np.zeros((11, 11)), np.zeros(11), np.diag(settings.start_sd**-2.0)
+    for first in range(0, 9, 3):
+        c, t, part = oracle.jacobian(p), oracle.theta(p), slice(first, first + 3)
+        m, b = m + n[part].T @ n[part], b + n[part].T @ y[part]
+        rhs = 0.3 * c.T @ (b - m @ t) + 0.7 * c.T @ n[part].T @ (y[part] - n[part] @ t)
+        dp = np.linalg.solve(c.T @ m @ c + prior, rhs)
+        p = p + dp * min(1.0, 0.9 / float(np.max(np.abs(dp / p))))
+        np.testing.assert_allclose(result.p[first + 2], p, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("row_sd", "held"), [(0.98, False), (1.02, True)])
+def test_a_step_needs_as_much_information_as_the_start(row_sd: float, held: bool) -> None:
+    """kappa (S + H0)_ww >= 2 H0_ww; rows of w alone have kappa 1, so S_ww >= H0_ww = row_sd^2 here."""
+    n = np.zeros((5, 11))
+    n[:, 0] = np.sqrt(0.2)  # five rows: S_ww = 1 at the last
+    settings = settings_of(row_sd=row_sd, start_sd=np.ones(3), divider=5)
+    assert oracle.identify_strong(n, np.full(5, 14.0), settings).updated[-1] != held
+
+
+def test_estimates_come_when_asked_and_say_the_state_of_their_tick() -> None:
+    n, y = noisy_rows(40, 0.1)
+    result = oracle.identify_strong(n, y, settings_of(), estimate_every=10)
+    assert [tick for tick, _ in result.estimates] == [10, 20, 30]  # at tick 0 one row is too few
+    for tick, estimate in result.estimates:
+        np.testing.assert_array_equal(estimate.p, result.p[tick])
+
+
+def test_no_convergence_is_said() -> None:
+    with pytest.raises(PvidError, match="did not converge"):
+        oracle.constrained_least_squares(np.eye(11), np.ones(11), TRUTH, iterations=2)
+
+
+def test_defaults_are_the_cores() -> None:
+    assert (settings_of().step_limit, settings_of().kappa_min) == (0.3, 1e-5)  # pvid_estimator_defaults_f32
+    n = np.array([1, 1, 1, 3, 3, 1, 1, 4, 6, 4, 1])
+    assert oracle.BINOMIAL.tolist() == n.tolist()
+
+
+@pytest.mark.parametrize("weight", [2.0, 3.0])
+def test_assess_with_too_few_rows_is_refused(weight: float) -> None:
+    with pytest.raises(PvidError):
+        oracle.assess(TRUTH, np.eye(11), np.zeros(11), 1.0, weight, TRUTH)
+
+
+def test_rows_of_nothing_leave_the_start() -> None:
+    last = oracle.identify_strong(np.zeros((20, 11)), np.zeros(20), settings_of()).last
+    np.testing.assert_allclose(last.se, 0.5 * TRUTH)

@@ -191,3 +191,59 @@ def test_any_value_of_any_key_gives_a_rig_or_a_sentence(table: str, key: str, va
         RigFile.parse(prefix + text)
     except PvidError as error:
         assert str(error)
+
+
+def test_the_published_defaults() -> None:
+    assert Identifier() == Identifier(
+        form="strong",
+        law="stationary",
+        core="f32",
+        window_s=0.0,
+        differentiator="savitzky-golay",
+        degree=12,
+        stride=1,
+        test_functions=12,
+        decimation=8,
+        forgetting_s=0.0,
+        feedback_hz=10.0,
+        divider=1,
+        full_angle=False,
+        damping=False,
+        zero=True,
+        kappa_min=1e-5,
+    )
+    assert Identifier(form="strong").window == 0.241
+    assert Identifier(form="weak").window == 1.25
+
+
+@pytest.mark.parametrize("key", ["stride", "test_functions", "decimation"])
+def test_whole_numbers_have_a_least_value(key: str) -> None:
+    with pytest.raises(PvidError, match=f"{key} must be from"):
+        RigFile.parse(f"l1 = 0.3\n[identifier]\n{key} = 0")
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_bytes(b"\xef\xbb\xbfl1 = 0.3\n")
+    assert load(path).l1 == 0.3
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "l1 = " + "[" * 3000 + "]" * 3000,
+        "l1 = " + "1" * 5000,
+        "l1 = 0x" + "f" * 5000,
+        "l1." + "a." * 3000 + "b = 1",
+    ],
+)
+def test_monsters_are_one_sentence(text: str) -> None:
+    with pytest.raises(PvidError) as caught:
+        RigFile.parse(text)
+    assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize("line", ["zero = 0", "law = 5"])
+def test_a_value_is_shown_as_it_was_written(line: str) -> None:
+    with pytest.raises(PvidError, match=f"not {line[-1]}$"):
+        RigFile.parse(f"l1 = 0.3\n[identifier]\n{line}")

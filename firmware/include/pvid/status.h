@@ -21,7 +21,8 @@ typedef enum {
     PVID_BAD_DIVIDER,         /* 0 */
     PVID_BAD_STEP_LIMIT,      /* not finite or outside (0, 0.9] */
     PVID_BAD_KAPPA_MIN,       /* not finite or outside [0, 1) */
-    PVID_BAD_CORRELATION      /* not finite or below 1 */
+    PVID_BAD_CORRELATION,     /* not finite or below 1 */
+    PVID_BAD_DRIVE_MIN        /* not finite or negative */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */

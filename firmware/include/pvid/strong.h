@@ -21,6 +21,9 @@
 typedef struct {
     float sample_rate_hz;     /* 1e-3..1e6 */
     float l1;                 /* length of rod 1 [m], > 0 */
+    float drive_min;          /* rms of u = y_A''/l1 [1/s^2] over the last second below which the pivot
+                                 counts as still and no row is taken in; some ten times the noise of u.
+                                 0: every row is taken in */
     pvid_fir_bank_f32 bank;   /* for both channels; the weights must outlive the identifier */
     pvid_estimator_config_f32 estimator; /* model and update_rate_hz are filled in by init */
 } pvid_strong_config_f32;
@@ -28,14 +31,19 @@ typedef struct {
 typedef struct {
     pvid_differentiator_f32 phi;
     pvid_differentiator_f32 y;
-    float inverse_l1; /* [1/m] */
+    float inverse_l1;       /* [1/m] */
+    float drive;            /* mean square of u over about a second [1/s^4] */
+    float drive_forgetting; /* part of it that a tick replaces */
+    float drive_min;        /* mean square below which no row is taken in */
     pvid_estimator_f32 estimator;
 } pvid_strong_f32;
 
 /* Prepares `self`. Fails iff a field of config is out of its range; the status names it. */
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config);
 
-/* One tick: phi [rad] and y_A [m] sampled together. A sample that is not finite is rejected and
+/* One tick: phi [rad] and y_A [m] sampled together. Answers as the estimator does, PVID_WARMING_UP
+ * until the windows are full, and PVID_HELD_NOT_EXCITED while the pivot is still: without a drive the
+ * noise of a still sensor, differentiated four times, would pass for one. A sample that is not finite is rejected and
  * empties the windows (its neighbours are no longer equidistant); the sums keep what they know. */
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y);
 

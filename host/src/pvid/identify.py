@@ -65,8 +65,7 @@ class Identification:
         """The object of `identify --json` (DESIGN.md)."""
         names = (*LINEAR, *PHYSICAL)
         parameters = {
-            name: {"value": self.value[name], "se": self.se[name]} if name in self.value else None
-            for name in names
+            name: {"value": self.value[name], "se": self.se[name]} if name in self.value else None for name in names
         }
         return {
             **parameters,
@@ -148,7 +147,11 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
     bank = bank_of(rig, run.sample_rate)
     d_phi = bank.apply(run.phi, run.sample_rate).T
     d_y = bank.apply(run.y, run.sample_rate).T
-    n, y = oracle.strong_rows(d_phi, d_y[:, 2:5] / rig.l1)
+    u = d_y[:, 2:5] / rig.l1
+    driven = oracle.driven(u[:, 0], run.sample_rate, config.drive_min)
+    if not driven.any():
+        return _start_held(run, rig, config)
+    n, y = oracle.strong_rows(d_phi[driven], u[driven])
     settings = config.estimator
     result = oracle.identify_strong(
         n,
@@ -170,15 +173,14 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
         ),
         estimate_every=every,
     )
-    first_row = 2 * config.delay
-    times = np.array([run.t[first_row + tick] for tick, _ in result.estimates])
-    moved_at_end = bool(result.updated[-settings.divider :].any())
+    times = run.t[2 * config.delay :][driven][[tick for tick, _ in result.estimates]]
+    moved_at_end = bool(driven[-1] and result.updated[-settings.divider :].any())
     return _identification(
         rig,
         p=result.last.p,
         covariance=result.last.covariance,
         kappa=result.last.kappa,
-        status="updated" if moved_at_end else "held not excited",
+        status=(Reason.UPDATED if moved_at_end else Reason.HELD_NOT_EXCITED).text,
         ticks=len(run.t),
         updates=int(result.updated.sum()),
         lost=0,
@@ -189,6 +191,24 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
             np.array([estimate.covariance for _, estimate in result.estimates]),
             rig.l1,
         ),
+    )
+
+
+def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
+    """The answer to a run without a drive: the start, with the start's own standard deviations."""
+    p = config.estimator.start.astype(np.float64)
+    covariance = np.diag(config.estimator.start_sd.astype(np.float64) ** 2)
+    return _identification(
+        rig,
+        p=p,
+        covariance=covariance,
+        kappa=0.0,
+        status=Reason.HELD_NOT_EXCITED.text,
+        ticks=len(run.t),
+        updates=0,
+        lost=0,
+        running_hash=None,
+        trajectory=_trajectory(run.t[[0, -1]], np.stack([p, p]), np.stack([covariance, covariance]), rig.l1),
     )
 
 

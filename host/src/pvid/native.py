@@ -66,6 +66,7 @@ class Status(IntEnum):
     BAD_STEP_LIMIT = 14
     BAD_KAPPA_MIN = 15
     BAD_CORRELATION = 16
+    BAD_DRIVE_MIN = 17
 
 
 class Law(IntEnum):
@@ -112,6 +113,7 @@ class StrongConfigStruct(ctypes.Structure):
     _fields_ = [
         ("sample_rate_hz", ctypes.c_float),
         ("l1", ctypes.c_float),
+        ("drive_min", ctypes.c_float),
         ("bank", FirBankStruct),
         ("estimator", EstimatorConfigStruct),
     ]
@@ -204,6 +206,7 @@ class StrongConfig:
     weights: Float32
     stride: int
     estimator: EstimatorConfig
+    drive_min: float = 0.0
 
     @property
     def half(self) -> int:
@@ -247,6 +250,7 @@ def _struct_layout() -> list[int]:
         at(EstimatorConfigStruct, "law"),
         at(EstimatorConfigStruct, "divider"),
         ctypes.sizeof(StrongConfigStruct),
+        at(StrongConfigStruct, "drive_min"),
         at(StrongConfigStruct, "bank"),
         at(StrongConfigStruct, "estimator"),
         ctypes.sizeof(CountersStruct),
@@ -289,9 +293,7 @@ class Native:
         mirrored = _struct_layout()
         estimator_size, counters_at, strong_size, estimator_at, *bounds = layout[len(mirrored) :]
         if layout[: len(mirrored)] != mirrored or bounds != [MAX_P, MAX_THETA, MAX_SUMS, MAX_WINDOW]:
-            raise PvidError(
-                f"the C core {path} was built with other struct sizes than this package: {layout}"
-            )
+            raise PvidError(f"the C core {path} was built with other struct sizes than this package: {layout}")
         self._estimator_size = estimator_size
         self._counters_at = counters_at
         self._strong_size = strong_size
@@ -435,6 +437,7 @@ class StrongIdentifier(_Stepper):
         struct = StrongConfigStruct(
             sample_rate_hz=config.sample_rate,
             l1=config.l1,
+            drive_min=config.drive_min,
             bank=bank,
             estimator=_estimator_struct(config.estimator),
         )

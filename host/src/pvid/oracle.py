@@ -104,6 +104,15 @@ def strong_rows(phi: npt.ArrayLike, u: npt.ArrayLike) -> tuple[Float, Float]:
     return n, y
 
 
+def driven(u: npt.ArrayLike, rate: float, threshold: float) -> npt.NDArray[np.bool_]:
+    """Where the rms of u [n] over about a second (first-order lag) reaches `threshold` [1/s^2]."""
+    mean_square, mask = 0.0, []
+    for value in np.asarray(u, np.float64):
+        mean_square += min(1.0, 1 / rate) * (value**2 - mean_square)
+        mask.append(mean_square >= threshold**2)
+    return np.array(mask, np.bool_)
+
+
 # ---- section 4: the identifier
 
 
@@ -149,8 +158,13 @@ def assess(
 
     The second term says that nobody knows less than at the start; it matters only while data are few.
     """
+    if not weight > N_P:
+        raise PvidError(f"{weight:g} rows are too few for the standard errors of {N_P} parameters")
     c, t = jacobian(p), theta(p)
     s = c.T @ m @ c
+    if not s.any():
+        sd = np.asarray(start_sd, np.float64)
+        return Estimate(p, sd, np.diag(sd**2), 0.0, 0.0)
     variance = max(float(yy - 2 * b @ t + t @ m @ t), 0.0) / (weight - N_P)
     wide = variance * correlation
     information = s + np.diag(wide / np.asarray(start_sd, np.float64) ** 2)

@@ -162,6 +162,8 @@ class RigFile:
             document = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise PvidError(f"is not TOML: {error}") from error
+        except ValueError as error:  # an integer of more digits than Python reads
+            raise PvidError("is not a rig file: a number in it has thousands of digits") from error
         except RecursionError as error:
             raise PvidError("is not a rig file: its tables are nested too deeply") from error
         top = _known(cls, document, "")
@@ -234,9 +236,9 @@ def _without_integers(owner: type, given: dict[str, Any]) -> dict[str, Any]:
     """1000 stands for 1000.0 where a float is wanted."""
 
     def converted(name: str, value: Any) -> Any:
-        if type(value) is int and not _wants_integer(_field(owner, name)) and abs(value) < 2**53:
-            return float(value)
-        return value
+        key = _field(owner, name)
+        wants_float = "low" in key.metadata and not _wants_integer(key)
+        return float(value) if type(value) is int and wants_float and abs(value) < 2**53 else value
 
     return {name: converted(name, value) for name, value in given.items()}
 
@@ -278,7 +280,10 @@ def _check_value(key: Field[Any], value: Any, place: str) -> None:
 def _shown(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
-    text = ascii(value)
+    try:
+        text = ascii(value)
+    except (ValueError, RecursionError):  # thousands of digits, or of tables in one another
+        return "that"
     return text if len(text) <= 40 else text[:40] + "..."
 
 

@@ -62,12 +62,25 @@ def estimator_config(rig: RigFile, bank: FirBank, start: npt.ArrayLike | None = 
     )
 
 
+def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
+    """Rms of u [1/s^2] below which the pivot counts as still: ten times the noise the bank makes of a still sensor.
+
+    The sensor's noise is taken as half an LSB (rounding, 0.29 LSB, and somewhat more of its own); without a
+    resolution in the rig file, a thousandth of w.
+    """
+    weights = bank.weights[2]
+    white_gain = np.sqrt(2 * np.sum(weights**2) + 4 * np.sum(weights) ** 2)
+    noise = 0.5 * rig.sensor.y_lsb * white_gain * (sample_rate / bank.stride) ** 2 / rig.l1
+    return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
+
+
 def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig:
     """Settings of the strong-form identifier for samples at `sample_rate` [Hz]."""
     bank = bank_of(rig, sample_rate)
     return StrongConfig(
         sample_rate=sample_rate,
         l1=rig.l1,
+        drive_min=drive_threshold(rig, bank, sample_rate),
         weights=bank.weights32,
         stride=bank.stride,
         estimator=estimator_config(rig, bank, start),

@@ -15,6 +15,7 @@ from pvid.twin.estimator import Estimator
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
+Reasons = npt.NDArray[np.uint8]
 
 
 @dataclass
@@ -41,17 +42,36 @@ class StrongTwin:
         self.config = config
         self.estimator = Estimator(estimators or [config.estimator], config.sample_rate)
 
-    def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, Mask, Mask]:
-        """N [ticks, 11], Y [ticks], whether a tick has a row, and whether its sample was finite."""
+    def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, Reasons]:
+        """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
         phi32 = np.asarray(phi, np.float32)
         y32 = np.asarray(y, np.float32)
         finite = np.isfinite(phi32) & np.isfinite(y32)
         bank = (self.config.weights.astype(np.float32), self.config.stride, self.config.sample_rate)
         d_phi, ready = derivatives(phi32, finite, *bank)
         d_y, _ = derivatives(y32, finite, *bank)
-        inverse_l1 = np.float32(1) / np.float32(self.config.l1)
-        n, row_y = model.rows(d_phi, d_y[:, 2:5] * inverse_l1)
-        return n, row_y, ready, finite
+        u = d_y[:, 2:5] * (np.float32(1) / np.float32(self.config.l1))
+        n, row_y = model.rows(d_phi, u)
+        fate = np.full(len(phi32), Reason.ACCUMULATED, np.uint8)
+        fate[ready & ~self._driven(u[:, 0], ready)] = Reason.HELD_NOT_EXCITED
+        fate[~ready] = Reason.WARMING_UP
+        fate[~finite] = Reason.REJECTED_NOT_FINITE
+        return n, row_y, fate
+
+    def _driven(self, u: Float32, ready: Mask) -> Mask:
+        """Where the mean square of u [ticks] over about a second reaches its threshold."""
+        rate = np.float32(self.config.sample_rate)
+        forgetting = np.float32(1) / rate if rate > 1 else np.float32(1)
+        threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)
+        mean_square = np.float32(0)
+        driven = np.zeros(len(u), np.bool_)
+        with np.errstate(all="ignore"):
+            squares = u * u
+            for tick in np.flatnonzero(ready):
+                moved = mean_square + forgetting * (squares[tick] - mean_square)
+                mean_square = moved if np.isfinite(moved) else mean_square
+                driven[tick] = mean_square >= threshold
+        return driven
 
     def run(
         self,
@@ -62,8 +82,8 @@ class StrongTwin:
         progress: Callable[[int], None] | None = None,
     ) -> TwinRecord:
         """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
-        n, row_y, ready, finite = self.rows(phi, y)
-        return run_rows(self.estimator, n, row_y, ready=ready, finite=finite, sums=sums, progress=progress)
+        n, row_y, fate = self.rows(phi, y)
+        return run_rows(self.estimator, n, row_y, fate=fate, sums=sums, progress=progress)
 
 
 def run_rows(
@@ -71,12 +91,14 @@ def run_rows(
     n: Float32,
     y: Float32,
     *,
-    ready: Mask | None = None,
-    finite: Mask | None = None,
+    fate: Reasons | None = None,
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
 ) -> TwinRecord:
-    """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share."""
+    """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share.
+
+    `fate` [ticks] tells what became of a tick before it reached the estimator; by default all have a row.
+    """
     ticks = len(y)
     lanes = estimator.p.shape[1]
     record = TwinRecord(
@@ -87,13 +109,12 @@ def run_rows(
     wide_n = np.broadcast_to(n[:, :, None], (ticks, model.N_THETA, lanes))
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
-        if finite is not None and not finite[tick]:
-            estimator.counters["rejected_not_finite"] += 1
-            record.reason[tick] = Reason.REJECTED_NOT_FINITE
-        elif ready is not None and not ready[tick]:
-            record.reason[tick] = Reason.WARMING_UP
-        else:
+        if fate is None or fate[tick] == Reason.ACCUMULATED:
             record.reason[tick] = estimator.step(wide_n[tick], wide_y[tick])
+        else:
+            record.reason[tick] = fate[tick]
+            if fate[tick] != Reason.WARMING_UP:
+                estimator.counters[Reason(fate[tick]).name.lower()] += 1
         record.p[tick] = estimator.p
         if sums:
             record.sums[tick] = estimator.sums
