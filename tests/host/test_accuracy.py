@@ -118,7 +118,7 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standar
 @pytest.mark.parametrize("bits", [14, 20])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_without_a_drive_the_start_is_held_and_said_to_be(native: Native, core: Core, bits: int, seed: int) -> None:
-    """The noise of a still pivot sensor, differentiated, must not pass for a drive: w came out 93 % off, confidently."""
+    """The noise of a still pivot sensor, differentiated, must not pass for a drive (w came out 93 % off)."""
     rig = replace(STRONG, identifier=replace(STRONG.identifier, core=core))
     run = simulate(drive=(), sensors=standard_sensors(bits), truth="linear", duration=6.0, seed=seed).run
     start = standard_start(seed)
