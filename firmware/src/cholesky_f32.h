@@ -5,16 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pvid/config.h"
-
-/* D S D = U U^T with D a diagonal of powers of two and U upper triangular: elimination runs from
- * the last index to the first, so that the last pivot is that of p[0]. */
-typedef struct {
-    uint8_t n;
-    float scale[PVID_MAX_P];         /* D: diagonal entries of D S D lie in [1, 4) */
-    float u[PVID_MAX_P][PVID_MAX_P]; /* upper triangle; the diagonal holds 1 / U_ii */
-    float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
-} pvid_cholesky_f32;
+#include "pvid/estimator.h"
 
 /* A pivot below this part of its diagonal entry is rounding, not data: n eps, with a margin for
  * the rounding of S itself. */

@@ -7,9 +7,11 @@
 
 #include "cholesky_f32.h"
 #include "finite_f32.h"
+#include "pattern_f32.h"
 
 const pvid_estimator_config_f32 pvid_estimator_defaults_f32 = {
     .correlation = 1.0f,
+    .row_weight = 1.0f,
     .step_limit = 0.3f,
     .kappa_min = 1.0e-5f,
     .law = PVID_LAW_STATIONARY,
@@ -93,6 +95,10 @@ static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
     if (!pvid_within_f32(config->correlation, 1.0f, 1.0e6f)) {
         return PVID_BAD_CORRELATION;
     }
+    if (!pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ||
+        (!relative_to_estimate(config->model) && (config->row_weight < 1.0f))) {
+        return PVID_BAD_ROW_WEIGHT;
+    }
     if (!pvid_within_f32(config->step_limit, 1.0e-6f, 0.9f)) {
         return PVID_BAD_STEP_LIMIT;
     }
@@ -124,6 +130,7 @@ pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimat
     memset(self, 0, sizeof *self);
     self->model = config->model;
     pvid_information_init_f32(&self->information, config->model, config->forgetting_s * config->update_rate_hz);
+    self->information.row_weight = config->row_weight;
     for (size_t i = 0; i < config->model->n_p; i++) {
         const float ratio = config->row_sd / config->start_sd[i];
         self->p[i] = config->start[i];
@@ -162,27 +169,19 @@ static pvid_reason row_is_usable(size_t n_theta, const float n[], float y)
     return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
 }
 
-/* out[n_p] = C^T x for the non-zeros c of C. */
-static void transpose_times(const pvid_model_f32 *model, const float c[], const float x[], float out[])
-{
-    for (size_t a = 0; a < model->n_p; a++) {
-        out[a] = 0.0f;
-    }
-    for (size_t k = 0; k < model->n_c; k++) {
-        out[model->c_column[k]] += c[k] * x[model->c_row[k]];
-    }
-}
-
-/* e = y - N^T theta and gradient = C^T N, by the model's own function or by the pattern of C. */
+/* e = y - N^T theta and, while g < 1, gradient = C^T N: by the model's own function or by theta and
+ * the pattern of C. */
 static float innovate(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
 {
     const pvid_model_f32 *model = self->model;
     if (model->innovate != NULL) {
         return model->innovate(self->p, n, y, gradient);
     }
-    float c[PVID_MAX_THETA * PVID_MAX_P];
-    model->jacobian(self->p, c);
-    transpose_times(model, c, n, gradient);
+    if (self->gain < 1.0f) {
+        float c[PVID_MAX_THETA * PVID_MAX_P];
+        model->jacobian(self->p, c);
+        pvid_pattern_transpose_times_f32(model, c, n, gradient);
+    }
     float e = y;
     for (size_t i = 0; i < model->n_theta; i++) {
         e -= n[i] * self->theta[i];
@@ -190,8 +189,8 @@ static float innovate(const pvid_estimator_f32 *self, const float n[], float y, 
     return e;
 }
 
-/* Takes one row in and writes the sums with it. */
-static pvid_reason add_row(pvid_estimator_f32 *self, const float n[], float y, float sums[])
+/* Takes one row in and writes the sums with it; sums may be NULL where the model does not insist. */
+static inline pvid_reason add_row(pvid_estimator_f32 *self, const float n[], float y, float sums[])
 {
     const pvid_model_f32 *model = self->model;
     const pvid_reason reason = row_is_usable(model->n_theta, n, y);
@@ -208,6 +207,10 @@ static pvid_reason add_row(pvid_estimator_f32 *self, const float n[], float y, f
     if (relative || (self->gain < 1.0f)) {
         float gradient[PVID_MAX_P];
         e = innovate(self, n, y, gradient);
+        if (relative && !((e * e) <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT))) {
+            count(&self->counters.rejected_saturated);
+            return PVID_REJECTED_SATURATED;
+        }
         if (self->gain < 1.0f) {
             for (size_t a = 0; a < model->n_p; a++) {
                 self->innovation[a] += gradient[a] * e;
@@ -221,46 +224,14 @@ static pvid_reason add_row(pvid_estimator_f32 *self, const float n[], float y, f
 
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
+    if (relative_to_estimate(self->model)) {
+        return add_row(self, n, y, NULL);
+    }
     float sums[PVID_MAX_SUMS];
     return add_row(self, n, y, sums);
 }
 
 /* ---- the solve ---- */
-
-/* Entry (i, j) of M kept as its packed upper triangle by rows. */
-static float moment_at(const float m[], size_t n, size_t i, size_t j)
-{
-    const size_t row = (i < j) ? i : j;
-    const size_t column = (i < j) ? j : i;
-    return m[((row * ((2u * n) - row - 1u)) / 2u) + column];
-}
-
-/* S = C^T M C by columns of C: t = M c_a, then S_ab = c_b^T t. */
-static void project_by_pattern(const pvid_model_f32 *model, const float c[], const float m[], float s[][PVID_MAX_P])
-{
-    size_t first = 0; /* non-zeros of column a: first..last-1 */
-    for (size_t a = 0; a < model->n_p; a++) {
-        size_t last = first;
-        while ((last < model->n_c) && (model->c_column[last] == a)) {
-            last++;
-        }
-        float t[PVID_MAX_THETA];
-        for (size_t i = 0; i < model->n_theta; i++) {
-            float sum = 0.0f;
-            for (size_t k = first; k < last; k++) {
-                sum += moment_at(m, model->n_theta, i, model->c_row[k]) * c[k];
-            }
-            t[i] = sum;
-        }
-        for (size_t b = a; b < model->n_p; b++) {
-            s[a][b] = 0.0f;
-        }
-        for (size_t k = first; k < model->n_c; k++) {
-            s[a][model->c_column[k]] += c[k] * t[model->c_row[k]];
-        }
-        first = last;
-    }
-}
 
 /* S = C^T M C and F = C^T (B - M theta) at the present p. Returns what to add to yy for the sum of
  * squared residuals. */
@@ -273,34 +244,14 @@ static inline float project(const pvid_estimator_f32 *self, const float sums[], 
     }
     float c[PVID_MAX_THETA * PVID_MAX_P];
     model->jacobian(self->p, c);
-    project_by_pattern(model, c, sums, s);
-    transpose_times(model, c, b, f);
+    for (size_t a = 0; a < model->n_p; a++) {
+        float column[PVID_MAX_THETA];
+        const size_t start = pvid_pattern_start_f32(model, a);
+        pvid_pattern_times_column_f32(model, c, start, sums, column);
+        pvid_pattern_project_row_f32(model, c, start, column, s[a]);
+    }
+    pvid_pattern_transpose_times_f32(model, c, b, f);
     return 0.0f;
-}
-
-/* Moves theta, b and rr to the new p: b -= M dtheta, rr -= dtheta^T (b_old + b_new). */
-static void follow_estimate(pvid_estimator_f32 *self, const float sums[])
-{
-    const size_t n = self->model->n_theta;
-    const float *b = &sums[self->model->n_moments];
-    float *low = &self->information.low[self->model->n_moments];
-    float theta[PVID_MAX_THETA];
-    float step[PVID_MAX_THETA];
-    self->model->theta(self->p, theta);
-    for (size_t i = 0; i < n; i++) {
-        step[i] = theta[i] - self->theta[i];
-        self->theta[i] = theta[i];
-    }
-    float fall = 0.0f;
-    for (size_t i = 0; i < n; i++) {
-        float moved = 0.0f;
-        for (size_t j = 0; j < n; j++) {
-            moved += moment_at(sums, n, i, j) * step[j];
-        }
-        low[i] -= moved;
-        fall += step[i] * (b[i] + (b[i] - moved));
-    }
-    low[n] -= fall;
 }
 
 /* How far dp goes, as a part of what each parameter is measured by: its own value where it is
@@ -317,8 +268,8 @@ static float relative_size(const pvid_estimator_f32 *self, const float dp[])
     return pvid_from_bits_f32(largest);
 }
 
-/* p += dp, shortened to the step limit, within the bounds. */
-static void take_step(pvid_estimator_f32 *self, const float dp[], float size)
+/* p[n_p] = where the step dp leads: shortened to the step limit, within the bounds. */
+static inline void take_step(pvid_estimator_f32 *self, const float dp[], float size, float p[])
 {
     float factor = 1.0f;
     bool bounded = false;
@@ -336,7 +287,7 @@ static void take_step(pvid_estimator_f32 *self, const float dp[], float size)
             x = self->lower[a];
             bounded = true;
         }
-        self->p[a] = x;
+        p[a] = x;
     }
     if (bounded) {
         count(&self->counters.bounded);
@@ -351,8 +302,8 @@ static bool is_excited(const pvid_estimator_f32 *self, float kappa, float diagon
     return (kappa >= self->kappa_min) && (own || !(self->kappa_min > 0.0f));
 }
 
-/* One step of p from the sums; `gain` is g of estimator.h. */
-static inline pvid_reason solve(pvid_estimator_f32 *self, float gain, const float sums[])
+/* One step of p from the sums, for a model that projects them by itself; `gain` is g of estimator.h. */
+static inline pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, const float sums[])
 {
     float s[PVID_MAX_P][PVID_MAX_P];
     float rhs[PVID_MAX_P];
@@ -378,54 +329,264 @@ static inline pvid_reason solve(pvid_estimator_f32 *self, float gain, const floa
         count(&self->counters.held_pivot);
         return PVID_HELD_PIVOT;
     }
-    take_step(self, dp, size);
-    if (relative_to_estimate(self->model)) {
-        follow_estimate(self, sums);
-    }
+    take_step(self, dp, size, self->p);
     count(&self->counters.updates);
     return PVID_UPDATED;
 }
 
-/* Ends a group whose sums are known and solves if it is time to. */
-static pvid_reason end_group(pvid_estimator_f32 *self, const float sums[])
+/* Counts a group; whether a solve is due. */
+static bool is_due(pvid_estimator_f32 *self)
 {
     self->phase++;
     if (self->phase < self->divider) {
-        return PVID_ACCUMULATED;
+        return false;
     }
     self->phase = 0;
-    return solve(self, self->gain, sums);
+    return true;
+}
+
+/* Ends a group whose sums are known and solves if it is time to. */
+static inline pvid_reason end_group(pvid_estimator_f32 *self, const float sums[])
+{
+    const pvid_reason reason = is_due(self) ? solve_at_once(self, self->gain, sums) : PVID_ACCUMULATED;
+    pvid_information_end_group_f32(&self->information);
+    return reason;
+}
+
+/* ---- the solve in stages, for a model without functions of its own ---- */
+
+enum {
+    STAGE_READ,    /* the sums and C */
+    STAGE_PROJECT, /* n_p times: M c_a, then row a of S and F */
+    STAGE_FACTOR,
+    STAGE_STEP,    /* dp, and where p and theta go with it */
+    STAGE_FOLLOW, /* a few rows of M dtheta at a time */
+    STAGE_COMMIT,
+    STAGE_FOLD,
+    STAGE_DONE
+};
+
+#define ROWS_A_STAGE 4u
+
+static void hold(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, pvid_reason reason)
+{
+    count((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
+    solve->reason = reason;
+}
+
+static void read_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    pvid_information_read_f32(&self->information, solve->sums);
+    self->model->jacobian(self->p, solve->c);
+}
+
+/* First M c_a, then row a of S and F; returns whether rows are left. */
+static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const pvid_model_f32 *model = self->model;
+    const size_t a = solve->index / 2u;
+    if ((solve->index % 2u) == 0u) {
+        solve->start = (uint8_t)pvid_pattern_start_f32(model, a);
+        pvid_pattern_times_column_f32(model, solve->c, solve->start, solve->sums, solve->column);
+    } else {
+        pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->column, solve->s[a]);
+        solve->force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
+    }
+    solve->index++;
+    return solve->index < 2u * model->n_p;
+}
+
+static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        solve->s[a][a] += self->prior[a];
+    }
+    solve->reason = PVID_UPDATED;
+    if (!pvid_cholesky_factor_f32(&solve->factor, self->model->n_p, (const float(*)[PVID_MAX_P])solve->s)) {
+        hold(self, solve, PVID_HELD_PIVOT);
+    } else if (!is_excited(self, solve->factor.first_pivot, solve->s[0][0])) {
+        hold(self, solve, PVID_HELD_NOT_EXCITED);
+    }
+}
+
+static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const pvid_model_f32 *model = self->model;
+    float rhs[PVID_MAX_P];
+    for (size_t a = 0; a < model->n_p; a++) {
+        rhs[a] = (solve->gain * solve->force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
+        self->innovation[a] = 0.0f;
+    }
+    memcpy(solve->p, self->p, sizeof solve->p);
+    if (solve->reason == PVID_UPDATED) {
+        float dp[PVID_MAX_P];
+        pvid_cholesky_solve_f32(&solve->factor, rhs, dp);
+        const float size = relative_size(self, dp);
+        if (pvid_finite_f32(size)) {
+            take_step(self, dp, size, solve->p);
+        } else {
+            hold(self, solve, PVID_HELD_PIVOT);
+        }
+    }
+    model->theta(solve->p, solve->theta);
+    for (size_t i = 0; i < model->n_theta; i++) {
+        solve->theta_step[i] = solve->theta[i] - self->theta[i];
+    }
+    solve->fall = 0.0f;
+}
+
+/* Rows first.. of M dtheta, and of the fall of rr by dtheta^T (b_old + b_new); returns the next row. */
+static size_t follow_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, size_t first)
+{
+    const size_t n = self->model->n_theta;
+    const float *b = &solve->sums[self->model->n_moments];
+    const size_t last = ((n - first) > ROWS_A_STAGE) ? (first + ROWS_A_STAGE) : n;
+    for (size_t i = first; i < last; i++) {
+        const float moved = pvid_pattern_times_f32(n, solve->sums, i, solve->theta_step);
+        solve->moved[i] = moved;
+        solve->fall += solve->theta_step[i] * (b[i] + (b[i] - moved));
+    }
+    return last;
+}
+
+/* Moves p, theta, b and rr together: b -= M dtheta. A sum that would overflow shows in `fall`. */
+static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    if (solve->reason != PVID_UPDATED) {
+        return;
+    }
+    const size_t n = self->model->n_theta;
+    float *low = &self->information.low[self->model->n_moments];
+    if (!pvid_finite_f32(solve->fall) || !pvid_finite_f32(low[n] - solve->fall)) {
+        hold(self, solve, PVID_HELD_PIVOT);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        low[i] -= solve->moved[i];
+    }
+    low[n] -= solve->fall;
+    memcpy(self->theta, solve->theta, sizeof self->theta);
+    memcpy(self->p, solve->p, sizeof self->p);
+    count(&self->counters.updates);
+}
+
+/* What follows once a stage that is not repeated is over. */
+static uint8_t after(uint8_t stage, bool ends_group)
+{
+    if ((stage == STAGE_COMMIT) && !ends_group) {
+        return STAGE_DONE;
+    }
+    return (uint8_t)(stage + 1u);
+}
+
+static void advance_at_once(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    pvid_information_read_f32(&self->information, solve->sums);
+    if (solve->ends_group) {
+        solve->reason = end_group(self, solve->sums);
+    } else if (!(self->gain < 1.0f)) {
+        solve->reason = solve_at_once(self, 1.0f, solve->sums);
+    }
+    solve->stage = STAGE_DONE;
+}
+
+void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
+{
+    solve->ends_group = ends_group;
+    solve->reason = PVID_ACCUMULATED;
+    solve->index = 0;
+    solve->stage = STAGE_READ;
+    solve->gain = 1.0f;
+    if (!relative_to_estimate(self->model)) {
+        return;
+    }
+    if (ends_group) {
+        solve->gain = self->gain;
+        solve->stage = (uint8_t)(is_due(self) ? STAGE_READ : STAGE_FOLD);
+    } else if (self->gain < 1.0f) {
+        solve->stage = STAGE_DONE; /* the law of g < 1 is a rate, not an iteration */
+    }
+}
+
+bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const pvid_model_f32 *model = self->model;
+    bool repeat = false;
+    if (!relative_to_estimate(model) && (solve->stage != STAGE_DONE)) {
+        advance_at_once(self, solve);
+    }
+    switch (solve->stage) {
+    case STAGE_READ:
+        read_stage(self, solve);
+        break;
+    case STAGE_PROJECT:
+        repeat = project_stage(self, solve);
+        break;
+    case STAGE_FACTOR:
+        factor_stage(self, solve);
+        break;
+    case STAGE_STEP:
+        step_stage(self, solve);
+        break;
+    case STAGE_FOLLOW:
+        solve->index = (uint8_t)follow_stage(self, solve, solve->index);
+        repeat = solve->index < model->n_theta;
+        break;
+    case STAGE_COMMIT:
+        commit_stage(self, solve);
+        break;
+    case STAGE_FOLD:
+        pvid_information_end_group_f32(&self->information);
+        break;
+    default:
+        return true;
+    }
+    if (!repeat) {
+        solve->index = 0;
+        solve->stage = after(solve->stage, solve->ends_group);
+    }
+    return solve->stage == STAGE_DONE;
+}
+
+uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
+{
+    const pvid_model_f32 *model = self->model;
+    if (!relative_to_estimate(model)) {
+        return 1;
+    }
+    const size_t follows = (model->n_theta + (ROWS_A_STAGE - 1u)) / ROWS_A_STAGE;
+    return (uint16_t)(4u + (2u * model->n_p) + follows + (ends_group ? 1u : 0u));
+}
+
+/* All stages of a solve at once. */
+static pvid_reason solve_in_stages(pvid_estimator_f32 *self, bool ends_group)
+{
+    pvid_estimator_solve_f32 solve;
+    pvid_estimator_begin_f32(self, &solve, ends_group);
+    while (!pvid_estimator_advance_f32(self, &solve)) {
+    }
+    return solve.reason;
 }
 
 pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
+    if (relative_to_estimate(self->model)) {
+        const pvid_reason added = add_row(self, n, y, NULL);
+        return (added == PVID_ACCUMULATED) ? solve_in_stages(self, true) : added;
+    }
     float sums[PVID_MAX_SUMS];
     const pvid_reason added = add_row(self, n, y, sums);
-    if (added != PVID_ACCUMULATED) {
-        return added;
-    }
-    const pvid_reason reason = end_group(self, sums);
-    pvid_information_end_group_f32(&self->information);
-    return reason;
+    return (added == PVID_ACCUMULATED) ? end_group(self, sums) : added;
 }
 
 pvid_reason pvid_estimator_update_f32(pvid_estimator_f32 *self)
 {
-    float sums[PVID_MAX_SUMS];
-    pvid_information_read_f32(&self->information, sums);
-    const pvid_reason reason = end_group(self, sums);
-    pvid_information_end_group_f32(&self->information);
-    return reason;
+    return solve_in_stages(self, true);
 }
 
 pvid_reason pvid_estimator_iterate_f32(pvid_estimator_f32 *self)
 {
-    if (self->gain < 1.0f) {
-        return PVID_ACCUMULATED; /* the law of g < 1 is a rate, not an iteration */
-    }
-    float sums[PVID_MAX_SUMS];
-    pvid_information_read_f32(&self->information, sums);
-    return solve(self, 1.0f, sums);
+    return solve_in_stages(self, false);
 }
 
 /* ---- what is published ---- */

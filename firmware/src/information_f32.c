@@ -2,6 +2,8 @@
 
 #include <stddef.h>
 
+#include "unroll.h"
+
 /* exp(-x), 0 <= x <= 4, by the series of exp(x): the core has no libm but sqrtf. Accurate to a few
  * ulp; called once, in init. */
 static float decay(float x)
@@ -24,6 +26,7 @@ void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 
     self->block = BLOCK_MAX;
     self->age = 0;
     self->retention = 1.0f;
+    self->row_weight = 1.0f;
     if (forgetting_groups > 0.0f) {
         if (forgetting_groups < 16.0f * (float)BLOCK_MAX) {
             self->block = (uint16_t)((forgetting_groups < 32.0f) ? 1.0f : (forgetting_groups / 16.0f));
@@ -41,29 +44,24 @@ static size_t number_of_sums(const pvid_information_f32 *self)
     return (size_t)self->n_moments + self->n_theta + 2u;
 }
 
-/* low[i] += a x[i] for i < count, and sums[i] = high[i] + low[i]. */
-static void accumulate_scaled(float a, const float x[], size_t count, const float high[], float *restrict low,
-                              float *restrict sums)
+/* Inlined twice: with n_theta a constant 8, that of the weak form, the compiler writes the loops out. */
+static inline void accumulate_of(size_t n_theta, const float *restrict n, float y, float row_weight,
+                                 float *restrict low)
 {
-    for (size_t i = 0; i < count; i++) {
-        low[i] += a * x[i];
-        sums[i] = high[i] + low[i];
-    }
-}
-
-static void accumulate_all(const float n[], size_t n_theta, float y, const float high[], float *restrict low,
-                           float *restrict sums)
-{
-    const float one = 1.0f;
-    size_t k = 0;
+    PVID_UNROLL
     for (size_t i = 0; i < n_theta; i++) {
-        accumulate_scaled(n[i], &n[i], n_theta - i, &high[k], &low[k], &sums[k]);
-        k += n_theta - i;
+        PVID_UNROLL
+        for (size_t j = i; j < n_theta; j++) {
+            *low += n[i] * n[j];
+            low++;
+        }
     }
-    accumulate_scaled(y, n, n_theta, &high[k], &low[k], &sums[k]);
-    k += n_theta;
-    accumulate_scaled(y, &y, 1, &high[k], &low[k], &sums[k]);
-    accumulate_scaled(one, &one, 1, &high[k + 1u], &low[k + 1u], &sums[k + 1u]);
+    PVID_UNROLL
+    for (size_t i = 0; i < n_theta; i++) {
+        low[i] += y * n[i];
+    }
+    low[n_theta] += y * y;
+    low[n_theta + 1u] += row_weight;
 }
 
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
@@ -72,8 +70,29 @@ void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *
     if (model->accumulate != NULL) {
         model->accumulate(n, y, self->high, self->low, sums);
     } else {
-        accumulate_all(n, model->n_theta, y, self->high, self->low, sums);
+        if (model->n_theta == 8u) {
+            accumulate_of(8, n, y, self->row_weight, self->low);
+        } else {
+            accumulate_of(model->n_theta, n, y, self->row_weight, self->low);
+        }
+        if (sums != NULL) {
+            pvid_information_read_f32(self, sums);
+        }
     }
+}
+
+/* Sums worked on together: lets the compiler use registers of four floats where there are any. */
+#define LANES 4u
+
+/* Knuth's two-sum after forgetting: new high + new low = retention (high + low), but for the two products. */
+static inline void fold(float *restrict high, float *restrict low, float retention)
+{
+    const float kept_high = *high * retention;
+    const float kept_low = *low * retention;
+    const float total = kept_high + kept_low;
+    const float part = total - kept_high;
+    *high = total;
+    *low = (kept_high - (total - part)) + (kept_low - part);
 }
 
 void pvid_information_end_group_f32(pvid_information_f32 *self)
@@ -85,14 +104,15 @@ void pvid_information_end_group_f32(pvid_information_f32 *self)
     self->age = 0;
     const size_t sums = number_of_sums(self);
     const float retention = self->retention;
-    for (size_t i = 0; i < sums; i++) {
-        const float high = self->high[i] * retention;
-        const float low = self->low[i] * retention;
-        const float total = high + low; /* Knuth's two-sum: total + error = high + low exactly */
-        const float part = total - high;
-        const float error = (high - (total - part)) + (low - part);
-        self->high[i] = total;
-        self->low[i] = error;
+    size_t i = 0;
+    for (; (i + LANES) <= sums; i += LANES) {
+        PVID_UNROLL
+        for (size_t j = i; j < i + LANES; j++) {
+            fold(&self->high[j], &self->low[j], retention);
+        }
+    }
+    for (; i < sums; i++) {
+        fold(&self->high[i], &self->low[i], retention);
     }
 }
 

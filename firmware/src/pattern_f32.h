@@ -10,8 +10,19 @@
 /* out[n_p] = C^T x for the non-zeros c of C. */
 void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const float x[], float out[]);
 
-/* Row a of S = C^T M C from the diagonal on: s[b] = c_b^T (M c_a), a <= b < n_p. */
-void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], const float m[], size_t a, float s[]);
+/* The first non-zero of column a of C. */
+size_t pvid_pattern_start_f32(const pvid_model_f32 *model, size_t a);
+
+/* t[n_theta] = M c_a; the non-zeros of column a of C start at `start`. */
+void pvid_pattern_times_column_f32(const pvid_model_f32 *model, const float c[], size_t start, const float m[],
+                                   float t[]);
+
+/* Row a of S = C^T M C from the diagonal on, s[b] = c_b^T t for a <= b < n_p, given t = M c_a. */
+void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], size_t start, const float t[],
+                                  float s[]);
+
+/* c_a^T x, x[n_theta]. */
+float pvid_pattern_dot_f32(const pvid_model_f32 *model, const float c[], size_t start, const float x[]);
 
 /* Entry i of M x, x[n]. */
 float pvid_pattern_times_f32(size_t n, const float m[], size_t i, const float x[]);

@@ -22,6 +22,15 @@ const uint32_t pvid_native_layout[] = {
     FIELD(pvid_strong_config_f32, drive_min),
     FIELD(pvid_strong_config_f32, bank),
     FIELD(pvid_strong_config_f32, estimator),
+    (uint32_t)sizeof(pvid_weak_design_f32),
+    FIELD(pvid_weak_design_f32, smooth),
+    FIELD(pvid_weak_design_f32, overlap),
+    (uint32_t)sizeof(pvid_weak_config_f32),
+    FIELD(pvid_weak_config_f32, drive_min),
+    FIELD(pvid_weak_config_f32, design),
+    FIELD(pvid_weak_config_f32, zero_unknown),
+    FIELD(pvid_weak_config_f32, iterations),
+    FIELD(pvid_weak_config_f32, estimator),
     (uint32_t)sizeof(pvid_counters),
     (uint32_t)sizeof(pvid_estimate_f32),
     FIELD(pvid_estimate_f32, kappa),
@@ -29,6 +38,8 @@ const uint32_t pvid_native_layout[] = {
     FIELD(pvid_estimator_f32, counters),
     (uint32_t)sizeof(pvid_strong_f32),
     FIELD(pvid_strong_f32, estimator),
+    (uint32_t)sizeof(pvid_weak_f32),
+    FIELD(pvid_weak_f32, estimator),
     PVID_MAX_P,
     PVID_MAX_THETA,
     PVID_MAX_SUMS,
@@ -69,6 +80,15 @@ void pvid_replay_strong_f32(pvid_strong_f32 *self, uint32_t ticks, const float p
 {
     for (uint32_t tick = 0; tick < ticks; tick++) {
         const pvid_reason reason = pvid_strong_step_f32(self, phi[tick], y[tick]);
+        record_tick(record, tick, &self->estimator, reason);
+    }
+}
+
+void pvid_replay_weak_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[], const float y[],
+                          const pvid_record_f32 *record)
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_weak_step_f32(self, phi[tick], y[tick]);
         record_tick(record, tick, &self->estimator, reason);
     }
 }

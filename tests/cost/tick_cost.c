@@ -10,6 +10,7 @@
 
 #include "pvid/pvid.h"
 #include "rls_f32.h"
+#include "weak_rig.h"
 
 static uint32_t generator = 1u;
 
@@ -87,6 +88,7 @@ static void prepare(void)
         exit(2);
     }
     rls_init_f32(&rls, 0.9999f, 1.0e6f);
+    weak_rig_prepare(noise);
 }
 
 static volatile float sink;
@@ -162,6 +164,13 @@ static void rls_step(uint32_t i)
     sink = rls.theta[0];
 }
 
+/* Whole periods of WEAK_RIG_PERIOD ticks make a mean. */
+static void weak(uint32_t i)
+{
+    weak_rig_tick(phi_samples[i], y_samples[i]);
+    sink = phi_samples[i];
+}
+
 static const struct {
     const char *name;
     void (*run)(uint32_t i);
@@ -169,6 +178,7 @@ static const struct {
     {"nothing", nothing},     {"differentiator", differentiator}, {"row", row},   {"add", add},
     {"read", read_sums},      {"project", project},               {"tick", tick}, {"estimator", estimator},
     {"assess", assess},       {"rls", rls_step},                  {"gauss-newton", gauss_newton},
+    {"weak", weak},
 };
 
 int main(int argc, char **argv)

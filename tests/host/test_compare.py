@@ -11,7 +11,10 @@ import pytest
 from conftest import ROOT
 
 MUTANTS = {
-    "estimator_f32.c": ("s[a][a] += self->prior[a];", "s[a][a] += 1.0000001f * self->prior[a];"),
+    "estimator_f32.c": (
+        "    s[a][a] += self->prior[a];\n        rhs[a] = (gain",
+        "    s[a][a] += 1.0000001f * self->prior[a];\n        rhs[a] = (gain",
+    ),
     "kapitza_strong_f32.c": ("c->r4[1] = 6.0f * w2;", "c->r4[1] = 6.0000005f * w2;"),
     "information_f32.c": (
         "const float error = (high - (total - part)) + (low - part);",

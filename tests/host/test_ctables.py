@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from pvid.ctables import bank_header, float_array, float_literal
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
+from pvid.oracle import linear
+from pvid.weak_design import design, to_c_header
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
@@ -76,3 +78,23 @@ def test_the_command_prints_and_checks(tmp_path: Path) -> None:
 def test_a_name_that_is_not_c_is_refused() -> None:
     with pytest.raises(PvidError, match="3d"):
         float_array("3d", np.zeros(3, np.float32), "nothing")
+
+
+def test_weak_tables_reach_the_core_with_their_bits(tmp_path: Path) -> None:
+    tables = design(0.3, 1000.0, linear(9.8, 0.1, 0.1, 0.3))
+    (tmp_path / "tables.h").write_text(to_c_header(tables, "tables", "a test"), encoding="utf-8")
+    (tmp_path / "print.c").write_text(
+        '#include <stdio.h>\n#include <string.h>\n#include "tables.h"\n'
+        "static void print(const float *x, size_t n) { for (size_t i = 0; i < n; i++) {"
+        ' unsigned bits; memcpy(&bits, &x[i], 4); printf("%08x\\n", bits); } }\n'
+        "int main(void) { const size_t k = tables.functions, half = (tables.taps - 1u) / 2u;"
+        " print(tables.smooth, half); print(tables.second, half); print(tables.chi, tables.window * 3u * k);"
+        " print(tables.gram, 6u * k * (k + 1u) / 2u); print(&tables.overlap, 1); return 0; }\n",
+        encoding="utf-8",
+    )
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{ROOT / 'firmware' / 'include'}"]
+    subprocess.run(["gcc", *flags, str(tmp_path / "print.c"), "-o", str(tmp_path / "print")], check=True)
+    printed = subprocess.run([str(tmp_path / "print")], capture_output=True, text=True, check=True).stdout.split()
+    values = [tables.smooth_32, tables.second_32, tables.chi_32, tables.gram_32, np.array([tables.overlap], np.float32)]
+    expected = [f"{word:08x}" for word in np.concatenate([v.ravel() for v in values]).view(np.uint32)]
+    assert printed == expected

@@ -45,6 +45,46 @@
 #error "PVID_MAX_MOMENTS must lie in 45..528"
 #endif
 
+/* Longest smoothing window of the weak form's front end [samples]. */
+#ifndef PVID_MAX_TAPS
+#define PVID_MAX_TAPS 81
+#endif
+#if PVID_MAX_TAPS < 5 || PVID_MAX_TAPS > 1023
+#error "PVID_MAX_TAPS must lie in 5..1023"
+#endif
+
+/* Largest decimation of the weak form's front end. RAM: 8 bytes for each of taps + decimation. */
+#ifndef PVID_MAX_DECIMATION
+#define PVID_MAX_DECIMATION 32
+#endif
+#if PVID_MAX_DECIMATION < 1 || PVID_MAX_DECIMATION > 255
+#error "PVID_MAX_DECIMATION must lie in 1..255"
+#endif
+
+/* Longest window of test functions [decimated samples]; bounds a table in flash, costs no RAM. */
+#ifndef PVID_MAX_WEAK_WINDOW
+#define PVID_MAX_WEAK_WINDOW 251
+#endif
+#if PVID_MAX_WEAK_WINDOW < 9 || PVID_MAX_WEAK_WINDOW > 4095
+#error "PVID_MAX_WEAK_WINDOW must lie in 9..4095"
+#endif
+
+/* Largest number of test functions. RAM: 164 bytes each and 2 for each pair. */
+#ifndef PVID_MAX_FUNCTIONS
+#define PVID_MAX_FUNCTIONS 16
+#endif
+#if PVID_MAX_FUNCTIONS < 4 || PVID_MAX_FUNCTIONS > 64
+#error "PVID_MAX_FUNCTIONS must lie in 4..64"
+#endif
+
+/* Most Gauss-Newton steps a window of the weak form may ask for. */
+#ifndef PVID_MAX_ITERATIONS
+#define PVID_MAX_ITERATIONS 10
+#endif
+#if PVID_MAX_ITERATIONS < 1 || PVID_MAX_ITERATIONS > 255
+#error "PVID_MAX_ITERATIONS must lie in 1..255"
+#endif
+
 /* Called on misuse (NULL where an object is needed). Replace it by your own trap or reset. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))

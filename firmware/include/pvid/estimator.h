@@ -25,6 +25,7 @@
 #ifndef PVID_ESTIMATOR_H
 #define PVID_ESTIMATOR_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "pvid/information.h"
@@ -49,6 +50,8 @@ typedef struct {
                                    0: g = 1, a Gauss-Newton step at every solve */
     float correlation;          /* rows that carry the information of one independent row, >= 1:
                                    widens the standard errors when filters overlap */
+    float row_weight;           /* independent rows that a row counts for, 0 < . <= 1: (K - 2)/K where K rows
+                                   lost 2 degrees of freedom; 1 where the model accumulates by itself */
     float step_limit;           /* largest |dp/p| (|dp|/start_sd where p may be zero), 0 < . <= 0.9 */
     float kappa_min;            /* no step while kappa of S + H0 is below this, or while the data say
                                    less of p[0] than the start does, 0..1; 0: always step */
@@ -56,7 +59,7 @@ typedef struct {
     uint16_t divider;           /* groups of rows a solve, 1.. */
 } pvid_estimator_config_f32;
 
-/* Defaults: stationary law, Gauss-Newton at every tick, no forgetting, step_limit 0.3,
+/* Defaults: stationary law, Gauss-Newton at every tick, no forgetting, row_weight 1, step_limit 0.3,
  * kappa_min 1e-5. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
 extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
 
@@ -92,6 +95,36 @@ typedef struct {
     pvid_counters counters;
 } pvid_estimator_f32;
 
+/* D S D = U U^T with D a diagonal of powers of two and U upper triangular: elimination runs from
+ * the last index to the first, so that the last pivot is that of p[0]. */
+typedef struct {
+    uint8_t n;
+    float scale[PVID_MAX_P];         /* D: diagonal entries of D S D lie in [1, 4) */
+    float u[PVID_MAX_P][PVID_MAX_P]; /* upper triangle; the diagonal holds 1 / U_ii */
+    float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
+} pvid_cholesky_f32;
+
+/* A solve in progress, kept by the caller; begin and advance write to it, `reason` is to be read. */
+typedef struct {
+    pvid_reason reason;
+    uint8_t stage;
+    uint8_t index;   /* of the row within the stage */
+    uint8_t start;   /* of the column of C in work among its non-zeros */
+    bool ends_group;
+    float gain;
+    float fall;      /* of rr */
+    float sums[PVID_MAX_SUMS];
+    float c[PVID_MAX_THETA * PVID_MAX_P];
+    float column[PVID_MAX_THETA]; /* M times a column of C */
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float force[PVID_MAX_P];
+    float p[PVID_MAX_P]; /* where p, theta and b = B - M theta go: b -= moved */
+    float theta[PVID_MAX_THETA];
+    float theta_step[PVID_MAX_THETA];
+    float moved[PVID_MAX_THETA];
+    pvid_cholesky_f32 factor;
+} pvid_estimator_solve_f32;
+
 /* What is published. Always finite. */
 typedef struct {
     float p[PVID_MAX_P];
@@ -119,6 +152,21 @@ pvid_reason pvid_estimator_update_f32(pvid_estimator_f32 *self);
 
 /* One more Gauss-Newton step on the same sums, without ending a group. Same answers. */
 pvid_reason pvid_estimator_iterate_f32(pvid_estimator_f32 *self);
+
+/* The same solve in stages that cost about as much as a row each, for a loop that cannot wait:
+ *
+ *   pvid_estimator_begin_f32(&estimator, &solve, true);        true: as update, false: as iterate
+ *   each tick:  if (pvid_estimator_advance_f32(&estimator, &solve)) use solve.reason
+ *
+ * advance returns whether the solve is complete. The same bits as in one go, provided that no row is
+ * added in between. What a stage costs and how many there are does not depend on the data; all of p,
+ * theta, b and rr move in one stage, the sums are folded in the last. A model with a `project` of its
+ * own is solved in one stage. */
+void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group);
+bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);
+
+/* Number of stages of a solve that is due. */
+uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group);
 
 /* Standard errors, kappa and residual of the present estimate, from (S / s^2 + 1 / start_sd^2)^-1
  * with s^2 = correlation * residual sum / (weight - n_p). Costs about two solves; changes nothing. */

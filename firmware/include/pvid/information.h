@@ -27,6 +27,7 @@ typedef struct {
     uint16_t block;    /* groups of rows between folds, 1.. */
     uint16_t age;      /* groups since the last fold, 0..block-1 */
     float retention;   /* factor on the past at a fold, in (0, 1]; 1 keeps everything */
+    float row_weight;  /* what a row adds to weight; 1 where the model accumulates by itself */
     float high[PVID_MAX_SUMS];
     float low[PVID_MAX_SUMS];
 } pvid_information_f32;
@@ -36,7 +37,8 @@ typedef struct {
 void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model, float forgetting_groups);
 
 /* Adds one row and writes the values of the sums with it, as pvid_information_read_f32 would: the
- * row must be within PVID_ROW_LIMIT. Cost: a product and two additions a sum. */
+ * row must be within PVID_ROW_LIMIT. sums may be NULL where the model does not accumulate by itself.
+ * Cost: a product and two additions a sum. */
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS]);
 

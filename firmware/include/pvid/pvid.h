@@ -1,7 +1,7 @@
 /* pvid.h - identifies the parameters of a mechanism on the microcontroller that drives it.
  *
- * C99, float32, static memory, no library but sqrtf. Start at strong.h (samples in, parameters
- * out) or at estimator.h and model.h (rows of a model of yours in). */
+ * C99, float32, static memory, no library but sqrtf. Start at weak.h or strong.h (samples in,
+ * parameters out) or at estimator.h and model.h (rows of a model of yours in). */
 #ifndef PVID_PVID_H
 #define PVID_PVID_H
 
@@ -15,9 +15,11 @@ extern "C" {
 #include "pvid/fnv.h"
 #include "pvid/information.h"
 #include "pvid/kapitza.h"
+#include "pvid/kapitza_weak.h"
 #include "pvid/model.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
+#include "pvid/weak.h"
 
 #define PVID_VERSION_MAJOR 0
 #define PVID_VERSION_MINOR 1

@@ -22,13 +22,16 @@ typedef enum {
     PVID_BAD_STEP_LIMIT,      /* not finite or outside (0, 0.9] */
     PVID_BAD_KAPPA_MIN,       /* not finite or outside [0, 1) */
     PVID_BAD_CORRELATION,     /* not finite or below 1 */
-    PVID_BAD_DRIVE_MIN        /* not finite or negative */
+    PVID_BAD_DRIVE_MIN,       /* not finite or negative */
+    PVID_BAD_ROW_WEIGHT,      /* not finite or outside (0, 1], or not 1 for a model that accumulates by itself */
+    PVID_BAD_DESIGN,          /* a weak-form design not as described in weak.h */
+    PVID_BAD_ITERATIONS       /* outside 1..PVID_MAX_ITERATIONS, or too many for the window's hop */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */
 typedef enum {
     PVID_UPDATED = 0,            /* the parameters took a step */
-    PVID_WARMING_UP,             /* the window of the differentiator is not full yet */
+    PVID_WARMING_UP,             /* the window of samples is not full yet */
     PVID_ACCUMULATED,            /* data taken in, no solve due at this tick (divider) */
     PVID_HELD_NOT_EXCITED,       /* kappa below its threshold: the data say nothing of w */
     PVID_HELD_PIVOT,             /* the system could not be solved, or its solution was not finite */

@@ -27,7 +27,7 @@ from pvid.compare import Comparison, compare_run
 from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
-from pvid.identify import LINEAR, PHYSICAL, UNITS, Identification, identify
+from pvid.identify import LINEAR, PHYSICAL, UNITS, ZERO, Identification, identify
 from pvid.native import Native
 from pvid.rig import (
     STANDARD_DRIVE,
@@ -41,7 +41,8 @@ from pvid.rig import (
     standard_start,
 )
 from pvid.rigfile import RigFile, load
-from pvid.setup import strong_config
+from pvid.setup import config_of, weak_design_of
+from pvid.weak_design import to_c_header
 
 DONE, DIFFERENT, BAD_INPUT, NOTHING_IDENTIFIED = 0, 1, 2, 3
 
@@ -87,14 +88,16 @@ def commands() -> None:
 @commands.command()
 @click.option("--figure", type=click.Path(path_type=Path), default=Path("pvid-demo.png"), help="Where the figure goes.")
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
-@click.option("--bits", default=20, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
+@click.option("--bits", default=14, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
+@click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
-def demo(figure: Path, seed: int, bits: int, truth: str) -> int:
+def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     """Simulates the standard rig, identifies it in the C core, compares every bit with numpy."""
     native = Native()
     simulation = simulate(sensors=standard_sensors(bits), truth=truth, seed=seed)  # type: ignore[arg-type]
     run = simulation.run
     rig = RigFile.standard()
+    rig = replace(rig, identifier=replace(rig.identifier, form=form))  # type: ignore[arg-type]
     start = standard_start(seed)
     messages.print(
         f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
@@ -104,7 +107,7 @@ def demo(figure: Path, seed: int, bits: int, truth: str) -> int:
     truths = _truths(simulation.pendulum)
     _print_result(result, truths)
     with progress_bar("comparing with the twin", len(run.t)) as advance:
-        comparison = compare_run(native, strong_config(rig, run.sample_rate, start), run.phi, run.y, advance)
+        comparison = compare_run(native, config_of(rig, run.sample_rate, start), run.phi, run.y, advance)
     _print_comparison(comparison)
     _write_figure(result, figure, truths)
     return DONE if comparison.equal else DIFFERENT
@@ -121,7 +124,7 @@ def _write_figure(result: Identification, path: Path, truths: dict[str, float] |
 
 def _truths(pendulum: Pendulum) -> dict[str, float]:
     w, d1, d2 = pendulum.linear
-    return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2}
+    return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2, "c": 0.0}
 
 
 def _print_result(result: Identification, truths: dict[str, float] | None = None) -> None:
@@ -133,14 +136,14 @@ def _print_result(result: Identification, truths: dict[str, float] | None = None
     table.add_column("standard error", justify="right")
     if truths:
         table.add_column("error %", justify="right")
-    for name in (*PHYSICAL, *LINEAR):
+    for name in (*PHYSICAL, *LINEAR, ZERO):
         if name not in result.value:
             continue
         label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
         cells = [f"{result.value[name]:.6g}", f"{result.se[name]:.2g}"]
         if truths:
             cells.insert(0, f"{truths[name]:.6g}")
-            cells.append(f"{100 * (result.value[name] / truths[name] - 1):+.4f}")
+            cells.append(f"{100 * (result.value[name] / truths[name] - 1):+.4f}" if truths[name] else "")
         table.add_row(label, *cells)
     Console().print(table)
     click.echo(
@@ -290,7 +293,7 @@ def identify_command(
     if figure is not None:
         _write_figure(result, figure, None)
     if not result.identified:
-        click.echo(f"pvid: nothing identified: {result.status}", err=True)
+        click.echo(f"pvid: nothing identified: {result.verdict}", err=True)
         return NOTHING_IDENTIFIED
     return DONE
 
@@ -308,7 +311,7 @@ def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str |
     for one in [law] if law else ["stationary", "pseudovelocity"]:
         chosen = replace(rig, identifier=replace(rig.identifier, law=one))  # type: ignore[arg-type]
         with progress_bar(f"{one} law", len(run.t)) as advance:
-            outcome = compare_run(native, strong_config(chosen, run.sample_rate), run.phi, run.y, advance)
+            outcome = compare_run(native, config_of(chosen, run.sample_rate), run.phi, run.y, advance)
         verdict = "equal" if outcome.equal else f"DIFFERENT: {outcome.difference}"
         table.add_row("f32", chosen.identifier.form, one, str(outcome.ticks), f"{outcome.core_hash:08x}", verdict)
         failed |= not outcome.equal
@@ -330,7 +333,29 @@ def fir_table(points: int, degree: int, difference: bool, stride: int, name: str
     """Prints a bank of derivative filters as a C header for pvid_fir_bank_f32."""
     bank = finite_difference(stride) if difference else savitzky_golay(points, degree, stride)
     kind = "--difference" if difference else f"--points {points} --degree {degree}"
-    header = bank_header(bank, name, f"pvid fir-table {kind} --stride {stride} --name {name}")
+    return _print_header(bank_header(bank, name, f"pvid fir-table {kind} --stride {stride} --name {name}"), check)
+
+
+@commands.command(name="weak-table")
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML).")
+@click.option("--name", default="weak_tables", show_default=True, help="Name of the design in C.")
+@click.option("--check", type=click.Path(path_type=Path), help="Only tell whether this file is what would be printed.")
+def weak_table(rig_path: Path, name: str, check: Path | None) -> int:
+    """Prints the weak form's tables for a rig as a C header for pvid_weak_config_f32."""
+    rig = load(rig_path)
+    if rig.sample_rate is None:
+        raise PvidError(f"{rig_path}: sample_rate is missing, and the tables hang on it")
+    tables = weak_design_of(rig, rig.sample_rate)
+    messages.print(
+        f"taps {tables.taps}, decimation {tables.decimation}, windows of {tables.window} samples "
+        f"({tables.window_s:g} s), {tables.functions} test functions; {tables.flash_bytes} bytes of flash; "
+        f"{tables.update_rate_hz:.2f} answers a second"
+    )
+    return _print_header(to_c_header(tables, name, f"pvid weak-table --rig {rig_path.name} --name {name}"), check)
+
+
+def _print_header(header: str, check: Path | None) -> int:
+    """Prints a generated header, or tells whether the file `check` is the same."""
     if check is None:
         click.echo(header, nl=False)
         return DONE
@@ -393,6 +418,18 @@ def bench_strong(update: Path | None) -> int:
     with progress_bar("strong form", len(strong.CASES)) as advance:
         rows = list(strong.strong_table(Native(), advance))
     _update_readme(update, "strong", _markdown(strong.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="weak")
+@_UPDATE
+def bench_weak(update: Path | None) -> int:
+    """Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."""
+    from pvid.bench import weak
+
+    with progress_bar("weak form", len(weak.CASES)) as advance:
+        rows = list(weak.weak_table(Native(), advance))
+    _update_readme(update, "weak", _markdown(weak.HEADER, rows))
     return DONE
 
 

@@ -8,22 +8,34 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.native import EstimatorConfig, Native, Record, StrongConfig
+from pvid.native import (
+    EstimatorConfig,
+    Native,
+    Record,
+    StrongConfig,
+    StrongIdentifier,
+    WeakConfig,
+    WeakIdentifier,
+)
 from pvid.twin import fnv
-from pvid.twin import kapitza_strong as model
 from pvid.twin.estimator import Estimator
 from pvid.twin.strong import StrongTwin, run_rows
+from pvid.twin.weak import WeakTwin
 
-P_NAMES = ("w", "d1", "d2")
+P_NAMES = ("w", "d1", "d2", "c")
+
+# Moments and entries of B by the number of sums: strong form, weak form with and without the encoder's zero.
+_LAYOUTS = {n_sums: (moments, n_theta) for n_sums, moments, n_theta in ((58, 45, 11), (46, 36, 8), (22, 15, 5))}
 
 
-def sum_name(index: int) -> str:
-    """Name of a sum by its place: M[i], B[i], yy or weight."""
-    if index < model.MOMENTS:
+def sum_name(index: int, n_sums: int) -> str:
+    """Name of a sum by its place among `n_sums`: M[i], B[i], yy or weight."""
+    moments, n_theta = _LAYOUTS[n_sums]
+    if index < moments:
         return f"M[{index}]"
-    if index < model.MOMENTS + model.N_THETA:
-        return f"B[{index - model.MOMENTS}]"
-    return ("yy", "weight")[index - model.MOMENTS - model.N_THETA]
+    if index < moments + n_theta:
+        return f"B[{index - moments}]"
+    return ("yy", "weight")[index - moments - n_theta]
 
 
 @dataclass(frozen=True)
@@ -65,7 +77,8 @@ def first_difference(
     reason: npt.NDArray[np.uint8],
 ) -> Difference | None:
     """The first difference between a replay of the core and one lane of the twin, p before sums before status."""
-    names: list[Callable[[int], str]] = [P_NAMES.__getitem__, sum_name, lambda _: "status"]
+    n_sums = sums.shape[1]
+    names: list[Callable[[int], str]] = [P_NAMES.__getitem__, lambda i: sum_name(i, n_sums), lambda _: "status"]
     cores = [_words(record.p), _words(record.sums), record.reason[:, None].astype(np.uint32)]
     twins = [_words(p), _words(sums), reason[:, None].astype(np.uint32)]
     found: list[tuple[int, int, str, int, int]] = []
@@ -82,18 +95,23 @@ def first_difference(
 
 def compare_run(
     native: Native,
-    config: StrongConfig,
+    config: StrongConfig | WeakConfig,
     phi: npt.ArrayLike,
     y: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,
 ) -> Comparison:
     """Runs phi [rad], y [m] through the core and the twin and compares every tick.
 
-    Cost: about 0.5 ms a tick, nearly all of it the twin's.
+    Cost: about 0.5 ms a tick in the strong form, which solves at every tick, 0.01 ms in the weak form.
     """
-    identifier = native.strong(config)
+    identifier: StrongIdentifier | WeakIdentifier
+    if isinstance(config, WeakConfig):
+        identifier = native.weak(config)
+        twin = WeakTwin(config).run(phi, y, progress=progress)
+    else:
+        identifier = native.strong(config)
+        twin = StrongTwin(config).run(phi, y, progress=progress)
     record = identifier.run(phi, y)
-    twin = StrongTwin(config).run(phi, y, progress=progress)
     p, sums, reason = twin.p[:, :, 0], twin.sums[:, :, 0], twin.reason[:, 0]
     hashes = fnv.running_hashes(p, sums, reason)
     return Comparison(

@@ -11,15 +11,20 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
-from pvid.native import Native, Reason, StrongConfig
+from pvid.native import Native, Reason, StrongConfig, WeakConfig
 from pvid.rigfile import RigFile
-from pvid.setup import bank_of, strong_config
+from pvid.setup import bank_of, config_of
 
 Float = npt.NDArray[np.float64]
 
 LINEAR = ("w", "d1", "d2")
+ZERO = "c"
+
+# With w known no better than this, relative, nothing is identified.
+WORST_SE = 0.1
+
 PHYSICAL = ("g", "l2", "rho2")
-UNITS = {"w": "1/s^2", "d1": "", "d2": "", "g": "m/s^2", "l2": "m", "rho2": "m"}
+UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", "rho2": "m"}
 
 
 @dataclass(frozen=True)
@@ -58,13 +63,24 @@ class Identification:
 
     @property
     def identified(self) -> bool:
-        """Whether the data moved the estimate at all and the last word is not a refusal."""
-        return self.updates > 0 and self.status in ("updated", "accumulated")
+        """Whether this is an answer: the data moved the estimate, the last word is no refusal, and w is known."""
+        return (
+            self.updates > 0
+            and self.status in (Reason.UPDATED.text, Reason.ACCUMULATED.text)
+            and self.se["w"] <= WORST_SE * abs(self.value["w"])
+        )
+
+    @property
+    def verdict(self) -> str:
+        """Why nothing was identified, in words."""
+        if self.updates and self.status in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
+            return f"the standard error of w is {100 * self.se['w'] / abs(self.value['w']):.0f} % of it"
+        return self.status
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (DESIGN.md)."""
-        names = (*LINEAR, *PHYSICAL)
-        parameters = {
+        names = (*LINEAR, *PHYSICAL, ZERO)
+        parameters: dict[str, Any] = {
             name: {"value": self.value[name], "se": self.se[name]} if name in self.value else None for name in names
         }
         return {
@@ -103,22 +119,32 @@ def identify(
     PvidError
         When the run is shorter than the window, or the settings do not fit the core.
     """
-    config = strong_config(rig, run.sample_rate, start)
-    if len(run.t) <= 2 * config.delay:
+    config = config_of(rig, run.sample_rate, start)
+    needed = _ticks_needed(config)
+    if len(run.t) < needed:
         raise PvidError(
-            f"the run has {len(run.t)} samples and the differentiator's window {2 * config.delay + 1}: "
+            f"the run has {len(run.t)} samples and the {rig.identifier.form} form needs {needed} for its first answer: "
             f"nothing can be identified; record longer or shorten window_s"
         )
     every = max(1, len(run.t) // points)
-    if rig.identifier.core == "f64":
+    if rig.identifier.core == "f32":
+        return _in_float32(run, rig, config, every, native)
+    if rig.identifier.core == "f64" and isinstance(config, StrongConfig):
         return _in_float64(run, rig, config, every)
-    if rig.identifier.core != "f32":
-        raise PvidError(f"core {rig.identifier.core} is not built yet: use f32 or f64")
-    return _in_float32(run, rig, config, every, native)
+    raise PvidError(f"core {rig.identifier.core} has no {rig.identifier.form} form yet: use f32")
 
 
-def _in_float32(run: Run, rig: RigFile, config: StrongConfig, every: int, native: Native) -> Identification:
-    identifier = native.strong(config)
+def _ticks_needed(config: StrongConfig | WeakConfig) -> int:
+    if isinstance(config, WeakConfig):
+        # one window, and as much again as its rows and steps may take
+        return config.design.taps + config.design.decimation * (config.design.window + config.hop)
+    return 2 * config.delay + 1
+
+
+def _in_float32(
+    run: Run, rig: RigFile, config: StrongConfig | WeakConfig, every: int, native: Native
+) -> Identification:
+    identifier = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
     record = identifier.run(run.phi, run.y, sums=False, estimate_every=every)
     counters = identifier.counters
     last = identifier.assess()
@@ -129,10 +155,11 @@ def _in_float32(run: Run, rig: RigFile, config: StrongConfig, every: int, native
         estimates["covariance"][:, :3, :3].astype(np.float64),
         rig.l1,
     )
+    n_p = record.p.shape[1]
     return _identification(
         rig,
-        p=last["p"][:3].astype(np.float64),
-        covariance=last["covariance"][:3, :3].astype(np.float64),
+        p=last["p"][:n_p].astype(np.float64),
+        covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
         kappa=float(last["kappa"]),
         status=_final_status(record.reason),
         ticks=len(run.t),
@@ -241,12 +268,13 @@ def _identification(
     running_hash: int | None,
     trajectory: Trajectory,
 ) -> Identification:
-    values = dict(zip(LINEAR, map(float, p), strict=True))
-    errors = dict(zip(LINEAR, map(float, np.sqrt(np.diag(covariance))), strict=True))
-    physical = oracle.physical(p, rig.l1)
+    names = (*LINEAR, ZERO)[: len(p)]
+    values = dict(zip(names, map(float, p), strict=True))
+    errors = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    physical = oracle.physical(p[:3], rig.l1)
     if np.isfinite(physical).all():
         values.update(zip(PHYSICAL, map(float, physical), strict=True))
-        errors.update(zip(PHYSICAL, map(float, oracle.physical_errors(p, covariance, rig.l1)), strict=True))
+        errors.update(zip(PHYSICAL, map(float, oracle.physical_errors(p[:3], covariance[:3, :3], rig.l1)), strict=True))
     return Identification(
         value=values,
         se=errors,

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +67,9 @@ class Status(IntEnum):
     BAD_KAPPA_MIN = 15
     BAD_CORRELATION = 16
     BAD_DRIVE_MIN = 17
+    BAD_ROW_WEIGHT = 18
+    BAD_DESIGN = 19
+    BAD_ITERATIONS = 20
 
 
 class Law(IntEnum):
@@ -100,6 +103,7 @@ class EstimatorConfigStruct(ctypes.Structure):
         ("forgetting_s", ctypes.c_float),
         ("feedback_hz", ctypes.c_float),
         ("correlation", ctypes.c_float),
+        ("row_weight", ctypes.c_float),
         ("step_limit", ctypes.c_float),
         ("kappa_min", ctypes.c_float),
         ("law", ctypes.c_int),
@@ -115,6 +119,36 @@ class StrongConfigStruct(ctypes.Structure):
         ("l1", ctypes.c_float),
         ("drive_min", ctypes.c_float),
         ("bank", FirBankStruct),
+        ("estimator", EstimatorConfigStruct),
+    ]
+
+
+class WeakDesignStruct(ctypes.Structure):
+    """pvid_weak_design_f32."""
+
+    _fields_ = [
+        ("taps", ctypes.c_uint16),
+        ("decimation", ctypes.c_uint16),
+        ("window", ctypes.c_uint16),
+        ("functions", ctypes.c_uint8),
+        ("smooth", ctypes.POINTER(ctypes.c_float)),
+        ("second", ctypes.POINTER(ctypes.c_float)),
+        ("chi", ctypes.POINTER(ctypes.c_float)),
+        ("gram", ctypes.POINTER(ctypes.c_float)),
+        ("overlap", ctypes.c_float),
+    ]
+
+
+class WeakConfigStruct(ctypes.Structure):
+    """pvid_weak_config_f32."""
+
+    _fields_ = [
+        ("sample_rate_hz", ctypes.c_float),
+        ("l1", ctypes.c_float),
+        ("drive_min", ctypes.c_float),
+        ("design", ctypes.POINTER(WeakDesignStruct)),
+        ("zero_unknown", ctypes.c_bool),
+        ("iterations", ctypes.c_uint8),
         ("estimator", EstimatorConfigStruct),
     ]
 
@@ -188,6 +222,7 @@ class EstimatorConfig:
     forgetting_s: float = 0.0
     feedback_hz: float = 0.0
     correlation: float = 1.0
+    row_weight: float = 1.0
     step_limit: float = 0.3
     kappa_min: float = 1e-5
     law: Law = Law.STATIONARY
@@ -217,6 +252,60 @@ class StrongConfig:
     def delay(self) -> int:
         """Ticks between a sample and the derivatives that refer to its instant."""
         return self.half * self.stride
+
+
+class WeakTables(Protocol):
+    """Tables of a weak-form design, as in weak.h; pvid.weak_design makes them.
+
+    smooth, second float32 [(taps - 1) / 2]; chi float32 [window, 3, functions] (orders 0, 2, 4);
+    gram float32 [6, functions (functions + 1) / 2].
+    """
+
+    @property
+    def taps(self) -> int: ...
+    @property
+    def decimation(self) -> int: ...
+    @property
+    def window(self) -> int: ...
+    @property
+    def functions(self) -> int: ...
+    @property
+    def smooth(self) -> Float32: ...
+    @property
+    def second(self) -> Float32: ...
+    @property
+    def chi(self) -> Float32: ...
+    @property
+    def gram(self) -> Float32: ...
+    @property
+    def overlap(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class WeakConfig:
+    """Settings of the weak-form identifier, as in weak.h.
+
+    The estimator's start, start_sd and bounds have four entries when the encoder's zero is unknown, else three;
+    its row_weight and correlation come from the design.
+    """
+
+    sample_rate: float
+    l1: float
+    design: WeakTables
+    estimator: EstimatorConfig
+    zero_unknown: bool = True
+    iterations: int = 3
+    drive_min: float = 0.0
+
+    @property
+    def hop(self) -> int:
+        """Decimated samples from the start of a window to the start of the next."""
+        return (self.design.window - 1) // 2
+
+    @property
+    def delay(self) -> int:
+        """Ticks between a sample and the smoothed value that refers to its instant."""
+        return (self.design.taps - 1) // 2
 
 
 @dataclass
@@ -253,6 +342,15 @@ def _struct_layout() -> list[int]:
         at(StrongConfigStruct, "drive_min"),
         at(StrongConfigStruct, "bank"),
         at(StrongConfigStruct, "estimator"),
+        ctypes.sizeof(WeakDesignStruct),
+        at(WeakDesignStruct, "smooth"),
+        at(WeakDesignStruct, "overlap"),
+        ctypes.sizeof(WeakConfigStruct),
+        at(WeakConfigStruct, "drive_min"),
+        at(WeakConfigStruct, "design"),
+        at(WeakConfigStruct, "zero_unknown"),
+        at(WeakConfigStruct, "iterations"),
+        at(WeakConfigStruct, "estimator"),
         ctypes.sizeof(CountersStruct),
         ctypes.sizeof(EstimateStruct),
         at(EstimateStruct, "kappa"),
@@ -291,13 +389,19 @@ class Native:
         length = ctypes.c_uint32.in_dll(self._lib, "pvid_native_layout_length").value
         layout = list((ctypes.c_uint32 * length).in_dll(self._lib, "pvid_native_layout"))
         mirrored = _struct_layout()
-        estimator_size, counters_at, strong_size, estimator_at, *bounds = layout[len(mirrored) :]
+        estimator_size, counters_at, strong_size, estimator_at, weak_size, weak_estimator_at, *bounds = layout[
+            len(mirrored) :
+        ]
         if layout[: len(mirrored)] != mirrored or bounds != [MAX_P, MAX_THETA, MAX_SUMS, MAX_WINDOW]:
-            raise PvidError(f"the C core {path} was built with other struct sizes than this package: {layout}")
+            raise PvidError(
+                f"the C core {path} was built with other struct sizes than this package: {layout}"
+            )
         self._estimator_size = estimator_size
         self._counters_at = counters_at
         self._strong_size = strong_size
         self._estimator_at = estimator_at
+        self._weak_size = weak_size
+        self._weak_estimator_at = weak_estimator_at
 
     @property
     def build(self) -> str:
@@ -307,7 +411,7 @@ class Native:
     @property
     def state_bytes(self) -> dict[str, int]:
         """Bytes of the state structs on this machine."""
-        return {"estimator": self._estimator_size, "strong": self._strong_size}
+        return {"estimator": self._estimator_size, "strong": self._strong_size, "weak": self._weak_size}
 
     def arithmetic_faults(self) -> int:
         """pvid_arithmetic_faults_f32: 0 when float32 behaves as the bits need."""
@@ -316,6 +420,10 @@ class Native:
     def strong(self, config: StrongConfig) -> StrongIdentifier:
         """An initialised strong-form identifier."""
         return StrongIdentifier(self, config)
+
+    def weak(self, config: WeakConfig) -> WeakIdentifier:
+        """An initialised weak-form identifier."""
+        return WeakIdentifier(self, config)
 
     def estimator(self, config: EstimatorConfig, update_rate: float) -> RowEstimator:
         """An initialised estimator of the strong form that is fed rows."""
@@ -352,7 +460,8 @@ def _estimator_struct(config: EstimatorConfig) -> EstimatorConfigStruct:
     for name in ("start", "start_sd", "lower", "upper"):
         values = np.asarray(getattr(config, name), np.float32)
         getattr(struct, name)[: len(values)] = [float(v) for v in values]
-    for name in ("row_sd", "forgetting_s", "feedback_hz", "correlation", "step_limit", "kappa_min"):
+    scalars = ("row_sd", "forgetting_s", "feedback_hz", "correlation", "row_weight", "step_limit", "kappa_min")
+    for name in scalars:
         setattr(struct, name, float(getattr(config, name)))
     struct.law = int(config.law)
     struct.divider = config.divider
@@ -465,6 +574,62 @@ class StrongIdentifier(_Stepper):
             hashes,
             estimate_every,
         )
+
+
+class WeakIdentifier(_Stepper):
+    """pvid_weak_f32. State persists between calls of `run`, so a run may come in pieces."""
+
+    def __init__(self, native: Native, config: WeakConfig) -> None:
+        n_p, n_theta = (4, 8) if config.zero_unknown else (3, 5)
+        super().__init__(native, n_p=n_p, n_sums=n_theta * (n_theta + 1) // 2 + n_theta + 2)
+        design = config.design
+        names = ("smooth", "second", "chi", "gram")
+        self._tables = {name: np.ascontiguousarray(getattr(design, name), np.float32) for name in names}
+        self._design = WeakDesignStruct(
+            taps=design.taps,
+            decimation=design.decimation,
+            window=design.window,
+            functions=design.functions,
+            overlap=float(design.overlap),
+            **{name: table.ctypes.data_as(ctypes.POINTER(ctypes.c_float)) for name, table in self._tables.items()},
+        )
+        struct = WeakConfigStruct(
+            sample_rate_hz=config.sample_rate,
+            l1=config.l1,
+            drive_min=config.drive_min,
+            design=ctypes.pointer(self._design),
+            zero_unknown=config.zero_unknown,
+            iterations=config.iterations,
+            estimator=_estimator_struct(config.estimator),
+        )
+        self._state = ctypes.create_string_buffer(native._weak_size)
+        self._estimator_at = native._weak_estimator_at
+        status = Status(native._lib.pvid_weak_init_f32(self._state, ctypes.byref(struct)))
+        if status is not Status.OK:
+            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
+
+    def run(
+        self,
+        phi: npt.ArrayLike,
+        y: npt.ArrayLike,
+        *,
+        sums: bool = True,
+        hashes: bool = True,
+        estimate_every: int = 0,
+    ) -> Record:
+        """Steps through phi [rad] and y [m], both [ticks], converted to float32 as a board would read them."""
+        return self._replay(
+            "pvid_replay_weak_f32",
+            np.ascontiguousarray(phi, np.float32),
+            np.ascontiguousarray(y, np.float32),
+            sums,
+            hashes,
+            estimate_every,
+        )
+
+    def gap(self) -> None:
+        """pvid_weak_gap_f32: samples are missing before the next call of `run`."""
+        self.native._lib.pvid_weak_gap_f32(self._state)
 
 
 class RowEstimator(_Stepper):

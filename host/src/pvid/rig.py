@@ -30,6 +30,7 @@ _ATOL = 1e-14
 # that takes ever more is running away, and would keep the user waiting for ever.
 _MAX_EVALUATIONS_PER_S = 50_000
 _MAX_EVALUATIONS_PER_PERIOD = 2_000
+_RUNAWAY = "The simulated motion grows without bound or turns too fast: choose a weaker drive or other tones."
 _MAX_SAMPLES = 10_000_000  # 10 hours at 278 Hz; beyond, the request is a slip of units
 
 
@@ -406,7 +407,7 @@ def _truth(
         nonlocal left
         left -= 1
         if left < 0 or not math.isfinite(x.sum()):
-            raise PvidError("The simulated motion grows without bound: choose a weaker drive or other tones.")
+            raise PvidError(_RUNAWAY)
         return equations(t, x)
 
     with np.errstate(over="ignore", invalid="ignore"):
@@ -423,7 +424,7 @@ def _truth(
         )
     state = np.ascontiguousarray(solution.y.T)
     if not solution.success or not np.isfinite(state).all():
-        raise PvidError("The simulated motion grows without bound: choose a weaker drive or other tones.")
+        raise PvidError(_RUNAWAY)
     state.setflags(write=False)
     if truth == "full":
         return state, None

@@ -93,7 +93,7 @@ class Identifier:
     degree : of its Savitzky-Golay polynomial
     stride : samples between the differentiator's points
     test_functions : of the weak form, per window
-    decimation : of the weak form, samples in per sample used
+    decimation : of the weak form, samples in per sample used; 0: what comes nearest to 125 Hz
     forgetting_s : time constant of forgetting [s]; 0: nothing is forgotten
     feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at
         every solve
@@ -104,15 +104,15 @@ class Identifier:
     kappa_min : hold the estimate while less than this part of w's information is its own
     """
 
-    form: Form = _choice("strong", Form)
+    form: Form = _choice("weak", Form)
     law: Law = _choice("stationary", Law)
     core: Core = _choice("f32", Core)
     window_s: float = _number(0.0, "s", 0.0, 1e6)
     differentiator: Differentiator = _choice("savitzky-golay", Differentiator)
     degree: int = _number(12, "", 4, 12)
     stride: int = _number(1, "samples", 1, 65535)
-    test_functions: int = _number(12, "", 3, 64)
-    decimation: int = _number(8, "samples", 1, 65535)
+    test_functions: int = _number(12, "", 4, 16)
+    decimation: int = _number(0, "samples", 0, 32)
     forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
     feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)
     divider: int = _number(1, "", 1, 65535)

@@ -8,8 +8,9 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.differentiation import FirBank, finite_difference, savitzky_golay
 from pvid.errors import PvidError
-from pvid.native import MAX_WINDOW, EstimatorConfig, Law, StrongConfig
+from pvid.native import MAX_WINDOW, EstimatorConfig, Law, StrongConfig, WeakConfig
 from pvid.rigfile import RigFile
+from pvid.weak_design import WeakDesign, design
 
 # The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
 START_RELATIVE_SD = 0.5
@@ -85,3 +86,60 @@ def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
         stride=bank.stride,
         estimator=estimator_config(rig, bank, start),
     )
+
+
+# The unknown encoder zero c [rad]: where it may lie, and how far from 0 it is expected; steps are limited to
+# 0.3 of the latter, which must not hold back a zero of 0.1 rad.
+ZERO_BOUND = 3.0
+ZERO_SD = 0.5
+
+# Below this kappa rounding alone speaks of w: without a drive float32 leaves up to 6e-7.
+WEAK_KAPPA_MIN = 5e-6
+
+
+def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
+    """The tables a rig file asks for at `sample_rate` [Hz], whitened at its nominal p."""
+    settings = rig.identifier
+    return design(
+        rig.l1,
+        sample_rate,
+        nominal_start(rig),
+        window_s=settings.window,
+        functions=settings.test_functions,
+        decimation=settings.decimation or None,
+    )
+
+
+def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfig:
+    """Settings of the weak-form identifier for samples at `sample_rate` [Hz]; `start` overrides the nominal p."""
+    settings = rig.identifier
+    tables = weak_design_of(rig, sample_rate)
+    p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
+    zero = 1 if settings.zero else 0
+    # rounding to an LSB and half an LSB of noise besides, through the smoother; an exact sensor has float32's noise
+    sample_sd = max(rig.sensor.phi_lsb * np.sqrt(1 / 12 + 1 / 4), 1e-8)
+    return WeakConfig(
+        sample_rate=sample_rate,
+        l1=rig.l1,
+        design=tables.f32,
+        zero_unknown=settings.zero,
+        estimator=EstimatorConfig(
+            start=np.append(p, [0.0] * zero).astype(np.float32),
+            start_sd=np.append(START_RELATIVE_SD * p, [ZERO_SD] * zero).astype(np.float32),
+            lower=np.append(p / BOUND_FACTOR, [-ZERO_BOUND] * zero).astype(np.float32),
+            upper=np.append(p * BOUND_FACTOR, [ZERO_BOUND] * zero).astype(np.float32),
+            row_sd=float(sample_sd * tables.smoothing_gain),
+            forgetting_s=settings.forgetting_s,
+            feedback_hz=0.0,
+            kappa_min=min(settings.kappa_min, WEAK_KAPPA_MIN),
+            law=LAWS[settings.law],
+            divider=settings.divider,
+        ),
+    )
+
+
+def config_of(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig | WeakConfig:
+    """Settings of the form the rig file asks for."""
+    if rig.identifier.form == "weak":
+        return weak_config(rig, sample_rate, start)
+    return strong_config(rig, sample_rate, start)

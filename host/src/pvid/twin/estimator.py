@@ -1,16 +1,22 @@
-"""Twin of estimator_f32.c on the strong form's model: one tick of every lane at a time."""
+"""Twin of estimator_f32.c: one tick of every lane at a time.
+
+`Estimator` is that of the strong form, whose model projects its sums by itself; `RelativeEstimator` is that of a
+model known by its pattern, which keeps B relative to the estimate and solves in stages.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.errors import PvidError
 from pvid.native import ESTIMATE_DTYPE, EstimatorConfig, Law, Reason
 from pvid.twin import cholesky
 from pvid.twin import kapitza_strong as model
 from pvid.twin.information import Information
+from pvid.twin.pattern import PatternModel
 
 Float32 = npt.NDArray[np.float32]
 
@@ -35,13 +41,19 @@ def _lanes(values: Sequence[float]) -> Float32:
 class Estimator:
     """pvid_estimator_f32 in every lane; one EstimatorConfig a lane.
 
-    p float32 [3, lanes], counters: name -> int64 [lanes].
+    p float32 [n_p, lanes], counters: name -> int64 [lanes].
     """
 
-    def __init__(self, configs: Sequence[EstimatorConfig], update_rate: float) -> None:
+    def __init__(
+        self,
+        configs: Sequence[EstimatorConfig],
+        update_rate: float,
+        n_p: int = model.N_P,
+        n_sums: int = model.SUMS,
+    ) -> None:
         rate = np.float32(update_rate)
         stack = {
-            name: np.stack([np.asarray(getattr(c, name), np.float32)[: model.N_P] for c in configs], axis=1)
+            name: np.stack([np.asarray(getattr(c, name), np.float32)[:n_p] for c in configs], axis=1)
             for name in ("start", "start_sd", "lower", "upper")
         }
         row_sd = _lanes([c.row_sd for c in configs])
@@ -59,7 +71,7 @@ class Estimator:
         self.phase = np.zeros(len(configs), np.int64)
         self.gain = np.array([self._gain(c, rate) for c in configs], np.float32)
         self.innovation = np.zeros_like(self.p)
-        self.information = Information(model.SUMS, _lanes([c.forgetting_s for c in configs]) * rate)
+        self.information = Information(n_sums, _lanes([c.forgetting_s for c in configs]) * rate)
         self.sums = self.information.read()
         self.counters = {name: np.zeros(len(configs), np.int64) for name in _COUNTERS}
 
@@ -107,38 +119,54 @@ class Estimator:
 
     def _solve(self, due: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
         s, force, _ = model.project(self.p, self.sums)
-        for a in range(model.N_P):
+        x, reason = self._step_from(s, force, self.gain, due)
+        moving = due & (reason == Reason.UPDATED)
+        self.p = np.where(moving, x, self.p)
+        self.counters["updates"] += moving
+        return reason
+
+    def _reference(self) -> Float32:
+        """What the size of a step is measured by [n_p, lanes]."""
+        return self.p
+
+    def _step_from(
+        self, s: Float32, force: Float32, gain: Float32, due: npt.NDArray[np.bool_]
+    ) -> tuple[Float32, npt.NDArray[np.uint8]]:
+        """Where p goes from S and F, and whether it may: UPDATED or why it is held, in every lane."""
+        for a in range(len(self.p)):
             s[a, a] = s[a, a] + self.prior[a]
-        rhs = self.gain * force + (np.float32(1) - self.gain) * self.innovation
+        rhs = gain * force + (np.float32(1) - gain) * self.innovation
         self.innovation = np.where(due, np.float32(0), self.innovation)
         f = cholesky.factor(s)
         own = (f.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
         excited = (f.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
         dp = cholesky.solve(f, rhs)
-        ratio = dp / self.p
-        size = np.zeros(len(due), np.float32)
-        for a in range(model.N_P):
-            one = np.where(ratio[a] < 0, -ratio[a], ratio[a])
-            size = np.where(one <= size, size, one)
+        magnitudes = (dp / self._reference()).view(np.uint32) & np.uint32(0x7FFFFFFF)
+        size = magnitudes.max(axis=0).view(np.float32)
         moving = due & f.ok & excited & np.isfinite(size)
         limited = size > self.step_limit
-        factor = np.where(limited, self.step_limit / size, np.float32(1))
+        factor = np.where(limited, self.step_limit / size, np.float32(1)).astype(np.float32, copy=False)
         x = self.p + factor * dp
         above = x > self.upper
         x = np.where(above, self.upper, x)
         below = x < self.lower
         x = np.where(below, self.lower, x)
-        self.p = np.where(moving, x, self.p)
         reason = np.full(len(due), Reason.UPDATED, np.uint8)
         reason[~np.isfinite(size)] = Reason.HELD_PIVOT
         reason[~excited] = Reason.HELD_NOT_EXCITED
         reason[~f.ok] = Reason.HELD_PIVOT
-        self.counters["updates"] += moving
         self.counters["limited"] += moving & limited
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         self.counters["held_not_excited"] += due & (reason == Reason.HELD_NOT_EXCITED)
         self.counters["held_pivot"] += due & (reason == Reason.HELD_PIVOT)
-        return reason
+        return x, reason
+
+    def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
+        """S [n_p, n_p, lanes] and the sum of squared residuals [lanes], not below its rounding."""
+        s, _, energy = model.project(self.p, sums)
+        floor = RESIDUAL_FLOOR * sums[-2]
+        residual = sums[-2] + energy
+        return s, np.where(residual > floor, residual, floor)
 
     def assess(self) -> npt.NDArray[np.void]:
         """pvid_estimator_assess_f32 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
@@ -146,16 +174,12 @@ class Estimator:
             return self._assess()
 
     def _assess(self) -> npt.NDArray[np.void]:
-        n_p = model.N_P
+        n_p = len(self.p)
         sums = self.information.read()
-        s, _, energy = model.project(self.p, sums)
-        yy, weight = sums[-2], sums[-1]
+        s, residual = self._assessed(sums)
+        weight = sums[-1]
         freedom = weight - np.float32(n_p)
-        floor = RESIDUAL_FLOOR * yy
-        residual = yy + energy
-        variance = np.where(
-            freedom >= 1, np.where(residual > floor, residual, floor) / freedom, self.row_variance
-        )
+        variance = np.where(freedom >= 1, residual / freedom, self.row_variance)
         kappa = cholesky.factor(s)
         wide = variance * self.correlation
         for a in range(n_p):
@@ -176,3 +200,117 @@ class Estimator:
                 unknown = start_variance if a == b else np.float32(0)
                 out["covariance"][:, a, b] = np.where(known, covariance[a, b], unknown)
         return out
+
+
+class RelativeEstimator(Estimator):
+    """pvid_estimator_f32 on a model known by its pattern. All lanes share law, feedback and divider.
+
+    theta float32 [n_theta, lanes] is f(p); B and yy are b = B - M theta and the sum of squared residuals.
+    """
+
+    _ROWS_A_STAGE = 4
+
+    def __init__(self, configs: Sequence[EstimatorConfig], update_rate: float, pattern: PatternModel) -> None:
+        super().__init__(configs, update_rate, pattern.n_p, pattern.n_sums)
+        schedules = {(c.law, c.feedback_hz, c.divider) for c in configs}
+        if len(schedules) != 1:
+            raise PvidError("lanes of one twin must share law, feedback and divider: their schedules differ")
+        self.model = pattern
+        with np.errstate(all="ignore"):
+            self.theta = pattern.theta(self.p)
+        self.row_weight = _lanes([c.row_weight for c in configs])
+        self.everywhere = np.ones(len(configs), np.bool_)
+        self.was_due = True
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether the law is a rate (g < 1) that does not iterate."""
+        return bool(self.gain[0] < 1)
+
+    def add(self, n: Float32, y: Float32) -> npt.NDArray[np.uint8]:
+        """One row of a group: N [n_theta, lanes], Y [lanes]."""
+        with np.errstate(all="ignore"):
+            squares = y * y
+            for entry in n:
+                squares = squares + entry * entry
+            fits = squares <= ROW_LIMIT * ROW_LIMIT
+            not_finite = ~fits & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
+            e = y
+            for entry, theta in zip(n, self.theta, strict=True):
+                e = e - entry * theta
+            fits = fits & (e * e <= ROW_LIMIT * ROW_LIMIT)
+            if self.is_rate:
+                gradient = self.model.transpose_times(self.model.jacobian(self.p), n)
+                self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
+            self.sums = self.information.add(self.model.terms(n, e, self.row_weight), fits)
+        reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
+        reason[not_finite] = Reason.REJECTED_NOT_FINITE
+        self.counters["rows"] += fits
+        self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
+        self.counters["rejected_not_finite"] += not_finite
+        return reason
+
+    def solve(self, ends_group: bool) -> Iterator[npt.NDArray[np.uint8] | None]:
+        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one."""
+        reason = np.full(len(self.phase), Reason.ACCUMULATED, np.uint8)
+        self.was_due = True
+        if ends_group:
+            self.phase += 1
+            self.was_due = bool(self.phase[0] >= self.divider[0])
+        elif self.is_rate:
+            yield reason
+            return
+        if self.was_due:
+            if ends_group:
+                self.phase[:] = 0
+            follows = -(-self.model.n_theta // self._ROWS_A_STAGE)
+            for _ in range(3 + 2 * self.model.n_p + follows):
+                yield None
+            with np.errstate(all="ignore"):
+                reason = self._commit(self.gain if ends_group else np.ones_like(self.gain))
+            self.sums = self.information.read()
+            yield None if ends_group else reason
+        if ends_group:
+            self.information.end_group(self.everywhere)
+            self.sums = self.information.read()
+            yield reason
+
+    def _commit(self, gain: Float32) -> npt.NDArray[np.uint8]:
+        pattern = self.model
+        sums = self.information.read()
+        matrix = pattern.matrix(sums)
+        b = sums[pattern.moments : pattern.moments + pattern.n_theta]
+        c = pattern.jacobian(self.p)
+        force = pattern.transpose_times(c, b)
+        x, reason = self._step_from(pattern.project(c, matrix), force, gain, self.everywhere)
+        x = np.where(reason == Reason.UPDATED, x, self.p)
+        theta = pattern.theta(x)
+        step = theta - self.theta
+        moved = pattern.times(matrix, step)
+        fall = np.zeros(len(reason), np.float32)
+        for i in range(pattern.n_theta):
+            fall = fall + step[i] * (b[i] + (b[i] - moved[i]))
+        residual = self.information.low[-2] - fall
+        overflow = (reason == Reason.UPDATED) & ~(np.isfinite(fall) & np.isfinite(residual))
+        reason[overflow] = Reason.HELD_PIVOT
+        self.counters["held_pivot"] += overflow
+        moving = reason == Reason.UPDATED
+        places = slice(pattern.moments, pattern.moments + pattern.n_theta)
+        low = self.information.low.copy()
+        low[places] = low[places] - moved
+        low[-2] = residual
+        self.information.low = np.where(moving, low, self.information.low)
+        self.theta = np.where(moving, theta, self.theta)
+        self.p = np.where(moving, x, self.p)
+        self.counters["updates"] += moving
+        return reason
+
+    def _reference(self) -> Float32:
+        positive = np.array(self.model.positive)[:, None]
+        return np.where(positive, self.p, self.start_sd)
+
+    def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
+        s = self.model.project(self.model.jacobian(self.p), self.model.matrix(sums))
+        residual = sums[-2] + np.float32(0)
+        return s, np.where(residual > 0, residual, np.float32(0))

@@ -1,0 +1,158 @@
+/* pvid/weak.h - the weak form of the identifier: samples of a real encoder in, parameters out.
+ *
+ * The strong form differentiates the angle four times and drowns in an encoder's noise. Here the
+ * equation of motion is multiplied by K test functions over a window of about a second and
+ * integrated by parts (MATH.md 5): no derivative of the angle is left, only y_A'' of the pivot, and
+ * each window gives K rows (Y, N) to the same estimator.
+ *
+ *   static pvid_weak_f32 identifier;
+ *   pvid_weak_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .design = &table,
+ *                                   .zero_unknown = true, .iterations = 3,
+ *                                   .estimator = pvid_estimator_defaults_f32 };
+ *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
+ *   each tick: reason = pvid_weak_step_f32(&identifier, phi, y);
+ *
+ * What happens when. Samples are smoothed over `taps` and decimated by D; two windows of W decimated
+ * samples, half a window apart, gather sums; every H = (W - 1) / 2 decimated samples one of them is
+ * complete. Of D ticks the first half smooths, a slice of the taps each; the second half adds the result
+ * to the windows, a slice of the functions each. In the first half, too, a complete window is turned
+ * into rows and Gauss-Newton steps, one small stage a tick, while the others fill. No tick is long: the
+ * longest costs less than three times the mean one, and what a tick does depends on its place in this
+ * schedule, never on the data.
+ *
+ * Never allocates. Total: a sample that is not finite is rejected and starts the windows again (its
+ * neighbours are no longer equidistant); the sums keep what they know. Not thread-safe.
+ * RAM: sizeof(pvid_weak_f32); the tables are read where they are.
+ */
+#ifndef PVID_WEAK_H
+#define PVID_WEAK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pvid/config.h"
+#include "pvid/estimator.h"
+#include "pvid/kapitza_weak.h"
+
+/* The tables of a design: constant data, made on a PC, kept by reference.
+ *
+ * The test functions chi_k and their first three derivatives vanish at both ends of the window, so
+ * the first and the last sample of a window have no weight: their rows of chi are not read. The
+ * functions are combined such that their residual filters chi'''' + d1 w chi'' + d2 w^2 chi are
+ * orthonormal at a nominal p; the Gram tables are what restores this at the p of the moment. */
+typedef struct {
+    uint16_t taps;       /* smoothing window [samples], odd, 5..PVID_MAX_TAPS */
+    uint16_t decimation; /* D, 1..PVID_MAX_DECIMATION */
+    uint16_t window;     /* W [decimated samples], odd, 9..PVID_MAX_WEAK_WINDOW */
+    uint8_t functions;   /* K, 4..PVID_MAX_FUNCTIONS */
+    const float *smooth; /* [(taps - 1) / 2] value, folded as in differentiator.h: x0 + sum w q_i */
+    const float *second; /* [(taps - 1) / 2] second derivative per sample^2, folded: sum w q_i */
+    const float *chi;    /* [W][3][K] chi, chi'' [1/s^2], chi'''' [1/s^4] at the window's samples */
+    const float *gram;   /* [6][K (K + 1) / 2] lower triangles by rows: G44, G42 + G24, G40 + G04, G22,
+                            G20 + G02, G00 with G_ij = sum over samples of chi^(i) chi^(j)^T */
+    float overlap;       /* variance inflation because half-overlapping windows share noise, >= 1 */
+} pvid_weak_design_f32;
+
+typedef struct {
+    float sample_rate_hz; /* 1e-3..1e6 */
+    float l1;             /* length of rod 1 [m], > 0 */
+    float drive_min;      /* rms of u = y_A''/l1 about its mean [1/s^2] over a window, below which the pivot
+                             counts as still and the window is dropped; some ten times the noise of u.
+                             0: every window is taken in */
+    const pvid_weak_design_f32 *design; /* must outlive the identifier, as must its tables */
+    bool zero_unknown;    /* true: p = (w, d1, d2, c), c [rad] the encoder's reading at rest; false: c = 0 */
+    uint8_t iterations;   /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; 3 is good. One where
+                             the estimator's law is a rate (g < 1) */
+    pvid_estimator_config_f32 estimator; /* model, update_rate_hz, row_weight and correlation are filled
+                                            in by init. A group of rows is a window; row_sd [rad] is
+                                            the noise of a decimated sample */
+} pvid_weak_config_f32;
+
+/* The front end: a ring of samples, and the FIR job of the last complete block in slices. */
+typedef struct {
+    uint16_t half;       /* pairs of taps */
+    uint16_t length;     /* places of the ring in use: taps + decimation - 1, for a job may last a block */
+    uint16_t decimation;
+    uint16_t slice;      /* pairs a tick: a job lasts half a block */
+    uint16_t head;       /* place of the next sample */
+    uint16_t wait;       /* samples until the next block is complete */
+    uint16_t pair;       /* pairs done; half: the job is done */
+    uint16_t newer;      /* places of the last pair */
+    uint16_t older;
+    const float *smooth;
+    const float *second;
+    float u_scale;       /* sample rate^2 / l1 [1/(m s^2)] */
+    float middle[2];     /* centre samples of phi and y */
+    float sum[2];        /* sum smooth q(phi), sum second q(y) */
+    float ring[PVID_MAX_TAPS + PVID_MAX_DECIMATION - 1][2]; /* phi [rad], y [m] */
+} pvid_weak_front_f32;
+
+/* What is integrated twice from a window's start: u phi, phi and u. */
+#define PVID_WEAK_INTEGRALS 3
+
+/* What a window gathers for each test function: eight sums with chi'', four with chi, one with chi''''. */
+#define PVID_WEAK_TERMS 13
+
+/* One of the two windows. */
+typedef struct {
+    uint16_t index; /* of the present decimated sample in the window, 0..W-2 */
+    bool whole;     /* the window has been filling from its first sample */
+    uint8_t buffer; /* which of the three it fills */
+    float before[PVID_WEAK_INTEGRALS]; /* the integrands at the last sample */
+    float once[PVID_WEAK_INTEGRALS];   /* their integrals */
+    float twice[PVID_WEAK_INTEGRALS];  /* the integrals of these */
+    float u_sum;                       /* of the window's samples */
+    float u_square_sum;
+} pvid_weak_window_f32;
+
+#define PVID_WEAK_FACTOR ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
+#define PVID_WEAK_COLUMNS 12 /* N1..N8, Y, a, b and one that stays 0 */
+
+/* The complete window that is being turned into rows and steps. */
+typedef struct {
+    uint8_t stage;
+    uint8_t index;     /* of the function within the stage */
+    uint8_t iteration;
+    uint8_t buffer;
+    bool whitened;     /* the Gram matrix could be factored */
+    float combination[5];
+    float direction[PVID_MAX_FUNCTIONS]; /* the one that is being projected out, of length 1 or 0 */
+    float along[PVID_WEAK_COLUMNS];      /* the columns' components along it */
+    float factor[PVID_WEAK_FACTOR];      /* R0, then its Cholesky factor with inverted diagonal */
+    pvid_estimator_solve_f32 solve;
+} pvid_weak_finish_f32;
+
+/* State; only the functions below write to it. */
+typedef struct {
+    const pvid_weak_design_f32 *design;
+    float dt;              /* between decimated samples [s] */
+    float drive_min;       /* variance of u below which a window is dropped [1/s^4] */
+    uint8_t iterations;
+    uint8_t slice;         /* functions a tick */
+    uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
+    uint8_t function;      /* functions of that window that have, 0..K-1 */
+    bool warm;             /* a window has been completed since the restart */
+    float phi;             /* the present decimated sample [rad] */
+    float u;               /* [1/s^2] */
+    pvid_weak_front_f32 front;
+    pvid_weak_window_f32 window[2];
+    pvid_weak_finish_f32 finish;
+    float term[PVID_WEAK_TERMS]; /* of the window in work */
+    float sums[3][PVID_MAX_FUNCTIONS][PVID_WEAK_TERMS];
+    pvid_estimator_f32 estimator;
+} pvid_weak_f32;
+
+/* Prepares `self`. Fails iff a field of config or of its design is out of its range, a table holds a
+ * number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
+ * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, 4 K + 6 stages and 15 a Gauss-Newton step. */
+pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
+
+/* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is
+ * complete; PVID_UPDATED or why p was held at the tick of a window's last Gauss-Newton step, or
+ * PVID_HELD_NOT_EXCITED at once where a window was dropped for want of drive; PVID_REJECTED_.. when the sample or a window's row was not usable; else PVID_ACCUMULATED. */
+pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
+
+/* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
+void pvid_weak_gap_f32(pvid_weak_f32 *self);
+
+#endif

@@ -1,0 +1,86 @@
+#include "pvid/kapitza_weak.h"
+
+enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2, C = PVID_KAPITZA_C };
+
+static void zeroed_theta_of(const float p[], float theta[])
+{
+    theta[0] = p[D1];
+    theta[1] = p[D1] * p[W];
+    theta[2] = p[D2];
+    theta[3] = p[D2] * p[W];
+    theta[4] = theta[3] * p[W];
+}
+
+static void theta_of(const float p[], float theta[])
+{
+    zeroed_theta_of(p, theta);
+    theta[5] = p[D2] * p[C];
+    theta[6] = theta[5] * p[W];
+    theta[7] = theta[6] * p[W];
+}
+
+static const uint8_t c_row[16] = {1, 3, 4, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7, 5, 6, 7};
+static const uint8_t c_column[16] = {W, W, W, W, W, D1, D1, D2, D2, D2, D2, D2, D2, C, C, C};
+
+static void jacobian_of(const float p[], float c[])
+{
+    const float w = p[W];
+    const float w2 = w * w;
+    const float d2c = p[D2] * p[C];
+    c[0] = p[D1];
+    c[1] = p[D2];
+    c[2] = 2.0f * (p[D2] * w);
+    c[3] = d2c;
+    c[4] = 2.0f * (d2c * w);
+    c[5] = 1.0f;
+    c[6] = w;
+    c[7] = 1.0f;
+    c[8] = w;
+    c[9] = w2;
+    c[10] = p[C];
+    c[11] = p[C] * w;
+    c[12] = p[C] * w2;
+    c[13] = p[D2];
+    c[14] = p[D2] * w;
+    c[15] = p[D2] * w2;
+}
+
+static const uint8_t zeroed_c_row[8] = {1, 3, 4, 0, 1, 2, 3, 4};
+static const uint8_t zeroed_c_column[8] = {W, W, W, D1, D1, D2, D2, D2};
+
+static void zeroed_jacobian_of(const float p[], float c[])
+{
+    const float w = p[W];
+    c[0] = p[D1];
+    c[1] = p[D2];
+    c[2] = 2.0f * (p[D2] * w);
+    c[3] = 1.0f;
+    c[4] = w;
+    c[5] = 1.0f;
+    c[6] = w;
+    c[7] = w * w;
+}
+
+const pvid_model_f32 pvid_kapitza_weak_f32 = {
+    .n_theta = PVID_KAPITZA_WEAK_THETA,
+    .n_p = PVID_KAPITZA_WEAK_P,
+    .n_moments = (PVID_KAPITZA_WEAK_THETA * (PVID_KAPITZA_WEAK_THETA + 1)) / 2,
+    .n_c = 16,
+    .positive = 7u,
+    .c_row = c_row,
+    .c_column = c_column,
+    .theta = theta_of,
+    .jacobian = jacobian_of,
+};
+
+const pvid_model_f32 pvid_kapitza_weak_zeroed_f32 = {
+    .n_theta = PVID_KAPITZA_ZEROED_THETA,
+    .n_p = PVID_KAPITZA_P,
+    .n_moments = (PVID_KAPITZA_ZEROED_THETA * (PVID_KAPITZA_ZEROED_THETA + 1)) / 2,
+    .n_c = 8,
+    .positive = 7u,
+    .c_row = zeroed_c_row,
+    .c_column = zeroed_c_column,
+    .theta = zeroed_theta_of,
+    .jacobian = zeroed_jacobian_of,
+};

@@ -1,0 +1,241 @@
+#include "pvid/weak.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "finite_f32.h"
+#include "weak_finish_f32.h"
+#include "weak_front_f32.h"
+#include "weak_window_f32.h"
+
+/* Counters stop at their end. */
+static void count(uint32_t *counter)
+{
+    if (*counter < UINT32_MAX) {
+        (*counter)++;
+    }
+}
+
+static bool all_finite(const float values[], size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (!pvid_finite_f32(values[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool is_odd_within(uint16_t n, uint16_t low, uint16_t high)
+{
+    return ((n % 2u) == 1u) && (n >= low) && (n <= high);
+}
+
+static bool design_is_valid(const pvid_weak_design_f32 *design)
+{
+    if ((design == NULL) || !is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
+        !is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
+        (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
+        (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
+        (design->chi == NULL) || (design->gram == NULL) || !pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
+        return false;
+    }
+    const size_t half = (design->taps - 1u) / 2u;
+    const size_t functions = design->functions;
+    return all_finite(design->smooth, half) && all_finite(design->second, half) &&
+           all_finite(design->chi, 3u * functions * design->window) &&
+           all_finite(design->gram, 3u * functions * (functions + 1u));
+}
+
+static uint16_t hop_of(const pvid_weak_design_f32 *design)
+{
+    return (uint16_t)((design->window - 1u) / 2u);
+}
+
+/* Ticks of a block in which the windows take a sample in: two slices or more after the front end's
+ * job. At D = 2 one tick has to do for both, at D = 1 the front end's. */
+static uint32_t ticks_a_window(const pvid_weak_f32 *self)
+{
+    const uint32_t left = (uint32_t)self->design->decimation - pvid_weak_front_ticks_f32(&self->front);
+    return (left > 1u) ? (left / 2u) : 1u;
+}
+
+/* Ticks of a block that are free for a window's stages. */
+static uint32_t free_ticks(const pvid_weak_f32 *self)
+{
+    const uint32_t decimation = self->design->decimation;
+    if (decimation <= 2u) {
+        return 1u;
+    }
+    const uint32_t slices = (self->design->functions + (self->slice - 1u)) / self->slice;
+    return decimation - (2u * slices);
+}
+
+static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+{
+    const pvid_weak_design_f32 *design = config->design;
+    const float functions = (float)design->functions;
+    pvid_estimator_config_f32 estimator = config->estimator;
+    estimator.model = config->zero_unknown ? &pvid_kapitza_weak_f32 : &pvid_kapitza_weak_zeroed_f32;
+    estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)hop_of(design));
+    estimator.row_weight = (functions - 2.0f) / functions;
+    estimator.correlation = design->overlap;
+    return pvid_estimator_init_f32(&self->estimator, &estimator);
+}
+
+pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL));
+    const pvid_weak_design_f32 *design = config->design;
+    if (!pvid_within_f32(config->sample_rate_hz, 1.0e-3f, 1.0e6f)) {
+        return PVID_BAD_SAMPLE_RATE;
+    }
+    if (!pvid_within_f32(config->l1, 1.0e-6f, 1.0e6f)) {
+        return PVID_BAD_LENGTH;
+    }
+    if (!pvid_within_f32(config->drive_min, 0.0f, 1.0e9f)) {
+        return PVID_BAD_DRIVE_MIN;
+    }
+    if (!design_is_valid(design)) {
+        return PVID_BAD_DESIGN;
+    }
+    memset(self, 0, sizeof *self);
+    const pvid_status status = init_estimator(self, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if ((config->iterations < 1u) || (config->iterations > PVID_MAX_ITERATIONS)) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->design = design;
+    self->dt = (float)design->decimation / config->sample_rate_hz;
+    pvid_weak_front_init_f32(&self->front, design, config->sample_rate_hz, config->l1);
+    self->drive_min = config->drive_min * config->drive_min;
+    const uint32_t ticks = ticks_a_window(self);
+    self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
+    self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
+    if (pvid_weak_finish_stages_f32(design->functions, self->iterations, &self->estimator) >
+        (hop_of(design) * free_ticks(self))) {
+        return PVID_BAD_ITERATIONS;
+    }
+    pvid_weak_finish_init_f32(&self->finish);
+    self->window[0].buffer = 0;
+    self->window[1].buffer = 1;
+    self->finish.buffer = 2;
+    pvid_weak_gap_f32(self);
+    return PVID_OK;
+}
+
+static void restart_window(pvid_weak_window_f32 *window, uint16_t index)
+{
+    window->index = index;
+    window->whole = false;
+    for (size_t i = 0; i < PVID_WEAK_INTEGRALS; i++) {
+        window->before[i] = 0.0f;
+        window->once[i] = 0.0f;
+        window->twice[i] = 0.0f;
+    }
+}
+
+/* The first window begins with the next decimated sample. The second stands in its middle then: what
+ * it gathers until its own beginning, half a window later, is thrown away. */
+void pvid_weak_gap_f32(pvid_weak_f32 *self)
+{
+    const uint16_t hop = hop_of(self->design);
+    pvid_weak_front_reset_f32(&self->front);
+    restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
+    restart_window(&self->window[1], (uint16_t)(hop - 1u));
+    self->turn = 2;
+    self->warm = false;
+}
+
+/* A window that has come round hands its sums over and goes on in the buffer that is free. Its last
+ * sample, which has no weight, is the first one of the next. Returns false if the window is dropped: its
+ * sums are cleared where they are. */
+static bool turn_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
+{
+    const bool still = (self->drive_min > 0.0f) &&
+                       (pvid_weak_window_drive_f32(window, self->design->window) < self->drive_min);
+    self->warm = true;
+    if (still) {
+        count(&self->estimator.counters.held_not_excited);
+        return false;
+    }
+    const uint8_t full = window->buffer;
+    window->buffer = self->finish.buffer;
+    self->finish.buffer = full;
+    pvid_weak_finish_begin_f32(&self->finish, &self->estimator);
+    return true;
+}
+
+/* Returns false if this sample completes a window that is dropped. */
+static bool next_sample(pvid_weak_f32 *self)
+{
+    bool kept = true;
+    for (size_t i = 0; i < 2u; i++) {
+        pvid_weak_window_f32 *window = &self->window[i];
+        window->index++;
+        if (window->index == self->design->window - 1u) {
+            window->index = 0;
+            if (window->whole) {
+                kept = turn_over(self, window);
+            }
+            window->whole = true;
+        }
+    }
+    self->turn = 0;
+    self->function = 0;
+    return kept;
+}
+
+/* Adds the present sample to the next few functions: first all of one window, then all of the other. */
+static inline void add_slice(pvid_weak_f32 *self)
+{
+    const pvid_weak_design_f32 *design = self->design;
+    pvid_weak_window_f32 *window = &self->window[self->turn];
+    const size_t first = self->function;
+    const size_t end = first + self->slice;
+    const size_t last = (end < design->functions) ? end : design->functions;
+    if (first == 0u) {
+        pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, self->term);
+    }
+    pvid_weak_window_add_f32(window, design, self->term, first, last, self->sums[window->buffer]);
+    self->function = (uint8_t)last;
+    if (last == design->functions) {
+        self->function = 0;
+        self->turn++;
+    }
+}
+
+pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
+{
+    if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
+        pvid_weak_gap_f32(self);
+        count(&self->estimator.counters.rejected_not_finite);
+        return PVID_REJECTED_NOT_FINITE;
+    }
+    const uint16_t decimation = self->design->decimation;
+    bool kept = true;
+    bool adding = false;
+    if (pvid_weak_front_step_f32(&self->front, phi, y, &self->phi, &self->u)) {
+        kept = next_sample(self);
+        if (decimation == 1u) {
+            add_slice(self);
+            add_slice(self);
+        }
+    } else if (self->turn < 2u) {
+        adding = true;
+        add_slice(self);
+        if (decimation == 2u) {
+            add_slice(self);
+        }
+    }
+    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+    if (!kept) {
+        reason = PVID_HELD_NOT_EXCITED;
+    } else if (!adding && pvid_weak_finish_is_busy_f32(&self->finish)) {
+        pvid_weak_finish_step_f32(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
+                                  &self->estimator, &reason);
+    }
+    return reason;
+}

@@ -1,0 +1,269 @@
+#include "weak_finish_f32.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "cholesky_f32.h"
+#include "finite_f32.h"
+#include "unroll.h"
+#include "weak_window_f32.h"
+
+/* Columns of a row once it is assembled, in place of its terms. */
+enum { COLUMN_N = 0, COLUMN_Y = 8, COLUMN_A = 9, COLUMN_B = 10, COLUMN_SPARE = 11 };
+
+enum {
+    STAGE_COMBINE,    /* K times: a row of the Gram matrix at p, the columns of a function */
+    STAGE_FACTOR,     /* K times: a row of its Cholesky factor */
+    STAGE_WHITEN,     /* K times: a row of L^-1 (Y, N, a, b) */
+    STAGE_DIRECTION_A,
+    STAGE_ALONG_A,
+    STAGE_REMOVE_A,
+    STAGE_DIRECTION_B,
+    STAGE_ALONG_B,
+    STAGE_REMOVE_B,
+    STAGE_ADD,        /* K times: a row to the estimator */
+    STAGE_SOLVE,      /* `iterations` solves of several stages each */
+    STAGE_IDLE
+};
+
+void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self)
+{
+    self->stage = STAGE_IDLE;
+}
+
+bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self)
+{
+    return self->stage != STAGE_IDLE;
+}
+
+/* The residual of p has the filter chi'''' + d1 w chi'' + d2 w^2 chi: what its noise covariance is
+ * made of, beside G44. */
+void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    const float *p = estimator->p;
+    const float two = p[PVID_KAPITZA_D1] * p[PVID_KAPITZA_W];
+    const float zero = (p[PVID_KAPITZA_D2] * p[PVID_KAPITZA_W]) * p[PVID_KAPITZA_W];
+    self->combination[0] = two;
+    self->combination[1] = zero;
+    self->combination[2] = two * two;
+    self->combination[3] = two * zero;
+    self->combination[4] = zero * zero;
+    self->whitened = true;
+    self->iteration = 0;
+    self->index = 0;
+    self->stage = STAGE_COMBINE;
+}
+
+static size_t row_start(size_t row)
+{
+    return (row * (row + 1u)) / 2u;
+}
+
+static void combine_row(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, size_t row)
+{
+    const size_t size = row_start(design->functions);
+    const float *c = self->combination;
+    const size_t last = row_start(row + 1u);
+    for (size_t i = row_start(row); i < last; i++) {
+        const float *g = &design->gram[i];
+        float sum = g[0];
+        sum += c[0] * g[size];
+        sum += c[1] * g[2u * size];
+        sum += c[2] * g[3u * size];
+        sum += c[3] * g[4u * size];
+        sum += c[4] * g[5u * size];
+        self->factor[i] = sum;
+    }
+}
+
+/* (N1..N8, Y, a, b, 0) from the terms of a function, in their place. */
+static void assemble(float sum[PVID_WEAK_TERMS])
+{
+    const float u = sum[PVID_TERM_U];
+    const float ut = sum[PVID_TERM_UT];
+    const float uiu = sum[PVID_TERM_UIU];
+    const float ui1 = sum[PVID_TERM_UI1];
+    sum[COLUMN_N + 3] = sum[PVID_TERM_UIF] + sum[PVID_TERM_CHI_UF];
+    sum[COLUMN_N + 4] = sum[PVID_TERM_CHI_F];
+    sum[COLUMN_N + 5] = uiu;
+    sum[COLUMN_N + 6] = ui1 + sum[PVID_TERM_CHI_U];
+    sum[COLUMN_N + 7] = sum[PVID_TERM_CHI_1];
+    sum[COLUMN_Y] = sum[PVID_TERM_Y];
+    sum[COLUMN_A] = u;
+    sum[COLUMN_B] = ut;
+    sum[COLUMN_SPARE] = 0.0f;
+}
+
+/* Row of L with L L^T = R0, in place; the diagonal is kept inverted. Where R0 cannot be factored the
+ * window keeps the whitening of its design. */
+static void factor_row(pvid_weak_finish_f32 *self, size_t row)
+{
+    float *l = &self->factor[row_start(row)];
+    const float *above = self->factor;
+    const float diagonal = l[row];
+    float pivot = diagonal;
+    for (size_t j = 0; j < row; j++) {
+        float sum = l[j];
+        for (size_t i = 0; i < j; i++) {
+            sum -= l[i] * above[i];
+        }
+        l[j] = sum * above[j];
+        pivot -= l[j] * l[j];
+        above += j + 1u;
+    }
+    self->whitened = self->whitened && (pivot > (PVID_PIVOT_MIN * diagonal)) && pvid_finite_f32(pivot);
+    l[row] = 1.0f / sqrtf(self->whitened ? pivot : 1.0f);
+}
+
+/* x -= a y for the columns of two functions. */
+static inline void subtract(float a, const float *restrict y, float *restrict x)
+{
+    PVID_UNROLL
+    for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
+        x[i] -= a * y[i];
+    }
+}
+
+static void whiten_row(const pvid_weak_finish_f32 *self, size_t row, float sums[][PVID_WEAK_TERMS])
+{
+    if (!self->whitened) {
+        return;
+    }
+    const float *l = &self->factor[row_start(row)];
+    float *x = sums[row];
+    for (size_t j = 0; j < row; j++) {
+        subtract(l[j], sums[j], x);
+    }
+    for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
+        x[i] *= l[row];
+    }
+}
+
+/* The direction of a column over the functions; none, that is zero, where its squared length is not a
+ * positive normal number (no drive: then there is nothing to remove either). */
+static void find_direction(pvid_weak_finish_f32 *self, size_t functions, size_t column,
+                           const float sums[][PVID_WEAK_TERMS])
+{
+    float square = 0.0f;
+    for (size_t k = 0; k < functions; k++) {
+        square += sums[k][column] * sums[k][column];
+    }
+    const bool usable = (square >= 1.17549435e-38f) && (square <= 3.4e38f);
+    const float inverse = 1.0f / sqrtf(usable ? square : 1.0f);
+    for (size_t k = 0; k < functions; k++) {
+        self->direction[k] = usable ? (sums[k][column] * inverse) : 0.0f;
+    }
+}
+
+static void find_components(pvid_weak_finish_f32 *self, size_t functions, const float sums[][PVID_WEAK_TERMS])
+{
+    float along[PVID_WEAK_COLUMNS] = {0.0f};
+    for (size_t k = 0; k < functions; k++) {
+        const float direction = self->direction[k];
+        PVID_UNROLL
+        for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
+            along[i] += direction * sums[k][i];
+        }
+    }
+    for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
+        self->along[i] = along[i];
+    }
+}
+
+static void remove_components(const pvid_weak_finish_f32 *self, size_t functions, float sums[][PVID_WEAK_TERMS])
+{
+    for (size_t k = 0; k < functions; k++) {
+        subtract(self->direction[k], self->along, sums[k]);
+    }
+}
+
+/* A row to the estimator; its reason is told if it was refused. */
+static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
+{
+    const pvid_reason added = pvid_estimator_add_f32(estimator, &column[COLUMN_N], column[COLUMN_Y]);
+    if (added != PVID_ACCUMULATED) {
+        *reason = added;
+    }
+}
+
+/* A stage of a solve; true once the last one of the window is complete. */
+static bool solve_on(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_estimator_f32 *estimator)
+{
+    if (!pvid_estimator_advance_f32(estimator, &self->solve)) {
+        return false;
+    }
+    self->iteration++;
+    /* not due: the divider says that this window only accumulates */
+    if ((self->iteration >= iterations) || (self->solve.reason == PVID_ACCUMULATED)) {
+        return true;
+    }
+    pvid_estimator_begin_f32(estimator, &self->solve, false);
+    return false;
+}
+
+void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, uint8_t iterations,
+                               float sums[][PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
+{
+    const size_t functions = design->functions;
+    const float(*fixed)[PVID_WEAK_TERMS] = (const float(*)[PVID_WEAK_TERMS])sums;
+    const size_t row = self->index;
+    bool repeat = false; /* for each function */
+    switch (self->stage) {
+    case STAGE_COMBINE:
+        combine_row(self, design, row);
+        assemble(sums[row]);
+        repeat = true;
+        break;
+    case STAGE_FACTOR:
+        factor_row(self, row);
+        repeat = true;
+        break;
+    case STAGE_WHITEN:
+        whiten_row(self, row, sums);
+        repeat = true;
+        break;
+    case STAGE_DIRECTION_A:
+        find_direction(self, functions, COLUMN_A, fixed);
+        break;
+    case STAGE_DIRECTION_B:
+        find_direction(self, functions, COLUMN_B, fixed);
+        break;
+    case STAGE_ALONG_A:
+    case STAGE_ALONG_B:
+        find_components(self, functions, fixed);
+        break;
+    case STAGE_REMOVE_A:
+    case STAGE_REMOVE_B:
+        remove_components(self, functions, sums);
+        break;
+    case STAGE_ADD:
+        add_row(sums[row], estimator, reason);
+        repeat = true;
+        break;
+    case STAGE_SOLVE:
+        if (!solve_on(self, iterations, estimator)) {
+            return;
+        }
+        *reason = self->solve.reason;
+        break;
+    default:
+        return;
+    }
+    self->index++;
+    if (!repeat || (self->index == functions)) {
+        self->index = 0;
+        self->stage++;
+        if (self->stage == STAGE_SOLVE) {
+            pvid_estimator_begin_f32(estimator, &self->solve, true);
+        }
+    }
+}
+
+uint32_t pvid_weak_finish_stages_f32(uint8_t functions, uint8_t iterations, const pvid_estimator_f32 *estimator)
+{
+    const uint32_t projection = (uint32_t)STAGE_ADD - (uint32_t)STAGE_DIRECTION_A;
+    const uint32_t rows = ((uint32_t)4u * functions) + projection;
+    const uint32_t first = pvid_estimator_stages_f32(estimator, true);
+    const uint32_t more = pvid_estimator_stages_f32(estimator, false);
+    return rows + first + ((iterations - 1u) * more);
+}

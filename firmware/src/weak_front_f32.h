@@ -1,0 +1,22 @@
+/* Front end of the weak form: smoothing, second derivative and decimation. Private to the core. */
+#ifndef PVID_WEAK_FRONT_F32_H
+#define PVID_WEAK_FRONT_F32_H
+
+#include <stdbool.h>
+
+#include "pvid/weak.h"
+
+void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design, float sample_rate_hz,
+                              float l1);
+
+void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self);
+
+/* Takes one finite sample in and does a slice of the present block's FIR job. Returns whether the job
+ * is complete with it, and then writes phi [rad] and u = y_A''/l1 [1/s^2] at the block's centre: once
+ * in `decimation` samples, in the first half of these. */
+bool pvid_weak_front_step_f32(pvid_weak_front_f32 *self, float phi, float y, float *smooth_phi, float *u);
+
+/* Ticks that a FIR job takes. */
+uint16_t pvid_weak_front_ticks_f32(const pvid_weak_front_f32 *self);
+
+#endif

@@ -1,0 +1,40 @@
+/* A window of the weak form while it fills: double integrals and sums. Private to the core. */
+#ifndef PVID_WEAK_WINDOW_F32_H
+#define PVID_WEAK_WINDOW_F32_H
+
+#include <stddef.h>
+
+#include "pvid/weak.h"
+
+/* What a decimated sample adds, by the factor of the table: places among the terms. */
+enum {
+    PVID_TERM_UF = 0,   /* chi'' (-u phi) */
+    PVID_TERM_F = 1,    /* chi'' (-phi) */
+    PVID_TERM_UIUF = 2, /* chi'' (-u I2(u phi)) */
+    PVID_TERM_UIF = 3,  /* chi'' (-u I2(phi)) */
+    PVID_TERM_UIU = 4,  /* chi'' u I2(u) */
+    PVID_TERM_UI1 = 5,  /* chi'' u I2(1) */
+    PVID_TERM_U = 6,    /* chi'' u */
+    PVID_TERM_UT = 7,   /* chi'' u t */
+    PVID_TERM_CHI_UF = 8, /* chi (-u phi) */
+    PVID_TERM_CHI_F = 9,  /* chi (-phi) */
+    PVID_TERM_CHI_U = 10, /* chi u */
+    PVID_TERM_CHI_1 = 11, /* chi */
+    PVID_TERM_Y = 12      /* chi'''' phi */
+};
+
+/* Integrates up to the decimated sample phi [rad], u [1/s^2] at self->index and writes the terms.
+ * I2 is the double integral from the window's first sample, by the trapezoid rule less dt^2/6 times
+ * the integrand; t is the time from the window's middle. Cost: 30 operations. */
+void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, float dt, float phi, float u,
+                                float term[PVID_WEAK_TERMS]);
+
+/* Variance of u [1/s^4] over the samples so far; call it where the window is complete. */
+float pvid_weak_window_drive_f32(const pvid_weak_window_f32 *self, uint16_t samples);
+
+/* Adds the terms to the sums of functions first..last-1, or clears them at the window's first sample. */
+void pvid_weak_window_add_f32(const pvid_weak_window_f32 *self, const pvid_weak_design_f32 *design,
+                              const float term[PVID_WEAK_TERMS], size_t first, size_t last,
+                              float sums[][PVID_WEAK_TERMS]);
+
+#endif

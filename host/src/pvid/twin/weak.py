@@ -1,0 +1,127 @@
+"""Twin of weak_f32.c: samples in, the state after every tick out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.native import EstimatorConfig, Reason, WeakConfig
+from pvid.twin import kapitza_weak, weak_finish, weak_front, weak_window
+from pvid.twin.differentiator import segments
+from pvid.twin.estimator import RelativeEstimator
+from pvid.twin.strong import TwinRecord
+
+Float32 = npt.NDArray[np.float32]
+Mask = npt.NDArray[np.bool_]
+
+
+class WeakTwin:
+    """The weak-form identifier in several lanes that share samples, design and rate.
+
+    Parameters
+    ----------
+    config
+        Design, rate and l1; its estimator settings are used when `estimators` is not given.
+    estimators
+        Settings of each lane; all share law, feedback and divider.
+    """
+
+    def __init__(self, config: WeakConfig, estimators: Sequence[EstimatorConfig] | None = None) -> None:
+        self.config = config
+        design = config.design
+        functions = np.float32(design.functions)
+        weight = (functions - np.float32(2)) / functions
+        rate = np.float32(config.sample_rate) / (np.float32(design.decimation) * np.float32(config.hop))
+        lanes = [
+            replace(e, row_weight=float(weight), correlation=design.overlap)
+            for e in estimators or [config.estimator]
+        ]
+        pattern = kapitza_weak.WEAK if config.zero_unknown else kapitza_weak.ZEROED
+        self.estimator = RelativeEstimator(lanes, float(rate), pattern)
+        self.iterations = 1 if self.estimator.is_rate else config.iterations
+
+    @property
+    def window_ticks(self) -> int:
+        """Ticks in which the windows take a decimated sample in, after the one at which it comes out."""
+        design = self.config.design
+        if design.decimation <= 2:
+            return design.decimation - 1
+        left = design.decimation - weak_front.job_ticks(design.taps, design.decimation)
+        functions = -(-design.functions // max(1, left // 2))
+        return 2 * -(-design.functions // functions)
+
+    def _driven(self, variance: Float32) -> Mask:
+        threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)
+        return ~((threshold > 0) & (variance < threshold))
+
+    def window_sums(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[dict[int, Float32 | None], Mask, Mask]:
+        """Sums [K, 13] of every whole window, None if it is dropped, by the tick of its handing over.
+
+        Also which samples were finite, and which ticks are free for the stages of a window, both [ticks].
+        """
+        config, design = self.config, self.config.design
+        phi32 = np.asarray(phi, np.float32)
+        y32 = np.asarray(y, np.float32)
+        finite = np.isfinite(phi32) & np.isfinite(y32)
+        dt = np.float32(design.decimation) / np.float32(config.sample_rate)
+        complete: dict[int, Float32 | None] = {}
+        free = finite.copy()
+        for first, last in segments(finite):
+            part = weak_front.decimate(phi32[first:last], y32[first:last], design, config.sample_rate, config.l1)
+            driven = self._driven(weak_window.drives(part[1], design))
+            for m, sums in enumerate(weak_window.sums(*part, design, dt)):
+                tick = first + weak_front.tick_of((m + 2) * config.hop, design.taps, design.decimation)
+                complete[tick] = sums if driven[m] else None
+            for index in range(len(part[0])):
+                start = first + weak_front.tick_of(index, design.taps, design.decimation) + 1
+                free[start : min(start + self.window_ticks, last)] = False
+        return complete, finite, free
+
+    def run(
+        self,
+        phi: npt.ArrayLike,
+        y: npt.ArrayLike,
+        *,
+        sums: bool = True,
+        progress: Callable[[int], None] | None = None,
+    ) -> TwinRecord:
+        """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
+        complete, finite, free = self.window_sums(phi, y)
+        estimator = self.estimator
+        ticks = len(finite)
+        n_p, lanes = estimator.p.shape
+        record = TwinRecord(
+            p=np.empty((ticks, n_p, lanes), np.float32),
+            sums=np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.float32),
+            reason=np.empty((ticks, lanes), np.uint8),
+        )
+        warm = False
+        work: Iterator[npt.NDArray[np.uint8] | None] = iter(())
+        for tick in range(ticks):
+            if not finite[tick]:
+                warm = False
+                estimator.counters["rejected_not_finite"] += 1
+                record.reason[tick] = Reason.REJECTED_NOT_FINITE
+            else:
+                told = None
+                if tick in complete:
+                    warm = True
+                    window = complete[tick]
+                    if window is None:
+                        estimator.counters["held_not_excited"] += 1
+                        told = np.full(lanes, Reason.HELD_NOT_EXCITED, np.uint8)
+                    else:
+                        work = weak_finish.stages(window, self.config.design, self.iterations, estimator)
+                if told is None and free[tick]:
+                    told = next(work, None)
+                usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
+                record.reason[tick] = usual if told is None else told
+            record.p[tick] = estimator.p
+            if sums:
+                record.sums[tick] = estimator.sums
+            if progress is not None and tick % 512 == 0:
+                progress(tick)
+        return record

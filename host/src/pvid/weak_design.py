@@ -1,0 +1,423 @@
+"""Design of the weak form's tables: front end, test functions, whitening (MATH.md 5, pvid/weak.h).
+
+The test functions are chi_k(x) = (1 - x^2)^exponent P_k(x), x from -1 to 1 over the window, recombined such
+that the residual filters
+
+    chi'''' + d1 w chi'' + d2 w^2 chi
+
+are orthonormal (plain sums over the window's samples) at a nominal p. A row's noise then has the variance
+of the decimated angle's noise, and rows of one window are independent. At another p the Gram tables restore
+this.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import legendre
+
+from pvid.ctables import float_array, float_literal
+from pvid.differentiation import savitzky_golay
+from pvid.errors import PvidError
+
+Float = npt.NDArray[np.float64]
+Float32 = npt.NDArray[np.float32]
+
+# Measured on the standard rig: 125 Hz and 71 ms lose nothing against 1 kHz at 14 bits.
+_DECIMATED_RATE_HZ = 125.0
+_SMOOTHING_S = 0.071
+# chi'''' must vanish at the window's ends, where the core reads no table: it has a factor
+# (1 - x^2)^(exponent - 4).
+_MIN_EXPONENT = 5
+_MAX_EXPONENT = 12
+# Below this the equilibrated Gram matrix's smallest eigenvalue leaves float32 no digits for re-whitening.
+_MIN_EIGENVALUE = 1e-5
+
+# How the Gram tables combine into R0(p): orders of the derivatives in each of the six, in the core's order.
+GRAM_PAIRS: tuple[tuple[tuple[int, int], ...], ...] = (
+    ((4, 4),),
+    ((4, 2), (2, 4)),
+    ((4, 0), (0, 4)),
+    ((2, 2),),
+    ((2, 0), (0, 2)),
+    ((0, 0),),
+)
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Compile-time bounds of the core (pvid/config.h); pass others when the core was built with others."""
+
+    taps: int = 81
+    decimation: int = 32
+    window: int = 251
+    functions: int = 16
+
+
+@dataclass(frozen=True, eq=False)
+class WeakTables32:
+    """The tables as the float32 core takes them: pvid_weak_design_f32, shapes as in `WeakDesign`."""
+
+    taps: int
+    decimation: int
+    window: int
+    functions: int
+    smooth: Float32
+    second: Float32
+    chi: Float32
+    gram: Float32
+    overlap: float
+
+
+@dataclass(frozen=True, eq=False)
+class WeakDesign:
+    """A design in float64, and its float32 tables (`smooth_32` and so on, or all of them in `f32`).
+
+    Attributes
+    ----------
+    l1 : length of rod 1 [m]
+    sample_rate : [Hz]
+    nominal : (w, d1, d2) of the whitening, shape [3]
+    taps : smoothing window [samples], odd
+    degree : of the smoothing polynomial
+    decimation : D, samples per decimated sample
+    window : W [decimated samples], odd
+    functions : K
+    exponent : of (1 - x^2) in the test functions
+    smooth, second : folded FIR tables of order 0 and 2 (per sample^2), shape [(taps - 1) / 2]
+    chi : chi, chi'' [1/s^2] and chi'''' [1/s^4] at the window's samples, shape [W, 3, K]
+    gram : lower triangles, by rows, of the six Gram matrices of GRAM_PAIRS, shape [6, K (K + 1) / 2]
+    overlap : inflation of variances because half-overlapping windows share noise
+    """
+
+    l1: float
+    sample_rate: float
+    nominal: Float
+    taps: int
+    degree: int
+    decimation: int
+    window: int
+    functions: int
+    exponent: int
+    smooth: Float
+    second: Float
+    chi: Float
+    gram: Float
+    overlap: float
+
+    @property
+    def dt(self) -> float:
+        """Time between decimated samples [s]."""
+        return self.decimation / self.sample_rate
+
+    @property
+    def hop(self) -> int:
+        """Decimated samples from the start of a window to the start of the next."""
+        return (self.window - 1) // 2
+
+    @property
+    def window_s(self) -> float:
+        """From the first sample of a window to the last [s]."""
+        return (self.window - 1) * self.dt
+
+    @property
+    def hop_s(self) -> float:
+        """From window to window, and from estimate to estimate [s]."""
+        return self.hop * self.dt
+
+    @property
+    def delay(self) -> int:
+        """Samples between a sample and the decimated value that refers to its instant."""
+        return (self.taps - 1) // 2
+
+    @property
+    def latency_s(self) -> float:
+        """Age of a window's middle when the window is complete [s]."""
+        return self.delay / self.sample_rate + self.hop_s
+
+    @property
+    def update_rate_hz(self) -> float:
+        """Windows, and estimates, a second."""
+        return 1 / self.hop_s
+
+    @property
+    def smoothing_gain(self) -> float:
+        """Standard deviation of a decimated sample for white noise of 1 on the samples."""
+        centre = 1 - 2 * float(np.sum(self.smooth))
+        return math.sqrt(2 * float(np.sum(self.smooth**2)) + centre**2)
+
+    @property
+    def flash_bytes(self) -> int:
+        """Size of the float32 tables."""
+        return 4 * (self.smooth.size + self.second.size + self.chi.size + self.gram.size)
+
+    @cached_property
+    def smooth_32(self) -> Float32:
+        """`smooth` in float32."""
+        return _as_float32(self.smooth)
+
+    @cached_property
+    def second_32(self) -> Float32:
+        """`second` in float32."""
+        return _as_float32(self.second)
+
+    @cached_property
+    def chi_32(self) -> Float32:
+        """`chi` in float32."""
+        return _as_float32(self.chi)
+
+    @cached_property
+    def gram_32(self) -> Float32:
+        """`gram` in float32."""
+        return _as_float32(self.gram)
+
+    @property
+    def overlap_32(self) -> np.float32:
+        """`overlap` in float32."""
+        return np.float32(self.overlap)
+
+    @property
+    def f32(self) -> WeakTables32:
+        """All float32 tables: what native.WeakConfig takes."""
+        return WeakTables32(
+            self.taps,
+            self.decimation,
+            self.window,
+            self.functions,
+            self.smooth_32,
+            self.second_32,
+            self.chi_32,
+            self.gram_32,
+            float(self.overlap_32),
+        )
+
+
+def design(
+    l1: float,
+    sample_rate: float,
+    nominal_p: Sequence[float] | Float,
+    window_s: float = 1.25,
+    functions: int = 12,
+    decimation: int | None = None,
+    taps: int | None = None,
+    degree: int = 6,
+    exponent: int = 6,
+    bounds: Bounds | None = None,
+) -> WeakDesign:
+    """Tables for a rig.
+
+    Parameters
+    ----------
+    l1 : length of rod 1 [m]
+    sample_rate : [Hz]
+    nominal_p : rough (w [1/s^2], d1, d2); may be wrong by a factor of 2
+    window_s : length of a window [s]; best at 0.75 to 1.5 times the slowest modal period
+    functions : test functions a window, K
+    decimation : samples per decimated sample; None: about 125 Hz
+    taps : smoothing window [samples], odd; None: about 71 ms
+    degree : of the smoothing polynomial, 4..12
+    exponent : of (1 - x^2) in the test functions, 5..12
+    bounds : of the core the tables are for
+
+    Raises
+    ------
+    PvidError
+        Naming the setting that makes no sense or exceeds the core's bounds.
+    """
+    bounds = bounds or Bounds()
+    nominal = _checked_rig(l1, sample_rate, nominal_p)
+    if decimation is None:
+        decimation = max(1, round(sample_rate / _DECIMATED_RATE_HZ))
+    if taps is None:
+        # Two points more than the polynomial's coefficients: else it interpolates and smooths nothing.
+        taps = max(round(_SMOOTHING_S * sample_rate) | 1, (degree + 2) | 1)
+        taps = min(taps, (bounds.taps - 1) | 1)
+    _require("decimation", decimation, 1, bounds.decimation, "PVID_MAX_DECIMATION")
+    _require("taps", taps, 5, bounds.taps, "PVID_MAX_TAPS")
+    _require("functions", functions, 4, bounds.functions, "PVID_MAX_FUNCTIONS")
+    _require("exponent", exponent, _MIN_EXPONENT, _MAX_EXPONENT)
+    if taps % 2 == 0:
+        raise PvidError(f"taps must be odd, not {taps}")
+    if not (math.isfinite(window_s) and window_s > 0):
+        raise PvidError(f"window_s must be a positive number of seconds, not {window_s:g}")
+    dt = decimation / sample_rate
+    window = 2 * round(min(window_s / (2 * dt), 1e9)) + 1
+    if not 9 <= window <= bounds.window:
+        raise PvidError(
+            f"window_s = {window_s:g} s is {window} samples after decimation by {decimation}, and the core "
+            f"takes 9 to {bounds.window} (PVID_MAX_WEAK_WINDOW): change window_s or decimation"
+        )
+    bank = savitzky_golay(taps, degree)
+    chi = _whitened(_test_functions(window, functions, exponent, dt), nominal)
+    w, d1, d2 = nominal
+    residual = chi[:, 2] + d1 * w * chi[:, 1] + d2 * w**2 * chi[:, 0]
+    hop = (window - 1) // 2
+    # The estimate sums g_m^T e_m over windows m, e_m the K residuals; neighbours share noise, E e_m e_(m+1)^T = R1,
+    # the filters' Gram at a lag of one hop. Motion that repeats from window to window (g_m = g_(m+1)) makes the
+    # variance grow by 2 g^T R1 g <= 2 lambda_max(R1 + R1^T)/2 |g|^2.
+    shared = residual[hop:].T @ residual[: window - hop]
+    return WeakDesign(
+        l1=float(l1),
+        sample_rate=float(sample_rate),
+        nominal=_frozen(nominal),
+        taps=taps,
+        degree=degree,
+        decimation=decimation,
+        window=window,
+        functions=functions,
+        exponent=exponent,
+        smooth=_frozen(bank.weights[0].copy()),
+        second=_frozen(bank.weights[2].copy()),
+        chi=_frozen(chi),
+        gram=_frozen(_gram_tables(chi)),
+        overlap=float(1 + 2 * np.linalg.eigvalsh((shared + shared.T) / 2).max()),
+    )
+
+
+def to_c_header(design: WeakDesign, name: str, made_by: str = "pvid.weak_design.to_c_header") -> str:
+    """A C header that defines `static const pvid_weak_design_f32 name`.
+
+    No date: the same design makes the same file. Every literal reads back as the same float32.
+
+    Parameters
+    ----------
+    design
+        The design.
+    name
+        Name of the struct in C; the arrays are name_smooth, name_second, name_chi and name_gram.
+    made_by
+        The command that makes it, for the banner.
+    """
+    k = design.functions
+    w, d1, d2 = design.nominal
+    arrays = [
+        float_array(f"{name}_smooth", design.smooth_32, "value, folded"),
+        float_array(f"{name}_second", design.second_32, "second derivative per sample^2, folded"),
+        float_array(f"{name}_chi", design.chi_32.reshape(-1, k), f"[{design.window}][3][{k}]: orders 0, 2, 4"),
+        float_array(f"{name}_gram", design.gram_32, f"[6][{k * (k + 1) // 2}]: 44, 42+24, 40+04, 22, 20+02, 00"),
+    ]
+    guard = f"{name.upper()}_H"
+    return "\n".join(
+        [
+            f"/* Generated by `{made_by}`: do not edit.",
+            f" * l1 {design.l1:g} m, {design.sample_rate:g} Hz, nominal w {w:.9g} 1/s^2, d1 {d1:.9g}, d2 {d2:.9g};",
+            f" * window {design.window_s:g} s, {k} functions (1 - x^2)^{design.exponent} P_k, "
+            f"smoothing of degree {design.degree}.",
+            f" * Flash: {design.flash_bytes} bytes. */",
+            f"#ifndef {guard}",
+            f"#define {guard}",
+            "",
+            '#include "pvid/weak.h"',
+            "",
+            f"#if PVID_MAX_TAPS < {design.taps} || PVID_MAX_DECIMATION < {design.decimation} || \\",
+            f"    PVID_MAX_WEAK_WINDOW < {design.window} || PVID_MAX_FUNCTIONS < {k}",
+            f'#error "the bounds of pvid/config.h are too small for {name}"',
+            "#endif",
+            "",
+            "\n\n".join(arrays),
+            "",
+            f"static const pvid_weak_design_f32 {name} = {{",
+            f"    .taps = {design.taps},",
+            f"    .decimation = {design.decimation},",
+            f"    .window = {design.window},",
+            f"    .functions = {k},",
+            *(f"    .{table} = {name}_{table}," for table in ("smooth", "second", "chi", "gram")),
+            f"    .overlap = {float_literal(design.overlap_32)},",
+            "};",
+            "",
+            "#endif",
+            "",
+        ]
+    )
+
+
+def _checked_rig(l1: float, sample_rate: float, nominal_p: Sequence[float] | Float) -> Float:
+    """nominal_p as an array [3], once the rig makes sense."""
+    for name, value in (("l1", l1), ("sample_rate", sample_rate)):
+        if not (math.isfinite(value) and value > 0):
+            raise PvidError(f"{name} must be a positive number, not {value:g}")
+    nominal = np.array(nominal_p, np.float64)
+    if nominal.shape != (3,) or not (np.isfinite(nominal).all() and (nominal > 0).all()):
+        raise PvidError(f"nominal_p must be three positive numbers (w, d1, d2), not {nominal_p}")
+    return nominal
+
+
+def _require(name: str, value: int, low: int, high: int, macro: str = "") -> None:
+    if not low <= value <= high:
+        limit = f" ({macro} of the core)" if macro and value > high else ""
+        raise PvidError(f"{name} must be {low} to {high}{limit}, not {value}")
+
+
+def _test_functions(window: int, functions: int, exponent: int, dt: float) -> Float:
+    """chi, chi'' and chi'''' before whitening, shape [window, 3, functions].
+
+    Each is evaluated on one half and mirrored, so that its parity (that of k) holds in every bit.
+    """
+    half = (window - 1) // 2
+    x = np.arange(half + 1) / half
+    bell = legendre.legpow(np.array([2 / 3, 0.0, -2 / 3]), exponent)  # 1 - x^2 = 2/3 (P_0 - P_2)
+    chi = np.empty((window, 3, functions))
+    for k in range(functions):
+        polynomial = legendre.legmul(bell, np.eye(functions)[k])
+        for place, order in enumerate((0, 2, 4)):
+            right = legendre.legval(x, legendre.legder(polynomial, order)) / (half * dt) ** order
+            right[-1] = 0.0
+            if k % 2:
+                right[0] = 0.0
+            chi[half:, place, k] = right
+            chi[half::-1, place, k] = -right if k % 2 else right
+    return chi
+
+
+def _whitened(chi: Float, p: Float) -> Float:
+    """The functions recombined, within each parity, such that their residual filters at p are orthonormal.
+
+    By the Cholesky factor of their Gram matrix (diagonally equilibrated): the result has no free signs, so
+    that every machine makes the same tables.
+    """
+    w, d1, d2 = p
+    residual = chi[:, 2] + d1 * w * chi[:, 1] + d2 * w**2 * chi[:, 0]
+    out = np.empty_like(chi)
+    for parity in (0, 1):
+        mine = slice(parity, None, 2)
+        gram = residual[:, mine].T @ residual[:, mine]
+        scale = 1 / np.sqrt(np.diag(gram))
+        gram *= np.outer(scale, scale)
+        if not np.isfinite(gram).all() or np.linalg.eigvalsh(gram)[0] < _MIN_EIGENVALUE:
+            raise PvidError(
+                f"functions = {chi.shape[2]} cannot be told apart on {chi.shape[0]} decimated samples: "
+                f"choose fewer functions, a longer window_s or a smaller decimation"
+            )
+        factor = np.linalg.cholesky(gram)
+        mixing = np.linalg.solve(factor, np.diag(scale))
+        out[:, :, mine] = chi[:, :, mine] @ mixing.T
+    return out
+
+
+def _gram_tables(chi: Float) -> Float:
+    """The six packed lower triangles of GRAM_PAIRS; exactly zero between functions of opposite parity."""
+    functions = chi.shape[2]
+    lower = np.tril_indices(functions)
+    opposite = (lower[0] + lower[1]) % 2 == 1
+    tables = []
+    for pairs in GRAM_PAIRS:
+        packed = sum((chi[:, i // 2].T @ chi[:, j // 2] for i, j in pairs), np.zeros((functions, functions)))[lower]
+        packed[opposite] = 0.0
+        tables.append(packed)
+    return np.stack(tables)
+
+
+def _frozen(array: Float) -> Float:
+    array.setflags(write=False)
+    return array
+
+
+def _as_float32(array: Float) -> Float32:
+    out = np.ascontiguousarray(array, np.float32)
+    out.setflags(write=False)
+    return out

@@ -1,0 +1,111 @@
+"""The tables of the weak form: what they must be for the mathematics to hold, and what cannot be designed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pvid import oracle
+from pvid.errors import PvidError
+from pvid.weak_design import WeakDesign, design
+
+NOMINAL = oracle.linear(9.8, 0.1, 0.1, 0.3)
+
+
+@pytest.fixture(scope="module")
+def standard() -> WeakDesign:
+    return design(0.3, 1000.0, NOMINAL)
+
+
+def residual_filters(tables: WeakDesign, p: np.ndarray) -> np.ndarray:
+    w, d1, d2 = p
+    chi = tables.chi
+    return np.asarray(chi[:, 2] + d1 * w * chi[:, 1] + d2 * w**2 * chi[:, 0])
+
+
+def test_the_standard_design(standard: WeakDesign) -> None:
+    assert (standard.taps, standard.decimation, standard.window, standard.functions) == (71, 8, 157, 12)
+    assert standard.hop == 78
+    assert standard.window_s == pytest.approx(1.248)
+
+
+def test_residual_filters_are_orthonormal_at_the_nominal(standard: WeakDesign) -> None:
+    filters = residual_filters(standard, NOMINAL)
+    # the Gram's condition is about 1e5 before whitening: float64 leaves 1e-11
+    np.testing.assert_allclose(filters.T @ filters, np.eye(12), atol=1e-9)
+
+
+def test_functions_and_three_derivatives_vanish_at_the_ends(standard: WeakDesign) -> None:
+    for order in range(2):  # chi and chi''; chi' and chi''' vanish with them: the next samples grow as x^6 and x^4
+        largest = np.abs(standard.chi[:, order]).max(axis=0)
+        assert (np.abs(standard.chi[[0, -1], order]) < 1e-9 * largest).all()
+        assert (np.abs(standard.chi[[1, -2], order]) < 1e-2 * largest).all()
+
+
+def test_every_function_is_even_or_odd(standard: WeakDesign) -> None:
+    for k in range(standard.functions):
+        for order in range(3):
+            column = standard.chi[:, order, k]
+            sign = 1 if k % 2 == 0 else -1
+            np.testing.assert_allclose(column, sign * column[::-1], atol=1e-9 * np.abs(column).max())
+
+
+def test_the_tables_are_derivatives_of_one_another(standard: WeakDesign) -> None:
+    dt = standard.decimation / standard.sample_rate
+    for order in range(2):
+        lower, upper = standard.chi[:, order], standard.chi[:, order + 1]
+        second = (lower[2:] - 2 * lower[1:-1] + lower[:-2]) / dt**2
+        # the difference's own error, h^2/12 of a derivative two orders up: 12 functions have up to 15 waves a window
+        assert np.abs(second - upper[1:-1]).max() < 0.05 * np.abs(upper).max()
+
+
+def test_gram_tables_give_the_gram_at_any_p(standard: WeakDesign) -> None:
+    w, d1, d2 = p = np.array([20.0, 12.0, 3.0])
+    weights = np.array([1, d1 * w, d2 * w**2, (d1 * w) ** 2, d1 * w * d2 * w**2, (d2 * w**2) ** 2])
+    filters = residual_filters(standard, p)
+    expected = (filters.T @ filters)[np.tril_indices(12)]
+    np.testing.assert_allclose(weights @ standard.gram, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_smoothing_keeps_polynomials_and_reduces_noise(standard: WeakDesign) -> None:
+    half = (standard.taps - 1) // 2
+    t = np.arange(-half, half + 1) / half
+    for power in range(7):
+        x = t**power
+        folded = (x[half + 1 :] - x[half]) + (x[half - 1 :: -1] - x[half])
+        assert x[half] + standard.smooth @ folded == pytest.approx(1.0 if power == 0 else 0.0, abs=1e-12)
+    noise = np.random.default_rng(0).standard_normal((20_000, standard.taps))
+    folded = (noise[:, half + 1 :] - noise[:, [half]]) + (noise[:, half - 1 :: -1] - noise[:, [half]])
+    smoothed = noise[:, half] + folded @ standard.smooth
+    assert np.std(smoothed) == pytest.approx(standard.smoothing_gain, rel=0.02)  # four times 1/sqrt(2 * 20 000)
+
+
+def test_overlap_is_what_noise_shares_between_neighbours(standard: WeakDesign) -> None:
+    filters = residual_filters(standard, NOMINAL)
+    noise = np.random.default_rng(1).standard_normal((20_000, standard.window + standard.hop))
+    shared = (noise[:, : standard.window] @ filters).T @ (noise[:, standard.hop :] @ filters) / len(noise)
+    largest = np.linalg.eigvalsh((shared + shared.T) / 2).max()
+    assert 1 + 2 * largest == pytest.approx(standard.overlap, abs=0.1)  # 12 x 12 entries known to 0.7 %, twice
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"functions": 3}, "functions"),
+        ({"functions": 17}, "functions"),
+        ({"window_s": 5.0}, "window_s"),
+        ({"window_s": 0.05}, "window_s"),
+        ({"decimation": 33}, "decimation"),
+        ({"exponent": 3}, "exponent"),
+    ],
+)
+def test_what_cannot_be_designed_is_named(settings: dict[str, float], named: str) -> None:
+    with pytest.raises(PvidError, match=named):
+        design(0.3, 1000.0, NOMINAL, **settings)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("rate", [125.0, 250.0, 500.0, 2000.0, 4000.0])
+def test_other_sample_rates_find_a_decimation(rate: float) -> None:
+    tables = design(0.3, rate, NOMINAL)
+    assert rate / tables.decimation == pytest.approx(125.0)
+    assert tables.window_s == pytest.approx(1.25, rel=0.02)
