@@ -1,88 +1,234 @@
-"""Bit equality of the weak form: every build, law, forgetting, with and without the encoder's zero, 20 starts."""
+"""Bit equality of the weak form in C and its numpy twin, after every tick: builds, laws, sizes, hostile samples."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from pvid.compare import compare_run, first_difference
-from pvid.native import EstimatorConfig, Law, Native, WeakConfig
+from pvid import oracle
+from pvid.compare import first_difference
+from pvid.errors import PvidError
+from pvid.native import EstimatorConfig, Law, Native, Reason, Record, WeakConfig
 from pvid.rig import Simulation, simulate, standard_sensors, standard_start
-from pvid.rigfile import RigFile
-from pvid.setup import weak_config
 from pvid.twin import fnv
 from pvid.twin.weak import WeakTwin
+from pvid.weak_design import design
 
-STARTS = 20
+BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
+L1 = 0.3
+NOMINAL = oracle.linear(9.8, 0.1, 0.1, L1)
+Samples = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
-def run() -> Simulation:
-    """The standard rig with a 14-bit encoder, 40.5 s."""
-    return simulate(sensors=standard_sensors(14), duration=40.5, seed=5)
+def standard_14_bits() -> Simulation:
+    """The standard rig, linear truth, 14-bit encoder, 20 s at 1 kHz."""
+    return simulate(sensors=standard_sensors(14), truth="linear", duration=20.0, seed=1)
 
 
-def configuration(zero_unknown: bool) -> WeakConfig:
-    rig = RigFile.standard()
-    return weak_config(replace(rig, identifier=replace(rig.identifier, form="weak", zero=zero_unknown)), 1000.0)
+def estimator(seed: int, zero_unknown: bool = True) -> EstimatorConfig:
+    """A start within 50 % of the truth."""
+    p = standard_start(seed)
+    lower, upper, sd = p / 20, p * 20, p / 2
+    if zero_unknown:
+        p, lower, upper, sd = (np.append(a, c) for a, c in ((p, 0.0), (lower, -1.0), (upper, 1.0), (sd, 0.5)))
+    start, start_sd, low, high = (a.astype(np.float32) for a in (p, sd, lower, upper))
+    return EstimatorConfig(start=start, start_sd=start_sd, lower=low, upper=high, row_sd=8e-5, kappa_min=5e-6)
 
 
-def started(config: WeakConfig, seed: int) -> EstimatorConfig:
-    """The same settings from another start."""
-    p = standard_start(seed).astype(np.float32)
-    start, start_sd = config.estimator.start.copy(), config.estimator.start_sd.copy()
-    start[:3] = p
-    start_sd[:3] = np.float32(0.5) * p
-    return replace(config.estimator, start=start, start_sd=start_sd)
+def configuration(zero_unknown: bool = True, **sizes: float) -> WeakConfig:
+    """The base design, or one of other sizes."""
+    tables = design(L1, 1000.0, NOMINAL, **sizes).f32  # type: ignore[arg-type]
+    return WeakConfig(1000.0, L1, tables, estimator(0, zero_unknown), zero_unknown=zero_unknown)
 
 
-@pytest.mark.parametrize("zero_unknown", [True, False])
-@pytest.mark.parametrize("law", list(Law))
-@pytest.mark.parametrize("forgetting_s", [0.0, 10.0])
-def test_twenty_starts_equal_the_twin_in_every_build(
-    zero_unknown: bool, law: Law, forgetting_s: float, matrix: dict[str, Native], run: Simulation
+def assert_lanes_equal(
+    natives: list[Native], config: WeakConfig, lanes: list[EstimatorConfig], phi: Samples, y: Samples
+) -> list[Record]:
+    """Runs every build and one pass of the twin; returns the records of the last build."""
+    twin = WeakTwin(config, lanes)
+    expected = twin.run(phi, y)
+    records = []
+    for lane, one in enumerate(lanes):
+        p, sums, reason = expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane]
+        hashes = fnv.running_hashes(p, sums, reason)
+        for native in natives:
+            core = native.weak(replace(config, estimator=one))
+            record = core.run(phi, y)
+            assert first_difference(record, p, sums, reason) is None, native.build
+            assert np.array_equal(record.hash, hashes), native.build
+            assert core.counters == {name: int(of[lane]) for name, of in twin.estimator.counters.items()}
+            assert core.assess().tobytes() == twin.estimator.assess()[lane].tobytes()
+            assert np.isfinite(record.p).all() and np.isfinite(record.sums).all()
+        records.append(record)
+    return records
+
+
+def test_twelve_lanes_equal_the_twin_in_every_build(matrix: dict[str, Native], standard_14_bits: Simulation) -> None:
+    run = standard_14_bits.run
+    lanes = [replace(estimator(seed), forgetting_s=tau) for seed in range(4) for tau in (0.0, 5.0, 40.0)]
+    records = assert_lanes_equal([matrix[name] for name in BUILDS], configuration(), lanes, run.phi, run.y)
+    for record in records:
+        assert (record.reason == Reason.UPDATED).sum() >= 28  # a window every 0.624 s
+        assert record.p[-1, :3] == pytest.approx(standard_14_bits.truth.linear, rel=0.005)
+
+
+def test_a_zeroed_encoder_equals_the_twin_in_every_build(
+    matrix: dict[str, Native], standard_14_bits: Simulation
 ) -> None:
-    config = configuration(zero_unknown)
-    lanes = [replace(started(config, seed), law=law, forgetting_s=forgetting_s) for seed in range(STARTS)]
-    phi, y = run.run.phi, run.run.y
-    assert len(phi) >= 40_000
-    twin = WeakTwin(config, lanes).run(phi, y)
-    for lane, estimator in enumerate(lanes):
-        p, sums, reason = twin.p[:, :, lane], twin.sums[:, :, lane], twin.reason[:, lane]
-        for name, native in matrix.items():
-            record = native.weak(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-            assert first_difference(record, p, sums, reason) is None, (name, lane)
-        if lane == 0:
-            identifier = matrix["gcc-O2"].weak(replace(config, estimator=estimator))
-            hashes = identifier.run(phi, y).hash
-            assert np.array_equal(hashes, fnv.running_hashes(p, sums, reason))
+    run = standard_14_bits.run
+    lanes = [estimator(seed, zero_unknown=False) for seed in range(3)]
+    config = replace(configuration(zero_unknown=False), iterations=2)
+    assert_lanes_equal([matrix[name] for name in BUILDS], config, lanes, run.phi[:8000], run.y[:8000])
 
 
-def test_hostile_samples_equal_the_twin_and_leave_only_numbers(native: Native, run: Simulation) -> None:
-    rng = np.random.default_rng(3)
-    phi, y = run.run.phi[:12_000].copy(), run.run.y[:12_000].copy()
-    phi[2000] = np.nan
-    y[4500] = -np.inf
-    phi[6000:6100] = 1e30 * rng.standard_normal(100)
-    phi[7000:8500] = phi[7000]
-    y[8500:8600] = rng.choice([-3.0, 3.0], 100)
-    phi[9500:11_000] = 0.0
-    y[9500:11_000] = 0.0
-    config = configuration(True)
-    outcome = compare_run(native, config, phi, y)
-    assert outcome.equal, outcome.difference
-    record = native.weak(config).run(phi, y)
-    assert np.isfinite(record.p).all()
-    assert np.isfinite(record.sums).all()
+@pytest.mark.parametrize(
+    ("law", "feedback_hz", "divider"),
+    [(Law.PSEUDOVELOCITY, 0.0, 1), (Law.STATIONARY, 0.5, 1), (Law.STATIONARY, 0.0, 3)],
+)
+def test_laws_and_divider_equal_the_twin(
+    native: Native, standard_14_bits: Simulation, law: Law, feedback_hz: float, divider: int
+) -> None:
+    run = standard_14_bits.run
+    lanes = [replace(estimator(seed), law=law, feedback_hz=feedback_hz, divider=divider) for seed in range(3)]
+    assert_lanes_equal([native], configuration(), lanes, run.phi[:10000], run.y[:10000])
 
 
-def test_a_run_in_pieces_has_the_bits_of_one(native: Native, run: Simulation) -> None:
-    phi, y = run.run.phi[:9000], run.run.y[:9000]
-    whole = native.weak(configuration(True))
-    whole.run(phi, y)
-    pieces = native.weak(configuration(True))
-    for first, last in ((0, 1), (1, 1300), (1300, 4321), (4321, 9000)):
-        pieces.run(phi[first:last], y[first:last])
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        {"decimation": 1, "taps": 31, "functions": 4, "window_s": 0.25},
+        {"decimation": 2, "taps": 31, "functions": 4, "window_s": 0.5},
+        {"decimation": 3, "taps": 21, "functions": 7, "window_s": 0.6},
+        {"decimation": 5, "taps": 61, "functions": 16, "window_s": 0.75},
+        {"decimation": 32, "taps": 81, "functions": 5, "window_s": 2.0},
+    ],
+    ids=lambda sizes: f"D{sizes['decimation']}-K{sizes['functions']}",
+)
+def test_every_size_equals_the_twin(native: Native, standard_14_bits: Simulation, sizes: dict[str, float]) -> None:
+    run = standard_14_bits.run
+    records = assert_lanes_equal([native], configuration(**sizes), [estimator(0)], run.phi[:8000], run.y[:8000])
+    assert (records[0].reason != Reason.WARMING_UP).any()
+
+
+def hostile(simulation: Simulation) -> tuple[Samples, Samples]:
+    """NaN before, inside and right after windows, infinity, overflowing steps, a dead encoder, a still pivot."""
+    rng = np.random.default_rng(7)
+    phi = simulation.run.phi[:16000].copy()
+    y = simulation.run.y[:16000].copy()
+    phi[[100, 3003, 5000, 5100]] = np.nan
+    phi[5020:5040:3] = np.nan
+    y[3000] = np.inf
+    phi[9000:9100] = 1e30 * rng.standard_normal(100)
+    y[12000:12010] = 3e38
+    phi[13000:] = 0.0
+    y[14000:] = 0.0
+    return phi, y
+
+
+@pytest.mark.parametrize("kappa_min", [0.0, 5e-6])
+@pytest.mark.parametrize("drive_min", [0.0, 0.4])
+def test_hostile_samples_equal_the_twin(
+    native: Native, standard_14_bits: Simulation, kappa_min: float, drive_min: float
+) -> None:
+    phi, y = hostile(standard_14_bits)
+    config = replace(configuration(), drive_min=drive_min)
+    lanes = [replace(estimator(seed), kappa_min=kappa_min) for seed in range(3)]
+    records = assert_lanes_equal([native], config, lanes, phi, y)
+    rejected = np.flatnonzero(records[0].reason == Reason.REJECTED_NOT_FINITE)
+    assert set(np.flatnonzero(~(np.isfinite(phi) & np.isfinite(y)))) <= set(rejected)
+
+
+def test_absurd_parameters_stay_finite_and_equal_the_twin(native: Native, standard_14_bits: Simulation) -> None:
+    run = standard_14_bits.run
+    absurd = replace(
+        estimator(0),
+        start=np.array([1e20, 1e20, 1e20, 0], np.float32),
+        start_sd=np.array([1e10, 1e10, 1e10, 0.5], np.float32),
+        lower=np.array([1e-30, 1e-30, 1e-30, -1], np.float32),
+        upper=np.array([1e30, 1e30, 1e30, 1], np.float32),
+        kappa_min=0.0,
+    )
+    assert_lanes_equal([native], configuration(), [absurd], run.phi[:6000], run.y[:6000])
+
+
+def test_without_motion_or_drive_p_does_not_move(native: Native, standard_14_bits: Simulation) -> None:
+    y = standard_14_bits.run.y[:6000]
+    config = replace(configuration(), drive_min=0.4)
+    still = np.zeros(6000)
+    for phi, drive in ((still, still), (standard_14_bits.run.phi[:6000], still), (still, y)):
+        record = assert_lanes_equal([native], config, [estimator(0)], phi, drive)[0]
+        assert np.array_equal(record.p[-1, :3], estimator(0).start[:3])
+        assert (record.reason == Reason.HELD_NOT_EXCITED).any()
+
+
+def test_a_pause_of_the_drive_freezes_p_and_the_sums(native: Native, standard_14_bits: Simulation) -> None:
+    phi, y = standard_14_bits.run.phi, standard_14_bits.run.y.copy()
+    y[8000:16000] = y[8000]
+    config = replace(configuration(), drive_min=0.4)
+    record = assert_lanes_equal([native], config, [estimator(0)], phi, y)[0]
+    # the last window that saw the drive is complete 1.25 s after it stops, and worked off 0.3 s later
+    paused = slice(8000 + 1600, 16000)
+    assert (record.p[paused] == record.p[paused.start]).all()
+    assert (record.sums[paused] == record.sums[paused.start]).all()
+    assert (record.p[-1] != record.p[paused.start]).any()
+
+
+def test_a_run_in_two_pieces_has_the_bits_of_one(native: Native, standard_14_bits: Simulation) -> None:
+    run = standard_14_bits.run
+    whole = native.weak(configuration())
+    whole.run(run.phi[:9000], run.y[:9000])
+    pieces = native.weak(configuration())
+    for part in (slice(0, 1), slice(1, 2345), slice(2345, 2346), slice(2346, 9000)):
+        pieces.run(run.phi[part], run.y[part])
     assert pieces.running_hash == whole.running_hash
+
+
+def test_a_gap_keeps_the_sums_and_starts_the_windows_again(native: Native, standard_14_bits: Simulation) -> None:
+    run = standard_14_bits.run
+    config = configuration()
+    told, seen = native.weak(config), native.weak(config)
+    for core in (told, seen):
+        core.run(run.phi[:6000], run.y[:6000])
+    told.gap()
+    told_record = told.run(run.phi[7000:9000], run.y[7000:9000])
+    broken = np.concatenate([[np.nan], run.phi[7000:9000]])
+    seen_record = seen.run(broken, np.concatenate([[0.0], run.y[7000:9000]]))
+    assert np.array_equal(told_record.p, seen_record.p[1:])
+    assert np.array_equal(told_record.sums, seen_record.sums[1:])
+    assert told_record.sums[0, -1] > 0
+    assert told_record.reason[0] in (Reason.WARMING_UP, Reason.UPDATED)
+
+
+def test_lanes_with_different_schedules_are_refused() -> None:
+    lanes = [estimator(0), replace(estimator(1), divider=2)]
+    with pytest.raises(PvidError, match="share law"):
+        WeakTwin(configuration(), lanes)
+
+
+def test_what_the_core_refuses_it_names(native: Native) -> None:
+    config = configuration()
+    for wrong, name in (
+        (replace(config, sample_rate=0.0), "bad sample rate"),
+        (replace(config, l1=float("nan")), "bad length"),
+        (replace(config, drive_min=-1.0), "bad drive min"),
+        (replace(config, iterations=0), "bad iterations"),
+        (replace(config, iterations=11), "bad iterations"),
+    ):
+        with pytest.raises(PvidError, match=name):
+            native.weak(wrong)
+    tables = design(L1, 1000.0, NOMINAL).f32
+    chi = tables.chi.copy()
+    chi[7, 1, 3] = np.nan
+    for wrong_tables in (replace(tables, chi=chi), replace(tables, taps=70), replace(tables, overlap=0.5)):
+        with pytest.raises(PvidError, match="bad design"):
+            native.weak(replace(config, design=wrong_tables))
+
+
+def test_a_window_too_short_for_its_work_is_refused(native: Native) -> None:
+    config = configuration(decimation=1, taps=31, functions=12, window_s=0.1)
+    with pytest.raises(PvidError, match="bad iterations"):
+        native.weak(config)

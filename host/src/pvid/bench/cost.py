@@ -24,10 +24,11 @@ STAGES = {
     "gauss-newton": "the same with feedback_hz = 0, which needs no innovation",
     "tick": "samples in, parameters out",
     "assess": "standard errors and kappa (only when published)",
+    "weak": "weak form, samples in, parameters out: mean over its windows (K = 12, 1 kHz)",
     "rls": "plain packed RLS of the same 11 parameters",
 }
 
-_FEW, _MANY = 640, 1280  # multiples of the fold's block of 64 ticks
+_FEW, _MANY = 2496, 4992  # multiples of the fold's block of 64 ticks and of the weak form's hop of 624
 
 
 RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32)
@@ -60,7 +61,8 @@ def state_bytes(native: Native) -> dict[str, int]:
     """Bytes of state beside the baseline's."""
     return {
         "estimator (two-level sums, counters, settings)": native.state_bytes["estimator"],
-        "identifier with windows of 321 samples": native.state_bytes["strong"],
+        "strong form, windows of 321 samples": native.state_bytes["strong"],
+        "weak form": native.state_bytes["weak"],
         "plain packed RLS of 11 parameters": RLS_STATE_BYTES,
     }
 

@@ -1,0 +1,622 @@
+"""The weak form in float64, straight from MATH.md section 5, to be read beside it.
+
+Nothing here is fast or bit-exact; it is what the twin and the C core are measured against, and where what the
+core does not have yet is tried: the full-angle correction and the two damping regressors.
+
+    samples -> front_end -> frames -> columns -> rows (whitened at p, a and b removed) -> WeakOracle -> p, s.e.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.errors import PvidError
+from pvid.oracle import Estimate, kappa_of
+from pvid.rig import Drive, Pendulum, Sensors, simulate
+from pvid.weak_design import GRAM_PAIRS, WeakDesign
+
+Float = npt.NDArray[np.float64]
+
+# Columns of a window: Y, N1..N8, a, b.
+Y, N, A, B = 0, slice(1, 9), 9, 10
+_COLUMNS = 11
+
+# The full-angle correction leaves out terms of the fourth order: measured bias in w at 0.13 rad 0.02 % and
+# growing fast (0.3 % at 0.16 rad).
+VALID_ANGLE = 0.12  # rad
+
+# The correction needs an estimate that has settled (from the first window on it diverges): these many windows,
+# a move of p below this a window, and standard errors below this, both relative. It goes off at four times that.
+_SETTLED_WINDOWS = 4
+_SETTLED_MOVE = 0.02
+_SETTLED_ERROR = 0.05
+# Then what the uncorrected windows said is aged: 0.3^4 = 0.8 % of it is left.
+_AGEING = 0.3
+_AGEING_WINDOWS = 4
+
+_DAMPING_SD = 1e-3  # m^2/s, prior of the damping coefficients
+_DAMPING_REACH = 1e-2  # m^2/s, what the step limit refers to
+
+
+# ---- from samples to rows
+
+
+def front_end(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign) -> tuple[Float, Float]:
+    """Decimated angle [rad] and u = y''/l1 [1/s^2], both [decimated samples].
+
+    Decimated sample m belongs to sample (taps - 1) / 2 + m D.
+    """
+    angle, height = np.asarray(phi, np.float64), np.asarray(y, np.float64)
+    count = (angle.size - design.taps) // design.decimation + 1
+    if count < 1:
+        raise PvidError(f"{angle.size} samples do not fill the smoothing window of {design.taps}")
+    centres = design.delay + design.decimation * np.arange(count)
+
+    def folded(x: Float, weights: Float) -> Float:
+        total = np.zeros(count)
+        for i, weight in enumerate(weights, start=1):
+            total += weight * ((x[centres + i] - x[centres]) + (x[centres - i] - x[centres]))
+        return total
+
+    smooth = angle[centres] + folded(angle, design.smooth)
+    return smooth, folded(height, design.second) * design.sample_rate**2 / design.l1
+
+
+def frames(x: Float, design: WeakDesign) -> Float:
+    """Half-overlapping windows [windows, W] of decimated samples [n]."""
+    if x.size < design.window:
+        raise PvidError(
+            f"{x.size} decimated samples do not fill one window of {design.window}: record longer or shorten window_s"
+        )
+    return np.lib.stride_tricks.sliding_window_view(x, design.window)[:: design.hop]
+
+
+def end_times(windows: int, design: WeakDesign) -> Float:
+    """Times [s] of the last sample that each window needs, from the first sample of the run."""
+    last = design.taps - 1 + design.decimation * (design.window - 1 + design.hop * np.arange(windows))
+    return np.asarray(last / design.sample_rate)
+
+
+def integrated_once(f: Float, dt: float) -> Float:
+    """Integral from the window's start, trapezoid; [..., W]."""
+    out = np.zeros_like(f)
+    out[..., 1:] = np.cumsum((f[..., 1:] + f[..., :-1]) / 2, axis=-1) * dt
+    return out
+
+
+def integrated_twice(f: Float, dt: float) -> Float:
+    """I2: double integral from the window's start, [..., W].
+
+    The trapezoid rule applied twice is wrong by dt^2/6 f and terms that are linear in time; the latter are of
+    the form a + b t and are projected out.
+    """
+    return integrated_once(integrated_once(f, dt), dt) - dt**2 / 6 * f
+
+
+def columns(phi: Float, u: Float, design: WeakDesign) -> Float:
+    """Columns Y, N1..N8, a, b of windows phi, u [windows, W]: shape [windows, 11, K]."""
+    dt, w = design.dt, design.window
+    chi, chi2, chi4 = design.chi[:, 0], design.chi[:, 1], design.chi[:, 2]
+    t = dt * (np.arange(w) - (w - 1) / 2)
+    one = np.ones_like(phi)
+    u_phi = u * phi
+    return np.stack(
+        [
+            phi @ chi4,
+            -u_phi @ chi2,
+            -phi @ chi2,
+            -(u * integrated_twice(u_phi, dt)) @ chi2,
+            -(u * integrated_twice(phi, dt)) @ chi2 - u_phi @ chi,
+            -phi @ chi,
+            (u * integrated_twice(u, dt)) @ chi2,
+            (u * integrated_twice(one, dt)) @ chi2 + u @ chi,
+            one @ chi,
+            u @ chi2,
+            (u * t) @ chi2,
+        ],
+        axis=1,
+    )
+
+
+def residual_filters(design: WeakDesign, p: Float) -> Float:
+    """chi'''' + d1 w chi'' + d2 w^2 chi [W, K]: what a row makes of the angle's noise, but for u."""
+    w, d1, d2 = p[:3]
+    return np.asarray(design.chi[:, 2] + d1 * w * design.chi[:, 1] + d2 * w**2 * design.chi[:, 0])
+
+
+def noise_gram(design: WeakDesign, p: Float) -> Float:
+    """R0(p) [K, K], from the design's Gram tables: covariance of a window's rows for noise of 1."""
+    w, d1, d2 = p[:3]
+    two, zero = d1 * w, d2 * w**2
+    packed = np.array([1.0, two, zero, two**2, two * zero, zero**2]) @ design.gram
+    r0 = np.zeros((design.functions, design.functions))
+    r0[np.tril_indices(design.functions)] = packed
+    return r0 + np.tril(r0, -1).T
+
+
+def overlap_gram(design: WeakDesign, p: Float) -> Float:
+    """R1(p) [K, K]: covariance of a window's rows with those of the next one."""
+    filters = residual_filters(design, p)
+    return np.asarray(filters[design.hop :].T @ filters[: design.window - design.hop])
+
+
+def without_directions(x: Float, directions: Float) -> Float:
+    """x [n, K] less its components along the directions [m, K], by Gram-Schmidt; one of length 0 is left out."""
+    for k in range(len(directions)):
+        length = float(np.linalg.norm(directions[k]))
+        if length > 0:
+            q = directions[k] / length
+            directions = directions - np.outer(directions @ q, q)
+            x = x - np.outer(x @ q, q)
+    return x
+
+
+# ---- parameters
+
+
+def theta(p: Float) -> Float:
+    """theta(p): 5 entries for p = (w, d1, d2), 8 for (w, d1, d2, c)."""
+    w, d1, d2 = p[:3]
+    first = [d1, d1 * w, d2, d2 * w, d2 * w**2]
+    return np.array([*first, *(p[3] * d2 * w**j for j in range(3))] if len(p) == 4 else first)
+
+
+def jacobian(p: Float) -> Float:
+    """C = d theta / d p, [5, 3] or [8, 4]."""
+    w, d1, d2 = p[:3]
+    core = np.array([[0, 1, 0], [d1, w, 0], [0, 0, 1], [d2, 0, w], [2 * d2 * w, 0, w**2]])
+    if len(p) == 3:
+        return core
+    c = p[3]
+    out = np.zeros((8, 4))
+    out[:5, :3] = core
+    out[5:] = [[0, 0, c, d2], [d2 * c, 0, c * w, d2 * w], [2 * d2 * c * w, 0, c * w**2, d2 * w**2]]
+    return out
+
+
+# ---- full angles and damping
+
+
+def internal_motion(
+    p: Float, window_columns: Float, known: Float, phi: Float, u: Float, design: WeakDesign
+) -> tuple[Float, Float]:
+    """q = phi''/G and q' of one window [W] at p, its a and b from the columns; `known` [K] is taken off Y first.
+
+    q = a + b t - d1 phi - d2 I2(G phi); phi as measured, since a has taken in what c does to d1 phi.
+    """
+    w, d1, d2 = p[:3]
+    c = p[3] if len(p) > 3 else 0.0
+    g, angle, dt = w + u, phi - c, design.dt
+    th = theta(p)
+    e = window_columns[Y] - th @ window_columns[1 : 1 + len(th)] - known
+    a, b = np.linalg.lstsq(window_columns[[A, B]].T, e, rcond=None)[0]
+    t = dt * (np.arange(design.window) - (design.window - 1) / 2)
+    rate = np.gradient(phi, dt)
+    q = a + b * t - d1 * phi - d2 * integrated_twice(g * angle, dt)
+    return q, b - d1 * rate - d2 * integrated_once(g * angle, dt)
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What the linear rows of a window lack: y [K] belongs on the right of Y = N^T theta + y + k^T damping."""
+
+    y: Float
+    k: Float
+
+
+def remainder(
+    p: Float,
+    damping: Float,
+    window_columns: Float,
+    phi: Float,
+    u: Float,
+    design: WeakDesign,
+    passes: int = 3,
+    full_angle: bool = True,
+) -> Remainder:
+    """Rows of the full-angle remainder and of the two damping columns of one window, at p.
+
+    With q known, so is the motion: phi1 = q + k phi, k = L2 (1 + L1). The exact equations are
+
+        phi'' = G q + k (e2 - e1) - e1,    q'' = -d1 phi'' - d2 G phi + d2 (e2 - e1)
+        e1 = G (a1 - sin a1) + ((1 - cos phi) a2'' + sin phi a2'^2) / L1 - c1 a1' / l1^2 + c2 phi' / l1^2
+        e2 = G (a2 - sin a2) + (1 - cos phi) a1'' - sin phi a1'^2 - c2 L1 phi' / l1^2
+
+    with a1 = phi1, a2 = phi1 + phi absolute. Each pass takes the last one's remainder off Y, so that a and b, and
+    with them q, improve. Outside the region L2 > 0.05 (hardly physical) nothing is corrected.
+    """
+    nothing = Remainder(np.zeros(design.functions), np.zeros((2, design.functions)))
+    w, d1, d2 = p[:3]
+    c = p[3] if len(p) > 3 else 0.0
+    big_l2 = d1 - d2 - 1
+    if big_l2 <= 0.05:
+        return nothing
+    big_l1 = d2 / big_l2
+    k, l1, dt = big_l2 * (1 + big_l1), design.l1, design.dt
+    g, angle, rate = w + u, phi - c, np.gradient(phi, dt)
+    sine, versine = np.sin(angle), 1 - np.cos(angle)
+    chi2 = design.chi[:, 1]
+
+    def weakened(e1: Float, e2: Float) -> Float:
+        m1, m2 = k * (e2 - e1) - e1, d2 * (e2 - e1)
+        return np.asarray((m1 + g * integrated_twice(m2, dt)) @ chi2)
+
+    out = nothing
+    for _ in range(passes):
+        q, q_rate = internal_motion(p, window_columns, out.y + damping @ out.k, phi, u, design)
+        a1, v1 = q + k * angle, q_rate + k * rate
+        a2, v2 = a1 + angle, v1 + rate
+        acceleration1 = -g * a1 + big_l2 * g * angle
+        acceleration2 = -d2 * g * angle
+        y = np.zeros(design.functions)
+        if full_angle:
+            y = weakened(
+                g * (a1 - np.sin(a1)) + (versine * acceleration2 + sine * v2**2) / big_l1,
+                g * (a2 - np.sin(a2)) + versine * acceleration1 - sine * v1**2,
+            )
+        columns_of_damping = [
+            weakened(-v1 / l1**2, np.zeros_like(v1)),
+            weakened(rate / l1**2, -big_l1 * rate / l1**2),
+        ]
+        out = Remainder(y, np.stack(columns_of_damping))
+    return out
+
+
+# ---- the identifier
+
+
+@dataclass(frozen=True)
+class WeakSettings:
+    """Settings of the estimator, as in estimator.h and weak.h.
+
+    Attributes
+    ----------
+    start : (w, d1, d2), or (w, d1, d2, c) when the encoder's zero is unknown
+    row_sd : standard deviation of a decimated sample's noise [rad]
+    start_sd : of the start [units of p]; None: half of w, d1, d2, and 0.5 rad
+    forgetting_s : time constant [s]; 0: none
+    iterations : Gauss-Newton steps a window
+    step_limit : largest |dp/p|, of c |dc| / start_sd; the whole step is shortened
+    kappa_min : below it no step
+    drive_min : rms of u [1/s^2] below which a window is dropped; 0: none is
+    full_angle, damping : correct for sines and cosines; estimate the two damping coefficients
+    passes : of the correction, per window
+    """
+
+    start: Float
+    row_sd: float
+    start_sd: Float | None = None
+    forgetting_s: float = 0.0
+    iterations: int = 3
+    step_limit: float = 0.3
+    kappa_min: float = 5e-6
+    drive_min: float = 0.0
+    full_angle: bool = False
+    damping: bool = False
+    passes: int = 3
+
+    @property
+    def sd(self) -> Float:
+        """start_sd, or its default."""
+        if self.start_sd is not None:
+            return self.start_sd
+        return np.array([*(0.5 * self.start[:3]), *([0.5] * (len(self.start) - 3))])
+
+
+@dataclass(frozen=True)
+class WeakIdentified:
+    """Outcome of identify_weak, one entry a window.
+
+    Attributes
+    ----------
+    t : end of each window [s]
+    p, se : estimates and standard errors [windows, n_p]; damping coefficients [m^2/s] last, where estimated
+    kappa : [windows]
+    updated : windows that moved p
+    corrected : windows that were corrected for full angles or damping
+    misfit : energy of a window's residuals against what row_sd predicts; about 1 when the model holds
+    valid : largest angle stayed below VALID_ANGLE; looked at only with the full-angle correction
+    last : the last estimate
+    sandwich : its standard errors with the measured effect of the overlap in place of the design's bound
+    """
+
+    t: Float
+    p: Float
+    se: Float
+    kappa: Float
+    updated: npt.NDArray[np.bool_]
+    corrected: npt.NDArray[np.bool_]
+    misfit: Float
+    valid: bool
+    last: Estimate
+    sandwich: Float
+
+
+@dataclass
+class WeakOracle:
+    """The estimator, fed windows. b = B - M theta and rr = sum (Y - N^T theta)^2 are kept relative to p.
+
+    p holds w, d1, d2, then c where unknown, then the two damping coefficients where estimated.
+    """
+
+    design: WeakDesign
+    settings: WeakSettings
+    corrected: bool = False
+    folded: int = 0
+    updated: bool = False
+    misfit: float = math.nan
+    _ageing: int = 0
+    _previous: tuple[Float, Float] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        self.n_core = len(self.settings.start)
+        extra = 2 if self.settings.damping else 0
+        self.p = np.append(self.settings.start, [0.0] * extra)
+        self.sd = np.append(self.settings.sd, [_DAMPING_SD] * extra)
+        n = len(self.theta())
+        self.m, self.q = np.zeros((n, n)), np.zeros((n, n))
+        self.b, self.rr, self.weight = np.zeros(n), 0.0, 0.0
+
+    def theta(self) -> Float:
+        """theta at the present p, damping coefficients last."""
+        return np.append(theta(self.p[: self.n_core]), self.p[self.n_core :])
+
+    def jacobian(self) -> Float:
+        """d theta / d p at the present p."""
+        c = jacobian(self.p[: self.n_core])
+        extra = len(self.p) - self.n_core
+        out = np.zeros((c.shape[0] + extra, c.shape[1] + extra))
+        out[: c.shape[0], : c.shape[1]] = c
+        out[c.shape[0] :, c.shape[1] :] = np.eye(extra)
+        return out
+
+    def window(self, window_columns: Float, phi: Float, u: Float) -> None:
+        """Takes in one window: its columns [11, K] and its samples phi [rad], u [1/s^2], both [W]."""
+        self.updated = False
+        self.misfit = math.nan
+        driven = u[:-1]  # the core looks at the window but its last sample
+        if self.settings.drive_min > 0 and float(np.var(driven)) < self.settings.drive_min**2:
+            self._previous = None
+            return
+        before = self.p.copy()
+        x, inverse_factor = self._rows(window_columns, phi, u)
+        self._add(x, inverse_factor)
+        for _ in range(self.settings.iterations):
+            self.updated |= self._step()
+        e = x[0] - self.theta() @ x[1:]
+        self.misfit = float(e @ e) / (self.design.functions - 2) / self.settings.row_sd**2
+        self.folded += 1
+        if self.settings.full_angle or self.settings.damping:
+            self._switch(before)
+
+    def _rows(self, window_columns: Float, phi: Float, u: Float) -> tuple[Float, Float]:
+        """Rows Y, N.. [1 + n_theta, K] whitened at p, without a and b; and L^-1."""
+        core = self.p[: self.n_core]
+        inverse_factor = np.linalg.inv(np.linalg.cholesky(noise_gram(self.design, core)))
+        x = window_columns[: 1 + len(theta(core))]
+        if self.settings.full_angle or self.settings.damping:
+            damping = self.p[self.n_core :] if self.settings.damping else np.zeros(2)
+            lack = Remainder(np.zeros(self.design.functions), np.zeros((2, self.design.functions)))
+            if self.corrected:
+                lack = remainder(
+                    core, damping, window_columns, phi, u, self.design, self.settings.passes, self.settings.full_angle
+                )
+            x = np.concatenate([x[:1] - lack.y, x[1:], lack.k if self.settings.damping else np.empty((0, x.shape[1]))])
+        return without_directions(x @ inverse_factor.T, window_columns[[A, B]] @ inverse_factor.T), inverse_factor
+
+    def _add(self, x: Float, inverse_factor: Float) -> None:
+        """Sums of a window's rows, those of the past forgotten or aged first."""
+        hop_s = self.design.hop_s
+        keep = math.exp(-hop_s / self.settings.forgetting_s) if self.settings.forgetting_s > 0 else 1.0
+        if self._ageing > 0:
+            keep *= _AGEING
+            self._ageing -= 1
+        y, n = x[0], x[1:]
+        e = y - self.theta() @ n
+        k = self.design.functions
+        self.m = keep * self.m + n @ n.T
+        self.b = keep * self.b + n @ e
+        self.rr = keep * self.rr + float(e @ e)
+        self.weight = keep * self.weight + (k - 2)
+        self.q = keep * self.q
+        if self._previous is not None:
+            last_n, last_factor = self._previous
+            shared = last_factor @ overlap_gram(self.design, self.p) @ inverse_factor.T
+            cross = last_n @ shared @ n.T
+            self.q = self.q + cross + cross.T
+        self._previous = n, inverse_factor
+
+    def information(self) -> Float:
+        """S = C^T M C."""
+        c = self.jacobian()
+        return np.asarray(c.T @ self.m @ c)
+
+    def _step(self) -> bool:
+        """One Gauss-Newton step; whether p moved."""
+        prior = (self.settings.row_sd / self.sd) ** 2
+        s = self.information() + np.diag(prior)
+        kappa = kappa_of(s[: self.n_core, : self.n_core])
+        if kappa < self.settings.kappa_min or (self.settings.kappa_min > 0 and kappa * s[0, 0] < 2 * prior[0]):
+            return False
+        d = 1 / np.sqrt(np.diag(s))
+        dp = d * np.linalg.solve(s * np.outer(d, d), d * (self.jacobian().T @ self.b))
+        reach = self.p.copy()
+        reach[3 : self.n_core] = self.sd[3 : self.n_core]
+        reach[self.n_core :] = _DAMPING_REACH
+        size = float(np.max(np.abs(dp) / reach))
+        dp *= min(1.0, self.settings.step_limit / max(size, 1e-300))
+        before = self.theta()
+        self.p = self.p + dp
+        change = self.theta() - before
+        self.rr += float(-2 * change @ self.b + change @ self.m @ change)
+        self.b = self.b - self.m @ change
+        return True
+
+    def _switch(self, before: Float) -> None:
+        """Turns the correction on once the estimate has settled, off when it is lost."""
+        worst = float(np.max(self.assess().se[:3] / self.p[:3])) if self.weight > len(self.p) else math.inf
+        moved = float(np.max(np.abs(self.p[:3] / before[:3] - 1)))
+        if self.corrected:
+            self.corrected = worst <= 4 * _SETTLED_ERROR
+        elif self.folded >= _SETTLED_WINDOWS and moved < _SETTLED_MOVE and worst < _SETTLED_ERROR:
+            self.corrected = True
+            self._ageing = _AGEING_WINDOWS
+
+    def assess(self) -> Estimate:
+        """Standard errors by (S / s^2 + 1 / start_sd^2)^-1, s^2 = overlap * rr / (weight - n_p)."""
+        if self.weight <= len(self.p):
+            return Estimate(self.p.copy(), self.sd.copy(), np.diag(self.sd**2), 0.0, 0.0)
+        variance = max(self.rr, 0.0) / (self.weight - len(self.p))
+        wide = variance * self.design.overlap
+        s = self.information()
+        covariance = _inverse(s + np.diag(wide / self.sd**2)) * wide
+        kappa = kappa_of(s[: self.n_core, : self.n_core])
+        return Estimate(self.p.copy(), np.sqrt(np.diag(covariance)), covariance, kappa, math.sqrt(variance))
+
+    def sandwich(self) -> Float:
+        """Standard errors [n_p] with the windows' shared noise counted where it was: S^-1 (S + C^T Q C) S^-1."""
+        if self.weight <= len(self.p):
+            return self.sd.copy()
+        variance = max(self.rr, 0.0) / (self.weight - len(self.p))
+        c = self.jacobian()
+        s = self.information()
+        inverse = _inverse(s + np.diag(variance / self.sd**2))
+        spread = np.diag(inverse @ (s + c.T @ self.q @ c) @ inverse)
+        # Q is an estimate itself: it may not claim that overlapping windows know more than twice as much.
+        return np.sqrt(variance * np.maximum(spread, np.diag(inverse) / 4))
+
+
+def _inverse(s: Float) -> Float:
+    d = 1 / np.sqrt(np.diag(s))
+    return np.asarray(np.linalg.inv(s * np.outer(d, d)) * np.outer(d, d))
+
+
+def identify_weak(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, settings: WeakSettings) -> WeakIdentified:
+    """Identifies a run phi [rad], y [m], both [samples], window by window.
+
+    Raises
+    ------
+    PvidError
+        When the run does not fill a window, or a sample is not finite.
+    """
+    if not (np.isfinite(phi).all() and np.isfinite(y).all()):
+        raise PvidError("the float64 weak form takes finite samples only")
+    smooth, u = front_end(phi, y, design)
+    phi_frames, u_frames = frames(smooth, design), frames(u, design)
+    oracle = WeakOracle(design, settings)
+    count = len(phi_frames)
+    history = np.empty((count, len(oracle.p))), np.empty((count, len(oracle.p)))
+    kappa, misfit = np.empty(count), np.empty(count)
+    updated, corrected = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    for k, window_columns in enumerate(columns(phi_frames, u_frames, design)):
+        corrected[k] = oracle.corrected
+        oracle.window(window_columns, phi_frames[k], u_frames[k])
+        estimate = oracle.assess()
+        history[0][k], history[1][k], kappa[k] = estimate.p, estimate.se, estimate.kappa
+        updated[k], misfit[k] = oracle.updated, oracle.misfit
+    zero = oracle.p[3] if oracle.n_core == 4 else 0.0
+    return WeakIdentified(
+        t=end_times(count, design),
+        p=history[0],
+        se=history[1],
+        kappa=kappa,
+        updated=updated,
+        corrected=corrected,
+        misfit=misfit,
+        valid=not settings.full_angle or float(np.max(np.abs(smooth - zero))) <= VALID_ANGLE,
+        last=oracle.assess(),
+        sandwich=oracle.sandwich(),
+    )
+
+
+# ---- prediction
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a design can be expected to make of a run.
+
+    Attributes
+    ----------
+    p : what it is predicted at
+    se : standard errors of p at the end of the run [units of p]
+    kappa : part of w's information that the other parameters cannot imitate
+    row_sd : standard deviation of a row's residual [rad], from both sensors
+    windows : in the run
+    """
+
+    p: Float
+    se: Float
+    kappa: float
+    row_sd: float
+    windows: int
+
+    @property
+    def relative(self) -> Float:
+        """Relative standard errors of w, d1, d2."""
+        return self.se[:3] / self.p[:3]
+
+
+def sample_sd(lsb: float, noise_lsb: float) -> float:
+    """Standard deviation of a sensor's error: rounding, lsb^2/12, and noise of noise_lsb LSB before it."""
+    return lsb * math.sqrt(1 / 12 + noise_lsb**2)
+
+
+def predict(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors) -> Prediction:
+    """Standard errors at p that this run gives with these sensors; phi, y [samples], recorded or simulated.
+
+    The rows are taken as exact; noise is white on both sensors and passes the front end. p has 3 entries, or 4
+    when the encoder's zero is unknown. Shared noise of neighbouring windows is counted (not bounded).
+    """
+    smooth, u = front_end(phi, y, design)
+    phi_frames, u_frames = frames(smooth, design), frames(u, design)
+    oracle = WeakOracle(design, WeakSettings(start=np.asarray(p, np.float64), row_sd=1.0))
+    height_sd = sample_sd(sensors.y_lsb, sensors.y_noise_lsb) * design.sample_rate**2 / design.l1
+    angle_sd = sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb)
+    smoother, differentiator = _taps(design.smooth, 1.0), _taps(design.second, 0.0)
+    variance = 0.0
+    for k, window_columns in enumerate(columns(phi_frames, u_frames, design)):
+        x, inverse_factor = oracle._rows(window_columns, phi_frames[k], u_frames[k])
+        oracle._add(x, inverse_factor)
+        motion, _ = internal_motion(oracle.p, window_columns, np.zeros(design.functions), phi_frames[k], u_frames[k], design)
+        of_angle = residual_filters(design, oracle.p) @ inverse_factor.T
+        of_drive = motion[:, None] * (design.chi[:, 1] @ inverse_factor.T)  # u enters as G q: an error of u times q
+        variance += angle_sd**2 * _energy(of_angle, smoother, design.decimation)
+        variance += height_sd**2 * _energy(of_drive, differentiator, design.decimation)
+    windows = len(phi_frames)
+    variance /= windows * design.functions
+    c = oracle.jacobian()
+    s = oracle.information()
+    inverse = _inverse(s)
+    spread = np.maximum(np.diag(inverse @ (s + c.T @ oracle.q @ c) @ inverse), np.diag(inverse) / 4)
+    return Prediction(oracle.p, np.sqrt(variance * spread), kappa_of(s), math.sqrt(variance), windows)
+
+
+def predict_rig(
+    design: WeakDesign,
+    pendulum: Pendulum,
+    drive: Drive,
+    sensors: Sensors,
+    duration: float = 40.0,
+    release: tuple[float, float] = (0.06, 0.14),
+    zero_unknown: bool = True,
+) -> Prediction:
+    """`predict` for a simulated run of the linear pendulum: what a rig of these rough parameters will give."""
+    run = simulate(pendulum, drive, Sensors(), design.sample_rate, duration, release, "linear").run
+    return predict(run.phi, run.y, design, np.append(pendulum.linear, [0.0] * zero_unknown), sensors)
+
+
+def _taps(folded: Float, unity: float) -> Float:
+    """All taps of a folded symmetric filter whose taps sum to `unity`."""
+    return np.concatenate([folded[::-1], [unity - 2 * float(np.sum(folded))], folded])
+
+
+def _energy(filters: Float, taps: Float, decimation: int) -> float:
+    """Sum over filters [W, K] of their squared impulse responses at the full rate, behind the FIR `taps`."""
+    stretched = np.zeros(((len(filters) - 1) * decimation + 1, filters.shape[1]))
+    stretched[::decimation] = filters
+    return float(sum(np.sum(np.convolve(column, taps) ** 2) for column in stretched.T))
