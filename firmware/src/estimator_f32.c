@@ -463,9 +463,9 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     }
     for (size_t i = 0; i < n; i++) {
         low[i] -= solve->moved[i];
+        self->theta[i] = solve->theta[i];
     }
     low[n] -= solve->fall;
-    memcpy(self->theta, solve->theta, sizeof self->theta);
     memcpy(self->p, solve->p, sizeof self->p);
     count(&self->counters.updates);
 }

@@ -52,12 +52,12 @@ static uint16_t hop_of(const pvid_weak_design_f32 *design)
     return (uint16_t)((design->window - 1u) / 2u);
 }
 
-/* Ticks of a block in which the windows take a sample in: two slices or more after the front end's
- * job. At D = 2 one tick has to do for both, at D = 1 the front end's. */
-static uint32_t ticks_a_window(const pvid_weak_f32 *self)
+/* Ticks of a block in which a window takes a sample in: the second half of a block is shared by two. At
+ * D = 2 one tick has to do for both, at D = 1 that of the front end. */
+static uint32_t ticks_a_window(uint32_t decimation)
 {
-    const uint32_t left = (uint32_t)self->design->decimation - pvid_weak_front_ticks_f32(&self->front);
-    return (left > 1u) ? (left / 2u) : 1u;
+    const uint32_t second_half = decimation - (decimation / 2u);
+    return (second_half > 1u) ? (second_half / 2u) : 1u;
 }
 
 /* Ticks of a block that are free for a window's stages. */
@@ -111,7 +111,7 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     self->dt = (float)design->decimation / config->sample_rate_hz;
     pvid_weak_front_init_f32(&self->front, design, config->sample_rate_hz, config->l1);
     self->drive_min = config->drive_min * config->drive_min;
-    const uint32_t ticks = ticks_a_window(self);
+    const uint32_t ticks = ticks_a_window(design->decimation);
     self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
     self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
     if (pvid_weak_finish_stages_f32(design->functions, self->iterations, &self->estimator) >

@@ -17,8 +17,8 @@ MUTANTS = {
     ),
     "kapitza_strong_f32.c": ("c->r4[1] = 6.0f * w2;", "c->r4[1] = 6.0000005f * w2;"),
     "information_f32.c": (
-        "const float error = (high - (total - part)) + (low - part);",
-        "const float error = 0.0f * part;",
+        "*low = (kept_high - (total - part)) + (kept_low - part);",
+        "*low = 0.0f * part;",
     ),
 }
 

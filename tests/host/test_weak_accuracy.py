@@ -15,7 +15,16 @@ import pytest
 from pvid.bench.weak import LSB_14, Case, Outcome, cramer_rao, run_case
 from pvid.identify import identify
 from pvid.native import Native
-from pvid.rig import STANDARD_DRIVE, Drive, simulate, standard_sensors, standard_start
+from pvid.rig import (
+    STANDARD_DRIVE,
+    STANDARD_PENDULUM,
+    Drive,
+    Pendulum,
+    Truth,
+    simulate,
+    standard_sensors,
+    standard_start,
+)
 from pvid.rigfile import RigFile
 
 
@@ -98,3 +107,20 @@ def test_the_command_line_publishes_the_zero(tmp_path: Path) -> None:
     assert answer["c"]["value"] == pytest.approx(0.02, abs=LSB_14)
     assert 0 < answer["c"]["se"] < LSB_14
     assert pvid("compare", "run.csv", "--rig", "run.toml").count("equal") == 2
+
+
+@pytest.mark.parametrize("bits", [12, 14, 16])
+def test_a_model_that_does_not_fit_is_noticed_and_one_that_does_is_not_blamed(native: Native, bits: int) -> None:
+    rig = RigFile.standard()
+    rig = replace(rig, sensor=replace(rig.sensor, phi_lsb=2 * np.pi / 2**bits))
+    rubbing = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
+    for seed in range(5):
+        sensors, start = standard_sensors(bits), standard_start(seed)
+
+        def warned(pendulum: Pendulum, truth: Truth) -> bool:
+            run = simulate(pendulum=pendulum, sensors=sensors, truth=truth, seed=seed).run  # noqa: B023
+            return identify(run, rig, native, start=start).warning is not None  # noqa: B023
+
+        assert not warned(STANDARD_PENDULUM, "linear")
+        assert warned(STANDARD_PENDULUM, "full")  # 0.107 rad
+        assert warned(rubbing, "linear")

@@ -106,6 +106,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     result = identify(run, rig, native, start=start)
     truths = _truths(simulation.pendulum)
     _print_result(result, truths)
+    _print_warning(result)
     with progress_bar("comparing with the twin", len(run.t)) as advance:
         comparison = compare_run(native, config_of(rig, run.sample_rate, start), run.phi, run.y, advance)
     _print_comparison(comparison)
@@ -150,6 +151,11 @@ def _print_result(result: Identification, truths: dict[str, float] | None = None
         f"status {result.status}; kappa {result.kappa:.2g}; {result.ticks} ticks, {result.updates} updates, "
         f"{result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"
     )
+
+
+def _print_warning(result: Identification) -> None:
+    if result.warning is not None:
+        click.echo(f"pvid: warning: {result.warning}", err=True)
 
 
 def _print_comparison(comparison: Comparison, label: str = "C core against the numpy twin") -> None:
@@ -292,6 +298,7 @@ def identify_command(
         _print_result(result)
     if figure is not None:
         _write_figure(result, figure, None)
+    _print_warning(result)
     if not result.identified:
         click.echo(f"pvid: nothing identified: {result.verdict}", err=True)
         return NOTHING_IDENTIFIED

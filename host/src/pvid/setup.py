@@ -116,7 +116,8 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
     tables = weak_design_of(rig, sample_rate)
     p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
     zero = 1 if settings.zero else 0
-    # rounding to an LSB and half an LSB of noise besides, through the smoother; an exact sensor has float32's noise
+    # Rounding to an LSB and half an LSB of noise besides; an exact sensor has float32's noise. The rows listen where
+    # the smoother passes, at the density of the samples' noise: what D samples average to.
     sample_sd = max(rig.sensor.phi_lsb * np.sqrt(1 / 12 + 1 / 4), 1e-8)
     return WeakConfig(
         sample_rate=sample_rate,
@@ -128,7 +129,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
             start_sd=np.append(START_RELATIVE_SD * p, [ZERO_SD] * zero).astype(np.float32),
             lower=np.append(p / BOUND_FACTOR, [-ZERO_BOUND] * zero).astype(np.float32),
             upper=np.append(p * BOUND_FACTOR, [ZERO_BOUND] * zero).astype(np.float32),
-            row_sd=float(sample_sd * tables.smoothing_gain),
+            row_sd=float(sample_sd / np.sqrt(tables.decimation)),
             forgetting_s=settings.forgetting_s,
             feedback_hz=0.0,
             kappa_min=min(settings.kappa_min, WEAK_KAPPA_MIN),

@@ -3,7 +3,7 @@
 Nothing here is fast or bit-exact; it is what the twin and the C core are measured against, and where what the
 core does not have yet is tried: the full-angle correction and the two damping regressors.
 
-    samples -> front_end -> frames -> columns -> rows (whitened at p, a and b removed) -> WeakOracle -> p, s.e.
+    samples -> front_end -> frames -> columns -> rows (whitened at p, no a and b) -> WeakOracle -> p, s.e.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from pvid.errors import PvidError
 from pvid.oracle import Estimate, kappa_of
 from pvid.rig import Drive, Pendulum, Sensors, simulate
-from pvid.weak_design import GRAM_PAIRS, WeakDesign
+from pvid.weak_design import WeakDesign
 
 Float = npt.NDArray[np.float64]
 
@@ -29,8 +29,9 @@ _COLUMNS = 11
 # growing fast (0.3 % at 0.16 rad).
 VALID_ANGLE = 0.12  # rad
 
-# The correction needs an estimate that has settled (from the first window on it diverges): these many windows,
-# a move of p below this a window, and standard errors below this, both relative. It goes off at four times that.
+# The correction needs an estimate that has settled (from the first window on it diverges): these many
+# windows, a move of p below this a window, and standard errors below this, both relative. It goes off again
+# at four times that.
 _SETTLED_WINDOWS = 4
 _SETTLED_MOVE = 0.02
 _SETTLED_ERROR = 0.05
@@ -70,7 +71,8 @@ def frames(x: Float, design: WeakDesign) -> Float:
     """Half-overlapping windows [windows, W] of decimated samples [n]."""
     if x.size < design.window:
         raise PvidError(
-            f"{x.size} decimated samples do not fill one window of {design.window}: record longer or shorten window_s"
+            f"{x.size} decimated samples do not fill one window of {design.window}: "
+            f"record longer or shorten window_s"
         )
     return np.lib.stride_tricks.sliding_window_view(x, design.window)[:: design.hop]
 
@@ -145,7 +147,7 @@ def overlap_gram(design: WeakDesign, p: Float) -> Float:
 
 
 def without_directions(x: Float, directions: Float) -> Float:
-    """x [n, K] less its components along the directions [m, K], by Gram-Schmidt; one of length 0 is left out."""
+    """x [n, K] less its components along directions [m, K], by Gram-Schmidt; those of length 0 do nothing."""
     for k in range(len(directions)):
         length = float(np.linalg.norm(directions[k]))
         if length > 0:
@@ -184,7 +186,7 @@ def jacobian(p: Float) -> Float:
 def internal_motion(
     p: Float, window_columns: Float, known: Float, phi: Float, u: Float, design: WeakDesign
 ) -> tuple[Float, Float]:
-    """q = phi''/G and q' of one window [W] at p, its a and b from the columns; `known` [K] is taken off Y first.
+    """q = phi''/G and q' of one window [W] at p, a and b from its columns; `known` [K] is taken off Y.
 
     q = a + b t - d1 phi - d2 I2(G phi); phi as measured, since a has taken in what c does to d1 phi.
     """
@@ -202,7 +204,7 @@ def internal_motion(
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the linear rows of a window lack: y [K] belongs on the right of Y = N^T theta + y + k^T damping."""
+    """What the linear rows of a window lack, y [K] and k [2, K]: Y = N^T theta + y + k^T damping."""
 
     y: Float
     k: Float
@@ -226,8 +228,8 @@ def remainder(
         e1 = G (a1 - sin a1) + ((1 - cos phi) a2'' + sin phi a2'^2) / L1 - c1 a1' / l1^2 + c2 phi' / l1^2
         e2 = G (a2 - sin a2) + (1 - cos phi) a1'' - sin phi a1'^2 - c2 L1 phi' / l1^2
 
-    with a1 = phi1, a2 = phi1 + phi absolute. Each pass takes the last one's remainder off Y, so that a and b, and
-    with them q, improve. Outside the region L2 > 0.05 (hardly physical) nothing is corrected.
+    with a1 = phi1, a2 = phi1 + phi absolute. Each pass takes the last one's remainder off Y, so that a and b,
+    and with them q, improve. Outside the region L2 > 0.05 (hardly physical) nothing is corrected.
     """
     nothing = Remainder(np.zeros(design.functions), np.zeros((2, design.functions)))
     w, d1, d2 = p[:3]
@@ -276,7 +278,7 @@ class WeakSettings:
     Attributes
     ----------
     start : (w, d1, d2), or (w, d1, d2, c) when the encoder's zero is unknown
-    row_sd : standard deviation of a decimated sample's noise [rad]
+    row_sd : standard deviation of a row's residual [rad], see `row_sd`
     start_sd : of the start [units of p]; None: half of w, d1, d2, and 0.5 rad
     forgetting_s : time constant [s]; 0: none
     iterations : Gauss-Newton steps a window
@@ -383,8 +385,8 @@ class WeakOracle:
             self._previous = None
             return
         before = self.p.copy()
-        x, inverse_factor = self._rows(window_columns, phi, u)
-        self._add(x, inverse_factor)
+        x, inverse_factor = self.rows(window_columns, phi, u)
+        self.add(x, inverse_factor)
         for _ in range(self.settings.iterations):
             self.updated |= self._step()
         e = x[0] - self.theta() @ x[1:]
@@ -393,22 +395,30 @@ class WeakOracle:
         if self.settings.full_angle or self.settings.damping:
             self._switch(before)
 
-    def _rows(self, window_columns: Float, phi: Float, u: Float) -> tuple[Float, Float]:
+    def rows(self, window_columns: Float, phi: Float, u: Float) -> tuple[Float, Float]:
         """Rows Y, N.. [1 + n_theta, K] whitened at p, without a and b; and L^-1."""
         core = self.p[: self.n_core]
         inverse_factor = np.linalg.inv(np.linalg.cholesky(noise_gram(self.design, core)))
         x = window_columns[: 1 + len(theta(core))]
-        if self.settings.full_angle or self.settings.damping:
-            damping = self.p[self.n_core :] if self.settings.damping else np.zeros(2)
-            lack = Remainder(np.zeros(self.design.functions), np.zeros((2, self.design.functions)))
-            if self.corrected:
-                lack = remainder(
-                    core, damping, window_columns, phi, u, self.design, self.settings.passes, self.settings.full_angle
-                )
-            x = np.concatenate([x[:1] - lack.y, x[1:], lack.k if self.settings.damping else np.empty((0, x.shape[1]))])
-        return without_directions(x @ inverse_factor.T, window_columns[[A, B]] @ inverse_factor.T), inverse_factor
+        lack = self._remainder(core, window_columns, phi, u)
+        x = np.concatenate([x[:1] - lack.y, x[1:], lack.k])
+        return without_directions(
+            x @ inverse_factor.T, window_columns[[A, B]] @ inverse_factor.T
+        ), inverse_factor
 
-    def _add(self, x: Float, inverse_factor: Float) -> None:
+    def _remainder(self, core: Float, window_columns: Float, phi: Float, u: Float) -> Remainder:
+        """What the rows lack at p: nothing while the correction is off; k has no rows without damping."""
+        functions, extra = self.design.functions, len(self.p) - self.n_core
+        if not self.corrected:
+            return Remainder(np.zeros(functions), np.zeros((extra, functions)))
+        damping = self.p[self.n_core :] if extra else np.zeros(2)
+        settings = self.settings
+        lack = remainder(
+            core, damping, window_columns, phi, u, self.design, settings.passes, settings.full_angle
+        )
+        return Remainder(lack.y, lack.k[:extra])
+
+    def add(self, x: Float, inverse_factor: Float) -> None:
         """Sums of a window's rows, those of the past forgotten or aged first."""
         hop_s = self.design.hop_s
         keep = math.exp(-hop_s / self.settings.forgetting_s) if self.settings.forgetting_s > 0 else 1.0
@@ -440,7 +450,9 @@ class WeakOracle:
         prior = (self.settings.row_sd / self.sd) ** 2
         s = self.information() + np.diag(prior)
         kappa = kappa_of(s[: self.n_core, : self.n_core])
-        if kappa < self.settings.kappa_min or (self.settings.kappa_min > 0 and kappa * s[0, 0] < 2 * prior[0]):
+        if kappa < self.settings.kappa_min or (
+            self.settings.kappa_min > 0 and kappa * s[0, 0] < 2 * prior[0]
+        ):
             return False
         d = 1 / np.sqrt(np.diag(s))
         dp = d * np.linalg.solve(s * np.outer(d, d), d * (self.jacobian().T @ self.b))
@@ -478,7 +490,7 @@ class WeakOracle:
         return Estimate(self.p.copy(), np.sqrt(np.diag(covariance)), covariance, kappa, math.sqrt(variance))
 
     def sandwich(self) -> Float:
-        """Standard errors [n_p] with the windows' shared noise counted where it was: S^-1 (S + C^T Q C) S^-1."""
+        """Standard errors [n_p] that count the noise windows share where it was: S^-1 (S + C^T Q C) S^-1."""
         if self.weight <= len(self.p):
             return self.sd.copy()
         variance = max(self.rr, 0.0) / (self.weight - len(self.p))
@@ -495,7 +507,9 @@ def _inverse(s: Float) -> Float:
     return np.asarray(np.linalg.inv(s * np.outer(d, d)) * np.outer(d, d))
 
 
-def identify_weak(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, settings: WeakSettings) -> WeakIdentified:
+def identify_weak(
+    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, settings: WeakSettings
+) -> WeakIdentified:
     """Identifies a run phi [rad], y [m], both [samples], window by window.
 
     Raises
@@ -566,11 +580,23 @@ def sample_sd(lsb: float, noise_lsb: float) -> float:
     return lsb * math.sqrt(1 / 12 + noise_lsb**2)
 
 
-def predict(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors) -> Prediction:
+def row_sd(design: WeakDesign, sensors: Sensors) -> float:
+    """Standard deviation of a row's residual [rad]: white noise of the angle sensor, through the front end.
+
+    About the samples' own over sqrt(D): the rows look at frequencies that the smoother lets pass, so that
+    `WeakDesign.smoothing_gain`, which averages over all frequencies, says too little.
+    """
+    energy = _energy(residual_filters(design, design.nominal), _taps(design.smooth, 1.0), design.decimation)
+    return sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb) * math.sqrt(energy / design.functions)
+
+
+def predict(
+    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors
+) -> Prediction:
     """Standard errors at p that this run gives with these sensors; phi, y [samples], recorded or simulated.
 
-    The rows are taken as exact; noise is white on both sensors and passes the front end. p has 3 entries, or 4
-    when the encoder's zero is unknown. Shared noise of neighbouring windows is counted (not bounded).
+    The rows are taken as exact; noise is white on both sensors and passes the front end. p has 3 entries, or
+    4 when the encoder's zero is unknown. Shared noise of neighbouring windows is counted (not bounded).
     """
     smooth, u = front_end(phi, y, design)
     phi_frames, u_frames = frames(smooth, design), frames(u, design)
@@ -580,11 +606,13 @@ def predict(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, 
     smoother, differentiator = _taps(design.smooth, 1.0), _taps(design.second, 0.0)
     variance = 0.0
     for k, window_columns in enumerate(columns(phi_frames, u_frames, design)):
-        x, inverse_factor = oracle._rows(window_columns, phi_frames[k], u_frames[k])
-        oracle._add(x, inverse_factor)
-        motion, _ = internal_motion(oracle.p, window_columns, np.zeros(design.functions), phi_frames[k], u_frames[k], design)
+        x, inverse_factor = oracle.rows(window_columns, phi_frames[k], u_frames[k])
+        oracle.add(x, inverse_factor)
+        nothing = np.zeros(design.functions)
+        motion, _ = internal_motion(oracle.p, window_columns, nothing, phi_frames[k], u_frames[k], design)
         of_angle = residual_filters(design, oracle.p) @ inverse_factor.T
-        of_drive = motion[:, None] * (design.chi[:, 1] @ inverse_factor.T)  # u enters as G q: an error of u times q
+        # phi'' = (w + u) q: an error of u weighs q
+        of_drive = motion[:, None] * (design.chi[:, 1] @ inverse_factor.T)
         variance += angle_sd**2 * _energy(of_angle, smoother, design.decimation)
         variance += height_sd**2 * _energy(of_drive, differentiator, design.decimation)
     windows = len(phi_frames)
@@ -605,7 +633,7 @@ def predict_rig(
     release: tuple[float, float] = (0.06, 0.14),
     zero_unknown: bool = True,
 ) -> Prediction:
-    """`predict` for a simulated run of the linear pendulum: what a rig of these rough parameters will give."""
+    """`predict` for a simulated run of the linear pendulum: what a rig of these parameters will give."""
     run = simulate(pendulum, drive, Sensors(), design.sample_rate, duration, release, "linear").run
     return predict(run.phi, run.y, design, np.append(pendulum.linear, [0.0] * zero_unknown), sensors)
 

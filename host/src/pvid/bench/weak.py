@@ -46,7 +46,8 @@ class Case:
     def label(self) -> str:
         """The case in words."""
         form = "zero unknown" if self.zero_unknown else "zero taken as 0"
-        return f"{self.truth} equations, {self.bits} bits, c = {self.zero:.2g} rad, {form}"
+        runs = f", {self.seeds} seeds" if self.seeds != Case.seeds else ""
+        return f"{self.truth} equations, {self.bits} bits, c = {self.zero:.2g} rad, {form}{runs}"
 
 
 LSB_14 = 2 * np.pi / 2**14

@@ -49,8 +49,8 @@ class WeakTwin:
         design = self.config.design
         if design.decimation <= 2:
             return design.decimation - 1
-        left = design.decimation - weak_front.job_ticks(design.taps, design.decimation)
-        functions = -(-design.functions // max(1, left // 2))
+        second_half = design.decimation - design.decimation // 2
+        functions = -(-design.functions // max(1, second_half // 2))
         return 2 * -(-design.functions // functions)
 
     def _driven(self, variance: Float32) -> Mask:
