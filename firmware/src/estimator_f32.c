@@ -245,9 +245,9 @@ static inline float project(const pvid_estimator_f32 *self, const float sums[], 
     float c[PVID_MAX_THETA * PVID_MAX_P];
     model->jacobian(self->p, c);
     for (size_t a = 0; a < model->n_p; a++) {
-        float column[PVID_MAX_THETA];
+        float column[PVID_MAX_THETA] = {0.0f};
         const size_t start = pvid_pattern_start_f32(model, a);
-        pvid_pattern_times_column_f32(model, c, start, sums, column);
+        pvid_pattern_add_columns_f32(model, c, start, pvid_pattern_end_f32(model, start), sums, column);
         pvid_pattern_project_row_f32(model, c, start, column, s[a]);
     }
     pvid_pattern_transpose_times_f32(model, c, b, f);
@@ -357,7 +357,7 @@ static inline pvid_reason end_group(pvid_estimator_f32 *self, const float sums[]
 
 enum {
     STAGE_READ,    /* the sums and C */
-    STAGE_PROJECT, /* n_p times: M c_a, then row a of S and F */
+    STAGE_PROJECT, /* n_p times: M c_a, a few non-zeros of c_a at a time, then row a of S and F */
     STAGE_FACTOR,
     STAGE_STEP,    /* dp, and where p and theta go with it */
     STAGE_FOLLOW, /* a few rows of M dtheta at a time */
@@ -367,6 +367,7 @@ enum {
 };
 
 #define ROWS_A_STAGE 4u
+#define COLUMNS_A_STAGE 3u
 
 static void hold(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, pvid_reason reason)
 {
@@ -380,20 +381,27 @@ static void read_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
     self->model->jacobian(self->p, solve->c);
 }
 
-/* First M c_a, then row a of S and F; returns whether rows are left. */
+/* A part of M c_a, or, once it is complete, row a of S and F; returns whether anything is left. */
 static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
-    const size_t a = solve->index / 2u;
-    if ((solve->index % 2u) == 0u) {
-        solve->start = (uint8_t)pvid_pattern_start_f32(model, a);
-        pvid_pattern_times_column_f32(model, solve->c, solve->start, solve->sums, solve->column);
-    } else {
-        pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->column, solve->s[a]);
-        solve->force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
+    const size_t a = solve->index;
+    const size_t next = solve->next;
+    const size_t end = pvid_pattern_end_f32(model, solve->start);
+    if (next == solve->start) {
+        memset(solve->column, 0, sizeof solve->column);
     }
+    if (next < end) {
+        const size_t last = ((end - next) > COLUMNS_A_STAGE) ? (next + COLUMNS_A_STAGE) : end;
+        pvid_pattern_add_columns_f32(model, solve->c, next, last, solve->sums, solve->column);
+        solve->next = (uint8_t)last;
+        return true;
+    }
+    pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->column, solve->s[a]);
+    solve->force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
+    solve->start = (uint8_t)end;
     solve->index++;
-    return solve->index < 2u * model->n_p;
+    return solve->index < model->n_p;
 }
 
 static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
@@ -495,6 +503,8 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
     solve->ends_group = ends_group;
     solve->reason = PVID_ACCUMULATED;
     solve->index = 0;
+    solve->start = 0;
+    solve->next = 0;
     solve->stage = STAGE_READ;
     solve->gain = 1.0f;
     if (!relative_to_estimate(self->model)) {
@@ -554,8 +564,13 @@ uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_gro
     if (!relative_to_estimate(model)) {
         return 1;
     }
-    const size_t follows = (model->n_theta + (ROWS_A_STAGE - 1u)) / ROWS_A_STAGE;
-    return (uint16_t)(4u + (2u * model->n_p) + follows + (ends_group ? 1u : 0u));
+    size_t stages = 4u + ((model->n_theta + (ROWS_A_STAGE - 1u)) / ROWS_A_STAGE) + (ends_group ? 1u : 0u);
+    for (size_t start = 0; start < model->n_c;) {
+        const size_t end = pvid_pattern_end_f32(model, start);
+        stages += 1u + (((end - start) + (COLUMNS_A_STAGE - 1u)) / COLUMNS_A_STAGE);
+        start = end;
+    }
+    return (uint16_t)stages;
 }
 
 /* All stages of a solve at once. */

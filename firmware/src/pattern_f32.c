@@ -39,8 +39,7 @@ size_t pvid_pattern_start_f32(const pvid_model_f32 *model, size_t a)
     return k;
 }
 
-/* Where the column that starts at `start` ends. */
-static size_t end_of(const pvid_model_f32 *model, size_t start)
+size_t pvid_pattern_end_f32(const pvid_model_f32 *model, size_t start)
 {
     const uint8_t *c_column = model->c_column;
     const size_t n_c = model->n_c;
@@ -51,18 +50,13 @@ static size_t end_of(const pvid_model_f32 *model, size_t start)
     return k;
 }
 
-void pvid_pattern_times_column_f32(const pvid_model_f32 *model, const float c[], size_t start, const float m[],
-                                   float t[])
+void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t last,
+                                  const float m[], float t[])
 {
     const uint8_t *c_row = model->c_row;
     const size_t n_theta = model->n_theta;
-    const size_t end = end_of(model, start);
-    float sum[PVID_MAX_THETA] = {0.0f};
-    for (size_t k = start; k < end; k++) {
-        add_column(n_theta, m, c_row[k], c[k], sum);
-    }
-    for (size_t i = 0; i < n_theta; i++) {
-        t[i] = sum[i];
+    for (size_t k = first; k < last; k++) {
+        add_column(n_theta, m, c_row[k], c[k], t);
     }
 }
 
@@ -85,7 +79,7 @@ void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], 
 float pvid_pattern_dot_f32(const pvid_model_f32 *model, const float c[], size_t start, const float x[])
 {
     const uint8_t *c_row = model->c_row;
-    const size_t end = end_of(model, start);
+    const size_t end = pvid_pattern_end_f32(model, start);
     float sum = 0.0f;
     for (size_t k = start; k < end; k++) {
         sum += c[k] * x[c_row[k]];

@@ -13,9 +13,12 @@ void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c
 /* The first non-zero of column a of C. */
 size_t pvid_pattern_start_f32(const pvid_model_f32 *model, size_t a);
 
-/* t[n_theta] = M c_a; the non-zeros of column a of C start at `start`. */
-void pvid_pattern_times_column_f32(const pvid_model_f32 *model, const float c[], size_t start, const float m[],
-                                   float t[]);
+/* One past the last non-zero of the column that starts at `start`. */
+size_t pvid_pattern_end_f32(const pvid_model_f32 *model, size_t start);
+
+/* t[n_theta] += M times the non-zeros first..last-1 of a column of C: M c_a once they are all in. */
+void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t last,
+                                  const float m[], float t[]);
 
 /* Row a of S = C^T M C from the diagonal on, s[b] = c_b^T t for a <= b < n_p, given t = M c_a. */
 void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], size_t start, const float t[],

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "cholesky_f32.h"
 #include "finite_f32.h"
@@ -16,8 +17,8 @@ enum {
     STAGE_FACTOR,     /* K times: a row of its Cholesky factor */
     STAGE_WHITEN,     /* K times: a row of L^-1 (Y, N, a, b) */
     STAGE_DIRECTION_A,
-    STAGE_ALONG_A,
-    STAGE_REMOVE_A,
+    STAGE_ALONG_A,    /* a few functions at a time */
+    STAGE_REMOVE_A,   /* likewise */
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
@@ -25,6 +26,9 @@ enum {
     STAGE_SOLVE,      /* `iterations` solves of several stages each */
     STAGE_IDLE
 };
+
+/* Functions whose columns one stage of the projection takes. */
+#define FUNCTIONS_A_STAGE 6u
 
 void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self)
 {
@@ -155,24 +159,29 @@ static void find_direction(pvid_weak_finish_f32 *self, size_t functions, size_t 
     }
 }
 
-static void find_components(pvid_weak_finish_f32 *self, size_t functions, const float sums[][PVID_WEAK_TERMS])
+/* sum += a x for the columns of a function. */
+static inline void add_scaled(float a, const float *restrict x, float *restrict sum)
 {
-    float along[PVID_WEAK_COLUMNS] = {0.0f};
-    for (size_t k = 0; k < functions; k++) {
-        const float direction = self->direction[k];
-        PVID_UNROLL
-        for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
-            along[i] += direction * sums[k][i];
-        }
-    }
+    PVID_UNROLL
     for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
-        self->along[i] = along[i];
+        sum[i] += a * x[i];
     }
 }
 
-static void remove_components(const pvid_weak_finish_f32 *self, size_t functions, float sums[][PVID_WEAK_TERMS])
+static void find_components(pvid_weak_finish_f32 *self, size_t first, size_t last, const float sums[][PVID_WEAK_TERMS])
 {
-    for (size_t k = 0; k < functions; k++) {
+    if (first == 0u) {
+        memset(self->along, 0, sizeof self->along);
+    }
+    for (size_t k = first; k < last; k++) {
+        add_scaled(self->direction[k], sums[k], self->along);
+    }
+}
+
+static void remove_components(const pvid_weak_finish_f32 *self, size_t first, size_t last,
+                              float sums[][PVID_WEAK_TERMS])
+{
+    for (size_t k = first; k < last; k++) {
         subtract(self->direction[k], self->along, sums[k]);
     }
 }
@@ -207,50 +216,52 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
     const size_t functions = design->functions;
     const float(*fixed)[PVID_WEAK_TERMS] = (const float(*)[PVID_WEAK_TERMS])sums;
     const size_t row = self->index;
-    bool repeat = false; /* for each function */
+    const size_t few = ((functions - row) > FUNCTIONS_A_STAGE) ? (row + FUNCTIONS_A_STAGE) : functions;
+    size_t done = row + 1u; /* functions, after this stage; all of them end it */
     switch (self->stage) {
     case STAGE_COMBINE:
         combine_row(self, design, row);
         assemble(sums[row]);
-        repeat = true;
         break;
     case STAGE_FACTOR:
         factor_row(self, row);
-        repeat = true;
         break;
     case STAGE_WHITEN:
         whiten_row(self, row, sums);
-        repeat = true;
         break;
     case STAGE_DIRECTION_A:
         find_direction(self, functions, COLUMN_A, fixed);
+        done = functions;
         break;
     case STAGE_DIRECTION_B:
         find_direction(self, functions, COLUMN_B, fixed);
+        done = functions;
         break;
     case STAGE_ALONG_A:
     case STAGE_ALONG_B:
-        find_components(self, functions, fixed);
+        find_components(self, row, few, fixed);
+        done = few;
         break;
     case STAGE_REMOVE_A:
     case STAGE_REMOVE_B:
-        remove_components(self, functions, sums);
+        remove_components(self, row, few, sums);
+        done = few;
         break;
     case STAGE_ADD:
         add_row(sums[row], estimator, reason);
-        repeat = true;
         break;
     case STAGE_SOLVE:
         if (!solve_on(self, iterations, estimator)) {
             return;
         }
         *reason = self->solve.reason;
+        done = functions;
         break;
     default:
         return;
     }
-    self->index++;
-    if (!repeat || (self->index == functions)) {
+    self->index = (uint8_t)done;
+    if (done == functions) {
         self->index = 0;
         self->stage++;
         if (self->stage == STAGE_SOLVE) {
@@ -261,8 +272,8 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
 
 uint32_t pvid_weak_finish_stages_f32(uint8_t functions, uint8_t iterations, const pvid_estimator_f32 *estimator)
 {
-    const uint32_t projection = (uint32_t)STAGE_ADD - (uint32_t)STAGE_DIRECTION_A;
-    const uint32_t rows = ((uint32_t)4u * functions) + projection;
+    const uint32_t parts = (functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
+    const uint32_t rows = (4u * (uint32_t)functions) + 2u + (4u * parts);
     const uint32_t first = pvid_estimator_stages_f32(estimator, true);
     const uint32_t more = pvid_estimator_stages_f32(estimator, false);
     return rows + first + ((iterations - 1u) * more);

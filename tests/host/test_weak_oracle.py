@@ -32,9 +32,7 @@ def standard() -> WeakDesign:
     return design(0.3, 1000.0, NOMINAL)
 
 
-def settings(
-    tables: WeakDesign, seed: int, bits: int = 14, zero: bool = True, **more: object
-) -> weak.WeakSettings:
+def settings(tables: WeakDesign, seed: int, bits: int = 14, zero: bool = True, **more: object) -> weak.WeakSettings:
     start = np.append(standard_start(seed), [0.0] * zero)
     return weak.WeakSettings(start, weak.row_sd(tables, standard_sensors(bits)), **more)  # type: ignore[arg-type]
 
@@ -58,9 +56,7 @@ def test_jacobian_is_the_derivative_of_theta() -> None:
             down[k] -= step
             slope = (weak.theta(up) - weak.theta(down)) / (2 * step)
             # theta has degree 4 at most: the difference's error is that of rounding, 1e-16 / 1e-6
-            np.testing.assert_allclose(
-                weak.jacobian(p)[:, k], slope, rtol=1e-7, atol=1e-7 * np.abs(slope).max()
-            )
+            np.testing.assert_allclose(weak.jacobian(p)[:, k], slope, rtol=1e-7, atol=1e-7 * np.abs(slope).max())
 
 
 def test_double_integral_of_a_sine() -> None:
@@ -135,9 +131,7 @@ def test_starts_off_by_half_converge_to_one_answer(standard: WeakDesign) -> None
 @pytest.mark.parametrize(
     ("bits", "allowed"), [(12, (0.06, 0.06, 0.15)), (14, (0.014, 0.014, 0.036)), (16, (0.009, 0.009, 0.02))]
 )
-def test_accuracy_is_what_the_issue_asks(
-    standard: WeakDesign, bits: int, allowed: tuple[float, float, float]
-) -> None:
+def test_accuracy_is_what_the_issue_asks(standard: WeakDesign, bits: int, allowed: tuple[float, float, float]) -> None:
     relative, standardised = errors(standard, 10, standard_sensors(bits), bits=bits)
     # ten seeds know an RMS to 22 %; the limits are 1.2 to 1.9 times what 60 seeds measure
     assert (100 * np.sqrt(np.mean(relative**2, axis=0)) < allowed).all()

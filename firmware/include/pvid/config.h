@@ -69,7 +69,7 @@
 #error "PVID_MAX_WEAK_WINDOW must lie in 9..4095"
 #endif
 
-/* Largest number of test functions. RAM: 164 bytes each and 2 for each pair. */
+/* Largest number of test functions. RAM: 160 bytes each and 4 for each pair. */
 #ifndef PVID_MAX_FUNCTIONS
 #define PVID_MAX_FUNCTIONS 16
 #endif

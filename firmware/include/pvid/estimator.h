@@ -110,6 +110,7 @@ typedef struct {
     uint8_t stage;
     uint8_t index;   /* of the row within the stage */
     uint8_t start;   /* of the column of C in work among its non-zeros */
+    uint8_t next;    /* non-zero to be multiplied next */
     bool ends_group;
     float gain;
     float fall;      /* of rr */

@@ -144,8 +144,8 @@ typedef struct {
 
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range, a table holds a
  * number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
- * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for 4 K + 6 stages and 15 a
- * Gauss-Newton step. */
+ * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for less than
+ * 5 K + 6 stages and 17 a Gauss-Newton step. */
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is

@@ -38,9 +38,7 @@ def _interesting(value: Float, band: Float) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def convergence(
-    result: Identification, path: Path, *, truth: dict[str, float] | None = None, title: str = ""
-) -> None:
+def convergence(result: Identification, path: Path, *, truth: dict[str, float] | None = None, title: str = "") -> None:
     """Writes the estimates of g*, l2 and rho2 over time with a +-2 s.e. band; the truth as a line if known.
 
     The format follows the suffix of `path` (png, svg, pdf). Raises PvidError when it cannot be written.

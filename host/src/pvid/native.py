@@ -393,9 +393,7 @@ class Native:
             len(mirrored) :
         ]
         if layout[: len(mirrored)] != mirrored or bounds != [MAX_P, MAX_THETA, MAX_SUMS, MAX_WINDOW]:
-            raise PvidError(
-                f"the C core {path} was built with other struct sizes than this package: {layout}"
-            )
+            raise PvidError(f"the C core {path} was built with other struct sizes than this package: {layout}")
         self._estimator_size = estimator_size
         self._counters_at = counters_at
         self._strong_size = strong_size

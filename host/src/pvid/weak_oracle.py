@@ -71,8 +71,7 @@ def frames(x: Float, design: WeakDesign) -> Float:
     """Half-overlapping windows [windows, W] of decimated samples [n]."""
     if x.size < design.window:
         raise PvidError(
-            f"{x.size} decimated samples do not fill one window of {design.window}: "
-            f"record longer or shorten window_s"
+            f"{x.size} decimated samples do not fill one window of {design.window}: record longer or shorten window_s"
         )
     return np.lib.stride_tricks.sliding_window_view(x, design.window)[:: design.hop]
 
@@ -402,9 +401,7 @@ class WeakOracle:
         x = window_columns[: 1 + len(theta(core))]
         lack = self._remainder(core, window_columns, phi, u)
         x = np.concatenate([x[:1] - lack.y, x[1:], lack.k])
-        return without_directions(
-            x @ inverse_factor.T, window_columns[[A, B]] @ inverse_factor.T
-        ), inverse_factor
+        return without_directions(x @ inverse_factor.T, window_columns[[A, B]] @ inverse_factor.T), inverse_factor
 
     def _remainder(self, core: Float, window_columns: Float, phi: Float, u: Float) -> Remainder:
         """What the rows lack at p: nothing while the correction is off; k has no rows without damping."""
@@ -413,9 +410,7 @@ class WeakOracle:
             return Remainder(np.zeros(functions), np.zeros((extra, functions)))
         damping = self.p[self.n_core :] if extra else np.zeros(2)
         settings = self.settings
-        lack = remainder(
-            core, damping, window_columns, phi, u, self.design, settings.passes, settings.full_angle
-        )
+        lack = remainder(core, damping, window_columns, phi, u, self.design, settings.passes, settings.full_angle)
         return Remainder(lack.y, lack.k[:extra])
 
     def add(self, x: Float, inverse_factor: Float) -> None:
@@ -450,9 +445,7 @@ class WeakOracle:
         prior = (self.settings.row_sd / self.sd) ** 2
         s = self.information() + np.diag(prior)
         kappa = kappa_of(s[: self.n_core, : self.n_core])
-        if kappa < self.settings.kappa_min or (
-            self.settings.kappa_min > 0 and kappa * s[0, 0] < 2 * prior[0]
-        ):
+        if kappa < self.settings.kappa_min or (self.settings.kappa_min > 0 and kappa * s[0, 0] < 2 * prior[0]):
             return False
         d = 1 / np.sqrt(np.diag(s))
         dp = d * np.linalg.solve(s * np.outer(d, d), d * (self.jacobian().T @ self.b))
@@ -507,9 +500,7 @@ def _inverse(s: Float) -> Float:
     return np.asarray(np.linalg.inv(s * np.outer(d, d)) * np.outer(d, d))
 
 
-def identify_weak(
-    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, settings: WeakSettings
-) -> WeakIdentified:
+def identify_weak(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, settings: WeakSettings) -> WeakIdentified:
     """Identifies a run phi [rad], y [m], both [samples], window by window.
 
     Raises
@@ -590,9 +581,7 @@ def row_sd(design: WeakDesign, sensors: Sensors) -> float:
     return sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb) * math.sqrt(energy / design.functions)
 
 
-def predict(
-    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors
-) -> Prediction:
+def predict(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors) -> Prediction:
     """Standard errors at p that this run gives with these sensors; phi, y [samples], recorded or simulated.
 
     The rows are taken as exact; noise is white on both sensors and passes the front end. p has 3 entries, or

@@ -128,12 +128,8 @@ def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None)
         starts = truth * (1 + size * signs)
         starts[starts[:, 1] - starts[:, 2] <= 1, 1:] = truth[1:] * (1 + size)
         off = f"{100 * size:g} %"
-        jobs.append(
-            (starts, "pseudovelocity", "row_sd 1e+05", off, {"law": Law.PSEUDOVELOCITY, "row_sd": 1e5})
-        )
-        jobs.append(
-            (starts, "stationary", "feedback 10/s", off, {"law": Law.STATIONARY, "feedback_hz": 10.0})
-        )
+        jobs.append((starts, "pseudovelocity", "row_sd 1e+05", off, {"law": Law.PSEUDOVELOCITY, "row_sd": 1e5}))
+        jobs.append((starts, "stationary", "feedback 10/s", off, {"law": Law.STATIONARY, "feedback_hz": 10.0}))
     for done, (starts, law, setting, off, changes) in enumerate(jobs):
         progress(done)
         yield run_law(native, n, y, starts, (law, setting, off), changes)

@@ -209,6 +209,7 @@ class RelativeEstimator(Estimator):
     """
 
     _ROWS_A_STAGE = 4
+    _COLUMNS_A_STAGE = 3
 
     def __init__(self, configs: Sequence[EstimatorConfig], update_rate: float, pattern: PatternModel) -> None:
         super().__init__(configs, update_rate, pattern.n_p, pattern.n_sums)
@@ -264,8 +265,7 @@ class RelativeEstimator(Estimator):
         if self.was_due:
             if ends_group:
                 self.phase[:] = 0
-            follows = -(-self.model.n_theta // self._ROWS_A_STAGE)
-            for _ in range(3 + 2 * self.model.n_p + follows):
+            for _ in range(self._stages_before_commit()):
                 yield None
             with np.errstate(all="ignore"):
                 reason = self._commit(self.gain if ends_group else np.ones_like(self.gain))
@@ -275,6 +275,11 @@ class RelativeEstimator(Estimator):
             self.information.end_group(self.everywhere)
             self.sums = self.information.read()
             yield reason
+
+    def _stages_before_commit(self) -> int:
+        columns = self.model.c_column
+        projections = sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
+        return 3 + projections + -(-self.model.n_theta // self._ROWS_A_STAGE)
 
     def _commit(self, gain: Float32) -> npt.NDArray[np.uint8]:
         pattern = self.model

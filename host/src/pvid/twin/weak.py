@@ -36,8 +36,7 @@ class WeakTwin:
         weight = (functions - np.float32(2)) / functions
         rate = np.float32(config.sample_rate) / (np.float32(design.decimation) * np.float32(config.hop))
         lanes = [
-            replace(e, row_weight=float(weight), correlation=design.overlap)
-            for e in estimators or [config.estimator]
+            replace(e, row_weight=float(weight), correlation=design.overlap) for e in estimators or [config.estimator]
         ]
         pattern = kapitza_weak.WEAK if config.zero_unknown else kapitza_weak.ZEROED
         self.estimator = RelativeEstimator(lanes, float(rate), pattern)

@@ -16,7 +16,7 @@ Reasons = npt.NDArray[np.uint8]
 
 COLUMNS = 12
 _Y, _A, _B = 8, 9, 10
-_PROJECTION_STAGES = 6
+_FUNCTIONS_A_STAGE = 6
 
 
 def assemble(sums: Float32) -> Float32:
@@ -96,7 +96,8 @@ def stages(
 ) -> Iterator[Reasons | None]:
     """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
     x = rows(sums, design, estimator.p)
-    for _ in range(3 * design.functions + _PROJECTION_STAGES):
+    parts = -(-design.functions // _FUNCTIONS_A_STAGE)
+    for _ in range(3 * design.functions + 2 + 4 * parts):
         yield None
     for k in range(design.functions):
         added = estimator.add(x[: estimator.model.n_theta, k], x[_Y, k])

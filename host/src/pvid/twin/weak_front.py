@@ -37,9 +37,7 @@ def tick_of(index: int, taps: int, decimation: int) -> int:
     return taps - 1 + index * decimation + job_ticks(taps, decimation) - 1
 
 
-def decimate(
-    phi: Float32, y: Float32, design: WeakTables, sample_rate: float, l1: float
-) -> tuple[Float32, Float32]:
+def decimate(phi: Float32, y: Float32, design: WeakTables, sample_rate: float, l1: float) -> tuple[Float32, Float32]:
     """phi [rad] and u [1/s^2] at the decimated instants of one stretch of finite samples [ticks]."""
     half = (design.taps - 1) // 2
     centres = half + design.decimation * np.arange(outputs(len(phi), design.taps, design.decimation))
