@@ -4,10 +4,10 @@
 
 #include "pvid/pvid.h"
 
-#define TAPS 71
-#define DECIMATION 8
-#define WINDOW 157
-#define FUNCTIONS 12
+#define TAPS WEAK_RIG_TAPS
+#define DECIMATION WEAK_RIG_DECIMATION
+#define WINDOW WEAK_RIG_WINDOW
+#define FUNCTIONS WEAK_RIG_FUNCTIONS
 #define PAIRS ((FUNCTIONS * (FUNCTIONS + 1)) / 2)
 
 static float smooth[(TAPS - 1) / 2];
@@ -48,7 +48,7 @@ void weak_rig_prepare(float (*noise)(void))
         .sample_rate_hz = 1000.0f,
         .l1 = 0.3f,
         .design = &design,
-        .zero_unknown = true,
+        .zero_unknown = (WEAK_RIG_ZERO != 0),
         .iterations = 3,
         .estimator = pvid_estimator_defaults_f32,
     };

@@ -361,6 +361,60 @@ def weak_table(rig_path: Path, name: str, check: Path | None) -> int:
     return _print_header(to_c_header(tables, name, f"pvid weak-table --rig {rig_path.name} --name {name}"), check)
 
 
+@commands.command(name="design")
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML).")
+@click.option("--run", "run_path", type=click.Path(path_type=Path), help="Predict for the drive of this recorded run.")
+@click.option(
+    "--tone",
+    "tones",
+    multiple=True,
+    metavar="A,F,PHASE",
+    help="Predict for this drive [m,Hz,rad]; repeatable.  [default: the standard rig's]",
+)
+@click.option("--release", nargs=2, type=float, help="phi1, phi1+phi [rad] that a predicted run starts from, at rest.")
+@click.option("--duration", type=float, help="Length to predict for [s].  [default: the run's, else 40]")
+@click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
+def design_command(
+    rig_path: Path,
+    run_path: Path | None,
+    tones: tuple[str, ...],
+    release: tuple[float, float] | None,
+    duration: float | None,
+    as_json: bool,
+) -> int:
+    """Predicts what the weak form's tables for a rig will give: standard errors, kappa, delay, memory, instructions.
+
+    The rig file holds no drive: it comes from a recorded run, or from tones. The tables themselves are printed by
+    weak-table.
+    """
+    from pvid.design_report import report_for_run, report_for_tones
+
+    rig = load(rig_path)
+    if duration is not None and not 0 < duration < float("inf"):
+        raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
+    state_bytes = Native().state_bytes["weak"]
+    if run_path is None:
+        drive = tuple(_tone(text) for text in tones) or STANDARD_DRIVE
+        report = report_for_tones(rig, drive, release or STANDARD_RELEASE, duration or 40.0, state_bytes)
+    elif tones or release:
+        raise PvidError("--run says how the rig was driven: leave --tone and --release out")
+    else:
+        report = report_for_run(rig, read_run(run_path, rig.sample_rate), state_bytes, duration)
+    if as_json:
+        click.echo(json.dumps(report.as_json()))
+        return DONE
+    table = Table("parameter", "predicted at", "standard error", "%", title=f"a run of {report.duration:g} s")
+    for name, value in report.value.items():
+        share = f"{100 * report.se[name] / abs(value):.2g}" if name != ZERO else ""
+        label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
+        table.add_row(label, f"{value:.6g}", f"{report.se[name]:.2g}", share)
+    Console().print(table)
+    click.echo(f"kappa {report.kappa:.2g}; noise of a row {report.row_sd:.2g} rad")
+    for name, text in report.cost_rows():
+        click.echo(f"{name}: {text}")
+    return DONE
+
+
 def _print_header(header: str, check: Path | None) -> int:
     """Prints a generated header, or tells whether the file `check` is the same."""
     if check is None:
@@ -449,6 +503,23 @@ def bench_cost(update: Path | None) -> int:
     with tempfile.TemporaryDirectory() as folder:
         costs = {level: cost.stage_costs(cost.build(Path(folder), level=level)) for level in ("-O2", "-O3")}
     _update_readme(update, "cost", cost.as_markdown(costs, cost.state_bytes(Native())))
+    return DONE
+
+
+@bench.command(name="design-cost")
+@click.option("--update", is_flag=True, help="Write the coefficients that `pvid design` computes with.")
+def bench_design_cost(update: bool) -> int:
+    """Instructions of the weak form over a grid of designs beside the formula of `pvid design` (needs valgrind)."""
+    from pvid import weak_cost
+    from pvid.bench import design_cost
+
+    with progress_bar("designs", len(design_cost.GRID)) as advance:
+        spreads = design_cost.measured_grid(advance)
+    mean, longest = design_cost.fit(spreads) if update else weak_cost.coefficients()
+    if update:
+        weak_cost.COEFFICIENTS_FILE.write_text(design_cost.as_toml(mean, longest), encoding="utf-8")
+        messages.print(f"{weak_cost.COEFFICIENTS_FILE.name} written")
+    click.echo(_markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
     return DONE
 
 

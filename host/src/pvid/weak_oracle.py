@@ -9,7 +9,7 @@ core does not have yet is tried: the full-angle correction and the two damping r
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -540,6 +540,9 @@ def identify_weak(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, sett
 
 # ---- prediction
 
+# Without a drive kappa is 1e-16 and S cannot be inverted; the weakest useful drives leave 1e-5 (MATH.md 4).
+_UNDRIVEN_KAPPA = 1e-10
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -549,6 +552,7 @@ class Prediction:
     ----------
     p : what it is predicted at
     se : standard errors of p at the end of the run [units of p]
+    covariance : of p [n_p, n_p]
     kappa : part of w's information that the other parameters cannot imitate
     row_sd : standard deviation of a row's residual [rad], from both sensors
     windows : in the run
@@ -556,6 +560,7 @@ class Prediction:
 
     p: Float
     se: Float
+    covariance: Float
     kappa: float
     row_sd: float
     windows: int
@@ -581,15 +586,25 @@ def row_sd(design: WeakDesign, sensors: Sensors) -> float:
     return sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb) * math.sqrt(energy / design.functions)
 
 
-def predict(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors) -> Prediction:
+def predict(
+    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors, forgetting_s: float = 0.0
+) -> Prediction:
     """Standard errors at p that this run gives with these sensors; phi, y [samples], recorded or simulated.
 
     The rows are taken as exact; noise is white on both sensors and passes the front end. p has 3 entries, or
     4 when the encoder's zero is unknown. Shared noise of neighbouring windows is counted (not bounded).
+    forgetting_s is the time constant of forgetting [s], 0: none.
+
+    Raises
+    ------
+    PvidError
+        When the run does not fill a window, or says nothing of w.
     """
     smooth, u = front_end(phi, y, design)
     phi_frames, u_frames = frames(smooth, design), frames(u, design)
-    oracle = WeakOracle(design, WeakSettings(start=np.asarray(p, np.float64), row_sd=1.0))
+    oracle = WeakOracle(design, WeakSettings(np.asarray(p, np.float64), row_sd=1.0, forgetting_s=forgetting_s))
+    # a row that weighs v has noise that weighs v^2: what has been forgotten twice as fast
+    noise = WeakOracle(design, replace(oracle.settings, forgetting_s=forgetting_s / 2))
     height_sd = sample_sd(sensors.y_lsb, sensors.y_noise_lsb) * design.sample_rate**2 / design.l1
     angle_sd = sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb)
     smoother, differentiator = _taps(design.smooth, 1.0), _taps(design.second, 0.0)
@@ -597,6 +612,7 @@ def predict(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, 
     for k, window_columns in enumerate(columns(phi_frames, u_frames, design)):
         x, inverse_factor = oracle.rows(window_columns, phi_frames[k], u_frames[k])
         oracle.add(x, inverse_factor)
+        noise.add(x, inverse_factor)
         nothing = np.zeros(design.functions)
         motion, _ = internal_motion(oracle.p, window_columns, nothing, phi_frames[k], u_frames[k], design)
         of_angle = residual_filters(design, oracle.p) @ inverse_factor.T
@@ -608,9 +624,16 @@ def predict(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, 
     variance /= windows * design.functions
     c = oracle.jacobian()
     s = oracle.information()
+    kappa = kappa_of(s)
+    if not kappa > _UNDRIVEN_KAPPA:
+        raise PvidError("this drive says nothing of w: the pivot stands still or hardly moves")
     inverse = _inverse(s)
-    spread = np.maximum(np.diag(inverse @ (s + c.T @ oracle.q @ c) @ inverse), np.diag(inverse) / 4)
-    return Prediction(oracle.p, np.sqrt(variance * spread), kappa_of(s), math.sqrt(variance), windows)
+    alone = inverse @ noise.information() @ inverse
+    shared = inverse @ c.T @ noise.q @ c @ inverse
+    # As in `WeakOracle.sandwich`, shared noise may not claim that windows know more than twice as much.
+    share = min(1.0, float(np.min(0.75 * np.diag(alone) / np.maximum(-np.diag(shared), 1e-300))))
+    covariance = variance * (alone + share * shared)
+    return Prediction(oracle.p, np.sqrt(np.diag(covariance)), covariance, kappa, math.sqrt(variance), windows)
 
 
 def predict_rig(
@@ -621,10 +644,12 @@ def predict_rig(
     duration: float = 40.0,
     release: tuple[float, float] = (0.06, 0.14),
     zero_unknown: bool = True,
+    forgetting_s: float = 0.0,
 ) -> Prediction:
     """`predict` for a simulated run of the linear pendulum: what a rig of these parameters will give."""
     run = simulate(pendulum, drive, Sensors(), design.sample_rate, duration, release, "linear").run
-    return predict(run.phi, run.y, design, np.append(pendulum.linear, [0.0] * zero_unknown), sensors)
+    p = np.append(pendulum.linear, [0.0] * zero_unknown)
+    return predict(run.phi, run.y, design, p, sensors, forgetting_s)
 
 
 def _taps(folded: Float, unity: float) -> Float:

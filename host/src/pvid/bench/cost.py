@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,8 +35,10 @@ _FEW, _MANY = 2496, 4992  # multiples of the fold's block of 64 ticks and of the
 RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32)
 
 
-def build(folder: Path, compiler: str = "gcc", level: str = "-O2") -> Path:
+def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: Sequence[str] = ()) -> Path:
     """Compiles tests/cost with the core as a device does, into `folder`; returns the binary.
+
+    `definitions` are macros, NAME=VALUE: sizes of tests/cost/weak_rig.h, bounds of pvid/config.h.
 
     Raises
     ------
@@ -46,6 +49,7 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2") -> Path:
     sources = sorted([*(root / "firmware" / "src").glob("*.c"), *(root / "tests" / "cost").glob("*.c")])
     binary = folder / "tick_cost"
     command = [compiler, "-std=c99", level, "-ffp-contract=off", f"-I{root / 'firmware' / 'include'}"]
+    command += [f"-D{definition}" for definition in definitions]
     try:
         done = subprocess.run(
             [*command, *map(str, sources), "-o", str(binary), "-lm"], capture_output=True, text=True, check=False

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from pvid.errors import PvidError
 
-PERIOD = 624  # ticks from window to window of tests/cost/weak_rig.c
+PERIOD = 624  # ticks from window to window of tests/cost/weak_rig.h, at its base size
 
 _STEP = "pvid_weak_step_f32"
 
@@ -38,8 +38,10 @@ class Spread:
         return self.longest / self.mean
 
 
-def measure(binary: Path, periods: int = 2) -> Spread:
+def measure(binary: Path, periods: int = 2, period: int = PERIOD) -> Spread:
     """Steps the weak form of the given tick_cost binary (pvid.bench.cost.build) and counts every tick.
+
+    `period` is the number of ticks from window to window where the binary was built for another size.
 
     Raises
     ------
@@ -51,10 +53,10 @@ def measure(binary: Path, periods: int = 2) -> Spread:
     with TemporaryDirectory() as folder:
         dump = Path(folder) / "ticks"
         command = ["valgrind", "--tool=callgrind", f"--toggle-collect={_STEP}", f"--dump-after={_STEP}"]
-        command += ["--combine-dumps=yes", f"--callgrind-out-file={dump}", str(binary), "weak", str(periods * PERIOD)]
+        command += ["--combine-dumps=yes", f"--callgrind-out-file={dump}", str(binary), "weak", str(periods * period)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         text = dump.read_text(encoding="utf-8") if dump.exists() else ""
     counts = [int(n) for n in re.findall(r"^totals: (\d+)", text, re.MULTILINE) if int(n) > 0]
-    if done.returncode != 0 or len(counts) < periods * PERIOD:
+    if done.returncode != 0 or len(counts) < periods * period:
         raise PvidError(f"counting the weak form's ticks failed: {done.stderr.strip().splitlines()[-1:]}")
-    return Spread(counts[-periods * PERIOD :])
+    return Spread(counts[-periods * period :])
