@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -61,6 +62,40 @@ def test_both_cores_agree(place: Path) -> None:
     for name in ("w", "d1", "d2"):
         # float32 differentiates with about 1e-6 relative noise of its own: far below a standard error
         assert abs(single[name]["value"] - double[name]["value"]) < 0.5 * double[name]["se"]
+
+
+def test_both_cores_of_the_weak_form_agree(place: Path) -> None:
+    answers = [
+        pvid("identify", "run.csv", "--rig", "run.toml", "--json", "--core", core, cwd=place) for core in ("f32", "f64")
+    ]
+    single, double = (json.loads(answer.stdout) for answer in answers)
+    assert double["hash"] is None
+    assert double["core"] == "f64"
+    assert double["updates"] >= single["updates"] > 0  # f32 may still be at work on the last window
+    for name in ("w", "d1", "d2", "c", "l2"):
+        # float32 rounds far below a standard error; the last of 17 windows moves p by a part of one
+        assert abs(single[name]["value"] - double[name]["value"]) < double[name]["se"], name
+        assert single[name]["se"] == pytest.approx(double[name]["se"], rel=0.3), name
+
+
+def test_the_float64_weak_form_corrects_full_angles(tmp_path: Path) -> None:
+    assert pvid("simulate", "run.csv", "--duration", "20", "--truth", "full", cwd=tmp_path).returncode == 0
+    rig = tmp_path / "run.toml"
+    errors = []
+    for corrected in ("false", "true"):
+        rig.write_text(re.sub("full_angle = .*", f"full_angle = {corrected}", rig.read_text()), encoding="utf-8")
+        answer = json.loads(
+            pvid("identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--json", cwd=tmp_path).stdout
+        )
+        errors.append(abs(answer["g"]["value"] / STANDARD_PENDULUM.g - 1))
+    assert errors[0] > 2e-3  # README: 0.4 % at 0.107 rad
+    assert errors[1] < 1e-3
+
+
+def test_the_float64_weak_form_refuses_the_other_law(place: Path) -> None:
+    done = pvid("identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--law", "pseudovelocity", cwd=place)
+    assert done.returncode == 2
+    assert "stationary law" in done.stderr
 
 
 def test_the_law_can_be_chosen(place: Path) -> None:

@@ -11,9 +11,10 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
-from pvid.native import Native, Reason, StrongConfig, WeakConfig
+from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig
 from pvid.rigfile import RigFile
-from pvid.setup import bank_of, config_of
+from pvid.setup import bank_of, config_of, weak_design_of
+from pvid.weak_oracle import WeakSettings, identify_weak
 
 Float = npt.NDArray[np.float64]
 
@@ -147,8 +148,10 @@ def identify(
     every = max(1, len(run.t) // points)
     if rig.identifier.core == "f32":
         return _in_float32(run, rig, config, every, native)
-    if rig.identifier.core == "f64" and isinstance(config, StrongConfig):
-        return _in_float64(run, rig, config, every)
+    if rig.identifier.core == "f64":
+        if isinstance(config, StrongConfig):
+            return _in_float64(run, rig, config, every)
+        return _weak_in_float64(run, rig, config)
     raise PvidError(f"core {rig.identifier.core} has no {rig.identifier.form} form yet: use f32")
 
 
@@ -238,6 +241,45 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
             np.array([estimate.covariance for _, estimate in result.estimates]),
             rig.l1,
         ),
+    )
+
+
+def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identification:
+    """The trajectory has one point a window."""
+    if config.estimator.law is not Law.STATIONARY or config.estimator.divider != 1:
+        raise PvidError("core f64 has the weak form's stationary law with a solve at every window only: use f32")
+    settings = config.estimator
+    result = identify_weak(
+        run.phi,
+        run.y,
+        weak_design_of(rig, run.sample_rate),
+        WeakSettings(
+            start=settings.start.astype(np.float64),
+            row_sd=settings.row_sd,
+            start_sd=settings.start_sd.astype(np.float64),
+            forgetting_s=settings.forgetting_s,
+            iterations=config.iterations,
+            step_limit=settings.step_limit,
+            kappa_min=settings.kappa_min,
+            drive_min=config.drive_min,
+            full_angle=rig.identifier.full_angle,
+            damping=rig.identifier.damping,
+        ),
+    )
+    n_p = len(settings.start)
+    last = result.last
+    return _identification(
+        rig,
+        p=last.p[:n_p],
+        covariance=last.covariance[:n_p, :n_p],
+        kappa=last.kappa,
+        misfit=last.residual_sd / settings.row_sd,
+        status=(Reason.UPDATED if result.updated[-1] else Reason.HELD_NOT_EXCITED).text,
+        ticks=len(run.t),
+        updates=config.iterations * int(result.updated.sum()),
+        lost=0,
+        running_hash=None,
+        trajectory=_trajectory(run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig.l1),
     )
 
 

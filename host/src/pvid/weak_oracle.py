@@ -316,6 +316,7 @@ class WeakIdentified:
     ----------
     t : end of each window [s]
     p, se : estimates and standard errors [windows, n_p]; damping coefficients [m^2/s] last, where estimated
+    covariance : of the estimates [windows, n_p, n_p]
     kappa : [windows]
     updated : windows that moved p
     corrected : windows that were corrected for full angles or damping
@@ -328,6 +329,7 @@ class WeakIdentified:
     t: Float
     p: Float
     se: Float
+    covariance: Float
     kappa: Float
     updated: npt.NDArray[np.bool_]
     corrected: npt.NDArray[np.bool_]
@@ -514,20 +516,22 @@ def identify_weak(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, sett
     phi_frames, u_frames = frames(smooth, design), frames(u, design)
     oracle = WeakOracle(design, settings)
     count = len(phi_frames)
-    history = np.empty((count, len(oracle.p))), np.empty((count, len(oracle.p)))
+    history = np.empty((count, len(oracle.p)))
+    covariance = np.empty((count, len(oracle.p), len(oracle.p)))
     kappa, misfit = np.empty(count), np.empty(count)
     updated, corrected = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     for k, window_columns in enumerate(columns(phi_frames, u_frames, design)):
         corrected[k] = oracle.corrected
         oracle.window(window_columns, phi_frames[k], u_frames[k])
         estimate = oracle.assess()
-        history[0][k], history[1][k], kappa[k] = estimate.p, estimate.se, estimate.kappa
+        history[k], covariance[k], kappa[k] = estimate.p, estimate.covariance, estimate.kappa
         updated[k], misfit[k] = oracle.updated, oracle.misfit
     zero = oracle.p[3] if oracle.n_core == 4 else 0.0
     return WeakIdentified(
         t=end_times(count, design),
-        p=history[0],
-        se=history[1],
+        p=history,
+        se=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
+        covariance=covariance,
         kappa=kappa,
         updated=updated,
         corrected=corrected,
