@@ -1,4 +1,4 @@
-/* Runs one stage of the strong form's tick a given number of times, for an instruction counter.
+/* Runs one stage of a tick, or a whole method's tick, a given number of times, for an instruction counter.
  *
  *   tick_cost STAGE TICKS      the difference between two values of TICKS is the stage's cost
  *
@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ekf_f32.h"
 #include "pvid/pvid.h"
 #include "rls_f32.h"
 #include "weak_rig.h"
@@ -39,8 +40,41 @@ static float derivatives_phi[SAMPLES][PVID_ORDERS], derivatives_u[SAMPLES][3];
 static float rows[SAMPLES][PVID_KAPITZA_STRONG_THETA], row_y[SAMPLES];
 
 static pvid_strong_f32 identifier;
+static pvid_strong_f32 smoothing; /* the same behind the longest window of a Savitzky-Golay bank */
 static pvid_estimator_f32 newton; /* feedback_hz = 0: a Gauss-Newton step at every tick */
 static rls_f32 rls;
+static ekf_f32 kalman;
+
+/* Five-point differences among zeros: what a bank of LONGEST points a side costs, with rows that stay those above. */
+#define LONGEST ((PVID_MAX_WINDOW - 1) / 2)
+static float long_bank[PVID_ORDERS * LONGEST];
+
+static void prepare_smoothing(pvid_strong_config_f32 config)
+{
+    for (uint32_t order = 0; order < PVID_ORDERS; order++) {
+        for (uint32_t i = 0; i < 2u; i++) {
+            long_bank[(order * LONGEST) + i] = pvid_five_points_f32[(2u * order) + i];
+        }
+    }
+    config.bank = (pvid_fir_bank_f32){.half = LONGEST, .stride = 1, .weights = long_bank};
+    if (pvid_strong_init_f32(&smoothing, &config) != PVID_OK) {
+        exit(2);
+    }
+}
+
+/* The filter's u is a second difference of the nearest samples, its other taps 0: they cost the same. */
+static void prepare_kalman(void)
+{
+    ekf_config_f32 config = {
+        .dt = 1.0e-3f,
+        .angle_variance = 5.0e-8f,
+        .rate_noise = 1.0e-10f,
+        .start = {31.0f, 8.9f, 5.6f},
+        .start_sd = {1.5f, 0.4f, 0.3f},
+        .second = {1.0e6f / 0.3f},
+    };
+    ekf_init_f32(&kalman, &config);
+}
 
 static void prepare(void)
 {
@@ -81,6 +115,8 @@ static void prepare(void)
     if (pvid_strong_init_f32(&identifier, &config) != PVID_OK) {
         exit(2);
     }
+    prepare_smoothing(config);
+    prepare_kalman();
     config.estimator.model = &pvid_kapitza_strong_f32;
     config.estimator.update_rate_hz = config.sample_rate_hz;
     config.estimator.feedback_hz = 0.0f;
@@ -151,6 +187,17 @@ static void tick(uint32_t i)
     sink = (float)pvid_strong_step_f32(&identifier, phi_samples[i], y_samples[i]);
 }
 
+static void smoothing_tick(uint32_t i)
+{
+    sink = (float)pvid_strong_step_f32(&smoothing, phi_samples[i], y_samples[i]);
+}
+
+static void kalman_tick(uint32_t i)
+{
+    (void)ekf_sample_f32(&kalman, phi_samples[i], y_samples[i]);
+    sink = kalman.x[4];
+}
+
 static void assess(uint32_t i)
 {
     pvid_estimate_f32 estimate;
@@ -175,10 +222,20 @@ static const struct {
     const char *name;
     void (*run)(uint32_t i);
 } stages[] = {
-    {"nothing", nothing},     {"differentiator", differentiator}, {"row", row},   {"add", add},
-    {"read", read_sums},      {"project", project},               {"tick", tick}, {"estimator", estimator},
-    {"assess", assess},       {"rls", rls_step},                  {"gauss-newton", gauss_newton},
+    {"nothing", nothing},
+    {"differentiator", differentiator},
+    {"row", row},
+    {"add", add},
+    {"read", read_sums},
+    {"project", project},
+    {"tick", tick},
+    {"estimator", estimator},
+    {"assess", assess},
+    {"rls", rls_step},
+    {"gauss-newton", gauss_newton},
     {"weak", weak},
+    {"smoothing", smoothing_tick},
+    {"kalman", kalman_tick},
 };
 
 int main(int argc, char **argv)
@@ -190,6 +247,8 @@ int main(int argc, char **argv)
     prepare();
     for (uint32_t i = 0; i < SAMPLES; i++) { /* warm: windows full, S positive */
         (void)pvid_strong_step_f32(&identifier, phi_samples[i], y_samples[i]);
+        (void)pvid_strong_step_f32(&smoothing, phi_samples[i], y_samples[i]);
+        (void)ekf_sample_f32(&kalman, phi_samples[i], y_samples[i]);
         (void)pvid_estimator_step_f32(&identifier.estimator, rows[i], row_y[i]);
         (void)pvid_estimator_step_f32(&newton, rows[i], row_y[i]);
     }

@@ -523,6 +523,20 @@ def bench_design_cost(update: bool) -> int:
     return DONE
 
 
+@bench.command(name="side-by-side")
+@_UPDATE
+def bench_side_by_side(update: Path | None) -> int:
+    """Every method on the same data: both forms, a Kalman filter, output error (counts need valgrind)."""
+    from pvid.bench import cost, side_by_side
+
+    with tempfile.TemporaryDirectory() as folder:
+        counted = {one.stage: one.instructions for one in cost.stage_costs(cost.build(Path(folder)))}
+    with progress_bar("side by side", side_by_side.NUMBER_OF_ROWS) as advance:
+        rows = list(side_by_side.side_by_side(Native(), instructions=counted, progress=advance))
+    _update_readme(update, "side-by-side", _markdown(side_by_side.HEADER, rows))
+    return DONE
+
+
 def _markdown(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])

@@ -26,7 +26,9 @@ STAGES = {
     "tick": "samples in, parameters out",
     "assess": "standard errors and kappa (only when published)",
     "weak": "weak form, samples in, parameters out: mean over its windows (K = 12, 1 kHz)",
+    "smoothing": "strong form behind two Savitzky-Golay banks of 321 points, samples in, parameters out",
     "rls": "plain packed RLS of the same 11 parameters",
+    "kalman": "extended Kalman filter of 7 states, u by 71 taps, samples in, parameters out",
 }
 
 _FEW, _MANY = 2496, 4992  # multiples of the fold's block of 64 ticks and of the weak form's hop of 624
