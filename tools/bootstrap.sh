@@ -44,8 +44,9 @@ unlock() { exec 9>&-; }
 
 # ---- Debian packages ----
 
-# The packages of PROFILE (pvid or test) that are missing, judged by what they bring, so that a tool
-# installed in another way counts.
+# The packages of PROFILE that are missing, judged by what they bring, so that a tool installed in another way
+# counts. Profiles: pvid (to run), targets (to build for every board and emulate it besides), test (to test, all
+# of that and more).
 missing_packages() {
     local missing=()
     need() { # need PACKAGE CHECK...
@@ -66,6 +67,16 @@ missing_packages() {
     need libc6-dev test -e /usr/include/stdio.h
     need cmake command -v cmake
     need ninja-build command -v ninja
+    if [[ $1 == test || $1 == targets ]]; then
+        # No C library for ARM and RISC-V: firmware/ports does without.
+        need gcc-arm-none-eabi command -v arm-none-eabi-gcc
+        need qemu-system-arm command -v qemu-system-arm
+        need gcc-riscv64-unknown-elf command -v riscv64-unknown-elf-gcc
+        need qemu-system-misc command -v qemu-system-riscv32
+        need gcc-avr command -v avr-gcc
+        need avr-libc test -e /usr/lib/avr/include/avr/io.h
+        need simavr command -v simavr
+    fi
     if [[ $1 == test ]]; then
         need binutils command -v readelf
         need clang command -v clang
@@ -205,12 +216,14 @@ build_core() {
     build_tree host -DCMAKE_C_COMPILER=gcc -DPVID_BUILD_TESTS=OFF || die "the C core did not build; see above"
 }
 
-# prepare PROFILE: pvid (what it takes to run) or test (and what it takes to test).
+# prepare PROFILE: as above.
 prepare() {
+    local python_profile="pvid"
+    [[ $1 != test ]] || python_profile="test"
     lock
     install_packages "$1"
     make_environment
-    install_requirements "$1"
+    install_requirements "$python_profile"
     build_core
     unlock
 }

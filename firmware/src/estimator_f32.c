@@ -48,7 +48,7 @@ static bool model_is_valid(const pvid_model_f32 *model)
            (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) && (model->n_moments >= 1u) &&
            (model->n_moments <= PVID_MAX_MOMENTS) && ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
-           ((model->accumulate != NULL) || (model->n_moments == (model->n_theta * (model->n_theta + 1)) / 2));
+           ((model->accumulate != NULL) || (model->n_moments == ((uint16_t)model->n_theta * (model->n_theta + 1u)) / 2u));
 }
 
 static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config)

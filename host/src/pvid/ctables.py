@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -55,3 +57,30 @@ def bank_header(bank: FirBank, name: str, made_by: str) -> str:
         f"  needs PVID_MAX_WINDOW >= {bank.window}",
     ]
     return _guarded(name, banner, [array])
+
+
+def struct_initializer(struct: ctypes.Structure, pointers: Mapping[str, str]) -> str:
+    """The C99 initializer, by field names, that makes a struct equal to `struct`.
+
+    Parameters
+    ----------
+    struct
+        A mirror of a C struct whose fields are numbers, arrays of them, structs and pointers.
+    pointers
+        What stands for each pointer, by its field's name: "replay_weights", "&replay_design"; NULL without an entry.
+    """
+    fields = []
+    for name, kind, *_ in struct._fields_:
+        value = getattr(struct, name)
+        if isinstance(value, ctypes.Structure):
+            text = struct_initializer(value, pointers)
+        elif isinstance(value, ctypes.Array):
+            text = "{" + ", ".join(float_literal(np.float32(entry)) for entry in value) + "}"
+        elif kind is ctypes.c_void_p or issubclass(kind, ctypes._Pointer):
+            text = pointers.get(name, "NULL")
+        elif kind is ctypes.c_float:
+            text = float_literal(np.float32(value))
+        else:
+            text = str(int(value))
+        fields.append(f".{name} = {text}")
+    return "{" + ", ".join(fields) + "}"

@@ -466,6 +466,51 @@ def _estimator_struct(config: EstimatorConfig) -> EstimatorConfigStruct:
     return struct
 
 
+Tables = dict[str, Float32]
+
+
+def _table_pointers(tables: Tables) -> dict[str, Any]:
+    return {name: table.ctypes.data_as(ctypes.POINTER(ctypes.c_float)) for name, table in tables.items()}
+
+
+def strong_config_struct(config: StrongConfig) -> tuple[StrongConfigStruct, Tables]:
+    """pvid_strong_config_f32 and the tables it points to, by field; they must live as long as the struct."""
+    tables = {"weights": np.ascontiguousarray(config.weights, np.float32)}
+    struct = StrongConfigStruct(
+        sample_rate_hz=config.sample_rate,
+        l1=config.l1,
+        drive_min=config.drive_min,
+        bank=FirBankStruct(half=config.half, stride=config.stride, **_table_pointers(tables)),
+        estimator=_estimator_struct(config.estimator),
+    )
+    return struct, tables
+
+
+def weak_config_struct(config: WeakConfig) -> tuple[WeakConfigStruct, Tables]:
+    """pvid_weak_config_f32 and the tables its design points to, by field; they must live as long as the struct."""
+    design = config.design
+    names = ("smooth", "second", "chi", "gram")
+    tables = {name: np.ascontiguousarray(getattr(design, name), np.float32) for name in names}
+    design_struct = WeakDesignStruct(
+        taps=design.taps,
+        decimation=design.decimation,
+        window=design.window,
+        functions=design.functions,
+        overlap=float(design.overlap),
+        **_table_pointers(tables),
+    )
+    struct = WeakConfigStruct(
+        sample_rate_hz=config.sample_rate,
+        l1=config.l1,
+        drive_min=config.drive_min,
+        design=ctypes.pointer(design_struct),
+        zero_unknown=config.zero_unknown,
+        iterations=config.iterations,
+        estimator=_estimator_struct(config.estimator),
+    )
+    return struct, tables
+
+
 @dataclass
 class _Stepper:
     """A state block in C memory and the replay function that steps it."""
@@ -535,22 +580,10 @@ class StrongIdentifier(_Stepper):
 
     def __init__(self, native: Native, config: StrongConfig) -> None:
         super().__init__(native)
-        self._weights = np.ascontiguousarray(config.weights, np.float32)
-        bank = FirBankStruct(
-            half=config.half,
-            stride=config.stride,
-            weights=self._weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float)),
-        )
-        struct = StrongConfigStruct(
-            sample_rate_hz=config.sample_rate,
-            l1=config.l1,
-            drive_min=config.drive_min,
-            bank=bank,
-            estimator=_estimator_struct(config.estimator),
-        )
+        self._config, self._tables = strong_config_struct(config)
         self._state = ctypes.create_string_buffer(native._strong_size)
         self._estimator_at = native._estimator_at
-        status = Status(native._lib.pvid_strong_init_f32(self._state, ctypes.byref(struct)))
+        status = Status(native._lib.pvid_strong_init_f32(self._state, ctypes.byref(self._config)))
         if status is not Status.OK:
             raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
 
@@ -580,29 +613,10 @@ class WeakIdentifier(_Stepper):
     def __init__(self, native: Native, config: WeakConfig) -> None:
         n_p, n_theta = (4, 8) if config.zero_unknown else (3, 5)
         super().__init__(native, n_p=n_p, n_sums=n_theta * (n_theta + 1) // 2 + n_theta + 2)
-        design = config.design
-        names = ("smooth", "second", "chi", "gram")
-        self._tables = {name: np.ascontiguousarray(getattr(design, name), np.float32) for name in names}
-        self._design = WeakDesignStruct(
-            taps=design.taps,
-            decimation=design.decimation,
-            window=design.window,
-            functions=design.functions,
-            overlap=float(design.overlap),
-            **{name: table.ctypes.data_as(ctypes.POINTER(ctypes.c_float)) for name, table in self._tables.items()},
-        )
-        struct = WeakConfigStruct(
-            sample_rate_hz=config.sample_rate,
-            l1=config.l1,
-            drive_min=config.drive_min,
-            design=ctypes.pointer(self._design),
-            zero_unknown=config.zero_unknown,
-            iterations=config.iterations,
-            estimator=_estimator_struct(config.estimator),
-        )
+        self._config, self._tables = weak_config_struct(config)
         self._state = ctypes.create_string_buffer(native._weak_size)
         self._estimator_at = native._weak_estimator_at
-        status = Status(native._lib.pvid_weak_init_f32(self._state, ctypes.byref(struct)))
+        status = Status(native._lib.pvid_weak_init_f32(self._state, ctypes.byref(self._config)))
         if status is not Status.OK:
             raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
 

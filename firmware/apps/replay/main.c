@@ -1,0 +1,105 @@
+/* Plays a run that stands in the image through the identifier and reports, as lines of text: the running hash
+ * (fnv.h) on the way and at the end, what a tick costs, how much stack and state it took. No link is needed, so
+ * it is the first thing to run on a new board. `pvid sizes` and the tests make replay_run.h: settings, tables
+ * and samples in counts of the sensors.
+ *
+ * Exit codes: 0 played, 2 the core refused the settings, 3 float arithmetic is not what was promised.
+ */
+#include "port.h"
+#include "pvid/pvid.h"
+#include "replay_run.h"
+#include "report.h"
+
+#if REPLAY_WEAK
+typedef pvid_weak_f32 identifier_f32;
+#define INIT pvid_weak_init_f32
+#define STEP pvid_weak_step_f32
+#else
+typedef pvid_strong_f32 identifier_f32;
+#define INIT pvid_strong_init_f32
+#define STEP pvid_strong_step_f32
+#endif
+
+#define EXIT_REFUSED 2
+#define EXIT_ARITHMETIC 3
+
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define SAMPLE(tick, channel) ((int16_t)pgm_read_word(&replay_samples[tick][channel]))
+#else
+#define SAMPLE(tick, channel) (replay_samples[tick][channel])
+#endif
+
+static identifier_f32 identifier;
+
+typedef struct {
+    uint64_t total; /* counts of pvid_port_instructions */
+    uint32_t longest;
+    uint32_t ticks;
+} cost;
+
+/* Counts that measuring itself takes: two readings in a row. */
+static uint32_t overhead(void)
+{
+    const uint32_t before = pvid_port_instructions();
+    return pvid_port_instructions() - before;
+}
+
+static void add(cost *self, uint32_t counts)
+{
+    self->total += counts;
+    self->ticks++;
+    self->longest = (counts > self->longest) ? counts : self->longest;
+}
+
+static uint32_t play(cost *whole)
+{
+    uint32_t hash = PVID_FNV_START;
+    const uint32_t reading = overhead();
+    for (uint32_t tick = 0; tick < REPLAY_TICKS; tick++) {
+        const float phi = (float)SAMPLE(tick, 0) * replay_phi_lsb;
+        const float y = (float)SAMPLE(tick, 1) * replay_y_lsb;
+        const uint32_t before = pvid_port_instructions();
+        const pvid_reason reason = STEP(&identifier, phi, y);
+        const uint32_t counts = pvid_port_instructions() - before - reading;
+        if (tick >= REPLAY_MEASURE_FROM) {
+            add(whole, counts);
+        }
+        hash = pvid_fnv_estimator_f32(hash, &identifier.estimator, reason);
+        if (((tick + 1u) % REPLAY_REPORT_EVERY) == 0u) {
+            report_hash_at(tick + 1u, hash);
+        }
+    }
+    return hash;
+}
+
+int main(void)
+{
+    pvid_port_init();
+    report_text("pvid replay on " PVID_BOARD_NAME ", " REPLAY_FORM " form\n");
+    const uint32_t faults = pvid_arithmetic_faults_f32();
+    report_number("arithmetic_faults", faults);
+    if (faults != 0u) {
+        return EXIT_ARITHMETIC;
+    }
+    const pvid_status status = INIT(&identifier, &replay_config);
+    report_number("status", (uint32_t)status);
+    if (status != PVID_OK) {
+        return EXIT_REFUSED;
+    }
+    cost whole = {0, 0, 0};
+    const uint32_t hash = play(&whole);
+    report_number("ticks", REPLAY_TICKS);
+    report_hex("hash", hash);
+    report_number("measured_ticks", whole.ticks);
+    report_hex("total_counts_high", (uint32_t)(whole.total >> 32));
+    report_hex("total_counts_low", (uint32_t)whole.total);
+    report_number("longest_counts", whole.longest);
+    report_number("counts_per_1024", pvid_port_counts_per_1024());
+    report_number("stack_used", (uint32_t)pvid_port_stack_used());
+    report_number("stack_size", (uint32_t)pvid_port_stack_size());
+    report_number("state_bytes", (uint32_t)sizeof identifier);
+    report_number("estimator_bytes", (uint32_t)sizeof identifier.estimator);
+    report_text("done\n");
+    return 0;
+}

@@ -1,0 +1,80 @@
+# A build for one board: PVID_BOARD names a file of ports/boards.
+#
+# Included before the targets are made, because the core's options hold for all of them. Then
+#     pvid_add_image(name main.c ...)
+# makes name.elf, with the board's start-up, port and memory map.
+
+set(pvid_ports ${CMAKE_CURRENT_LIST_DIR}/../ports)
+set(pvid_board_file ${pvid_ports}/boards/${PVID_BOARD}.cmake)
+if(NOT EXISTS ${pvid_board_file})
+  file(GLOB pvid_boards RELATIVE ${pvid_ports}/boards ${pvid_ports}/boards/*.cmake)
+  list(TRANSFORM pvid_boards REPLACE "\\.cmake$" "")
+  list(JOIN pvid_boards ", " pvid_boards)
+  message(FATAL_ERROR "PVID_BOARD is ${PVID_BOARD}; there are ${pvid_boards}")
+endif()
+include(${pvid_board_file})
+
+if(PVID_BOARD_FAMILY STREQUAL "cortex_m")
+  set(pvid_toolchain cortex-m)
+else()
+  set(pvid_toolchain ${PVID_BOARD_FAMILY})
+endif()
+if(NOT CMAKE_CROSSCOMPILING)
+  message(FATAL_ERROR "${PVID_BOARD} needs a cross compiler: --toolchain firmware/cmake/${pvid_toolchain}.cmake")
+endif()
+
+add_compile_options(
+  ${PVID_BOARD_CPU}
+  -ffunction-sections
+  -fdata-sections
+  -fstack-usage     # read by `pvid sizes`
+  -fno-math-errno   # sqrtf is one instruction where there is one
+)
+add_link_options(${PVID_BOARD_CPU})
+
+set(pvid_port_sources ${pvid_ports}/fault.c)
+if(PVID_BOARD_FAMILY STREQUAL "avr")
+  list(APPEND pvid_port_sources ${pvid_ports}/avr/port.c)
+else()
+  # No C library: the compiler's own headers, these two, and its arithmetic (libgcc).
+  add_compile_options(-ffreestanding -fbuiltin)
+  include_directories(${pvid_ports}/freestanding/include)
+  set(PVID_MATH_LIBRARY "" CACHE STRING "The library that has sqrtf" FORCE)
+  list(APPEND pvid_port_sources
+    ${pvid_ports}/freestanding/memory.c
+    ${pvid_ports}/freestanding/square_root.c
+    ${pvid_ports}/start.c
+    ${pvid_ports}/uart/uart_port.c
+    ${pvid_ports}/uart/uart_${PVID_BOARD_UART}.c
+    ${pvid_ports}/${PVID_BOARD_FAMILY}/startup.c
+    ${pvid_ports}/${PVID_BOARD_FAMILY}/port.c
+  )
+  # Loops that fill and copy must not become calls of themselves.
+  set_source_files_properties(
+    ${pvid_ports}/freestanding/memory.c ${pvid_ports}/start.c
+    PROPERTIES COMPILE_OPTIONS -fno-tree-loop-distribute-patterns
+  )
+  set(pvid_linker_script ${pvid_ports}/${PVID_BOARD_FAMILY}/link.ld)
+  list(TRANSFORM PVID_BOARD_MEMORY PREPEND "-Wl,--defsym=pvid_" OUTPUT_VARIABLE pvid_memory_options)
+endif()
+
+add_library(pvid_port OBJECT ${pvid_port_sources})
+target_include_directories(pvid_port PUBLIC ${pvid_ports})
+target_compile_definitions(pvid_port PRIVATE ${PVID_BOARD_DEFINITIONS})
+set_target_properties(pvid_port PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+pvid_developer_warnings(pvid_port)
+
+function(pvid_add_image name)
+  add_executable(${name} ${ARGN})
+  pvid_compile_as_core(${name})
+  pvid_developer_warnings(${name})
+  set_target_properties(${name} PROPERTIES SUFFIX .elf)
+  target_compile_definitions(${name} PRIVATE PVID_BOARD_NAME="${PVID_BOARD}")
+  target_link_libraries(${name} PRIVATE pvid_port pvid::pvid)
+  target_link_options(${name} PRIVATE -Wl,--gc-sections -Wl,-Map=${CMAKE_CURRENT_BINARY_DIR}/${name}.map)
+  if(pvid_linker_script)
+    target_link_options(${name} PRIVATE -nostdlib -T${pvid_linker_script} ${pvid_memory_options})
+    target_link_libraries(${name} PRIVATE gcc)
+    set_target_properties(${name} PROPERTIES LINK_DEPENDS ${pvid_linker_script})
+  endif()
+endfunction()

@@ -1,0 +1,6 @@
+# Arm MPS3 with image AN547: Cortex-M55, FPU without the vector extension. QEMU: -machine mps3-an547.
+set(PVID_BOARD_FAMILY cortex_m)
+set(PVID_BOARD_CPU -mcpu=cortex-m55+nomve -mfloat-abi=hard)
+set(PVID_BOARD_UART cmsdk)
+set(PVID_BOARD_DEFINITIONS PVID_UART_BASE=0x59303000u PVID_CLOCK_HZ=32000000u)
+set(PVID_BOARD_MEMORY code_origin=0 code_bytes=512K ram_origin=0x20000000 ram_bytes=512K stack_bytes=16K)

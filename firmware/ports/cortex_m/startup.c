@@ -1,0 +1,114 @@
+/* Start of a Cortex-M (v6-M to v8.1-M): vector table, FPU, then main; every exception is a fault here,
+ * reported over the UART with its cause.
+ *
+ * The stack lies at the lowest address of the RAM: a stack that overflows leaves the memory and faults,
+ * instead of writing over variables. The report has a stack of its own.
+ */
+#include "../fault.h"
+#include "../memory_map.h"
+#include "../start.h"
+
+void pvid_reset(void);
+void pvid_exception(void);
+void pvid_exception_report(const uint32_t *frame, uint32_t exception);
+
+static uint64_t report_stack[64];
+
+typedef void (*vector)(void);
+
+/* Entry 0 is the initial stack pointer, 1 the reset, 2 to 15 the core's own exceptions. A board that uses
+ * interrupts adds theirs. */
+__attribute__((section(".vectors"), used)) static const struct {
+    uint32_t *stack;
+    vector reset;
+    vector exceptions[14];
+} vectors = {
+    .stack = pvid_stack_top,
+    .reset = pvid_reset,
+    .exceptions = {pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception,
+                   pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception,
+                   pvid_exception, pvid_exception},
+};
+
+#define SYSTEM_REGISTER(address) (*(volatile uint32_t *)(uintptr_t)(address))
+#define CPACR SYSTEM_REGISTER(0xE000ED88u)
+#define CPACR_FPU_FULL_ACCESS 0x00F00000u
+#define CFSR SYSTEM_REGISTER(0xE000ED28u)
+#define HFSR SYSTEM_REGISTER(0xE000ED2Cu)
+#define BFAR SYSTEM_REGISTER(0xE000ED38u)
+
+#define CFSR_STACKING 0x1010u        /* MSTKERR, STKERR: the exception's own frame could not be written */
+#define CFSR_NO_COPROCESSOR 0x80000u /* NOCP: an FPU instruction without an FPU, or with it switched off */
+#define CFSR_UNDEFINED 0x10000u
+#define CFSR_BUS 0x0F00u
+#define CFSR_MEMORY 0x00FFu
+
+void pvid_reset(void)
+{
+#if defined(__ARM_FP)
+    CPACR |= CPACR_FPU_FULL_ACCESS;
+    __asm__ volatile("dsb\n\tisb" ::: "memory");
+#endif
+    uint32_t *stack;
+    __asm__ volatile("mov %0, sp" : "=r"(stack));
+    pvid_start(stack);
+}
+
+/* The report runs on its own stack: the interrupted one may be what failed. */
+__attribute__((naked)) void pvid_exception(void)
+{
+    __asm__ volatile("mrs r0, msp\n\t"
+                     "mrs r1, ipsr\n\t"
+                     "ldr r2, =%c0\n\t"
+                     "mov sp, r2\n\t"
+                     "ldr r2, =pvid_exception_report\n\t"
+                     "bx r2\n\t"
+                     ".ltorg"
+                     :
+                     : "i"(&report_stack[sizeof report_stack / sizeof report_stack[0]]));
+}
+
+static const char *cause(const uint32_t *frame, uint32_t exception)
+{
+    if (((uintptr_t)frame < (uintptr_t)pvid_stack_bottom) || ((uintptr_t)frame > ((uintptr_t)pvid_stack_top - 32u))) {
+        return "stack overflow,";
+    }
+    if ((exception < 3u) || (exception > 6u)) {
+        return "unexpected exception,";
+    }
+#if !defined(__ARM_ARCH_6M__) && !defined(__ARM_ARCH_8M_BASE__)
+    const uint32_t status = CFSR;
+    if ((status & CFSR_STACKING) != 0u) {
+        return "stack overflow,";
+    }
+    if ((status & CFSR_NO_COPROCESSOR) != 0u) {
+        return "FPU instruction and no FPU,";
+    }
+    if ((status & CFSR_UNDEFINED) != 0u) {
+        return "undefined instruction,";
+    }
+    if ((status & CFSR_BUS) != 0u) {
+        return "bus error,";
+    }
+    if ((status & CFSR_MEMORY) != 0u) {
+        return "memory protection,";
+    }
+#endif
+    return "hard fault,";
+}
+
+void pvid_exception_report(const uint32_t *frame, uint32_t exception)
+{
+    pvid_fault_begin(cause(frame, exception));
+    pvid_fault_word("exception", exception);
+    if (((uintptr_t)frame >= (uintptr_t)pvid_stack_bottom) && ((uintptr_t)frame <= ((uintptr_t)pvid_stack_top - 32u))) {
+        pvid_fault_word("pc", frame[6]);
+        pvid_fault_word("lr", frame[5]);
+    }
+#if !defined(__ARM_ARCH_6M__) && !defined(__ARM_ARCH_8M_BASE__)
+    pvid_fault_word("cfsr", CFSR);
+    pvid_fault_word("hfsr", HFSR);
+    pvid_fault_word("bfar", BFAR);
+#endif
+    pvid_fault_end();
+}

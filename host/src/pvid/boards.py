@@ -1,0 +1,164 @@
+"""The boards of firmware/ports: how an image for each is built and run in its emulator."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pvid.errors import PvidError
+
+ROOT = Path(__file__).resolve().parents[3]
+BUILD = ROOT / "build" / "targets"
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board of firmware/ports/boards and the emulator that plays it."""
+
+    name: str
+    core: str
+    toolchain: str
+    fpu: bool
+    emulator: str
+    machine: str
+
+    @property
+    def compiler(self) -> str:
+        """The cross compiler's command."""
+        return {"cortex-m": "arm-none-eabi-gcc", "riscv": "riscv64-unknown-elf-gcc", "avr": "avr-gcc"}[self.toolchain]
+
+    @property
+    def tool_prefix(self) -> str:
+        """What stands before objdump, nm and size."""
+        return self.compiler.removesuffix("gcc")
+
+    @property
+    def unit(self) -> str:
+        """What the emulator counts."""
+        return "cycles" if self.toolchain == "avr" else "instructions"
+
+    def command(self, image: Path) -> list[str]:
+        """Runs `image` with the UART on standard input and output; instructions are counted, not timed.
+
+        The exit code is the image's own, but simavr's, which is always 0.
+        """
+        if self.emulator == "simavr":
+            return ["simavr", "-m", self.machine, "-f", "16000000", str(image)]
+        command = [
+            self.emulator,
+            "-machine",
+            self.machine,
+            "-display",
+            "none",
+            "-monitor",
+            "none",
+            "-nodefaults",
+            "-nic",
+            "none",
+        ]
+        command += ["-serial", "stdio", "-kernel", str(image)]
+        if self.toolchain == "riscv":
+            return [*command, "-bios", "none", "-icount", "shift=0,sleep=off"]
+        return [*command, "-icount", "shift=8,sleep=off", "-semihosting-config", "enable=on,target=native"]
+
+    @property
+    def missing(self) -> list[str]:
+        """Commands that this machine lacks to build for the board and run it."""
+        return [tool for tool in (self.compiler, self.emulator) if shutil.which(tool) is None]
+
+
+def _cortex_m(name: str, core: str, fpu: bool) -> Board:
+    return Board(name, core, "cortex-m", fpu, "qemu-system-arm", name)
+
+
+BOARDS = {
+    board.name: board
+    for board in (
+        _cortex_m("microbit", "Cortex-M0", False),
+        _cortex_m("mps2-an385", "Cortex-M3", False),
+        _cortex_m("mps2-an386", "Cortex-M4F", True),
+        _cortex_m("netduinoplus2", "Cortex-M4F", True),
+        _cortex_m("mps2-an500", "Cortex-M7F", True),
+        _cortex_m("mps2-an505", "Cortex-M33F", True),
+        _cortex_m("mps3-an547", "Cortex-M55F", True),
+        Board("virt-rv32imac", "RV32IMAC", "riscv", False, "qemu-system-riscv32", "virt"),
+        Board("virt-rv32imafc", "RV32IMAFC", "riscv", True, "qemu-system-riscv32", "virt"),
+        Board("atmega2560", "ATmega2560", "avr", False, "simavr", "atmega2560"),
+        Board("atmega328p", "ATmega328P", "avr", False, "simavr", "atmega328p"),
+    )
+}
+
+
+def board(name: str) -> Board:
+    """The board of that name.
+
+    Raises
+    ------
+    PvidError
+        When there is none.
+    """
+    if name not in BOARDS:
+        raise PvidError(f"there is no board {name}; there are {', '.join(BOARDS)}")
+    return BOARDS[name]
+
+
+def build(target: Board, tree: Path, options: Mapping[str, str]) -> Path:
+    """Builds firmware/ for a board into `tree` with these CMake variables; returns `tree`.
+
+    Raises
+    ------
+    PvidError
+        When the compiler is missing or something does not build.
+    """
+    if shutil.which(target.compiler) is None:
+        raise PvidError(f"{target.compiler} is not installed: it comes with ./tools/test")
+    firmware = ROOT / "firmware"
+    configure = ["cmake", "-S", str(firmware), "-B", str(tree), "-G", "Ninja"]
+    configure += [f"-DCMAKE_TOOLCHAIN_FILE={firmware / 'cmake' / target.toolchain}.cmake"]
+    configure += [f"-DPVID_BOARD={target.name}", "-DPVID_DEVELOPER=ON"]
+    configure += [f"-D{name}={value}" for name, value in options.items()]
+    for command in (configure, ["cmake", "--build", str(tree)]):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            lines = (done.stdout + done.stderr).strip().splitlines()
+            errors = [line for line in lines if re.search(r"error|undefined|overflowed|CMake Error", line)]
+            raise PvidError(f"{target.name}: the build failed: {' '.join((errors or lines or ['no output'])[:2])}")
+    return tree
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run in an emulator left."""
+
+    text: str
+    exit_code: int
+
+
+def run(target: Board, image: Path, timeout: float, machine: str | None = None) -> Outcome:
+    """Runs an image in its board's emulator until it exits, `timeout` seconds at most.
+
+    Parameters
+    ----------
+    machine
+        Another machine of the same emulator.
+
+    Raises
+    ------
+    PvidError
+        When the emulator is missing or the image does not exit in time.
+    """
+    if shutil.which(target.emulator) is None:
+        raise PvidError(f"{target.emulator} is not installed: it comes with ./tools/test")
+    command = [machine if machine and part == target.machine else part for part in target.command(image)]
+    try:
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=timeout, check=False)
+    except subprocess.TimeoutExpired as error:
+        heard = (error.stdout or b"").decode("ascii", "replace").strip().splitlines()
+        raise PvidError(
+            f"{target.name}: no end after {timeout:g} s; last heard: {heard[-1] if heard else 'nothing'}"
+        ) from error
+    return Outcome((done.stdout + done.stderr).decode("ascii", "replace"), done.returncode)
