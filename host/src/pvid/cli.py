@@ -523,6 +523,18 @@ def bench_design_cost(update: bool) -> int:
     return DONE
 
 
+@bench.command(name="hard")
+@_UPDATE
+def bench_hard(update: Path | None) -> int:
+    """Noise until the answer fails, little motion or drive, one mode, friction, large angles: 40 runs a case."""
+    from pvid.bench import hard
+
+    with progress_bar("hard cases", len(hard.CASES) * hard.SEEDS) as advance:
+        rows = list(hard.hard_table(Native(), progress=advance))
+    _update_readme(update, "hard", _markdown(hard.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="side-by-side")
 @_UPDATE
 def bench_side_by_side(update: Path | None) -> int:
