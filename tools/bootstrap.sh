@@ -80,6 +80,7 @@ missing_packages() {
     if [[ $1 == test ]]; then
         need binutils command -v readelf
         need clang command -v clang
+        need g++ command -v g++
         need libclang-rt-dev links_with clang -fsanitize=address,undefined
         need libcmocka-dev test -e /usr/include/cmocka.h
         need pkg-config command -v pkg-config

@@ -4,6 +4,7 @@ include(GNUInstallDirs)
 
 install(TARGETS pvid EXPORT pvid-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/pvid DESTINATION include)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(EXPORT pvid-targets NAMESPACE pvid:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pvid)
 
 # The exported target has no dependency to look up, so the targets file is the whole configuration.

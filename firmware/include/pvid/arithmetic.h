@@ -8,9 +8,17 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* 0 when float32 behaves as promised, else the sum of:
  *   1 products and sums are fused   2 subnormals are flushed   4 not rounding to nearest even
  *   8 sqrtf is not correctly rounded   16 division is not correctly rounded */
 uint32_t pvid_arithmetic_faults_f32(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -21,6 +21,10 @@
 #include "pvid/config.h"
 #include "pvid/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PVID_ORDERS 5
 
 /* A bank in folded form. With x[0] the centre sample and x[+-i] the samples i * stride away,
@@ -60,5 +64,9 @@ void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self);
 /* Takes one finite sample in and, once the window is full, writes the five derivatives
  * out[k] [unit/s^k]. Returns whether it did. Cost: 5 half multiplications. */
 bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, float out[PVID_ORDERS]);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

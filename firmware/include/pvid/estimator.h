@@ -32,6 +32,10 @@
 #include "pvid/model.h"
 #include "pvid/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     PVID_LAW_STATIONARY = 0, /* with the feedback of F: converges to the least-squares estimate */
     PVID_LAW_PSEUDOVELOCITY  /* equation (5) alone */
@@ -172,5 +176,9 @@ uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_gro
 /* Standard errors, kappa and residual of the present estimate, from (S / s^2 + 1 / start_sd^2)^-1
  * with s^2 = correlation * residual sum / (weight - n_p). Costs about two solves; changes nothing. */
 void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,6 +10,10 @@
 
 #include "pvid/estimator.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PVID_FNV_START 0x811C9DC5u
 
 /* hash continued over one 32-bit word, low byte first, whatever the machine's byte order. */
@@ -17,5 +21,9 @@ uint32_t pvid_fnv_word(uint32_t hash, uint32_t word);
 
 /* hash continued over the estimator's state after a tick that ended with `reason`. */
 uint32_t pvid_fnv_estimator_f32(uint32_t hash, const pvid_estimator_f32 *estimator, pvid_reason reason);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,6 +15,10 @@
 #include "pvid/config.h"
 #include "pvid/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Layout of the sums: n_moments of M, n_theta of B, yy, weight. */
 #define PVID_MAX_SUMS (PVID_MAX_MOMENTS + PVID_MAX_THETA + 2)
 
@@ -48,5 +52,9 @@ void pvid_information_end_group_f32(pvid_information_f32 *self);
 
 /* sums[0 .. n_moments + n_theta + 1] = the current values, in the layout above. */
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS]);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -16,6 +16,10 @@
 #include "pvid/estimator.h"
 #include "pvid/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PVID_KAPITZA_P 3
 #define PVID_KAPITZA_STRONG_THETA 11
 
@@ -47,5 +51,9 @@ void pvid_kapitza_strong_row_f32(const float phi[5], const float u[3], float *y,
 
 /* The strong form as a model: 11 entries of theta, 3 free parameters, 45 moments. */
 extern const pvid_model_f32 pvid_kapitza_strong_f32;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

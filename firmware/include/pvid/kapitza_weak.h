@@ -15,6 +15,10 @@
 #include "pvid/kapitza.h"
 #include "pvid/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PVID_KAPITZA_WEAK_THETA 8
 #define PVID_KAPITZA_WEAK_P 4
 #define PVID_KAPITZA_ZEROED_THETA 5
@@ -26,5 +30,9 @@ extern const pvid_model_f32 pvid_kapitza_weak_f32;
 
 /* The weak form of a zeroed encoder: 5 entries of theta, 3 free parameters, 15 moments. */
 extern const pvid_model_f32 pvid_kapitza_weak_zeroed_f32;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

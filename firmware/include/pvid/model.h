@@ -20,6 +20,10 @@
 
 #include "pvid/config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct pvid_model_f32 pvid_model_f32;
 
 struct pvid_model_f32 {
@@ -49,5 +53,9 @@ struct pvid_model_f32 {
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
 };
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,10 +5,6 @@
 #ifndef PVID_PVID_H
 #define PVID_PVID_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #include "pvid/arithmetic.h"
 #include "pvid/differentiator.h"
 #include "pvid/estimator.h"
@@ -24,9 +20,5 @@ extern "C" {
 #define PVID_VERSION_MAJOR 0
 #define PVID_VERSION_MINOR 1
 #define PVID_VERSION_PATCH 0
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

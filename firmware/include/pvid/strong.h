@@ -18,6 +18,10 @@
 #include "pvid/estimator.h"
 #include "pvid/kapitza.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     float sample_rate_hz;     /* 1e-3..1e6 */
     float l1;                 /* length of rod 1 [m], > 0 */
@@ -49,5 +53,9 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_strong_gap_f32(pvid_strong_f32 *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -34,6 +34,10 @@
 #include "pvid/estimator.h"
 #include "pvid/kapitza_weak.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* The tables of a design: constant data, made on a PC, kept by reference.
  *
  * The test functions chi_k and their first three derivatives vanish at both ends of the window, so
@@ -155,5 +159,9 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,0 +1,37 @@
+// The headers from C++, each by itself and before the others, and the C library behind them.
+// Prints "version MAJOR.MINOR.PATCH taps PVID_MAX_TAPS".
+#include "pvid/weak.h"
+
+#include "pvid/strong.h"
+
+#include "pvid/fnv.h"
+
+#include "pvid/arithmetic.h"
+
+#include "pvid/pvid.h"
+
+#include <cstdio>
+
+namespace {
+
+pvid_weak_f32 weak;
+pvid_strong_f32 strong;
+
+} // namespace
+
+int main()
+{
+    // Linking is half of the test: without C linkage these are other names than the library's. Empty configurations
+    // are refused.
+    pvid_weak_config_f32 weak_config{};
+    weak_config.estimator = pvid_estimator_defaults_f32;
+    pvid_strong_config_f32 strong_config{};
+    strong_config.estimator = pvid_estimator_defaults_f32;
+    if (pvid_weak_init_f32(&weak, &weak_config) == PVID_OK || pvid_strong_init_f32(&strong, &strong_config) == PVID_OK ||
+        pvid_arithmetic_faults_f32() != 0) {
+        return 1;
+    }
+    std::printf("version %d.%d.%d taps %d\n", PVID_VERSION_MAJOR, PVID_VERSION_MINOR, PVID_VERSION_PATCH,
+                PVID_MAX_TAPS);
+    return 0;
+}
