@@ -76,6 +76,8 @@ missing_packages() {
         need gcc-avr command -v avr-gcc
         need avr-libc test -e /usr/lib/avr/include/avr/io.h
         need simavr command -v simavr
+        need libsimavr-dev test -e /usr/include/simavr/sim_avr.h
+        need libelf-dev test -e /usr/include/libelf.h
     fi
     if [[ $1 == test ]]; then
         need binutils command -v readelf

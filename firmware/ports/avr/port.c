@@ -8,6 +8,7 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
+#include <stdlib.h>
 #include <util/delay.h>
 
 #include "../fault.h"
@@ -34,6 +35,12 @@ __asm__(".section .init3,\"ax\",@progbits\n\t"
 ISR(TIMER1_OVF_vect)
 {
     overflows++;
+}
+
+/* avr-libc's start calls this when main returns. */
+void exit(int code)
+{
+    pvid_port_exit(code);
 }
 
 ISR(BADISR_vect)
@@ -92,10 +99,10 @@ uint32_t pvid_port_counts_per_1024(void)
     return 1024u;
 }
 
-/* Asleep without interrupts: simavr ends, with 0 whatever the code. */
+/* Asleep without interrupts, with the code in GPIOR0: the emulator ends. */
 void pvid_port_exit(int code)
 {
-    (void)code;
+    GPIOR0 = (uint8_t)code;
     _delay_us(200); /* two bytes at 115200 baud: the one on its way and the one behind it */
     cli();
     sleep_enable();

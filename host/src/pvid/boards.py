@@ -13,6 +13,7 @@ from pvid.errors import PvidError
 
 ROOT = Path(__file__).resolve().parents[3]
 BUILD = ROOT / "build" / "targets"
+SIMAVR_STDIO = BUILD / "simavr_stdio"
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,10 @@ class Board:
     def command(self, image: Path) -> list[str]:
         """Runs `image` with the UART on standard input and output; instructions are counted, not timed.
 
-        The exit code is the image's own, but simavr's, which is always 0.
+        The exit code is the image's own. For an AVR `simavr_stdio` has to be there: see `prepare_emulator`.
         """
         if self.emulator == "simavr":
-            return ["simavr", "-m", self.machine, "-f", "16000000", str(image)]
+            return [str(SIMAVR_STDIO), self.machine, str(image)]
         command = [
             self.emulator,
             "-machine",
@@ -130,6 +131,30 @@ def build(target: Board, tree: Path, options: Mapping[str, str]) -> Path:
     return tree
 
 
+def prepare_emulator(target: Board) -> None:
+    """Makes sure that `target.command` can be run.
+
+    Raises
+    ------
+    PvidError
+        When the emulator is not installed.
+    """
+    if shutil.which(target.emulator) is None:
+        raise PvidError(f"{target.emulator} is not installed: it comes with ./tools/test")
+    source = ROOT / "host" / "native" / "simavr_stdio.c"
+    if target.emulator != "simavr" or (
+        SIMAVR_STDIO.exists() and SIMAVR_STDIO.stat().st_mtime >= source.stat().st_mtime
+    ):
+        return
+    BUILD.mkdir(parents=True, exist_ok=True)
+    fresh = SIMAVR_STDIO.with_suffix(".new")
+    command = ["gcc", "-std=gnu99", "-O2", "-I/usr/include/simavr", str(source), "-lsimavr", "-lelf", "-o", str(fresh)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise PvidError(f"simavr_stdio did not build (libsimavr-dev, libelf-dev): {done.stderr.strip()[:200]}")
+    fresh.replace(SIMAVR_STDIO)
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What a run in an emulator left."""
@@ -151,8 +176,7 @@ def run(target: Board, image: Path, timeout: float, machine: str | None = None) 
     PvidError
         When the emulator is missing or the image does not exit in time.
     """
-    if shutil.which(target.emulator) is None:
-        raise PvidError(f"{target.emulator} is not installed: it comes with ./tools/test")
+    prepare_emulator(target)
     command = [machine if machine and part == target.machine else part for part in target.command(image)]
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=timeout, check=False)

@@ -549,6 +549,31 @@ def bench_side_by_side(update: Path | None) -> int:
     return DONE
 
 
+# ---- sizes
+
+
+@commands.command(name="sizes")
+@_UPDATE
+@click.option("--budget", type=click.Path(path_type=Path, exists=True), help="Write the figures as this file's budget.")
+@click.option("--check", type=click.Path(path_type=Path, exists=True), help="Hold the figures against this budget.")
+def sizes_command(update: Path | None, budget: Path | None, check: Path | None) -> int:
+    """Flash, RAM, stack and instructions a tick on every board, built and run in its emulator."""
+    from pvid import sizes
+
+    footprints = {}
+    with progress_bar("boards", len(sizes.CONFIGURATIONS)) as advance:
+        for done, configuration in enumerate(sizes.CONFIGURATIONS):
+            footprints[configuration] = sizes.measure(configuration)[0]
+            advance(done + 1)
+    _update_readme(update, "sizes", _markdown(sizes.HEADER, sizes.table_rows(footprints)))
+    if budget is not None:
+        sizes.write_budget(budget, footprints)
+    excess = sizes.over_budget(check, footprints) if check is not None else []
+    for sentence in excess:
+        click.echo(f"pvid: over budget: {sentence}", err=True)
+    return DIFFERENT if excess else DONE
+
+
 def _markdown(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])

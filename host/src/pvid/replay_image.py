@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.boards import BUILD, Board, build
+from pvid.boards import run as run_image
 from pvid.ctables import float_array, float_literal, struct_initializer
 from pvid.errors import PvidError
 from pvid.native import Native, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
@@ -221,3 +224,34 @@ def parse_report(text: str) -> ReplayReport:
         state_bytes=number["state_bytes"],
         estimator_bytes=number["estimator_bytes"],
     )
+
+
+# ---- the image
+
+
+def build_image(target: Board, run: ReplayRun) -> tuple[Path, Path]:
+    """Builds the replay image of `run` for a board under build/targets; returns (image, build tree).
+
+    The strong form's windows are as long as its five points, so that its state is what a board would hold.
+    """
+    name = f"{run.form}-{run.ticks}"
+    folder = BUILD / "runs" / name
+    text = header(run)
+    place = folder / "replay_run.h"
+    if not place.exists() or place.read_text(encoding="utf-8") != text:  # else the build has nothing to do
+        folder.mkdir(parents=True, exist_ok=True)
+        place.write_text(text, encoding="utf-8")
+    options = {"PVID_REPLAY_RUN": str(folder)}
+    if isinstance(run.config, StrongConfig):
+        options["PVID_MAX_WINDOW"] = str(2 * run.config.half * run.config.stride + 1)
+    tree = build(target, BUILD / f"{target.name}-{name}", options)
+    return tree / "apps" / "replay" / "replay.elf", tree
+
+
+def play(target: Board, image: Path, timeout: float) -> ReplayReport:
+    """Runs a replay image in its board's emulator and reads its report; see `pvid.boards.run` for `timeout` [s]."""
+    outcome = run_image(target, image, timeout)
+    report = parse_report(outcome.text)
+    if outcome.exit_code != 0:
+        raise PvidError(f"{target.name}: the image ended with exit code {outcome.exit_code}")
+    return report
