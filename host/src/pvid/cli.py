@@ -535,6 +535,18 @@ def bench_hard(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="noise")
+@_UPDATE
+def bench_noise(update: Path | None) -> int:
+    """Bias by the noise inside the weak form's rows, as it is and with that noise taken off, in float64."""
+    from pvid.bench import noise
+
+    with progress_bar("noise in the rows", len(noise.CASES)) as advance:
+        rows = list(noise.noise_table(Native(), progress=advance))
+    _update_readme(update, "noise", _markdown(noise.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="side-by-side")
 @_UPDATE
 def bench_side_by_side(update: Path | None) -> int:

@@ -502,8 +502,16 @@ def _inverse(s: Float) -> Float:
     return np.asarray(np.linalg.inv(s * np.outer(d, d)) * np.outer(d, d))
 
 
-def identify_weak(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, settings: WeakSettings) -> WeakIdentified:
+def identify_weak(
+    phi: npt.ArrayLike,
+    y: npt.ArrayLike,
+    design: WeakDesign,
+    settings: WeakSettings,
+    estimator: type[WeakOracle] | None = None,
+) -> WeakIdentified:
     """Identifies a run phi [rad], y [m], both [samples], window by window.
+
+    `estimator` is a subclass of WeakOracle that takes its place.
 
     Raises
     ------
@@ -514,7 +522,7 @@ def identify_weak(phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, sett
         raise PvidError("the float64 weak form takes finite samples only")
     smooth, u = front_end(phi, y, design)
     phi_frames, u_frames = frames(smooth, design), frames(u, design)
-    oracle = WeakOracle(design, settings)
+    oracle = (estimator or WeakOracle)(design, settings)
     count = len(phi_frames)
     history = np.empty((count, len(oracle.p)))
     covariance = np.empty((count, len(oracle.p), len(oracle.p)))
