@@ -204,6 +204,7 @@ def test_the_published_defaults() -> None:
         stride=1,
         test_functions=12,
         decimation=0,
+        smoothing_s=0.0,
         forgetting_s=0.0,
         feedback_hz=10.0,
         divider=1,

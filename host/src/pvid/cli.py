@@ -326,6 +326,72 @@ def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str |
     return DIFFERENT if failed else DONE
 
 
+# ---- tune
+
+_TUNED_SHOWN = 12
+
+
+@commands.command(name="tune")
+@click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file.  [default: RUN with .toml]")
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Rig file to write.  [default: RUN-tuned.toml]")
+def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int:
+    """Picks window, test functions, decimation, smoothing and forgetting of the weak form for a recorded RUN.
+
+    Candidates are judged by what can be seen without the truth: standard errors from the run's own information, how
+    much a shorter smoothing filter moves the estimate, how well the run's halves agree, energy and colour of the
+    residuals. Writes a rig file with the choice.
+    """
+    from pvid.tune import STEPS, Judged, tune
+
+    rig = load(rig_path or _rig_path(run_path))
+    run = read_run(run_path, rig.sample_rate)
+    with progress_bar("tuning", STEPS) as advance:
+        tuned = tune(run, rig, Native(), advance)
+    out = out or run_path.with_name(_rig_path(run_path).stem + "-tuned.toml")
+    tuned.rig.write(out)
+    table = Table(title="errors in % of w / d1 / d2, best first")
+    for heading in ("", "window s", "functions", "decimation", "smoothing ms", "standard error", "bias", "split"):
+        table.add_column(heading, justify="right")
+    for heading in ("misfit", "colour", "delay s", "instructions", "expected error %"):
+        table.add_column(heading, justify="right")
+
+    def add(mark: str, one: Judged) -> None:
+        settings = one.settings
+        table.add_row(
+            mark,
+            f"{settings.window_s:g}",
+            f"{settings.functions}",
+            f"{settings.decimation}",
+            f"{1000 * settings.smoothing_s:.4g}",
+            " ".join(f"{100 * error:.2g}" for error in one.se),
+            " ".join(f"{100 * bias:.2g}" for bias in one.bias),
+            f"{one.split:.2g}",
+            f"{one.misfit:.2g}",
+            f"{one.colour:.2g}",
+            f"{one.delay_s:.3g}",
+            f"{one.instructions:.0f}",
+            f"{100 * one.error:.2g}",
+        )
+
+    chosen = replace(tuned.chosen.settings, forgetting_s=0.0)
+    for rank, one in enumerate(tuned.candidates):
+        is_chosen, is_default = one.settings == chosen, tuned.default is not None and one == tuned.default
+        if rank < _TUNED_SHOWN or is_chosen or is_default:
+            add("chosen" if is_chosen else "rig file" if is_default else "", one)
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
+    if tuned.default_refusal is not None:
+        click.echo(f"the rig file's own settings cannot be used: {tuned.default_refusal}")
+    residuals = ", ".join(
+        f"{one.forgetting_s:g} s {one.energy:.4g}" for one in tuned.forgetting if one.forgetting_s > 0
+    )
+    if residuals:
+        click.echo(f"residual of the next window with forgetting, over that without: {residuals}")
+    click.echo(f"chosen: {tuned.reason}")
+    click.echo(f"rig file: {out}")
+    return DONE
+
+
 # ---- tables for the core
 
 
@@ -491,6 +557,18 @@ def bench_weak(update: Path | None) -> int:
     with progress_bar("weak form", len(weak.CASES)) as advance:
         rows = list(weak.weak_table(Native(), advance))
     _update_readme(update, "weak", _markdown(weak.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="tune")
+@_UPDATE
+def bench_tune(update: Path | None) -> int:
+    """Errors against the truth with the default settings and with those that `tune` picks, on several rigs."""
+    from pvid.bench import tuning
+
+    with progress_bar("tuning", len(tuning.CASES) * tuning.SEEDS) as advance:
+        rows = list(tuning.tuning_table(Native(), advance))
+    _update_readme(update, "tune", _markdown(tuning.HEADER, rows))
     return DONE
 
 

@@ -94,6 +94,7 @@ class Identifier:
     stride : samples between the differentiator's points
     test_functions : of the weak form, per window
     decimation : of the weak form, samples in per sample used; 0: what comes nearest to 125 Hz
+    smoothing_s : of the weak form, length of the smoothing filter before decimation [s]; 0: 0.071 s
     forgetting_s : time constant of forgetting [s]; 0: nothing is forgotten
     feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at
         every solve
@@ -113,6 +114,7 @@ class Identifier:
     stride: int = _number(1, "samples", 1, 65535)
     test_functions: int = _number(12, "", 4, 16)
     decimation: int = _number(0, "samples", 0, 32)
+    smoothing_s: float = _number(0.0, "s", 0.0, 1e6)
     forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
     feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)
     divider: int = _number(1, "", 1, 65535)

@@ -107,6 +107,7 @@ def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
         window_s=settings.window,
         functions=settings.test_functions,
         decimation=settings.decimation or None,
+        taps=round(min(settings.smoothing_s * sample_rate, 1e9)) | 1 if settings.smoothing_s > 0 else None,
     )
 
 
