@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from pvid.bench.hard import CASES, HEADER, LARGEST, ZERO, Case, Outcome, modes, row, run_case
+from pvid.compare import compare_run
 from pvid.native import Native
-from pvid.rig import Sensors, simulate
+from pvid.rig import Sensors, simulate, standard_start
+from pvid.setup import config_of
 from pvid.weak_oracle import sample_sd
 
 SEEDS = 5
@@ -64,6 +66,26 @@ def test_what_the_model_or_the_rig_file_does_not_know_raises_the_alarm(label: st
 
 def test_noise_that_is_told_of_raises_none() -> None:
     assert not outcome("14 bits, noise of 64 LSB").alarmed[outcome("14 bits, noise of 64 LSB").published].any()
+
+
+@pytest.mark.parametrize(
+    "label",
+    [
+        "14 bits, noise of 512 LSB",
+        "drive x0.03, 14 bits",
+        "drive, no motion",
+        "slow mode only, 14 bits",
+        "fast mode only, 16 bits",
+        "friction of 0.0003 m^2/s, 14 bits",
+        "full equations, 0.107 rad, 14 bits",
+    ],
+)
+def test_the_twin_has_the_same_bits_where_it_is_hard(native: Native, label: str) -> None:
+    """12 s: first windows, steps that are held, limited or led astray by noise."""
+    one, start = case(label), standard_start(3)
+    run = one.run(3, duration=12.0)
+    result = compare_run(native, config_of(one.rig, run.sample_rate, start), run.phi, run.y)
+    assert result.equal, str(result.difference)
 
 
 def test_the_modes_are_modes() -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from pvid.capture import Run
 from pvid.identify import LINEAR, Identification, identify
 from pvid.native import Native
 from pvid.rig import (
@@ -32,6 +33,7 @@ from pvid.weak_oracle import sample_sd
 Float = npt.NDArray[np.float64]
 
 SEEDS = 40
+RATE_HZ = 1000.0
 ZERO = 0.02  # rad, what the encoder reads at rest
 LARGEST = 0.107  # rad, |phi| of the standard rig (linear equations 0.106, full ones 0.108)
 TRUTH = STANDARD_PENDULUM.linear
@@ -89,6 +91,22 @@ class Case:
             lsb *= sample_sd(1.0, self.noise_lsb) / sample_sd(1.0, 0.5)
         return replace(standard, sensor=replace(standard.sensor, phi_lsb=lsb))
 
+    def run(self, seed: int, duration: float = 40.0) -> Run:
+        """What the sensors see in `duration` [s]."""
+        pendulum = replace(STANDARD_PENDULUM, damping1=self.damping, damping2=self.damping)
+        tones = tuple(replace(tone, amplitude_m=self.drive * tone.amplitude_m) for tone in self.tones if self.drive)
+        simulation = simulate(
+            pendulum,
+            tones,
+            self.sensors,
+            RATE_HZ,
+            duration,
+            self.release,
+            self.truth,
+            seed,
+        )
+        return simulation.run
+
 
 def modes() -> Float:
     """Release angles (phi1, phi1 + phi) of the slow and the fast mode with phi = 1 rad, [2, 2]."""
@@ -128,7 +146,7 @@ def _cases() -> Iterator[Case]:
     yield Case("no drive, no motion", drive=0.0, release=(0.0, 0.0))
     yield Case("drive, no motion", release=(0.0, 0.0))
     slow, fast = _in_mode(0, 0.08), _in_mode(1, 0.05)
-    for bits in (14, 12):
+    for bits in (16, 14, 12):
         yield Case(f"slow mode only, one tone, {bits} bits", tones=(Tone(6e-3, 1.1, 0.3),), release=slow, bits=bits)
         yield Case(f"slow mode only, {bits} bits", release=slow, bits=bits)
         yield Case(f"fast mode only, {bits} bits", release=fast, bits=bits)
@@ -178,13 +196,10 @@ def run_case(
     native: Native, case: Case, seeds: int = SEEDS, progress: Callable[[int], None] = lambda _: None
 ) -> Outcome:
     """All seeds of a case through `identify`; progress is told the runs done."""
-    pendulum = replace(STANDARD_PENDULUM, damping1=case.damping, damping2=case.damping)
-    tones = tuple(replace(tone, amplitude_m=case.drive * tone.amplitude_m) for tone in case.tones) if case.drive else ()
     results: list[Identification] = []
     for seed in range(seeds):
         progress(seed)
-        run = simulate(pendulum, tones, case.sensors, release=case.release, truth=case.truth, seed=seed).run
-        results.append(identify(run, case.rig, native, start=standard_start(seed)))
+        results.append(identify(case.run(seed), case.rig, native, start=standard_start(seed)))
     values = np.array([[result.value[name] for name in LINEAR] for result in results])
     standard_errors = np.array([[result.se[name] for name in LINEAR] for result in results])
     return Outcome(

@@ -9,16 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.bench.hard import CASES as HARD
-from pvid.bench.hard import SEEDS, TRUTH, Case, run_case
+from pvid.bench.hard import RATE_HZ, SEEDS, TRUTH, Case, run_case
 from pvid.native import Native
-from pvid.rig import simulate, standard_start
+from pvid.rig import standard_start
 from pvid.setup import weak_design_of
 from pvid.weak_noise import CompensatedOracle
 from pvid.weak_oracle import WeakOracle, WeakSettings, identify_weak, sample_sd
 
 Float = npt.NDArray[np.float64]
 
-RATE_HZ = 1000.0
 LABELS = (
     "14 bits, noise of 16 LSB",
     "14 bits, noise of 64 LSB",
@@ -64,7 +63,7 @@ def errors_of(case: Case, seeds: int, estimator: type[WeakOracle]) -> Bias:
     row_sd = sample_sd(case.sensors.phi_lsb, case.noise_lsb) / np.sqrt(design.decimation)
     errors, standard_errors = np.empty((seeds, 3)), np.empty((seeds, 3))
     for seed in range(seeds):
-        run = simulate(sensors=case.sensors, release=case.release, sample_rate=RATE_HZ, seed=seed).run
+        run = case.run(seed)
         settings = WeakSettings(np.append(standard_start(seed), 0.0), float(row_sd))
         result = identify_weak(run.phi, run.y, design, settings, estimator)
         errors[seed] = result.last.p[:3] / TRUTH - 1
