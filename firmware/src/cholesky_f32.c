@@ -137,17 +137,21 @@ void pvid_cholesky_solve_f32(const pvid_cholesky_f32 *self, const float rhs[], f
     }
 }
 
+void pvid_cholesky_inverse_column_f32(const pvid_cholesky_f32 *self, size_t j, float inverse[][PVID_MAX_P])
+{
+    float unit[PVID_MAX_P] = {0.0f};
+    float column[PVID_MAX_P];
+    unit[j] = 1.0f;
+    pvid_cholesky_solve_f32(self, unit, column);
+    for (size_t i = 0; i <= j; i++) { /* the two triangles differ by rounding: keep one */
+        inverse[i][j] = column[i];
+        inverse[j][i] = column[i];
+    }
+}
+
 void pvid_cholesky_inverse_f32(const pvid_cholesky_f32 *self, float inverse[][PVID_MAX_P])
 {
-    const size_t n = self->n;
-    for (size_t j = 0; j < n; j++) {
-        float unit[PVID_MAX_P] = {0.0f};
-        float column[PVID_MAX_P];
-        unit[j] = 1.0f;
-        pvid_cholesky_solve_f32(self, unit, column);
-        for (size_t i = 0; i <= j; i++) { /* the two triangles differ by rounding: keep one */
-            inverse[i][j] = column[i];
-            inverse[j][i] = column[i];
-        }
+    for (size_t j = 0; j < self->n; j++) {
+        pvid_cholesky_inverse_column_f32(self, j, inverse);
     }
 }

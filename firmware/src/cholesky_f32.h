@@ -3,6 +3,7 @@
 #define PVID_CHOLESKY_F32_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "pvid/estimator.h"
@@ -18,6 +19,10 @@ bool pvid_cholesky_factor_f32(pvid_cholesky_f32 *self, uint8_t n, const float s[
 
 /* x[n] = S^-1 rhs[n]. */
 void pvid_cholesky_solve_f32(const pvid_cholesky_f32 *self, const float rhs[], float x[]);
+
+/* Column j of inverse[n][n] = S^-1 down to its diagonal, and row j likewise: all of them, in any order, make a
+ * symmetric inverse. Cost: a solve. */
+void pvid_cholesky_inverse_column_f32(const pvid_cholesky_f32 *self, size_t j, float inverse[][PVID_MAX_P]);
 
 /* inverse[n][n] = S^-1, symmetric. */
 void pvid_cholesky_inverse_f32(const pvid_cholesky_f32 *self, float inverse[][PVID_MAX_P]);

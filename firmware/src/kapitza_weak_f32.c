@@ -61,6 +61,32 @@ static void zeroed_jacobian_of(const float p[], float c[])
     c[7] = w * w;
 }
 
+/* Noise of phi alone stands in N2 = -int chi'' phi and N5 = -int chi phi as if it were motion; c_2 and c_5, what
+ * they carry into C^T N, do not contain the zero. The double integrals of the noise are small beside it. */
+static void noise_of(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P])
+{
+    const float w = p[W];
+    const float w2 = w * w;
+    const float two_d2w = 2.0f * (p[D2] * w);
+    const float c2[2] = {p[D1], w};    /* of w, d1 */
+    const float c5[2] = {two_d2w, w2}; /* of w, d2 */
+    const float mixed = c2[0] * c5[0];
+    s[W][W] = ((c2[0] * c2[0]) * traces[0]) + (((2.0f * mixed) * traces[1]) + ((c5[0] * c5[0]) * traces[2]));
+    s[W][D1] = ((c2[0] * c2[1]) * traces[0]) + ((c5[0] * c2[1]) * traces[1]);
+    s[W][D2] = ((c2[0] * c5[1]) * traces[1]) + ((c5[0] * c5[1]) * traces[2]);
+    s[D1][D1] = (c2[1] * c2[1]) * traces[0];
+    s[D1][D2] = (c2[1] * c5[1]) * traces[1];
+    s[D2][D2] = (c5[1] * c5[1]) * traces[2];
+}
+
+static void noise_with_zero(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P])
+{
+    noise_of(p, traces, s);
+    for (int i = 0; i <= C; i++) {
+        s[i][C] = 0.0f;
+    }
+}
+
 const pvid_model_f32 pvid_kapitza_weak_f32 = {
     .n_theta = PVID_KAPITZA_WEAK_THETA,
     .n_p = PVID_KAPITZA_WEAK_P,
@@ -71,6 +97,7 @@ const pvid_model_f32 pvid_kapitza_weak_f32 = {
     .c_column = c_column,
     .theta = theta_of,
     .jacobian = jacobian_of,
+    .noise = noise_with_zero,
 };
 
 const pvid_model_f32 pvid_kapitza_weak_zeroed_f32 = {
@@ -83,4 +110,5 @@ const pvid_model_f32 pvid_kapitza_weak_zeroed_f32 = {
     .c_column = zeroed_c_column,
     .theta = zeroed_theta_of,
     .jacobian = zeroed_jacobian_of,
+    .noise = noise_of,
 };

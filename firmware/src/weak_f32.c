@@ -3,18 +3,11 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "count.h"
 #include "finite_f32.h"
 #include "weak_finish_f32.h"
 #include "weak_front_f32.h"
 #include "weak_window_f32.h"
-
-/* Counters stop at their end. */
-static void count(uint32_t *counter)
-{
-    if (*counter < UINT32_MAX) {
-        (*counter)++;
-    }
-}
 
 static bool all_finite(const float values[], size_t n)
 {
@@ -37,7 +30,8 @@ static bool design_is_valid(const pvid_weak_design_f32 *design)
         !is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
         (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
         (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
-        (design->chi == NULL) || (design->gram == NULL) || !pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
+        (design->chi == NULL) || (design->gram == NULL) || (design->lag < 1u) ||
+        !pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
         return false;
     }
     const size_t half = (design->taps - 1u) / 2u;
@@ -96,11 +90,21 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     if (!pvid_within_f32(config->drive_min, 0.0f, 1.0e9f)) {
         return PVID_BAD_DRIVE_MIN;
     }
+    if (!pvid_within_f32(config->pivot_noise, 0.0f, 1.0e9f)) {
+        return PVID_BAD_PIVOT_NOISE;
+    }
+    if (!pvid_within_f32(config->angle_limit, 0.0f, 1.0e9f)) {
+        return PVID_BAD_ANGLE_LIMIT;
+    }
     if (!design_is_valid(design)) {
         return PVID_BAD_DESIGN;
     }
     memset(self, 0, sizeof *self);
-    const pvid_status status = init_estimator(self, config);
+    pvid_status status = init_estimator(self, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_trust_init_f32(&self->trust, &config->trust, &self->estimator);
     if (status != PVID_OK) {
         return status;
     }
@@ -111,6 +115,10 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     self->dt = (float)design->decimation / config->sample_rate_hz;
     pvid_weak_front_init_f32(&self->front, design, config->sample_rate_hz, config->l1);
     self->drive_min = config->drive_min * config->drive_min;
+    const float lag = self->dt * (float)design->lag;
+    self->row_variance = config->estimator.row_sd * config->estimator.row_sd;
+    self->pivot_noise = config->pivot_noise / ((lag * lag) * (lag * lag));
+    self->angle_limit = config->angle_limit;
     const uint32_t ticks = ticks_a_window(design->decimation);
     self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
     self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
@@ -147,45 +155,96 @@ void pvid_weak_gap_f32(pvid_weak_f32 *self)
     restart_window(&self->window[1], (uint16_t)(hop - 1u));
     self->turn = 2;
     self->warm = false;
+    self->bend.wait = 1;
+    self->bend.known = 0;
+    self->bend.due = false;
+}
+
+static void next_bend(pvid_weak_bend_f32 *self, uint8_t lag, float phi)
+{
+    self->due = false;
+    self->wait--;
+    if (self->wait > 0u) {
+        return;
+    }
+    self->wait = lag;
+    if (self->known < 2u) {
+        self->known++;
+    } else {
+        const float bend = (phi - self->before[0]) - (self->before[0] - self->before[1]);
+        self->square = bend * bend;
+        self->due = true;
+    }
+    self->before[1] = self->before[0];
+    self->before[0] = phi;
+}
+
+/* An encoder's zero may be anywhere: before the first row c goes to the mean of phi. */
+static void place_zero(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
+{
+    float p[PVID_MAX_P];
+    memcpy(p, self->estimator.p, sizeof p);
+    p[PVID_KAPITZA_C] = pvid_weak_window_mean_f32(window, self->design->window);
+    pvid_estimator_place_f32(&self->estimator, p);
+    pvid_trust_place_f32(&self->trust, &self->estimator);
+}
+
+/* Why a window that is complete cannot be used; PVID_ACCUMULATED if it can. */
+static pvid_reason objection(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
+{
+    if ((self->drive_min > 0.0f) && (pvid_weak_window_drive_f32(window, self->design->window) < self->drive_min)) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    const bool zeroed = self->estimator.model->n_p <= (uint8_t)PVID_KAPITZA_C;
+    if (!zeroed && (self->estimator.counters.rows == 0u)) {
+        place_zero(self, window);
+    }
+    const float zero = zeroed ? 0.0f : self->estimator.p[PVID_KAPITZA_C];
+    if ((self->angle_limit > 0.0f) && (pvid_weak_window_reach_f32(window, zero) > self->angle_limit)) {
+        pvid_count_up(&self->estimator.counters.held_out_of_range);
+        return PVID_HELD_OUT_OF_RANGE;
+    }
+    return PVID_ACCUMULATED;
 }
 
 /* A window that has come round hands its sums over and goes on in the buffer that is free. Its last
- * sample, which has no weight, is the first one of the next. Returns false if the window is dropped: its
- * sums are cleared where they are. */
-static bool turn_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
+ * sample, which has no weight, is the first one of the next. A window that is dropped leaves its sums where
+ * they are, to be cleared. */
+static pvid_reason turn_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
 {
-    const bool still = (self->drive_min > 0.0f) &&
-                       (pvid_weak_window_drive_f32(window, self->design->window) < self->drive_min);
+    const pvid_reason reason = objection(self, window);
     self->warm = true;
-    if (still) {
-        count(&self->estimator.counters.held_not_excited);
-        return false;
+    if (reason != PVID_ACCUMULATED) {
+        return reason;
     }
     const uint8_t full = window->buffer;
     window->buffer = self->finish.buffer;
     self->finish.buffer = full;
-    pvid_weak_finish_begin_f32(&self->finish, &self->estimator);
-    return true;
+    const float expected = self->row_variance + (self->pivot_noise * pvid_weak_window_bend_f32(window));
+    pvid_weak_finish_begin_f32(&self->finish, &self->estimator, expected);
+    return PVID_ACCUMULATED;
 }
 
-/* Returns false if this sample completes a window that is dropped. */
-static bool next_sample(pvid_weak_f32 *self)
+/* Returns why a window that this sample completes is dropped, if it is. */
+static pvid_reason next_sample(pvid_weak_f32 *self)
 {
-    bool kept = true;
+    pvid_reason reason = PVID_ACCUMULATED;
+    next_bend(&self->bend, self->design->lag, self->phi);
     for (size_t i = 0; i < 2u; i++) {
         pvid_weak_window_f32 *window = &self->window[i];
         window->index++;
         if (window->index == self->design->window - 1u) {
             window->index = 0;
             if (window->whole) {
-                kept = turn_over(self, window);
+                reason = turn_over(self, window);
             }
             window->whole = true;
         }
     }
     self->turn = 0;
     self->function = 0;
-    return kept;
+    return reason;
 }
 
 /* Adds the present sample to the next few functions: first all of one window, then all of the other. */
@@ -197,7 +256,7 @@ static inline void add_slice(pvid_weak_f32 *self)
     const size_t end = first + self->slice;
     const size_t last = (end < design->functions) ? end : design->functions;
     if (first == 0u) {
-        pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, self->term);
+        pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, &self->bend, self->term);
     }
     pvid_weak_window_add_f32(window, design, self->term, first, last, self->sums[window->buffer]);
     self->function = (uint8_t)last;
@@ -211,14 +270,14 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
 {
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
         pvid_weak_gap_f32(self);
-        count(&self->estimator.counters.rejected_not_finite);
+        pvid_count_up(&self->estimator.counters.rejected_not_finite);
         return PVID_REJECTED_NOT_FINITE;
     }
     const uint16_t decimation = self->design->decimation;
-    bool kept = true;
+    pvid_reason dropped = PVID_ACCUMULATED;
     bool adding = false;
     if (pvid_weak_front_step_f32(&self->front, phi, y, &self->phi, &self->u)) {
-        kept = next_sample(self);
+        dropped = next_sample(self);
         if (decimation == 1u) {
             add_slice(self);
             add_slice(self);
@@ -231,11 +290,16 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
         }
     }
     pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    if (!kept) {
-        reason = PVID_HELD_NOT_EXCITED;
+    if (dropped != PVID_ACCUMULATED) {
+        reason = dropped;
     } else if (!adding && pvid_weak_finish_is_busy_f32(&self->finish)) {
         pvid_weak_finish_step_f32(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
-                                  &self->estimator, &reason);
+                                  &self->estimator, &self->trust, &reason);
     }
     return reason;
+}
+
+const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self)
+{
+    return &self->trust.estimate;
 }

@@ -7,6 +7,7 @@
 #include "cholesky_f32.h"
 #include "finite_f32.h"
 #include "unroll.h"
+#include "weak_whiten_f32.h"
 #include "weak_window_f32.h"
 
 /* Columns of a row once it is assembled, in place of its terms. */
@@ -15,6 +16,7 @@ enum { COLUMN_N = 0, COLUMN_Y = 8, COLUMN_A = 9, COLUMN_B = 10, COLUMN_SPARE = 1
 enum {
     STAGE_COMBINE,    /* K times: a row of the Gram matrix at p, the columns of a function */
     STAGE_FACTOR,     /* K times: a row of its Cholesky factor */
+    STAGE_TRACE,      /* 4 K times: a row of its inverse, then what noise is in it, in three sums */
     STAGE_WHITEN,     /* K times: a row of L^-1 (Y, N, a, b) */
     STAGE_DIRECTION_A,
     STAGE_ALONG_A,    /* a few functions at a time */
@@ -24,8 +26,11 @@ enum {
     STAGE_REMOVE_B,
     STAGE_ADD,        /* K times: a row to the estimator */
     STAGE_SOLVE,      /* `iterations` solves of several stages each */
+    STAGE_ASSESS,     /* several stages; the last one publishes or not */
     STAGE_IDLE
 };
+
+#define TRACE_STAGES (1u + PVID_NOISE_TRACES)
 
 /* Functions whose columns one stage of the projection takes. */
 #define FUNCTIONS_A_STAGE 6u
@@ -38,46 +43,6 @@ void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self)
 bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self)
 {
     return self->stage != STAGE_IDLE;
-}
-
-/* The residual of p has the filter chi'''' + d1 w chi'' + d2 w^2 chi: what its noise covariance is
- * made of, beside G44. */
-void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator)
-{
-    const float *p = estimator->p;
-    const float two = p[PVID_KAPITZA_D1] * p[PVID_KAPITZA_W];
-    const float zero = (p[PVID_KAPITZA_D2] * p[PVID_KAPITZA_W]) * p[PVID_KAPITZA_W];
-    self->combination[0] = two;
-    self->combination[1] = zero;
-    self->combination[2] = two * two;
-    self->combination[3] = two * zero;
-    self->combination[4] = zero * zero;
-    self->whitened = true;
-    self->iteration = 0;
-    self->index = 0;
-    self->stage = STAGE_COMBINE;
-}
-
-static size_t row_start(size_t row)
-{
-    return (row * (row + 1u)) / 2u;
-}
-
-static void combine_row(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, size_t row)
-{
-    const size_t size = row_start(design->functions);
-    const float *c = self->combination;
-    const size_t last = row_start(row + 1u);
-    for (size_t i = row_start(row); i < last; i++) {
-        const float *g = &design->gram[i];
-        float sum = g[0];
-        sum += c[0] * g[size];
-        sum += c[1] * g[2u * size];
-        sum += c[2] * g[3u * size];
-        sum += c[3] * g[4u * size];
-        sum += c[4] * g[5u * size];
-        self->factor[i] = sum;
-    }
 }
 
 /* (N1..N8, Y, a, b, 0) from the terms of a function, in their place. */
@@ -98,48 +63,12 @@ static void assemble(float sum[PVID_WEAK_TERMS])
     sum[COLUMN_SPARE] = 0.0f;
 }
 
-/* Row of L with L L^T = R0, in place; the diagonal is kept inverted. Where R0 cannot be factored the
- * window keeps the whitening of its design. */
-static void factor_row(pvid_weak_finish_f32 *self, size_t row)
-{
-    float *l = &self->factor[row_start(row)];
-    const float *above = self->factor;
-    const float diagonal = l[row];
-    float pivot = diagonal;
-    for (size_t j = 0; j < row; j++) {
-        float sum = l[j];
-        for (size_t i = 0; i < j; i++) {
-            sum -= l[i] * above[i];
-        }
-        l[j] = sum * above[j];
-        pivot -= l[j] * l[j];
-        above += j + 1u;
-    }
-    self->whitened = self->whitened && (pivot > (PVID_PIVOT_MIN * diagonal)) && pvid_finite_f32(pivot);
-    l[row] = 1.0f / sqrtf(self->whitened ? pivot : 1.0f);
-}
-
 /* x -= a y for the columns of two functions. */
 static inline void subtract(float a, const float *restrict y, float *restrict x)
 {
     PVID_UNROLL
     for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
         x[i] -= a * y[i];
-    }
-}
-
-static void whiten_row(const pvid_weak_finish_f32 *self, size_t row, float sums[][PVID_WEAK_TERMS])
-{
-    if (!self->whitened) {
-        return;
-    }
-    const float *l = &self->factor[row_start(row)];
-    float *x = sums[row];
-    for (size_t j = 0; j < row; j++) {
-        subtract(l[j], sums[j], x);
-    }
-    for (size_t i = 0; i < PVID_WEAK_COLUMNS; i++) {
-        x[i] *= l[row];
     }
 }
 
@@ -186,6 +115,23 @@ static void remove_components(const pvid_weak_finish_f32 *self, size_t first, si
     }
 }
 
+void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator, float expected)
+{
+    pvid_weak_whiten_begin_f32(&self->whiten, estimator->p);
+    self->expected = expected;
+    self->iteration = 0;
+    self->index = 0;
+    self->stage = STAGE_COMBINE;
+}
+
+/* What noise there is, to the estimator: where the window keeps the whitening of its design, the last known. */
+static void tell_noise(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator)
+{
+    if (self->whiten.whitened) {
+        memcpy(estimator->noise, self->whiten.trace, sizeof estimator->noise);
+    }
+}
+
 /* A row to the estimator; its reason is told if it was refused. */
 static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
 {
@@ -195,6 +141,12 @@ static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *est
     }
 }
 
+static void begin_solves(pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator, const pvid_trust_f32 *trust)
+{
+    pvid_estimator_begin_f32(estimator, &self->solve, true);
+    self->solve.refuge = pvid_trust_refuge_f32(trust);
+}
+
 /* A stage of a solve; true once the last one of the window is complete. */
 static bool solve_on(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_estimator_f32 *estimator)
 {
@@ -202,32 +154,59 @@ static bool solve_on(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_estima
         return false;
     }
     self->iteration++;
+    self->reason = self->solve.reason;
+    self->size = self->solve.size;
     /* not due: the divider says that this window only accumulates */
-    if ((self->iteration >= iterations) || (self->solve.reason == PVID_ACCUMULATED)) {
+    if ((self->iteration >= iterations) || (self->reason == PVID_ACCUMULATED)) {
         return true;
     }
     pvid_estimator_begin_f32(estimator, &self->solve, false);
     return false;
 }
 
+/* A stage of the assessment; true once the estimate is judged. */
+static bool assess_on(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, pvid_estimator_f32 *estimator,
+                      pvid_trust_f32 *trust)
+{
+    if (!pvid_estimator_assess_on_f32(estimator, &self->solve)) {
+        return false;
+    }
+    const float freedom = (float)design->functions - 2.0f;
+    const float surplus = self->solve.energy / (freedom * self->expected);
+    self->reason = pvid_trust_judge_f32(trust, estimator, self->reason, self->size, self->solve.informed, surplus,
+                                        &self->candidate);
+    return true;
+}
+
 void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, uint8_t iterations,
-                               float sums[][PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
+                               float sums[][PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_trust_f32 *trust,
+                               pvid_reason *reason)
 {
     const size_t functions = design->functions;
     const float(*fixed)[PVID_WEAK_TERMS] = (const float(*)[PVID_WEAK_TERMS])sums;
     const size_t row = self->index;
     const size_t few = ((functions - row) > FUNCTIONS_A_STAGE) ? (row + FUNCTIONS_A_STAGE) : functions;
-    size_t done = row + 1u; /* functions, after this stage; all of them end it */
+    size_t done = row + 1u; /* functions, after this stage */
+    size_t all = functions; /* of them end it */
     switch (self->stage) {
     case STAGE_COMBINE:
-        combine_row(self, design, row);
+        pvid_weak_whiten_combine_f32(&self->whiten, design, row);
         assemble(sums[row]);
         break;
     case STAGE_FACTOR:
-        factor_row(self, row);
+        pvid_weak_whiten_factor_f32(&self->whiten, row);
+        break;
+    case STAGE_TRACE:
+        all = TRACE_STAGES * functions;
+        if ((row % TRACE_STAGES) == 0u) {
+            pvid_weak_whiten_inverse_f32(&self->whiten, row / TRACE_STAGES, self->direction);
+        } else {
+            pvid_weak_whiten_trace_f32(&self->whiten, design, row / TRACE_STAGES, self->direction,
+                                       (row % TRACE_STAGES) - 1u);
+        }
         break;
     case STAGE_WHITEN:
-        whiten_row(self, row, sums);
+        pvid_weak_whiten_row_f32(&self->whiten, row, sums);
         break;
     case STAGE_DIRECTION_A:
         find_direction(self, functions, COLUMN_A, fixed);
@@ -254,18 +233,28 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         if (!solve_on(self, iterations, estimator)) {
             return;
         }
-        *reason = self->solve.reason;
+        done = functions;
+        break;
+    case STAGE_ASSESS:
+        if (!assess_on(self, design, estimator, trust)) {
+            return;
+        }
+        *reason = self->reason;
         done = functions;
         break;
     default:
         return;
     }
-    self->index = (uint8_t)done;
-    if (done == functions) {
+    self->index = (uint16_t)done;
+    if (done >= all) {
         self->index = 0;
         self->stage++;
-        if (self->stage == STAGE_SOLVE) {
-            pvid_estimator_begin_f32(estimator, &self->solve, true);
+        if (self->stage == STAGE_ADD) {
+            tell_noise(self, estimator);
+        } else if (self->stage == STAGE_SOLVE) {
+            begin_solves(self, estimator, trust);
+        } else if (self->stage == STAGE_ASSESS) {
+            pvid_estimator_begin_assessment_f32(estimator, &self->solve, &self->candidate);
         }
     }
 }
@@ -273,8 +262,8 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
 uint32_t pvid_weak_finish_stages_f32(uint8_t functions, uint8_t iterations, const pvid_estimator_f32 *estimator)
 {
     const uint32_t parts = (functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
-    const uint32_t rows = (4u * (uint32_t)functions) + 2u + (4u * parts);
+    const uint32_t rows = ((4u + TRACE_STAGES) * (uint32_t)functions) + 2u + (4u * parts);
     const uint32_t first = pvid_estimator_stages_f32(estimator, true);
     const uint32_t more = pvid_estimator_stages_f32(estimator, false);
-    return rows + first + ((iterations - 1u) * more);
+    return rows + first + ((iterations - 1u) * more) + pvid_estimator_assessment_stages_f32(estimator);
 }

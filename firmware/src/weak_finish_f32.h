@@ -10,8 +10,9 @@
 /* No work. */
 void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self);
 
-/* Starts on the window whose sums stand in self->buffer, at the estimator's present p. */
-void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator);
+/* Starts on the window whose sums stand in self->buffer, at the estimator's present p; `expected` is the
+ * variance that noise gives its rows. */
+void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator, float expected);
 
 /* Whether a window is in work. */
 bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self);
@@ -19,7 +20,8 @@ bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self);
 /* One stage; sums are those of self->buffer. Writes what became of it to *reason if there is something
  * to tell: a row was refused, or the window is done. */
 void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, uint8_t iterations,
-                               float sums[][PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason);
+                               float sums[][PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_trust_f32 *trust,
+                               pvid_reason *reason);
 
 /* Number of stages of a window. */
 uint32_t pvid_weak_finish_stages_f32(uint8_t functions, uint8_t iterations, const pvid_estimator_f32 *estimator);

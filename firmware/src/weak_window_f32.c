@@ -9,8 +9,22 @@ enum { UF = 0, F = 1, U = 2 }; /* integrands */
 #define ON_CHI2 8u /* terms that chi'' multiplies, then those of chi, then the one of chi'''' */
 #define ON_CHI0 4u
 
+/* What is known of the window as a whole: drive, zero, range, curvature. */
+static inline void observe(pvid_weak_window_f32 *self, float phi, float u, const pvid_weak_bend_f32 *bend)
+{
+    const bool first = self->index == 0u;
+    const float bend_square = bend->due ? bend->square : 0.0f;
+    self->u_sum = (first ? 0.0f : self->u_sum) + u;
+    self->u_square_sum = (first ? 0.0f : self->u_square_sum) + (u * u);
+    self->phi_sum = (first ? 0.0f : self->phi_sum) + phi;
+    self->lowest = (first || (phi < self->lowest)) ? phi : self->lowest;
+    self->highest = (first || (phi > self->highest)) ? phi : self->highest;
+    self->bend_square_sum = (first ? 0.0f : self->bend_square_sum) + bend_square;
+    self->bends = (uint16_t)((first ? 0u : self->bends) + (bend->due ? 1u : 0u));
+}
+
 void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, float dt, float phi, float u,
-                                float term[PVID_WEAK_TERMS])
+                                const pvid_weak_bend_f32 *bend, float term[PVID_WEAK_TERMS])
 {
     const float half_dt = 0.5f * dt;
     const float correction = (dt * dt) / 6.0f;
@@ -25,8 +39,7 @@ void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, fl
         self->before[i] = now[i];
         integral[i] = twice - (correction * now[i]);
     }
-    self->u_sum = (first ? 0.0f : self->u_sum) + u;
-    self->u_square_sum = (first ? 0.0f : self->u_square_sum) + (u * u);
+    observe(self, phi, u, bend);
     const float steps = (float)self->index;
     const float i2_one = (dt * dt) * ((0.5f * (steps * steps)) - (1.0f / 6.0f));
     const float t = dt * (steps - (0.5f * (float)(samples - 1u)));
@@ -51,6 +64,23 @@ float pvid_weak_window_drive_f32(const pvid_weak_window_f32 *self, uint16_t samp
     const float n = (float)(samples - 1u);
     const float mean = self->u_sum / n;
     return (self->u_square_sum / n) - (mean * mean);
+}
+
+float pvid_weak_window_mean_f32(const pvid_weak_window_f32 *self, uint16_t samples)
+{
+    return self->phi_sum / (float)(samples - 1u);
+}
+
+float pvid_weak_window_reach_f32(const pvid_weak_window_f32 *self, float zero)
+{
+    const float up = self->highest - zero;
+    const float down = zero - self->lowest;
+    return (up > down) ? up : down;
+}
+
+float pvid_weak_window_bend_f32(const pvid_weak_window_f32 *self)
+{
+    return (self->bends > 0u) ? (self->bend_square_sum / (float)self->bends) : 0.0f;
 }
 
 static inline void add_function(const float *restrict term, float chi0, float chi2, float chi4, float *restrict sum)

@@ -25,12 +25,21 @@ enum {
 
 /* Integrates up to the decimated sample phi [rad], u [1/s^2] at self->index and writes the terms.
  * I2 is the double integral from the window's first sample, by the trapezoid rule less dt^2/6 times
- * the integrand; t is the time from the window's middle. Cost: 30 operations. */
+ * the integrand; t is the time from the window's middle. Cost: 40 operations. */
 void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, float dt, float phi, float u,
-                                float term[PVID_WEAK_TERMS]);
+                                const pvid_weak_bend_f32 *bend, float term[PVID_WEAK_TERMS]);
 
-/* Variance of u [1/s^4] over the samples so far; call it where the window is complete. */
+/* Variance of u [1/s^4] over the samples so far; call it where the window is complete, as the next two. */
 float pvid_weak_window_drive_f32(const pvid_weak_window_f32 *self, uint16_t samples);
+
+/* Mean of phi [rad]. */
+float pvid_weak_window_mean_f32(const pvid_weak_window_f32 *self, uint16_t samples);
+
+/* Largest |phi - zero| [rad]. */
+float pvid_weak_window_reach_f32(const pvid_weak_window_f32 *self, float zero);
+
+/* Mean square of the second differences of phi [rad^2]; 0 where there were none. */
+float pvid_weak_window_bend_f32(const pvid_weak_window_f32 *self);
 
 /* Adds the terms to the sums of functions first..last-1, or clears them at the window's first sample. */
 void pvid_weak_window_add_f32(const pvid_weak_window_f32 *self, const pvid_weak_design_f32 *design,

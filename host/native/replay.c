@@ -16,6 +16,7 @@ const uint32_t pvid_native_layout[] = {
     (uint32_t)sizeof(pvid_estimator_config_f32),
     FIELD(pvid_estimator_config_f32, start),
     FIELD(pvid_estimator_config_f32, row_sd),
+    FIELD(pvid_estimator_config_f32, noise_margin),
     FIELD(pvid_estimator_config_f32, law),
     FIELD(pvid_estimator_config_f32, divider),
     (uint32_t)sizeof(pvid_strong_config_f32),
@@ -25,12 +26,17 @@ const uint32_t pvid_native_layout[] = {
     (uint32_t)sizeof(pvid_weak_design_f32),
     FIELD(pvid_weak_design_f32, smooth),
     FIELD(pvid_weak_design_f32, overlap),
+    FIELD(pvid_weak_design_f32, lag),
     (uint32_t)sizeof(pvid_weak_config_f32),
     FIELD(pvid_weak_config_f32, drive_min),
+    FIELD(pvid_weak_config_f32, pivot_noise),
     FIELD(pvid_weak_config_f32, design),
     FIELD(pvid_weak_config_f32, zero_unknown),
     FIELD(pvid_weak_config_f32, iterations),
     FIELD(pvid_weak_config_f32, estimator),
+    FIELD(pvid_weak_config_f32, trust),
+    (uint32_t)sizeof(pvid_trust_config_f32),
+    FIELD(pvid_trust_config_f32, groups_min),
     (uint32_t)sizeof(pvid_counters),
     (uint32_t)sizeof(pvid_estimate_f32),
     FIELD(pvid_estimate_f32, kappa),
@@ -40,6 +46,9 @@ const uint32_t pvid_native_layout[] = {
     FIELD(pvid_strong_f32, estimator),
     (uint32_t)sizeof(pvid_weak_f32),
     FIELD(pvid_weak_f32, estimator),
+    FIELD(pvid_weak_f32, trust.estimate),
+    FIELD(pvid_weak_f32, trust.published),
+    FIELD(pvid_weak_f32, trust.long_mean),
     PVID_MAX_P,
     PVID_MAX_THETA,
     PVID_MAX_SUMS,
@@ -90,6 +99,10 @@ void pvid_replay_weak_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[]
     for (uint32_t tick = 0; tick < ticks; tick++) {
         const pvid_reason reason = pvid_weak_step_f32(self, phi[tick], y[tick]);
         record_tick(record, tick, &self->estimator, reason);
+        if (record->published != NULL) {
+            const uint32_t n_p = self->estimator.model->n_p;
+            memcpy(&record->published[(size_t)tick * n_p], pvid_weak_estimate_f32(self)->p, n_p * sizeof(float));
+        }
     }
 }
 

@@ -9,6 +9,7 @@
 /* Where a replay writes; NULL: not recorded. Rows stand one after the other, without padding. */
 typedef struct {
     float *p;               /* [ticks][n_p] */
+    float *published;       /* [ticks][n_p] of the weak form */
     float *sums;            /* [ticks][n_moments + n_theta + 2] */
     uint8_t *reason;        /* [ticks] */
     uint32_t *hash;         /* [ticks] running hash after the tick */

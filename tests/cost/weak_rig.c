@@ -25,6 +25,7 @@ static const pvid_weak_design_f32 design = {
     .chi = chi,
     .gram = gram,
     .overlap = 1.5f,
+    .lag = 8,
 };
 
 static pvid_weak_f32 identifier;
@@ -51,6 +52,7 @@ void weak_rig_prepare(float (*noise)(void))
         .zero_unknown = (WEAK_RIG_ZERO != 0),
         .iterations = 3,
         .estimator = pvid_estimator_defaults_f32,
+        .trust = pvid_trust_defaults_f32,
     };
     const float start[4] = {30.0f, 9.0f, 5.0f, 0.0f};
     for (uint32_t i = 0; i < 4u; i++) {

@@ -49,6 +49,8 @@ static void the_front_end_keeps_its_schedule_and_reproduces_a_parabola(void **st
 
 /* ---- a window ---- */
 
+static const pvid_weak_bend_f32 no_bend;
+
 static void double_integrals_of_polynomials_are_exact_but_for_rounding(void **state)
 {
     (void)state;
@@ -61,7 +63,7 @@ static void double_integrals_of_polynomials_are_exact_but_for_rounding(void **st
         const double t = (double)dt * i;
         const float phi = (float)t; /* integrates twice to t^3 / 6 */
         const float u = 2.0f;       /* to t^2 */
-        pvid_weak_window_terms_f32(&window, 129, dt, phi, u, term);
+        pvid_weak_window_terms_f32(&window, 129, dt, phi, u, &no_bend, term);
         if (i == 0u) {
             continue;
         }
@@ -88,10 +90,33 @@ static void the_drive_of_a_window_is_the_variance_of_u(void **state)
         for (uint16_t i = 0; i < 100u; i++) {
             window.index = i;
             const float u = 3.0f + (((i % 2u) == 0u) ? 0.5f : -0.5f);
-            pvid_weak_window_terms_f32(&window, 101, 0.008f, 0.0f, u, term);
+            pvid_weak_window_terms_f32(&window, 101, 0.008f, 0.0f, u, &no_bend, term);
         }
         assert_close((double)pvid_weak_window_drive_f32(&window, 101), 0.25, 1.0e-5);
     }
+}
+
+static void a_window_knows_its_mean_its_reach_and_its_curvature(void **state)
+{
+    (void)state;
+    pvid_weak_window_f32 window;
+    memset(&window, 0, sizeof window);
+    float term[PVID_WEAK_TERMS];
+    for (int pass = 0; pass < 2; pass++) { /* the second begins afresh */
+        for (uint16_t i = 0; i < 100u; i++) {
+            const pvid_weak_bend_f32 bend = {.due = (i % 10u) == 3u, .square = 0.25f};
+            window.index = i;
+            const float phi = 0.25f + ((i == 40u) ? 0.5f : 0.0f) - ((i == 60u) ? 0.75f : 0.0f);
+            pvid_weak_window_terms_f32(&window, 101, 0.008f, phi, 1.0f, &bend, term);
+        }
+        assert_close((double)pvid_weak_window_mean_f32(&window, 101), 0.2475, 1.0e-6);
+        assert_close((double)pvid_weak_window_reach_f32(&window, 0.0f), 0.75, 0.0);
+        assert_close((double)pvid_weak_window_reach_f32(&window, 0.25f), 0.75, 0.0);
+        assert_close((double)pvid_weak_window_reach_f32(&window, 0.75f), 1.25, 0.0);
+        assert_close((double)pvid_weak_window_bend_f32(&window), 0.25, 1.0e-7);
+    }
+    memset(&window, 0, sizeof window);
+    assert_close((double)pvid_weak_window_bend_f32(&window), 0.0, 0.0);
 }
 
 static void the_first_sample_of_a_window_clears_its_sums(void **state)
@@ -151,13 +176,15 @@ static void work_off(pvid_weak_finish_f32 *finish, const pvid_weak_design_f32 *d
     pvid_reason reason;
     pvid_weak_finish_init_f32(finish);
     assert_false(pvid_weak_finish_is_busy_f32(finish));
-    pvid_weak_finish_begin_f32(finish, estimator);
-    for (int i = 0; i < 3 * TABLE_FUNCTIONS; i++) {
-        pvid_weak_finish_step_f32(finish, design, 3, sums, estimator, &reason);
+    pvid_trust_f32 trust;
+    assert_int_equal(pvid_trust_init_f32(&trust, &pvid_trust_defaults_f32, estimator), PVID_OK);
+    pvid_weak_finish_begin_f32(finish, estimator, 1.0f);
+    for (int i = 0; i < 7 * TABLE_FUNCTIONS; i++) {
+        pvid_weak_finish_step_f32(finish, design, 3, sums, estimator, &trust, &reason);
     }
     memcpy(whitened, sums, TABLE_FUNCTIONS * sizeof sums[0]);
     for (int i = 0; i < 6; i++) {
-        pvid_weak_finish_step_f32(finish, design, 3, sums, estimator, &reason);
+        pvid_weak_finish_step_f32(finish, design, 3, sums, estimator, &trust, &reason);
     }
 }
 
@@ -174,7 +201,7 @@ static void rows_are_orthogonal_to_what_is_unknown_of_a_window(void **state)
         }
     }
     work_off(&finish, &table_design, &estimator, sums, whitened);
-    assert_true(finish.whitened);
+    assert_true(finish.whiten.whitened);
     for (size_t column = 0; column < COLUMNS_OF_ROW; column++) {
         for (size_t unknown = 9; unknown <= 10; unknown++) { /* a and b */
             double product = 0.0;
@@ -187,8 +214,28 @@ static void rows_are_orthogonal_to_what_is_unknown_of_a_window(void **state)
     /* at its nominal p a design is white already */
     for (size_t row = 0; row < TABLE_FUNCTIONS; row++) {
         for (size_t i = 0; i <= row; i++) {
-            assert_close((double)finish.factor[((row * (row + 1u)) / 2u) + i], (i == row) ? 1.0 : 0.0, 2.0e-6);
+            assert_close((double)finish.whiten.factor[((row * (row + 1u)) / 2u) + i], (i == row) ? 1.0 : 0.0, 2.0e-6);
         }
+    }
+}
+
+static void noise_that_passes_for_motion_is_what_a_trace_says(void **state)
+{
+    (void)state;
+    static pvid_weak_finish_f32 finish;
+    static float sums[TABLE_FUNCTIONS][PVID_WEAK_TERMS];
+    static float whitened[TABLE_FUNCTIONS][PVID_WEAK_TERMS];
+    pvid_estimator_f32 estimator = estimator_at_nominal();
+    work_off(&finish, &table_design, &estimator, sums, whitened);
+    /* R0 = 1 at the nominal p: the traces are those of the Gram tables, over K */
+    const double part[3] = {1.0, 0.5, 1.0};
+    for (size_t i = 0; i < 3u; i++) {
+        double trace = 0.0;
+        for (size_t k = 0; k < TABLE_FUNCTIONS; k++) {
+            trace += (double)table_gram[((3u + i) * TABLE_PAIRS) + ((k * (k + 1u)) / 2u) + k];
+        }
+        const double expected = part[i] * trace / TABLE_FUNCTIONS;
+        assert_close((double)finish.whiten.trace[i], expected, 2.0e-5 * ((expected < 0.0) ? -expected : expected));
     }
 }
 
@@ -226,7 +273,7 @@ static void a_gram_matrix_that_cannot_be_factored_leaves_the_designs_whitening(v
         y[k] = sums[k][PVID_TERM_Y];
     }
     work_off(&finish, &design, &estimator, sums, whitened);
-    assert_false(finish.whitened);
+    assert_false(finish.whiten.whitened);
     for (size_t k = 0; k < TABLE_FUNCTIONS; k++) {
         assert_true((whitened[k][8] >= y[k]) && (whitened[k][8] <= y[k]));
     }
@@ -424,8 +471,10 @@ int main(void)
         cmocka_unit_test(the_front_end_keeps_its_schedule_and_reproduces_a_parabola),
         cmocka_unit_test(double_integrals_of_polynomials_are_exact_but_for_rounding),
         cmocka_unit_test(the_drive_of_a_window_is_the_variance_of_u),
+        cmocka_unit_test(a_window_knows_its_mean_its_reach_and_its_curvature),
         cmocka_unit_test(the_first_sample_of_a_window_clears_its_sums),
         cmocka_unit_test(rows_are_orthogonal_to_what_is_unknown_of_a_window),
+        cmocka_unit_test(noise_that_passes_for_motion_is_what_a_trace_says),
         cmocka_unit_test(without_drive_nothing_is_removed),
         cmocka_unit_test(a_gram_matrix_that_cannot_be_factored_leaves_the_designs_whitening),
         cmocka_unit_test(products_by_pattern_are_those_of_whole_matrices),

@@ -33,6 +33,7 @@ static pvid_weak_design_f32 table_design = {
     .chi = table_chi,
     .gram = table_gram,
     .overlap = 1.5f,
+    .lag = 8,
 };
 
 static double table_double[3][TABLE_FUNCTIONS][TABLE_WINDOW]; /* chi, chi'', chi'''' */

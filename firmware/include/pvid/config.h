@@ -28,7 +28,8 @@
 #error "PVID_MAX_THETA must lie in 11..32"
 #endif
 
-/* Largest number of free parameters p. */
+/* Largest number of free parameters p: 3 in the strong form, 4 in the weak, 6 in the weak with
+ * friction (which PVID_MAX_MOMENTS 55 goes with). */
 #ifndef PVID_MAX_P
 #define PVID_MAX_P 4
 #endif
@@ -36,8 +37,8 @@
 #error "PVID_MAX_P must lie in 3..8"
 #endif
 
-/* Largest number of distinct entries of M that a model keeps: 45 for Kapitza's strong form;
- * a model without repeated entries needs n_theta (n_theta + 1) / 2. */
+/* Largest number of distinct entries of M that a model keeps: 45 for Kapitza's strong form, 36 for the weak,
+ * 55 for that with friction. RAM: 12 bytes each. A model without repeated entries needs n_theta (n_theta + 1) / 2. */
 #ifndef PVID_MAX_MOMENTS
 #define PVID_MAX_MOMENTS 45
 #endif

@@ -59,12 +59,14 @@ typedef struct {
     float step_limit;           /* largest |dp/p| (|dp|/start_sd where p may be zero), 0 < . <= 0.9 */
     float kappa_min;            /* no step while kappa of S + H0 is below this, or while the data say
                                    less of p[0] than the start does, 0..1; 0: always step */
+    float noise_margin;         /* no step while the data say less than so many times what noise of row_sd
+                                   alone would (for models that know it), 0..1e6; 0: do not ask */
     pvid_law law;
     uint16_t divider;           /* groups of rows a solve, 1.. */
 } pvid_estimator_config_f32;
 
 /* Defaults: stationary law, Gauss-Newton at every tick, no forgetting, row_weight 1, step_limit 0.3,
- * kappa_min 1e-5. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
+ * kappa_min 1e-5, noise_margin 4. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
 extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
 
 typedef struct {
@@ -76,6 +78,9 @@ typedef struct {
     uint32_t held_pivot;
     uint32_t rejected_not_finite;
     uint32_t rejected_saturated;
+    uint32_t held_uncertain;      /* groups after which nothing was published: see trust.h */
+    uint32_t held_out_of_range;   /* windows dropped because the angle was too large */
+    uint32_t misfits;             /* groups published under the alarm */
 } pvid_counters; /* each stops at 2^32 - 1 */
 
 /* State; only the functions below write to it. */
@@ -94,6 +99,9 @@ typedef struct {
     float correlation;
     float step_limit;
     float kappa_min;
+    float noise_margin;
+    float noise[PVID_NOISE_TRACES]; /* what the model's `noise` is told; written by whoever makes the rows */
+    float energy;                 /* sum of e^2 of the rows since the last group's end, at the p they met */
     uint16_t divider;
     uint16_t phase;               /* groups since the last solve */
     pvid_counters counters;
@@ -108,9 +116,27 @@ typedef struct {
     float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
 } pvid_cholesky_f32;
 
-/* A solve in progress, kept by the caller; begin and advance write to it, `reason` is to be read. */
+/* What is published. Always finite. */
+typedef struct {
+    float p[PVID_MAX_P];
+    float se[PVID_MAX_P];                      /* standard errors; start_sd where data say nothing */
+    float covariance[PVID_MAX_P][PVID_MAX_P];  /* of p, symmetric */
+    float kappa;       /* part of p[0]'s information that the other parameters cannot imitate, 0..1 */
+    float residual_sd; /* of Y - N^T theta [units of Y] */
+    float weight;      /* rows remembered */
+} pvid_estimate_f32;
+
+/* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be
+ * read when it is complete, refuge may be set after begin. */
 typedef struct {
     pvid_reason reason;
+    const float *refuge; /* [n_p] where p goes if it may not step; NULL: it stays */
+    pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
+    float size;      /* largest |dp/p| of the step before its limit; 0 while p is held */
+    float energy;    /* sum of e^2 of the group's rows at the p they met */
+    float variance;  /* of a row's noise */
+    bool informed;   /* the data say more than noise does */
+    bool solvable;
     uint8_t stage;
     uint8_t index;   /* of the row within the stage */
     uint8_t start;   /* of the column of C in work among its non-zeros */
@@ -129,16 +155,6 @@ typedef struct {
     float moved[PVID_MAX_THETA];
     pvid_cholesky_f32 factor;
 } pvid_estimator_solve_f32;
-
-/* What is published. Always finite. */
-typedef struct {
-    float p[PVID_MAX_P];
-    float se[PVID_MAX_P];                      /* standard errors; start_sd where data say nothing */
-    float covariance[PVID_MAX_P][PVID_MAX_P];  /* of p, symmetric */
-    float kappa;       /* part of p[0]'s information that the other parameters cannot imitate, 0..1 */
-    float residual_sd; /* of Y - N^T theta [units of Y] */
-    float weight;      /* rows remembered */
-} pvid_estimate_f32;
 
 /* Prepares `self`. Fails iff a field of config is not as described there; the status names it. */
 pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config);
@@ -173,9 +189,19 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
 /* Number of stages of a solve that is due. */
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group);
 
+/* Sets p before the first row, within its bounds. */
+void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[]);
+
 /* Standard errors, kappa and residual of the present estimate, from (S / s^2 + 1 / start_sd^2)^-1
  * with s^2 = correlation * residual sum / (weight - n_p). Costs about two solves; changes nothing. */
 void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate);
+
+/* The same in stages, for a model without a `project` of its own: begin, then assess_on until it returns
+ * true. `estimate` must stay where it is meanwhile. */
+void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
+                                         pvid_estimate_f32 *estimate);
+bool pvid_estimator_assess_on_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);
+uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self);
 
 #ifdef __cplusplus
 }

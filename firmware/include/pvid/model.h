@@ -11,7 +11,8 @@
  *
  * The optional functions are for models whose M has structure: `accumulate` when entries of M
  * repeat (fewer sums than n_theta (n_theta + 1) / 2), the others when C^T M C, C^T N and
- * theta^T M theta are cheaper than by the pattern of C. They come together or not at all.
+ * theta^T M theta are cheaper than by the pattern of C. Those three come together or not at all; `noise`
+ * is for models that know what their rows make of the sensor's noise.
  */
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
@@ -24,11 +25,15 @@
 extern "C" {
 #endif
 
+/* What the noise inside the rows is described by; see `noise` below. */
+#define PVID_NOISE_TRACES 3
+
 typedef struct pvid_model_f32 pvid_model_f32;
 
 struct pvid_model_f32 {
     uint8_t n_theta;   /* entries of theta and N, 1..PVID_MAX_THETA */
     uint8_t n_p;       /* free parameters, 1..PVID_MAX_P; p[0] is the one kappa speaks of */
+    uint8_t n_gated;   /* the first so many are what the gates look at, the others only absorb; 0: all */
     uint16_t n_moments; /* distinct entries of M kept, 1..PVID_MAX_MOMENTS */
     uint16_t n_c;      /* structural non-zeros of C */
     uint32_t positive; /* bit i set: p[i] > 0 always, steps and start_sd are taken relative to it */
@@ -50,6 +55,10 @@ struct pvid_model_f32 {
      * theta^T M theta - 2 theta^T b.
      * NULL: by the pattern of C, with b kept relative to theta(p); see estimator.h. */
     float (*project)(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[]);
+    /* Information that the sensor's noise alone makes at p, as if it were signal: what noise of unit variance
+     * adds to C^T M C for each unit of weight, s[i][j] for i <= j < n_p, from the traces that the estimator
+     * was given. NULL: not known; then nobody asks. */
+    void (*noise)(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P]);
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
 };

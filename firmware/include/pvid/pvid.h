@@ -15,6 +15,7 @@
 #include "pvid/model.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
+#include "pvid/trust.h"
 #include "pvid/weak.h"
 
 #define PVID_VERSION_MAJOR 0

@@ -25,7 +25,13 @@ typedef enum {
     PVID_BAD_DRIVE_MIN,       /* not finite or negative */
     PVID_BAD_ROW_WEIGHT,      /* not finite or outside (0, 1], or not 1 for a model that accumulates by itself */
     PVID_BAD_DESIGN,          /* a weak-form design not as described in weak.h */
-    PVID_BAD_ITERATIONS       /* outside 1..PVID_MAX_ITERATIONS, or too many for the window's hop */
+    PVID_BAD_ITERATIONS,      /* outside 1..PVID_MAX_ITERATIONS, or too many for the window's hop */
+    PVID_BAD_NOISE_MARGIN,    /* not finite or outside 0..1e6 */
+    PVID_BAD_PUBLISH_KAPPA,   /* kappa_min of trust.h not finite or outside [0, 1) */
+    PVID_BAD_SE_MAX,          /* not finite or not positive */
+    PVID_BAD_MISFIT_MAX,      /* not finite, or neither 0 nor at least 1 */
+    PVID_BAD_PIVOT_NOISE,     /* not finite or negative */
+    PVID_BAD_ANGLE_LIMIT      /* not finite or negative */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */
@@ -33,11 +39,16 @@ typedef enum {
     PVID_UPDATED = 0,            /* the parameters took a step */
     PVID_WARMING_UP,             /* the window of samples is not full yet */
     PVID_ACCUMULATED,            /* data taken in, no solve due at this tick (divider) */
-    PVID_HELD_NOT_EXCITED,       /* kappa below its threshold: the data say nothing of w */
+    PVID_HELD_NOT_EXCITED,       /* the data say nothing of w: no drive, kappa below its threshold, or no more
+                                    information than noise makes */
     PVID_HELD_PIVOT,             /* the system could not be solved, or its solution was not finite */
     PVID_REJECTED_NOT_FINITE,    /* NaN or infinity in the sample or in its row */
     PVID_REJECTED_OUTLIER,       /* reserved for the outlier gate */
-    PVID_REJECTED_SATURATED      /* a row beyond PVID_ROW_LIMIT */
+    PVID_REJECTED_SATURATED,     /* a row beyond PVID_ROW_LIMIT */
+    PVID_HELD_UNCERTAIN,         /* not published: standard errors too wide, or p still on its way */
+    PVID_HELD_OUT_OF_RANGE,      /* window dropped: the angle went beyond what the equations are good for */
+    PVID_MISFIT                  /* the parameters took a step, but the residuals are larger than the sensors'
+                                    noise explains: the model is not this mechanism's */
 } pvid_reason;
 
 #endif

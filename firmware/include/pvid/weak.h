@@ -8,9 +8,11 @@
  *   static pvid_weak_f32 identifier;
  *   pvid_weak_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .design = &table,
  *                                   .zero_unknown = true, .iterations = 3,
- *                                   .estimator = pvid_estimator_defaults_f32 };
+ *                                   .estimator = pvid_estimator_defaults_f32,
+ *                                   .trust = pvid_trust_defaults_f32 };
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_weak_step_f32(&identifier, phi, y);
+ *   whenever:  estimate = pvid_weak_estimate_f32(&identifier);
  *
  * What happens when. Samples are smoothed over `taps` and decimated by D; two windows of W decimated
  * samples, half a window apart, gather sums; every H = (W - 1) / 2 decimated samples one of them is
@@ -19,6 +21,8 @@
  * into rows and Gauss-Newton steps, one small stage a tick, while the others fill. No tick is long: the
  * longest costs less than three times the mean one, and what a tick does depends on its place in this
  * schedule, never on the data.
+ *
+ * The first window that is taken in sets c to the mean of phi over it: an encoder's zero may be far from 0.
  *
  * Never allocates. Total: a sample that is not finite is rejected and starts the windows again (its
  * neighbours are no longer equidistant); the sums keep what they know. Not thread-safe.
@@ -33,6 +37,7 @@
 #include "pvid/config.h"
 #include "pvid/estimator.h"
 #include "pvid/kapitza_weak.h"
+#include "pvid/trust.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -55,6 +60,8 @@ typedef struct {
     const float *gram;   /* [6][K (K + 1) / 2] lower triangles by rows: G44, G42 + G24, G40 + G04, G22,
                             G20 + G02, G00 with G_ij = sum over samples of chi^(i) chi^(j)^T */
     float overlap;       /* variance inflation because half-overlapping windows share noise, >= 1 */
+    uint8_t lag;         /* decimated samples between the three that phi'' is taken from for the alarm, 1..255:
+                            a sixth of the fast mode's period */
 } pvid_weak_design_f32;
 
 typedef struct {
@@ -63,6 +70,9 @@ typedef struct {
     float drive_min;      /* rms of u = y_A''/l1 about its mean [1/s^2] over a window, below which the pivot
                              counts as still and the window is dropped; some ten times the noise of u.
                              0: every window is taken in */
+    float pivot_noise;    /* variance that the pivot sensor's noise gives a row, for each (rad/s^2)^2 of mean square
+                             phi'' [s^4]; 0: an exact pivot. For the alarm only */
+    float angle_limit;    /* largest |phi - c| [rad] that a window may hold; 0: no limit */
     const pvid_weak_design_f32 *design; /* must outlive the identifier, as must its tables */
     bool zero_unknown;    /* true: p = (w, d1, d2, c), c [rad] the encoder's reading at rest; false: c = 0 */
     uint8_t iterations;   /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; 3 is good. One where
@@ -70,6 +80,7 @@ typedef struct {
     pvid_estimator_config_f32 estimator; /* model, update_rate_hz, row_weight and correlation are filled
                                             in by init. A group of rows is a window; row_sd [rad] is
                                             the noise of a decimated sample */
+    pvid_trust_config_f32 trust;         /* which estimates are published */
 } pvid_weak_config_f32;
 
 /* The front end: a ring of samples, and the FIR job of the last complete block in slices. */
@@ -107,23 +118,46 @@ typedef struct {
     float twice[PVID_WEAK_INTEGRALS];  /* the integrals of these */
     float u_sum;                       /* of the window's samples */
     float u_square_sum;
+    float phi_sum;
+    float lowest;                      /* phi */
+    float highest;
+    float bend_square_sum;             /* of the second differences of phi that fell into the window */
+    uint16_t bends;                    /* how many did */
 } pvid_weak_window_f32;
+
+/* Second differences phi(t) - 2 phi(t - lag) + phi(t - 2 lag), one every `lag` decimated samples. */
+typedef struct {
+    uint8_t wait;      /* samples until the next */
+    uint8_t known;     /* samples in `before`, 0..2 */
+    bool due;          /* the present sample ends one */
+    float before[2];   /* phi one lag and two lags ago */
+    float square;      /* of the one that is due */
+} pvid_weak_bend_f32;
 
 #define PVID_WEAK_FACTOR ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 #define PVID_WEAK_COLUMNS 12 /* N1..N8, Y, a, b and one that stays 0 */
 
+typedef struct {
+    bool whitened;                        /* the Gram matrix could be factored */
+    float combination[5];                 /* of the Gram tables but the first */
+    float trace[PVID_NOISE_TRACES];       /* noise in the columns, a row of unit noise variance */
+    float factor[PVID_WEAK_FACTOR];       /* R0, then its Cholesky factor with inverted diagonal */
+} pvid_weak_whiten_f32;
+
 /* The complete window that is being turned into rows and steps. */
 typedef struct {
     uint8_t stage;
-    uint8_t index;     /* of the function within the stage */
+    uint16_t index;    /* of the function, or of its part, within the stage */
     uint8_t iteration;
     uint8_t buffer;
-    bool whitened;     /* the Gram matrix could be factored */
-    float combination[5];
+    pvid_reason reason; /* of the last solve, then of the window */
+    float size;         /* of the last step, relative */
+    float expected;     /* variance of a row's noise */
     float direction[PVID_MAX_FUNCTIONS]; /* the one that is being projected out, of length 1 or 0 */
     float along[PVID_WEAK_COLUMNS];      /* the columns' components along it */
-    float factor[PVID_WEAK_FACTOR];      /* R0, then its Cholesky factor with inverted diagonal */
+    pvid_weak_whiten_f32 whiten;
     pvid_estimator_solve_f32 solve;
+    pvid_estimate_f32 candidate;         /* for publication */
 } pvid_weak_finish_f32;
 
 /* State; only the functions below write to it. */
@@ -131,6 +165,9 @@ typedef struct {
     const pvid_weak_design_f32 *design;
     float dt;              /* between decimated samples [s] */
     float drive_min;       /* variance of u below which a window is dropped [1/s^4] */
+    float row_variance;    /* that the encoder's noise gives a row [rad^2] */
+    float pivot_noise;     /* that the pivot's gives it, for each mean square of a second difference */
+    float angle_limit;     /* [rad]; 0: none */
     uint8_t iterations;
     uint8_t slice;         /* functions a tick */
     uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
@@ -139,23 +176,30 @@ typedef struct {
     float phi;             /* the present decimated sample [rad] */
     float u;               /* [1/s^2] */
     pvid_weak_front_f32 front;
+    pvid_weak_bend_f32 bend;
     pvid_weak_window_f32 window[2];
     pvid_weak_finish_f32 finish;
     float term[PVID_WEAK_TERMS]; /* of the window in work */
     float sums[3][PVID_MAX_FUNCTIONS][PVID_WEAK_TERMS];
     pvid_estimator_f32 estimator;
+    pvid_trust_f32 trust;
 } pvid_weak_f32;
 
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range, a table holds a
  * number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
  * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for less than
- * 5 K + 6 stages and 17 a Gauss-Newton step. */
+ * 10 K + 35 stages and 19 a Gauss-Newton step. */
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is
- * complete; PVID_UPDATED or why p was held at the tick of a window's last Gauss-Newton step, or
- * PVID_HELD_NOT_EXCITED at once where a window was dropped for want of drive; PVID_REJECTED_.. when the sample or a window's row was not usable; else PVID_ACCUMULATED. */
+ * complete; at the tick that ends the work on a window what trust.h says of it; PVID_HELD_NOT_EXCITED or
+ * PVID_HELD_OUT_OF_RANGE at once where a window was dropped for want of drive or for its angle;
+ * PVID_REJECTED_.. when the sample or a window's row was not usable; else PVID_ACCUMULATED. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
+
+/* What is published: the last estimate that could be trusted, the start until there is one (then
+ * self->trust.published is false). The reasons of the windows since say how old it is. */
+const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self);

@@ -580,7 +580,8 @@ def bench_cost(update: Path | None) -> int:
 
     with tempfile.TemporaryDirectory() as folder:
         costs = {level: cost.stage_costs(cost.build(Path(folder), level=level)) for level in ("-O2", "-O3")}
-    _update_readme(update, "cost", cost.as_markdown(costs, cost.state_bytes(Native())))
+        state_bytes = cost.state_bytes(Path(folder))
+    _update_readme(update, "cost", cost.as_markdown(costs, state_bytes))
     return DONE
 
 

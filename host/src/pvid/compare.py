@@ -75,12 +75,18 @@ def first_difference(
     p: npt.NDArray[np.float32],
     sums: npt.NDArray[np.float32],
     reason: npt.NDArray[np.uint8],
+    published: npt.NDArray[np.float32] | None = None,
 ) -> Difference | None:
-    """The first difference between a replay of the core and one lane of the twin, p before sums before status."""
+    """The first difference between a replay of the core and one lane of the twin: p, sums, status, then what is
+    published."""
     n_sums = sums.shape[1]
     names: list[Callable[[int], str]] = [P_NAMES.__getitem__, lambda i: sum_name(i, n_sums), lambda _: "status"]
     cores = [_words(record.p), _words(record.sums), record.reason[:, None].astype(np.uint32)]
     twins = [_words(p), _words(sums), reason[:, None].astype(np.uint32)]
+    if published is not None:
+        names.append(lambda i: f"published {P_NAMES[i]}")
+        cores.append(_words(record.published))
+        twins.append(_words(published))
     found: list[tuple[int, int, str, int, int]] = []
     for order, (core, twin, name) in enumerate(zip(cores, twins, names, strict=True)):
         ticks, places = np.nonzero(core != twin)
@@ -118,7 +124,9 @@ def compare_run(
         ticks=len(record.reason),
         core_hash=identifier.running_hash,
         twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
-        difference=first_difference(record, p, sums, reason),
+        difference=first_difference(
+            record, p, sums, reason, twin.published[:, :, 0] if isinstance(config, WeakConfig) else None
+        ),
     )
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
-from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig
+from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, config_of, weak_design_of
 from pvid.weak_oracle import WeakSettings, identify_weak
@@ -23,10 +23,6 @@ ZERO = "c"
 
 # With w known no better than this, relative, nothing is identified.
 WORST_SE = 0.1
-
-# Residual beyond which the model does not explain the data, in units of the encoder's own noise. On the standard rig
-# the pivot sensor's noise brings it to 2.3 at 16 bits; 0.107 rad or friction of 1e-4 m^2/s to 2.5 at 12 bits, 9 at 14.
-WORST_MISFIT = 2.4
 
 PHYSICAL = ("g", "l2", "rho2")
 UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", "rho2": "m"}
@@ -49,14 +45,18 @@ class Identification:
     """What a run told.
 
     `value` and `se` map w, d1, d2 [1/s^2, -, -] and, inside the physical region, g, l2, rho2 [m/s^2, m, m].
-    `lost` counts samples that were rejected; `hash` is None where the core has none (f64). `misfit` is the residual
-    in units of the encoder's noise (weak form; else None): much above 1 the standard errors are not to be trusted.
+    `lost` counts samples that were rejected; `hash` is None where the core has none (f64). In the weak form the values
+    are the published ones (pvid/trust.h): `trusted_s` is when the last of them was trusted [s] (None: never, they are
+    the start), `misfit` the variance of the residuals over what the sensors' noise explains, and `alarm` whether that
+    is too much. In the strong form, which has no such gate, they are the last ones, and None, None, False.
     """
 
     value: dict[str, float]
     se: dict[str, float]
     kappa: float
+    trusted_s: float | None
     misfit: float | None
+    alarm: bool
     status: str
     ticks: int
     updates: int
@@ -70,7 +70,10 @@ class Identification:
 
     @property
     def identified(self) -> bool:
-        """Whether this is an answer: the data moved the estimate, the last word is no refusal, and w is known."""
+        """Whether this is an answer: one that was trusted; in the strong form, whose last word is no refusal and whose
+        w is known."""
+        if self.form == "weak":
+            return self.trusted_s is not None
         return (
             self.updates > 0
             and self.status in (Reason.UPDATED.text, Reason.ACCUMULATED.text)
@@ -80,17 +83,19 @@ class Identification:
     @property
     def warning(self) -> str | None:
         """What makes the answer doubtful, in words; None if nothing does."""
-        if self.misfit is None or self.misfit <= WORST_MISFIT:
-            return None
-        return (
-            f"the residual is {self.misfit:.1f} times what the encoder's noise explains: large angles, friction, or a "
-            f"wrong phi_lsb; the errors are larger than the standard errors say"
-        )
+        if self.alarm and self.misfit is not None:
+            return (
+                f"the residuals have {self.misfit:.1f} times the variance that the sensors' noise explains: large "
+                f"angles, friction, or a wrong phi_lsb; the errors are larger than the standard errors say"
+            )
+        if self.trusted_s is not None and self.status not in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
+            return f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}"
+        return None
 
     @property
     def verdict(self) -> str:
         """Why nothing was identified, in words."""
-        if self.updates and self.status in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
+        if self.form == "strong" and self.updates and self.status in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
             return f"the standard error of w is {100 * self.se['w'] / abs(self.value['w']):.0f} % of it"
         return self.status
 
@@ -103,6 +108,7 @@ class Identification:
         return {
             **parameters,
             "kappa": self.kappa,
+            "trusted_s": self.trusted_s,
             "misfit": self.misfit,
             "warning": self.warning,
             "status": self.status,
@@ -168,7 +174,9 @@ def _in_float32(
     identifier = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
     record = identifier.run(run.phi, run.y, sums=False, estimate_every=every)
     counters = identifier.counters
-    last = identifier.assess()
+    last = identifier.estimate if isinstance(identifier, WeakIdentifier) else identifier.assess()
+    trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
+    gated = isinstance(identifier, WeakIdentifier) and len(trusted) > 0
     estimates = record.estimate
     trajectory = _trajectory(
         run.t[::every],
@@ -182,7 +190,9 @@ def _in_float32(
         p=last["p"][:n_p].astype(np.float64),
         covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
         kappa=float(last["kappa"]),
-        misfit=float(last["residual_sd"]) / config.estimator.row_sd if isinstance(config, WeakConfig) else None,
+        trusted_s=float(run.t[trusted[-1]]) if gated else None,
+        misfit=identifier.misfit if isinstance(identifier, WeakIdentifier) else None,
+        alarm=gated and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],
@@ -229,7 +239,9 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
         p=result.last.p,
         covariance=result.last.covariance,
         kappa=result.last.kappa,
+        trusted_s=None,
         misfit=None,
+        alarm=False,
         status=(Reason.UPDATED if moved_at_end else Reason.HELD_NOT_EXCITED).text,
         ticks=len(run.t),
         updates=int(result.updated.sum()),
@@ -292,7 +304,9 @@ def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
         p=p,
         covariance=covariance,
         kappa=0.0,
+        trusted_s=None,
         misfit=None,
+        alarm=False,
         status=Reason.HELD_NOT_EXCITED.text,
         ticks=len(run.t),
         updates=0,
@@ -324,7 +338,9 @@ def _identification(
     p: Float,
     covariance: Float,
     kappa: float,
+    trusted_s: float | None,
     misfit: float | None,
+    alarm: bool,
     status: str,
     ticks: int,
     updates: int,
@@ -343,7 +359,9 @@ def _identification(
         value=values,
         se=errors,
         kappa=kappa,
+        trusted_s=trusted_s,
         misfit=misfit,
+        alarm=alarm,
         status=status,
         ticks=ticks,
         updates=updates,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,9 +21,10 @@ from pvid.errors import PvidError
 
 Float32 = npt.NDArray[np.float32]
 
-MAX_P = 4
+# Bounds that host/native builds the core with.
+MAX_P = 6
 MAX_THETA = 11
-MAX_MOMENTS = 45
+MAX_MOMENTS = 55
 MAX_SUMS = MAX_MOMENTS + MAX_THETA + 2
 MAX_WINDOW = 321
 
@@ -39,6 +40,9 @@ class Reason(IntEnum):
     REJECTED_NOT_FINITE = 5
     REJECTED_OUTLIER = 6
     REJECTED_SATURATED = 7
+    HELD_UNCERTAIN = 8
+    HELD_OUT_OF_RANGE = 9
+    MISFIT = 10
 
     @property
     def text(self) -> str:
@@ -70,6 +74,12 @@ class Status(IntEnum):
     BAD_ROW_WEIGHT = 18
     BAD_DESIGN = 19
     BAD_ITERATIONS = 20
+    BAD_NOISE_MARGIN = 21
+    BAD_PUBLISH_KAPPA = 22
+    BAD_SE_MAX = 23
+    BAD_MISFIT_MAX = 24
+    BAD_PIVOT_NOISE = 25
+    BAD_ANGLE_LIMIT = 26
 
 
 class Law(IntEnum):
@@ -106,8 +116,21 @@ class EstimatorConfigStruct(ctypes.Structure):
         ("row_weight", ctypes.c_float),
         ("step_limit", ctypes.c_float),
         ("kappa_min", ctypes.c_float),
+        ("noise_margin", ctypes.c_float),
         ("law", ctypes.c_int),
         ("divider", ctypes.c_uint16),
+    ]
+
+
+class TrustConfigStruct(ctypes.Structure):
+    """pvid_trust_config_f32."""
+
+    _fields_ = [
+        ("kappa_min", ctypes.c_float),
+        ("se_max", ctypes.c_float),
+        ("misfit_max", ctypes.c_float),
+        ("groups_min", ctypes.c_uint16),
+        ("shut_max", ctypes.c_uint16),
     ]
 
 
@@ -136,6 +159,7 @@ class WeakDesignStruct(ctypes.Structure):
         ("chi", ctypes.POINTER(ctypes.c_float)),
         ("gram", ctypes.POINTER(ctypes.c_float)),
         ("overlap", ctypes.c_float),
+        ("lag", ctypes.c_uint8),
     ]
 
 
@@ -146,10 +170,13 @@ class WeakConfigStruct(ctypes.Structure):
         ("sample_rate_hz", ctypes.c_float),
         ("l1", ctypes.c_float),
         ("drive_min", ctypes.c_float),
+        ("pivot_noise", ctypes.c_float),
+        ("angle_limit", ctypes.c_float),
         ("design", ctypes.POINTER(WeakDesignStruct)),
         ("zero_unknown", ctypes.c_bool),
         ("iterations", ctypes.c_uint8),
         ("estimator", EstimatorConfigStruct),
+        ("trust", TrustConfigStruct),
     ]
 
 
@@ -167,6 +194,9 @@ class CountersStruct(ctypes.Structure):
             "held_pivot",
             "rejected_not_finite",
             "rejected_saturated",
+            "held_uncertain",
+            "held_out_of_range",
+            "misfits",
         )
     ]
 
@@ -189,6 +219,7 @@ class RecordStruct(ctypes.Structure):
 
     _fields_ = [
         ("p", ctypes.c_void_p),
+        ("published", ctypes.c_void_p),
         ("sums", ctypes.c_void_p),
         ("reason", ctypes.c_void_p),
         ("hash", ctypes.c_void_p),
@@ -225,6 +256,7 @@ class EstimatorConfig:
     row_weight: float = 1.0
     step_limit: float = 0.3
     kappa_min: float = 1e-5
+    noise_margin: float = 4.0
     law: Law = Law.STATIONARY
     divider: int = 1
 
@@ -279,6 +311,19 @@ class WeakTables(Protocol):
     def gram(self) -> Float32: ...
     @property
     def overlap(self) -> float: ...
+    @property
+    def lag(self) -> int: ...
+
+
+@dataclass(frozen=True)
+class TrustConfig:
+    """Which estimates are published, as in trust.h."""
+
+    kappa_min: float = 3e-5
+    se_max: float = 0.05
+    misfit_max: float = 1.5
+    groups_min: int = 3
+    shut_max: int = 16
 
 
 @dataclass(frozen=True)
@@ -296,6 +341,9 @@ class WeakConfig:
     zero_unknown: bool = True
     iterations: int = 3
     drive_min: float = 0.0
+    pivot_noise: float = 0.0
+    angle_limit: float = 0.0
+    trust: TrustConfig = field(default_factory=TrustConfig)
 
     @property
     def hop(self) -> int:
@@ -312,11 +360,13 @@ class WeakConfig:
 class Record:
     """What a replay left, one entry a tick.
 
-    p float32 [ticks, n_p]; sums float32 [ticks, n_moments + n_theta + 2] (M, B, yy, weight);
+    p float32 [ticks, n_p], the estimator's; published likewise, of the weak form (else empty);
+    sums float32 [ticks, n_moments + n_theta + 2] (M, B, yy, weight);
     reason uint8 [ticks]; hash uint32 [ticks]; estimate: structured [ticks / estimate_every].
     """
 
     p: Float32
+    published: Float32
     sums: Float32
     reason: npt.NDArray[np.uint8]
     hash: npt.NDArray[np.uint32]
@@ -336,6 +386,7 @@ def _struct_layout() -> list[int]:
         ctypes.sizeof(EstimatorConfigStruct),
         at(EstimatorConfigStruct, "start"),
         at(EstimatorConfigStruct, "row_sd"),
+        at(EstimatorConfigStruct, "noise_margin"),
         at(EstimatorConfigStruct, "law"),
         at(EstimatorConfigStruct, "divider"),
         ctypes.sizeof(StrongConfigStruct),
@@ -345,12 +396,17 @@ def _struct_layout() -> list[int]:
         ctypes.sizeof(WeakDesignStruct),
         at(WeakDesignStruct, "smooth"),
         at(WeakDesignStruct, "overlap"),
+        at(WeakDesignStruct, "lag"),
         ctypes.sizeof(WeakConfigStruct),
         at(WeakConfigStruct, "drive_min"),
+        at(WeakConfigStruct, "pivot_noise"),
         at(WeakConfigStruct, "design"),
         at(WeakConfigStruct, "zero_unknown"),
         at(WeakConfigStruct, "iterations"),
         at(WeakConfigStruct, "estimator"),
+        at(WeakConfigStruct, "trust"),
+        ctypes.sizeof(TrustConfigStruct),
+        at(TrustConfigStruct, "groups_min"),
         ctypes.sizeof(CountersStruct),
         ctypes.sizeof(EstimateStruct),
         at(EstimateStruct, "kappa"),
@@ -389,17 +445,13 @@ class Native:
         length = ctypes.c_uint32.in_dll(self._lib, "pvid_native_layout_length").value
         layout = list((ctypes.c_uint32 * length).in_dll(self._lib, "pvid_native_layout"))
         mirrored = _struct_layout()
-        estimator_size, counters_at, strong_size, estimator_at, weak_size, weak_estimator_at, *bounds = layout[
-            len(mirrored) :
-        ]
+        sizes, bounds = layout[len(mirrored) : -4], layout[-4:]
         if layout[: len(mirrored)] != mirrored or bounds != [MAX_P, MAX_THETA, MAX_SUMS, MAX_WINDOW]:
             raise PvidError(f"the C core {path} was built with other struct sizes than this package: {layout}")
-        self._estimator_size = estimator_size
-        self._counters_at = counters_at
-        self._strong_size = strong_size
-        self._estimator_at = estimator_at
-        self._weak_size = weak_size
-        self._weak_estimator_at = weak_estimator_at
+        self._estimator_size, self._counters_at = sizes[:2]
+        self._strong_size, self._estimator_at = sizes[2:4]
+        self._weak_size, self._weak_estimator_at, self._published_at, self._is_published_at = sizes[4:8]
+        self._misfit_at = sizes[8]
 
     @property
     def build(self) -> str:
@@ -458,8 +510,8 @@ def _estimator_struct(config: EstimatorConfig) -> EstimatorConfigStruct:
     for name in ("start", "start_sd", "lower", "upper"):
         values = np.asarray(getattr(config, name), np.float32)
         getattr(struct, name)[: len(values)] = [float(v) for v in values]
-    scalars = ("row_sd", "forgetting_s", "feedback_hz", "correlation", "row_weight", "step_limit", "kappa_min")
-    for name in scalars:
+    scalars = ("row_sd", "forgetting_s", "feedback_hz", "correlation", "row_weight", "step_limit")
+    for name in (*scalars, "kappa_min", "noise_margin"):
         setattr(struct, name, float(getattr(config, name)))
     struct.law = int(config.law)
     struct.divider = config.divider
@@ -497,16 +549,20 @@ def weak_config_struct(config: WeakConfig) -> tuple[WeakConfigStruct, Tables]:
         window=design.window,
         functions=design.functions,
         overlap=float(design.overlap),
+        lag=design.lag,
         **_table_pointers(tables),
     )
     struct = WeakConfigStruct(
         sample_rate_hz=config.sample_rate,
         l1=config.l1,
         drive_min=config.drive_min,
+        pivot_noise=config.pivot_noise,
+        angle_limit=config.angle_limit,
         design=ctypes.pointer(design_struct),
         zero_unknown=config.zero_unknown,
         iterations=config.iterations,
         estimator=_estimator_struct(config.estimator),
+        trust=TrustConfigStruct(**asdict(config.trust)),
     )
     return struct, tables
 
@@ -517,7 +573,8 @@ class _Stepper:
 
     native: Native
     n_p: int = 3
-    n_sums: int = MAX_SUMS
+    n_sums: int = 45 + MAX_THETA + 2
+    publishes: bool = False
     _hash: npt.NDArray[np.uint32] = field(default_factory=lambda: np.array([0x811C9DC5], np.uint32))
     _state: Any = None
     _estimator_at: int = 0
@@ -535,6 +592,7 @@ class _Stepper:
         estimates = -(-ticks // estimate_every) if estimate_every else 0
         record = Record(
             p=np.empty((ticks, self.n_p), np.float32),
+            published=np.empty((ticks if self.publishes else 0, self.n_p), np.float32),
             sums=np.empty((ticks if want_sums else 0, self.n_sums), np.float32),
             reason=np.empty(ticks, np.uint8),
             hash=np.empty(ticks if want_hash else 0, np.uint32),
@@ -543,6 +601,7 @@ class _Stepper:
         )
         struct = RecordStruct(
             p=record.p.ctypes.data,
+            published=record.published.ctypes.data if self.publishes else None,
             sums=record.sums.ctypes.data if want_sums else None,
             reason=record.reason.ctypes.data,
             hash=record.hash.ctypes.data if want_hash else None,
@@ -612,7 +671,7 @@ class WeakIdentifier(_Stepper):
 
     def __init__(self, native: Native, config: WeakConfig) -> None:
         n_p, n_theta = (4, 8) if config.zero_unknown else (3, 5)
-        super().__init__(native, n_p=n_p, n_sums=n_theta * (n_theta + 1) // 2 + n_theta + 2)
+        super().__init__(native, n_p=n_p, n_sums=n_theta * (n_theta + 1) // 2 + n_theta + 2, publishes=True)
         self._config, self._tables = weak_config_struct(config)
         self._state = ctypes.create_string_buffer(native._weak_size)
         self._estimator_at = native._weak_estimator_at
@@ -638,6 +697,25 @@ class WeakIdentifier(_Stepper):
             hashes,
             estimate_every,
         )
+
+    @property
+    def published(self) -> npt.NDArray[np.void] | None:
+        """pvid_weak_estimate_f32, dtype ESTIMATE_DTYPE, shape (); None until an estimate has been trusted."""
+        if not self._state[self.native._is_published_at][0]:
+            return None
+        return self.estimate
+
+    @property
+    def estimate(self) -> npt.NDArray[np.void]:
+        """pvid_weak_estimate_f32, dtype ESTIMATE_DTYPE, shape (): the start until an estimate has been trusted."""
+        place = self.native._published_at
+        raw = self._state[place : place + ESTIMATE_DTYPE.itemsize]
+        return np.frombuffer(raw, ESTIMATE_DTYPE)[0].copy()  # type: ignore[no-any-return]
+
+    @property
+    def misfit(self) -> float:
+        """Mean variance of the residuals over what the sensors' noise explains, since the first publication."""
+        return ctypes.c_float.from_buffer(self._state, self.native._misfit_at).value
 
     def gap(self) -> None:
         """pvid_weak_gap_f32: samples are missing before the next call of `run`."""

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.differentiation import FirBank, finite_difference, savitzky_golay
 from pvid.errors import PvidError
-from pvid.native import MAX_WINDOW, EstimatorConfig, Law, StrongConfig, WeakConfig
+from pvid.native import MAX_WINDOW, EstimatorConfig, Law, StrongConfig, TrustConfig, WeakConfig
 from pvid.rigfile import RigFile
 from pvid.weak_design import WeakDesign, design
 
@@ -93,6 +93,9 @@ def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
 ZERO_BOUND = 3.0
 ZERO_SD = 0.5
 
+# Noise of a sensor in LSB: rounding, and half an LSB of its own.
+NOISE_LSB = float(np.sqrt(1 / 12 + 1 / 4))
+
 # Below this kappa rounding alone speaks of w: without a drive float32 leaves up to 6e-7.
 WEAK_KAPPA_MIN = 5e-6
 
@@ -111,20 +114,31 @@ def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
     )
 
 
+def weak_drive_threshold(rig: RigFile, tables: WeakDesign) -> float:
+    """Rms of u [1/s^2] below which a window counts as undriven: ten times the noise of a still pivot's u."""
+    weights = tables.second
+    white_gain = np.sqrt(2 * np.sum(weights**2) + 4 * np.sum(weights) ** 2)
+    noise = NOISE_LSB * rig.sensor.y_lsb * white_gain * tables.sample_rate**2 / rig.l1
+    return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
+
+
 def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfig:
     """Settings of the weak-form identifier for samples at `sample_rate` [Hz]; `start` overrides the nominal p."""
     settings = rig.identifier
     tables = weak_design_of(rig, sample_rate)
     p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
     zero = 1 if settings.zero else 0
-    # Rounding to an LSB and half an LSB of noise besides; an exact sensor has float32's noise. The rows listen where
+    # An exact sensor has float32's noise. The rows listen where
     # the smoother passes, at the density of the samples' noise: what D samples average to.
-    sample_sd = max(rig.sensor.phi_lsb * np.sqrt(1 / 12 + 1 / 4), 1e-8)
+    sample_sd = max(rig.sensor.phi_lsb * NOISE_LSB, 1e-8)
     return WeakConfig(
         sample_rate=sample_rate,
         l1=rig.l1,
         design=tables.f32,
         zero_unknown=settings.zero,
+        drive_min=weak_drive_threshold(rig, tables),
+        pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
+        trust=TrustConfig(),
         estimator=EstimatorConfig(
             start=np.append(p, [0.0] * zero).astype(np.float32),
             start_sd=np.append(START_RELATIVE_SD * p, [ZERO_SD] * zero).astype(np.float32),

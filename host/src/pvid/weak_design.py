@@ -72,6 +72,7 @@ class WeakTables32:
     chi: Float32
     gram: Float32
     overlap: float
+    lag: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +153,46 @@ class WeakDesign:
         return math.sqrt(2 * float(np.sum(self.smooth**2)) + centre**2)
 
     @property
+    def fast_rad_s(self) -> float:
+        """Angular frequency of the fast mode at the nominal p [rad/s]."""
+        w, d1, d2 = self.nominal
+        return math.sqrt(w * (d1 + math.sqrt(max(d1 * d1 - 4 * d2, 0.0))) / 2)
+
+    @property
+    def lag(self) -> int:
+        """Decimated samples in a sixth of the fast mode's period: a second difference that wide is phi'' to a tenth."""
+        return min(max(round(2 * math.pi / (6 * self.fast_rad_s * self.dt)), 1), 255)
+
+    def pivot_noise(self, y_sd: float) -> float:
+        """Variance that white noise of y_sd [m] on the pivot's samples gives a row, for each (rad/s^2)^2 of phi''^2.
+
+        An error du of u enters a row as sum chi'' q du with q = phi''/w, motion at the fast mode's frequency. What of
+        du lies in the rows' band is dy''/l1, so that (chi'' q)'' meets dy; to it comes what decimation folds into
+        the band.
+        """
+        w = self.nominal[0]
+        g = self.chi[:, 1]
+        slope = np.gradient(g, self.dt, axis=0)
+        bend = np.gradient(slope, self.dt, axis=0)
+        omega = self.fast_rad_s
+        inner = np.sum((bend - omega**2 * g) ** 2 + (2 * omega * slope) ** 2) / self.decimation
+        band_hz = omega / (2 * math.pi) + self.functions / (2 * self.window_s)
+        outer = float(np.sum(g**2)) * self._folded_gain(band_hz)
+        return float((inner + outer) / self.functions * (y_sd / (self.l1 * w)) ** 2)
+
+    def _folded_gain(self, band_hz: float) -> float:
+        """Variance of y'' [1/s^4] that noise of 1 on y has after decimation, as its density below band_hz says."""
+        rate = self.sample_rate / self.decimation
+        f = (np.arange(4096) + 0.5) * self.sample_rate / 8192
+        folded = np.abs(f - rate * np.round(f / rate))
+        beyond = (folded < band_hz) & (f > rate / 2)
+        if not beyond.any():
+            return 0.0
+        phase = 2 * math.pi * np.outer(f[beyond], np.arange(1, len(self.second) + 1)) / self.sample_rate
+        response = 2 * (np.cos(phase) - 1) @ self.second * self.sample_rate**2
+        return float(np.mean(response**2) * (self.decimation - 1) / self.decimation)
+
+    @property
     def flash_bytes(self) -> int:
         """Size of the float32 tables."""
         return 4 * (self.smooth.size + self.second.size + self.chi.size + self.gram.size)
@@ -194,6 +235,7 @@ class WeakDesign:
             self.chi_32,
             self.gram_32,
             float(self.overlap_32),
+            self.lag,
         )
 
 
@@ -328,6 +370,7 @@ def to_c_header(design: WeakDesign, name: str, made_by: str = "pvid.weak_design.
             f"    .functions = {k},",
             *(f"    .{table} = {name}_{table}," for table in ("smooth", "second", "chi", "gram")),
             f"    .overlap = {float_literal(design.overlap_32)},",
+            f"    .lag = {design.lag},",
             "};",
             "",
             "#endif",
@@ -371,7 +414,35 @@ def _test_functions(window: int, functions: int, exponent: int, dt: float) -> Fl
                 right[0] = 0.0
             chi[half:, place, k] = right
             chi[half::-1, place, k] = -right if k % 2 else right
+    _as_integrals(chi[:, 2])
     return chi
+
+
+# Gregory's end corrections of the trapezoid rule: what the differences of order 1, 2, .. at an end are multiplied by.
+_GREGORY = (1 / 12, 1 / 24, 19 / 720, 3 / 160, 863 / 60480)
+
+
+def _as_integrals(chi4: Float) -> None:
+    """Lets plain sums with chi'''' [W, K] do what its integrals do.
+
+    chi'''' vanishes at the ends only as (1 - x^2)^(exponent - 4): the trapezoid rule errs by some millionths there, and
+    with an encoder's zero of 0.1 rad that is a row's standard deviation. First Gregory's weights near the ends; then
+    the sums with 1, x, x^2 and x^3 are made to vanish by taking off (1 - x^2)^2 times a cubic.
+    """
+    weights = np.ones(len(chi4))
+    for order, factor in enumerate(_GREGORY, 1):
+        for j in range(order + 1):
+            weights[[j, -1 - j]] -= factor * (-1) ** j * math.comb(order, j)
+    chi4 *= weights[:, None]
+    half = (len(chi4) - 1) // 2
+    x = np.arange(-half, half + 1) / half
+    for k in range(chi4.shape[1]):
+        powers = x[:, None] ** (np.array([1, 3]) if k % 2 else np.array([0, 2]))
+        shapes = (1 - x**2)[:, None] ** 2 * powers
+        chi4[:, k] -= shapes @ np.linalg.solve(powers.T @ shapes, powers.T @ chi4[:, k])
+        chi4[half::-1, k] = -chi4[half:, k] if k % 2 else chi4[half:, k]
+        if k % 2:
+            chi4[half, k] = 0.0
 
 
 def _whitened(chi: Float, p: Float) -> Float:

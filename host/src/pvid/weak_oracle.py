@@ -385,6 +385,8 @@ class WeakOracle:
         if self.settings.drive_min > 0 and float(np.var(driven)) < self.settings.drive_min**2:
             self._previous = None
             return
+        if self.folded == 0 and self.n_core == 4:
+            self.p[3] = float(np.mean(phi[:-1]))
         before = self.p.copy()
         x, inverse_factor = self.rows(window_columns, phi, u)
         self.add(x, inverse_factor)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pvid.errors import PvidError
-from pvid.native import Native
 
 STAGES = {
     "differentiator": "two channels, five points, orders 0 to 4",
@@ -63,12 +62,27 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: 
     return binary
 
 
-def state_bytes(native: Native) -> dict[str, int]:
-    """Bytes of state beside the baseline's."""
+_SIZES = """#include <stdio.h>
+#include "pvid/pvid.h"
+int main(void) {
+    printf("%zu %zu %zu", sizeof(pvid_estimator_f32), sizeof(pvid_strong_f32), sizeof(pvid_weak_f32));
+    return 0;
+}
+"""
+
+
+def state_bytes(folder: Path) -> dict[str, int]:
+    """Bytes of state with the bounds of pvid/config.h as they are, and the baseline's; works in `folder`."""
+    source, binary = folder / "sizes.c", folder / "sizes"
+    source.write_text(_SIZES, encoding="utf-8")
+    include = Path(__file__).resolve().parents[4] / "firmware" / "include"
+    subprocess.run(["gcc", "-std=c99", f"-I{include}", str(source), "-o", str(binary)], check=True)
+    printed = subprocess.run([str(binary)], capture_output=True, text=True, check=True).stdout
+    estimator, strong, weak = map(int, printed.split())
     return {
-        "estimator (two-level sums, counters, settings)": native.state_bytes["estimator"],
-        "strong form, windows of 321 samples": native.state_bytes["strong"],
-        "weak form": native.state_bytes["weak"],
+        "estimator (two-level sums, counters, settings)": estimator,
+        "strong form, windows of 321 samples": strong,
+        "weak form": weak,
         "plain packed RLS of 11 parameters": RLS_STATE_BYTES,
     }
 

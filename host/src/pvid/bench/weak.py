@@ -87,13 +87,13 @@ def run_case(native: Native, case: Case) -> Outcome:
         run = simulate(sensors=sensors, truth=case.truth, seed=seed).run
         identifier = native.weak(weak_config(rig, RATE_HZ, standard_start(seed)))
         record = identifier.run(run.phi, run.y, sums=False, hashes=False)
-        last = identifier.assess()
+        last = identifier.estimate
         p = last["p"][:3].astype(np.float64)
         errors.append(p / truth - 1)
         standard_errors.append(last["se"][:3] / truth)
         lengths = oracle.physical(p, STANDARD_PENDULUM.l1)[1:]
         physical.append(lengths / [STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2] - 1)
-        early += bool(np.abs(record.p[3000:, :3] / truth - 1).max() < 0.01)
+        early += bool(np.abs(record.published[3000:, :3] / truth - 1).max() < 0.01)
     return Outcome(np.array(errors), np.array(standard_errors), np.array(physical), early)
 
 

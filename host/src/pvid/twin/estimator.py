@@ -31,6 +31,9 @@ _COUNTERS = (
     "held_pivot",
     "rejected_not_finite",
     "rejected_saturated",
+    "held_uncertain",
+    "held_out_of_range",
+    "misfits",
 )
 
 
@@ -74,6 +77,7 @@ class Estimator:
         self.information = Information(n_sums, _lanes([c.forgetting_s for c in configs]) * rate)
         self.sums = self.information.read()
         self.counters = {name: np.zeros(len(configs), np.int64) for name in _COUNTERS}
+        self.size = np.zeros(len(configs), np.float32)
 
     @staticmethod
     def _gain(config: EstimatorConfig, rate: np.float32) -> np.float32:
@@ -119,7 +123,8 @@ class Estimator:
 
     def _solve(self, due: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
         s, force, _ = model.project(self.p, self.sums)
-        x, reason = self._step_from(s, force, self.gain, due)
+        everywhere = np.ones(len(due), np.bool_)
+        x, reason = self._step_from(s, force, self.gain, due, everywhere)
         moving = due & (reason == Reason.UPDATED)
         self.p = np.where(moving, x, self.p)
         self.counters["updates"] += moving
@@ -129,8 +134,17 @@ class Estimator:
         """What the size of a step is measured by [n_p, lanes]."""
         return self.p
 
+    def _kappa(self, s: Float32, whole: cholesky.Factor) -> cholesky.Factor:
+        """The factor of the leading parameters that the gates look at; `whole` is that of all."""
+        return whole
+
     def _step_from(
-        self, s: Float32, force: Float32, gain: Float32, due: npt.NDArray[np.bool_]
+        self,
+        s: Float32,
+        force: Float32,
+        gain: Float32,
+        due: npt.NDArray[np.bool_],
+        informed: npt.NDArray[np.bool_],
     ) -> tuple[Float32, npt.NDArray[np.uint8]]:
         """Where p goes from S and F, and whether it may: UPDATED or why it is held, in every lane."""
         for a in range(len(self.p)):
@@ -138,12 +152,15 @@ class Estimator:
         rhs = gain * force + (np.float32(1) - gain) * self.innovation
         self.innovation = np.where(due, np.float32(0), self.innovation)
         f = cholesky.factor(s)
-        own = (f.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
-        excited = (f.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
+        kappa = self._kappa(s, f)
+        solvable = f.ok & kappa.ok
+        own = (kappa.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
+        excited = informed & (kappa.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
         dp = cholesky.solve(f, rhs)
         magnitudes = (dp / self._reference()).view(np.uint32) & np.uint32(0x7FFFFFFF)
         size = magnitudes.max(axis=0).view(np.float32)
-        moving = due & f.ok & excited & np.isfinite(size)
+        moving = due & solvable & excited & np.isfinite(size)
+        self.size = np.where(moving, size, np.float32(0))
         limited = size > self.step_limit
         factor = np.where(limited, self.step_limit / size, np.float32(1)).astype(np.float32, copy=False)
         x = self.p + factor * dp
@@ -154,7 +171,7 @@ class Estimator:
         reason = np.full(len(due), Reason.UPDATED, np.uint8)
         reason[~np.isfinite(size)] = Reason.HELD_PIVOT
         reason[~excited] = Reason.HELD_NOT_EXCITED
-        reason[~f.ok] = Reason.HELD_PIVOT
+        reason[~solvable] = Reason.HELD_PIVOT
         self.counters["limited"] += moving & limited
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         self.counters["held_not_excited"] += due & (reason == Reason.HELD_NOT_EXCITED)
@@ -171,16 +188,19 @@ class Estimator:
     def assess(self) -> npt.NDArray[np.void]:
         """pvid_estimator_assess_f32 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
         with np.errstate(all="ignore"):
-            return self._assess()
+            sums = self.information.read()
+            s, residual = self._assessed(sums)
+            return self._assess(sums, s, self._variance(sums, residual))
 
-    def _assess(self) -> npt.NDArray[np.void]:
+    def _variance(self, sums: Float32, residual: Float32) -> Float32:
+        """s^2 of a row [lanes]."""
+        freedom = sums[-1] - np.float32(len(self.p))
+        return np.where(freedom >= 1, residual / freedom, self.row_variance)
+
+    def _assess(self, sums: Float32, s: Float32, variance: Float32) -> npt.NDArray[np.void]:
         n_p = len(self.p)
-        sums = self.information.read()
-        s, residual = self._assessed(sums)
         weight = sums[-1]
-        freedom = weight - np.float32(n_p)
-        variance = np.where(freedom >= 1, residual / freedom, self.row_variance)
-        kappa = cholesky.factor(s)
+        kappa = self._kappa(s, cholesky.factor(s))
         wide = variance * self.correlation
         for a in range(n_p):
             s[a, a] = s[a, a] + wide / (self.start_sd[a] * self.start_sd[a])
@@ -220,6 +240,10 @@ class RelativeEstimator(Estimator):
         with np.errstate(all="ignore"):
             self.theta = pattern.theta(self.p)
         self.row_weight = _lanes([c.row_weight for c in configs])
+        self.noise_margin = _lanes([c.noise_margin for c in configs])
+        self.noise = np.zeros((3, len(configs)), np.float32)
+        self.energy = np.zeros(len(configs), np.float32)
+        self.group_energy = self.energy
         self.everywhere = np.ones(len(configs), np.bool_)
         self.was_due = True
 
@@ -243,6 +267,7 @@ class RelativeEstimator(Estimator):
             if self.is_rate:
                 gradient = self.model.transpose_times(self.model.jacobian(self.p), n)
                 self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
+            self.energy = np.where(fits, self.energy + e * e, self.energy)
             self.sums = self.information.add(self.model.terms(n, e, self.row_weight), fits)
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
@@ -252,11 +277,19 @@ class RelativeEstimator(Estimator):
         self.counters["rejected_not_finite"] += not_finite
         return reason
 
-    def solve(self, ends_group: bool) -> Iterator[npt.NDArray[np.uint8] | None]:
-        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one."""
+    def solve(
+        self, ends_group: bool, refuge: tuple[npt.NDArray[np.bool_], Float32] | None = None
+    ) -> Iterator[npt.NDArray[np.uint8] | None]:
+        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one.
+
+        refuge: in which lanes p goes elsewhere if it may not step, and where.
+        """
         reason = np.full(len(self.phase), Reason.ACCUMULATED, np.uint8)
         self.was_due = True
+        self.size = np.zeros(len(reason), np.float32)
         if ends_group:
+            self.group_energy = self.energy
+            self.energy = np.zeros_like(self.energy)
             self.phase += 1
             self.was_due = bool(self.phase[0] >= self.divider[0])
         elif self.is_rate:
@@ -265,10 +298,10 @@ class RelativeEstimator(Estimator):
         if self.was_due:
             if ends_group:
                 self.phase[:] = 0
-            for _ in range(self._stages_before_commit()):
+            for _ in range(self._projection_stages + 3 + -(-self.model.n_theta // self._ROWS_A_STAGE)):
                 yield None
             with np.errstate(all="ignore"):
-                reason = self._commit(self.gain if ends_group else np.ones_like(self.gain))
+                reason = self._commit(self.gain if ends_group else np.ones_like(self.gain), refuge)
             self.sums = self.information.read()
             yield None if ends_group else reason
         if ends_group:
@@ -276,20 +309,55 @@ class RelativeEstimator(Estimator):
             self.sums = self.information.read()
             yield reason
 
-    def _stages_before_commit(self) -> int:
+    @property
+    def _projection_stages(self) -> int:
         columns = self.model.c_column
-        projections = sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
-        return 3 + projections + -(-self.model.n_theta // self._ROWS_A_STAGE)
+        return 1 + sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
 
-    def _commit(self, gain: Float32) -> npt.NDArray[np.uint8]:
+    @property
+    def assessment_stages(self) -> int:
+        """Stages of an assessment."""
+        return self._projection_stages + 4 + self.model.n_p
+
+    def judged(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
+        """The assessment, and where the data say more than noise of the variance found would [lanes]."""
+        sums = self.information.read()
+        s, residual = self._assessed(sums)
+        variance = self._variance(sums, residual)
+        return self._assess(sums, s.copy(), variance), self._informed(s, variance, sums[-1])
+
+    def _informed(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
+        if self.model.noise is None:
+            return self.everywhere
+        gated = self.model.gated
+        rest = np.zeros((gated, gated, s.shape[2]), np.float32)
+        much = (self.noise_margin * variance) * weight
+        noise = self.model.noise(self.p, self.noise)
+        for a in range(gated):
+            for b in range(a, gated):
+                rest[a, b] = s[a, b] - much * noise[a, b]
+        return cholesky.factor(rest).ok | ~(self.noise_margin > 0)
+
+    def _kappa(self, s: Float32, whole: cholesky.Factor) -> cholesky.Factor:
+        gated = self.model.gated
+        return whole if gated == self.model.n_p else cholesky.factor(s[:gated, :gated])
+
+    def _commit(self, gain: Float32, refuge: tuple[npt.NDArray[np.bool_], Float32] | None) -> npt.NDArray[np.uint8]:
         pattern = self.model
         sums = self.information.read()
         matrix = pattern.matrix(sums)
         b = sums[pattern.moments : pattern.moments + pattern.n_theta]
         c = pattern.jacobian(self.p)
         force = pattern.transpose_times(c, b)
-        x, reason = self._step_from(pattern.project(c, matrix), force, gain, self.everywhere)
-        x = np.where(reason == Reason.UPDATED, x, self.p)
+        s = pattern.project(c, matrix)
+        informed = self._informed(s, self.row_variance, sums[-1])
+        x, reason = self._step_from(s, force, gain, self.everywhere, informed)
+        stepping = reason == Reason.UPDATED
+        x = np.where(stepping, x, self.p)
+        fleeing = np.zeros_like(stepping)
+        if refuge is not None:
+            fleeing = ~stepping & refuge[0]
+            x = np.where(fleeing, refuge[1], x)
         theta = pattern.theta(x)
         step = theta - self.theta
         moved = pattern.times(matrix, step)
@@ -297,10 +365,11 @@ class RelativeEstimator(Estimator):
         for i in range(pattern.n_theta):
             fall = fall + step[i] * (b[i] + (b[i] - moved[i]))
         residual = self.information.low[-2] - fall
-        overflow = (reason == Reason.UPDATED) & ~(np.isfinite(fall) & np.isfinite(residual))
+        finite = np.isfinite(fall) & np.isfinite(residual)
+        overflow = stepping & ~finite
         reason[overflow] = Reason.HELD_PIVOT
         self.counters["held_pivot"] += overflow
-        moving = reason == Reason.UPDATED
+        moving = (stepping | fleeing) & finite
         places = slice(pattern.moments, pattern.moments + pattern.n_theta)
         low = self.information.low.copy()
         low[places] = low[places] - moved
@@ -308,8 +377,15 @@ class RelativeEstimator(Estimator):
         self.information.low = np.where(moving, low, self.information.low)
         self.theta = np.where(moving, theta, self.theta)
         self.p = np.where(moving, x, self.p)
-        self.counters["updates"] += moving
+        self.counters["updates"] += moving & stepping
         return reason
+
+    def place(self, p: Float32) -> None:
+        """Sets p [n_p, lanes] before the first row, within its bounds."""
+        x = np.where(p < self.lower, self.lower, p)
+        self.p = np.where(x > self.upper, self.upper, x)
+        with np.errstate(all="ignore"):
+            self.theta = self.model.theta(self.p)
 
     def _reference(self) -> Float32:
         positive = np.array(self.model.positive)[:, None]

@@ -39,6 +39,26 @@ def _jacobian(p: Float32) -> Float32:
     return np.stack([*of_w, *of_d1, *of_d2, *of_c])
 
 
+def _zeroed_noise(p: Float32, traces: Float32) -> Float32:
+    w, d1, d2 = p[0], p[1], p[2]
+    two_d2w, w2 = _TWO * (d2 * w), w * w
+    mixed = d1 * two_d2w
+    s = np.zeros((3, 3, p.shape[1]), np.float32)
+    s[0, 0] = (d1 * d1) * traces[0] + ((_TWO * mixed) * traces[1] + (two_d2w * two_d2w) * traces[2])
+    s[0, 1] = (d1 * w) * traces[0] + (two_d2w * w) * traces[1]
+    s[0, 2] = (d1 * w2) * traces[1] + (two_d2w * w2) * traces[2]
+    s[1, 1] = (w * w) * traces[0]
+    s[1, 2] = (w * w2) * traces[1]
+    s[2, 2] = (w2 * w2) * traces[2]
+    return s
+
+
+def _noise(p: Float32, traces: Float32) -> Float32:
+    s = np.zeros((4, 4, p.shape[1]), np.float32)
+    s[:3, :3] = _zeroed_noise(p, traces)
+    return s
+
+
 WEAK = PatternModel(
     n_theta=8,
     n_p=4,
@@ -47,6 +67,7 @@ WEAK = PatternModel(
     c_column=(0, 0, 0, 0, 0, 1, 1, 2, 2, 2, 2, 2, 2, 3, 3, 3),
     theta=_theta,
     jacobian=_jacobian,
+    noise=_noise,
 )
 
 ZEROED = PatternModel(
@@ -57,4 +78,5 @@ ZEROED = PatternModel(
     c_column=(0, 0, 0, 1, 1, 2, 2, 2),
     theta=_zeroed_theta,
     jacobian=_zeroed_jacobian,
+    noise=_zeroed_noise,
 )

@@ -25,6 +25,13 @@ class PatternModel:
     c_column: tuple[int, ...]
     theta: Callable[[Float32], Float32]
     jacobian: Callable[[Float32], Float32]
+    noise: Callable[[Float32, Float32], Float32] | None = None
+    n_gated: int = 0
+
+    @property
+    def gated(self) -> int:
+        """Leading parameters that the gates look at."""
+        return self.n_gated or self.n_p
 
     @property
     def moments(self) -> int:

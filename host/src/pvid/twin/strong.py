@@ -20,11 +20,13 @@ Reasons = npt.NDArray[np.uint8]
 
 @dataclass
 class TwinRecord:
-    """State after every tick: p [ticks, 3, lanes], sums [ticks, n, lanes], reason [ticks, lanes]."""
+    """State after every tick: p and, in the weak form, published [ticks, n_p, lanes], sums [ticks, n, lanes], reason
+    [ticks, lanes]."""
 
     p: Float32
     sums: Float32
     reason: npt.NDArray[np.uint8]
+    published: Float32
 
 
 class StrongTwin:
@@ -105,6 +107,7 @@ def run_rows(
         p=np.empty((ticks, model.N_P, lanes), np.float32),
         sums=np.empty((ticks if sums else 0, model.SUMS, lanes), np.float32),
         reason=np.empty((ticks, lanes), np.uint8),
+        published=np.empty((0, model.N_P, lanes), np.float32),
     )
     wide_n = np.broadcast_to(n[:, :, None], (ticks, model.N_THETA, lanes))
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))

@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.errors import PvidError
 from pvid.native import EstimatorConfig, Reason, WeakConfig
 from pvid.twin import kapitza_weak, weak_finish, weak_front, weak_window
 from pvid.twin.differentiator import segments
 from pvid.twin.estimator import RelativeEstimator
 from pvid.twin.strong import TwinRecord
+from pvid.twin.trust import Trust
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Window:
+    """A whole window at its handing over: sums [K, 13], whether it is driven, and what is known of it."""
+
+    sums: Float32
+    driven: bool
+    mean: np.float32
+    lowest: np.float32
+    highest: np.float32
+    bend: np.float32
 
 
 class WeakTwin:
@@ -41,6 +55,11 @@ class WeakTwin:
         pattern = kapitza_weak.WEAK if config.zero_unknown else kapitza_weak.ZEROED
         self.estimator = RelativeEstimator(lanes, float(rate), pattern)
         self.iterations = 1 if self.estimator.is_rate else config.iterations
+        self.trust = Trust(config.trust, self.estimator)
+        row_sd = np.array([e.row_sd for e in lanes], np.float32)
+        self.row_variance = row_sd * row_sd
+        lag = (np.float32(design.decimation) / np.float32(config.sample_rate)) * np.float32(design.lag)
+        self.pivot_noise = np.float32(config.pivot_noise) / ((lag * lag) * (lag * lag))
 
     @property
     def window_ticks(self) -> int:
@@ -56,8 +75,8 @@ class WeakTwin:
         threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)
         return ~((threshold > 0) & (variance < threshold))
 
-    def window_sums(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[dict[int, Float32 | None], Mask, Mask]:
-        """Sums [K, 13] of every whole window, None if it is dropped, by the tick of its handing over.
+    def windows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[dict[int, Window], Mask, Mask]:
+        """Every whole window, by the tick of its handing over.
 
         Also which samples were finite, and which ticks are free for the stages of a window, both [ticks].
         """
@@ -66,18 +85,50 @@ class WeakTwin:
         y32 = np.asarray(y, np.float32)
         finite = np.isfinite(phi32) & np.isfinite(y32)
         dt = np.float32(design.decimation) / np.float32(config.sample_rate)
-        complete: dict[int, Float32 | None] = {}
+        complete: dict[int, Window] = {}
         free = finite.copy()
         for first, last in segments(finite):
             part = weak_front.decimate(phi32[first:last], y32[first:last], design, config.sample_rate, config.l1)
-            driven = self._driven(weak_window.drives(part[1], design))
+            seen = weak_window.observe(*part, design)
+            driven = self._driven(seen.drive)
             for m, sums in enumerate(weak_window.sums(*part, design, dt)):
                 tick = first + weak_front.tick_of((m + 2) * config.hop, design.taps, design.decimation)
-                complete[tick] = sums if driven[m] else None
+                complete[tick] = Window(
+                    sums, bool(driven[m]), seen.mean[m], seen.lowest[m], seen.highest[m], seen.bend[m]
+                )
             for index in range(len(part[0])):
                 start = first + weak_front.tick_of(index, design.taps, design.decimation) + 1
                 free[start : min(start + self.window_ticks, last)] = False
         return complete, finite, free
+
+    def _objection(self, window: Window) -> npt.NDArray[np.uint8] | None:
+        """Why a window is dropped [lanes], None if it is not; all lanes must agree."""
+        estimator = self.estimator
+        lanes = estimator.p.shape[1]
+        if not window.driven:
+            estimator.counters["held_not_excited"] += 1
+            return np.full(lanes, Reason.HELD_NOT_EXCITED, np.uint8)
+        zeroed = len(estimator.p) <= 3
+        if not zeroed and not estimator.counters["rows"].any():
+            estimator.place(np.concatenate([estimator.p[:3], np.full((1, lanes), window.mean), estimator.p[4:]]))
+            self.trust.place()
+        limit = np.float32(self.config.angle_limit)
+        zero = np.zeros(lanes, np.float32) if zeroed else estimator.p[3]
+        up, down = window.highest - zero, zero - window.lowest
+        beyond = (limit > 0) & (np.where(up > down, up, down) > limit)
+        if beyond.any():
+            if not beyond.all():
+                raise PvidError("lanes of one twin must drop the same windows: their zeros differ too much")
+            estimator.counters["held_out_of_range"] += 1
+            return np.full(lanes, Reason.HELD_OUT_OF_RANGE, np.uint8)
+        return None
+
+    def _work(self, window: Window) -> Iterator[npt.NDArray[np.uint8] | None]:
+        with np.errstate(all="ignore"):
+            expected = self.row_variance + self.pivot_noise * window.bend
+        return weak_finish.stages(
+            window.sums, self.config.design, self.iterations, self.estimator, self.trust, expected
+        )
 
     def run(
         self,
@@ -88,7 +139,7 @@ class WeakTwin:
         progress: Callable[[int], None] | None = None,
     ) -> TwinRecord:
         """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
-        complete, finite, free = self.window_sums(phi, y)
+        complete, finite, free = self.windows(phi, y)
         estimator = self.estimator
         ticks = len(finite)
         n_p, lanes = estimator.p.shape
@@ -96,6 +147,7 @@ class WeakTwin:
             p=np.empty((ticks, n_p, lanes), np.float32),
             sums=np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.float32),
             reason=np.empty((ticks, lanes), np.uint8),
+            published=np.empty((ticks, n_p, lanes), np.float32),
         )
         warm = False
         work: Iterator[npt.NDArray[np.uint8] | None] = iter(())
@@ -109,16 +161,15 @@ class WeakTwin:
                 if tick in complete:
                     warm = True
                     window = complete[tick]
-                    if window is None:
-                        estimator.counters["held_not_excited"] += 1
-                        told = np.full(lanes, Reason.HELD_NOT_EXCITED, np.uint8)
-                    else:
-                        work = weak_finish.stages(window, self.config.design, self.iterations, estimator)
+                    told = self._objection(window)
+                    if told is None:
+                        work = self._work(window)
                 if told is None and free[tick]:
                     told = next(work, None)
                 usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
                 record.reason[tick] = usual if told is None else told
             record.p[tick] = estimator.p
+            record.published[tick] = self.trust.estimate["p"][:, :n_p].T
             if sums:
                 record.sums[tick] = estimator.sums
             if progress is not None and tick % 512 == 0:

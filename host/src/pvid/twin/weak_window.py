@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
@@ -21,20 +23,52 @@ def window_count(decimated: int, hop: int) -> int:
     return max(0, (decimated - 1) // hop - 1)
 
 
-def drives(u: Float32, design: WeakTables) -> Float32:
-    """Variance of u [1/s^4] over all but the last sample of every window of one stretch [windows]."""
+def bend_squares(phi: Float32, lag: int) -> tuple[Float32, Float32]:
+    """At each decimated sample of a stretch: the square of the second difference that ends there, and 1, or 0 and 0."""
+    squares, due = np.zeros(len(phi), np.float32), np.zeros(len(phi), np.float32)
+    with np.errstate(all="ignore"):
+        for i in range(2 * lag, len(phi), lag):
+            bend = (phi[i] - phi[i - lag]) - (phi[i - lag] - phi[i - 2 * lag])
+            squares[i], due[i] = bend * bend, 1
+    return squares, due
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Of every window of one stretch, over all but its last sample [windows].
+
+    drive : variance of u [1/s^4];  mean, lowest, highest : of phi [rad];  bend : mean square of its second differences
+    """
+
+    drive: Float32
+    mean: Float32
+    lowest: Float32
+    highest: Float32
+    bend: Float32
+
+
+def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
+    """What is known of each window as a whole."""
     hop = (design.window - 1) // 2
     starts = hop * np.arange(window_count(len(u), hop))
-    total = np.zeros(len(starts), np.float32)
-    squares = np.zeros(len(starts), np.float32)
+    zero = np.zeros(len(starts), np.float32)
+    u_sum, u_squares, phi_sum, bend_sum, bends = zero, zero, zero, zero, zero
+    squares, due = bend_squares(phi, design.lag)
+    lowest, highest = phi[starts], phi[starts]
     n = np.float32(design.window - 1)
     with np.errstate(all="ignore"):
         for index in range(design.window - 1):
-            now = u[starts + index]
-            total = total + now
-            squares = squares + now * now
-        mean = total / n
-        return squares / n - mean * mean
+            at = starts + index
+            u_sum = u_sum + u[at]
+            u_squares = u_squares + u[at] * u[at]
+            phi_sum = phi_sum + phi[at]
+            lowest = np.where(phi[at] < lowest, phi[at], lowest)
+            highest = np.where(phi[at] > highest, phi[at], highest)
+            bend_sum = bend_sum + squares[at]
+            bends = bends + due[at]
+        mean = u_sum / n
+        bend = np.where(bends > 0, bend_sum / bends, zero)
+        return Observed(u_squares / n - mean * mean, phi_sum / n, lowest, highest, bend)
 
 
 def _terms(index: int, samples: int, dt: np.float32, phi: Float32, u: Float32, twice: Float32) -> Float32:

@@ -1,0 +1,81 @@
+/* pvid/trust.h - which estimate may be shown to others.
+ *
+ * The estimator always has a p; this decides whether it is worth anything. After every group of rows the
+ * present estimate is judged, and either becomes the published one or not, for a reason that is told:
+ *
+ *   PVID_UPDATED            it is published
+ *   PVID_MISFIT             it is published, but the residuals are larger than the sensors' noise explains
+ *   PVID_HELD_NOT_EXCITED   the data do not say enough of p[0], or no more than noise would
+ *   PVID_HELD_PIVOT         the system could not be solved
+ *   PVID_HELD_UNCERTAIN     the standard errors are too wide, or p is still on its way
+ *
+ * Until the first one is trusted, the published estimate is the start with the start's standard deviations.
+ * An estimate that was trusted stays until a better one is. Total; O(n_p^2).
+ */
+#ifndef PVID_TRUST_H
+#define PVID_TRUST_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pvid/estimator.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+    float kappa_min;     /* least kappa, 0 <= . < 1 */
+    float se_max;        /* largest standard error of the positive parameters, relative to them, > 0 */
+    float misfit_max;    /* alarm when the residuals' variance exceeds what is expected of it so many times, on
+                            the mean over PVID_TRUST_LONG groups and more; half as much again on the mean
+                            over the last PVID_TRUST_SHORT ones. At least 1; 0: no alarm */
+    uint16_t groups_min; /* groups before the first publication */
+    uint16_t shut_max;   /* groups in a row that say too little for a step, after which p goes back to the
+                            published one, lest it stay where noise led it; 0: never */
+} pvid_trust_config_f32;
+
+/* kappa_min 3e-5, se_max 5 %, misfit_max 1.5, groups_min 3, shut_max 16. */
+extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
+
+#define PVID_TRUST_SHORT 8
+#define PVID_TRUST_LONG 16
+
+/* State; only the functions below write to it. */
+typedef struct {
+    pvid_trust_config_f32 config;
+    uint16_t groups;  /* taken in; stops at its end */
+    uint16_t shut;    /* groups in a row that said too little */
+    uint16_t judged;  /* residuals in long_mean; stops at long_memory */
+    uint16_t long_memory;
+    uint8_t next;     /* place of the next residual in recent */
+    bool published;   /* whether an estimate has been trusted yet */
+    bool misfit;
+    float long_mean;  /* of residual variances relative to what is expected */
+    float recent[PVID_TRUST_SHORT];
+    pvid_estimate_f32 estimate; /* the published one */
+} pvid_trust_f32;
+
+/* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as
+ * described there; the status names it. */
+pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
+                                const pvid_estimator_f32 *estimator);
+
+/* Publishes the start again, where p was placed elsewhere before the first row. */
+void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
+
+/* Where p is to go if the coming group does not let it step; NULL: nowhere. */
+const float *pvid_trust_refuge_f32(const pvid_trust_f32 *self);
+
+/* Judges a group whose last solve and whose assessment of `candidate` are complete.
+ *   reason, size: of that solve;  informed: of the assessment;
+ *   surplus: variance of the group's residuals over what was expected.
+ * Returns what is to be told; counts it. */
+pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
+                                 bool informed, float surplus, const pvid_estimate_f32 *candidate);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

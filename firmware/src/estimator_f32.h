@@ -1,0 +1,113 @@
+/* What the parts of the estimator share: the solve at once, the solve in stages, the assessment. Private to the core. */
+#ifndef PVID_ESTIMATOR_F32_H
+#define PVID_ESTIMATOR_F32_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "cholesky_f32.h"
+#include "count.h"
+#include "finite_f32.h"
+#include "pvid/estimator.h"
+
+static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
+{
+    return ((model->positive >> i) & 1u) != 0u;
+}
+
+/* Whether B and yy are kept relative to the estimate; see estimator.h. */
+static inline bool pvid_relative_f32(const pvid_model_f32 *model)
+{
+    return model->project == NULL;
+}
+
+/* Leading parameters that the gates look at. */
+static inline uint8_t pvid_gated_f32(const pvid_model_f32 *model)
+{
+    return (model->n_gated > 0u) ? model->n_gated : model->n_p;
+}
+
+/* How far dp goes, as a part of what each parameter is measured by: its own value where it is
+ * positive, else the standard deviation of its start. Not finite if dp is not: the bits of |x| order
+ * as |x| does, infinity and NaN last. */
+static inline float pvid_estimator_size_f32(const pvid_estimator_f32 *self, const float dp[])
+{
+    uint32_t largest = 0;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
+        const uint32_t bits = pvid_bits_f32(dp[a] / reference[a]) & 0x7FFFFFFFu;
+        largest = (bits > largest) ? bits : largest;
+    }
+    return pvid_from_bits_f32(largest);
+}
+
+/* p[n_p] = where the step dp leads: shortened to the step limit, within the bounds. */
+static inline void pvid_estimator_take_step_f32(pvid_estimator_f32 *self, const float dp[], float size, float p[])
+{
+    float factor = 1.0f;
+    bool bounded = false;
+    if (size > self->step_limit) {
+        factor = self->step_limit / size;
+        pvid_count_up(&self->counters.limited);
+    }
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        float x = self->p[a] + (factor * dp[a]);
+        if (x > self->upper[a]) {
+            x = self->upper[a];
+            bounded = true;
+        }
+        if (x < self->lower[a]) {
+            x = self->lower[a];
+            bounded = true;
+        }
+        p[a] = x;
+    }
+    if (bounded) {
+        pvid_count_up(&self->counters.bounded);
+    }
+}
+
+/* Whether the data speak of p[0]: what of its information no other parameter can imitate is a part
+ * kappa of its diagonal entry, and more than the start brought along. */
+static inline bool pvid_estimator_is_excited_f32(const pvid_estimator_f32 *self, float kappa, float diagonal)
+{
+    const bool own = (kappa * diagonal) >= (2.0f * self->prior[0]);
+    return (kappa >= self->kappa_min) && (own || !(self->kappa_min > 0.0f));
+}
+
+/* Counts a group; whether a solve is due. */
+static inline bool pvid_estimator_is_due_f32(pvid_estimator_f32 *self)
+{
+    self->phase++;
+    if (self->phase < self->divider) {
+        return false;
+    }
+    self->phase = 0;
+    return true;
+}
+
+/* A solve of a model that projects its sums by itself: at the end of a group, or once more. */
+pvid_reason pvid_estimator_solve_sums_f32(pvid_estimator_f32 *self, bool ends_group);
+
+/* Whether S - margin Sn, Sn the information that noise of the given variance alone would make, is still
+ * positive: what the data say goes beyond what noise says. True where the model does not know Sn.
+ * s: upper triangle of C^T M C [n_p][n_p]. Cost: a factorisation. */
+bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
+                                    float weight);
+
+/* s^2 of a row: residual sum of squares over degrees of freedom; row_sd^2 while there are none. */
+float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy);
+
+/* estimate->kappa from S, the upper triangle s. */
+void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],
+                                   pvid_estimate_f32 *estimate);
+
+/* Factors S / wide + 1 / start_sd^2, times wide; s is used up. Returns whether it could be done. */
+bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PVID_MAX_P], float wide,
+                                    pvid_cholesky_f32 *factor);
+
+/* Scales estimate->covariance, that factor's inverse, by `wide` and takes its roots; what the start said where `known` is false or the result not finite. */
+void pvid_estimator_scale_f32(const pvid_estimator_f32 *self, float wide, bool known, pvid_estimate_f32 *estimate);
+
+#endif

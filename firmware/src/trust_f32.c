@@ -1,0 +1,157 @@
+#include "pvid/trust.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "count.h"
+#include "estimator_f32.h"
+#include "finite_f32.h"
+
+const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
+    .kappa_min = 3.0e-5f,
+    .se_max = 0.05f,
+    .misfit_max = 1.5f,
+    .groups_min = 3,
+    .shut_max = 16,
+};
+
+/* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
+#define ARRIVED 0.3f
+#define SMALL_STEP 1.0e-4f
+
+/* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
+#define LONG_MEMORY 4096.0f
+
+/* One group that the model cannot explain at all must not outweigh thousands. */
+#define SURPLUS_MAX 1.0e6f
+
+static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
+{
+    if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
+        return PVID_BAD_PUBLISH_KAPPA;
+    }
+    if (!pvid_within_f32(config->se_max, 1.0e-9f, 1.0e9f)) {
+        return PVID_BAD_SE_MAX;
+    }
+    if (!pvid_within_f32(config->misfit_max, 1.0f, 1.0e6f) && !pvid_within_f32(config->misfit_max, 0.0f, 0.0f)) {
+        return PVID_BAD_MISFIT_MAX;
+    }
+    return PVID_OK;
+}
+
+void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    memcpy(self->estimate.p, estimator->p, sizeof self->estimate.p);
+}
+
+pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
+                                const pvid_estimator_f32 *estimator)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    const pvid_status status = config_is_valid(config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    memset(self, 0, sizeof *self);
+    self->config = *config;
+    const pvid_information_f32 *sums = &estimator->information;
+    float memory = LONG_MEMORY;
+    if (sums->retention < 1.0f) {
+        const float groups = (float)sums->block / (1.0f - sums->retention);
+        memory = (groups < LONG_MEMORY) ? groups : LONG_MEMORY;
+    }
+    self->long_memory = (uint16_t)((memory < (float)PVID_TRUST_LONG) ? (float)PVID_TRUST_LONG : memory);
+    pvid_estimator_assess_f32(estimator, &self->estimate);
+    return PVID_OK;
+}
+
+const float *pvid_trust_refuge_f32(const pvid_trust_f32 *self)
+{
+    return ((self->config.shut_max > 0u) && (self->shut >= self->config.shut_max)) ? self->estimate.p : NULL;
+}
+
+/* ---- the alarm ---- */
+
+static void take_surplus(pvid_trust_f32 *self, float surplus)
+{
+    const float x = (surplus <= SURPLUS_MAX) ? surplus : SURPLUS_MAX; /* NaN becomes the limit */
+    if (self->judged < self->long_memory) {
+        self->judged++;
+    }
+    self->long_mean += (x - self->long_mean) / (float)self->judged;
+    self->recent[self->next] = x;
+    self->next = (uint8_t)((self->next + 1u == PVID_TRUST_SHORT) ? 0u : (self->next + 1u));
+    float sum = 0.0f;
+    for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
+        sum += self->recent[i];
+    }
+    const float limit = self->config.misfit_max;
+    const bool lately = (self->judged >= PVID_TRUST_SHORT) && (sum > (1.5f * (limit * (float)PVID_TRUST_SHORT)));
+    const bool at_length = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
+    self->misfit = (limit > 0.0f) && (lately || at_length);
+}
+
+/* ---- the gate ---- */
+
+static float widest(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
+{
+    float widest = 0.0f;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_f32(estimator->model, a)) {
+            const float relative = candidate->se[a] / candidate->p[a];
+            widest = (relative <= widest) ? widest : relative;
+        }
+    }
+    return widest;
+}
+
+static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
+                           float size, bool informed, const pvid_estimate_f32 *candidate)
+{
+    if (reason != PVID_UPDATED) {
+        return reason;
+    }
+    if (!informed || !(candidate->kappa >= self->config.kappa_min)) {
+        return PVID_HELD_NOT_EXCITED;
+    }
+    const float error = widest(estimator, candidate);
+    const float near = ARRIVED * error;
+    const bool arrived = size <= ((near > SMALL_STEP) ? near : SMALL_STEP);
+    if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !arrived) {
+        return PVID_HELD_UNCERTAIN;
+    }
+    return PVID_UPDATED;
+}
+
+pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
+                                 bool informed, float surplus, const pvid_estimate_f32 *candidate)
+{
+    pvid_count_up_16(&self->groups);
+    if (reason == PVID_ACCUMULATED) { /* no solve was due */
+        return reason;
+    }
+    if (reason == PVID_UPDATED) {
+        self->shut = 0;
+    } else if (pvid_trust_refuge_f32(self) != NULL) {
+        self->shut = 0; /* p is back */
+    } else {
+        pvid_count_up_16(&self->shut);
+    }
+    if (self->published) {
+        take_surplus(self, surplus);
+    }
+    pvid_reason told = verdict(self, estimator, reason, size, informed, candidate);
+    if (told == PVID_UPDATED) {
+        self->estimate = *candidate;
+        self->published = true;
+        if (self->misfit) {
+            pvid_count_up(&estimator->counters.misfits);
+            told = PVID_MISFIT;
+        }
+    } else if (told == PVID_HELD_UNCERTAIN) {
+        pvid_count_up(&estimator->counters.held_uncertain);
+    } else if ((told == PVID_HELD_NOT_EXCITED) && (reason == PVID_UPDATED)) {
+        pvid_count_up(&estimator->counters.held_not_excited);
+    }
+    return told;
+}

@@ -1,0 +1,34 @@
+/* Whitening of a window's rows at the p of the moment. Private to the core.
+ *
+ * The residual of p has the filter chi'''' + d1 w chi'' + d2 w^2 chi: the noise of a window's rows has the
+ * covariance R0(p), a combination of the design's six Gram tables, times that of the decimated angle. With
+ * R0 = L L^T the rows of L^-1 (Y, N) are independent. One function a call, so that a tick takes one. */
+#ifndef PVID_WEAK_WHITEN_F32_H
+#define PVID_WEAK_WHITEN_F32_H
+
+#include <stddef.h>
+
+#include "pvid/weak.h"
+
+/* Takes p = (w, d1, d2, ..) for the calls that follow. */
+void pvid_weak_whiten_begin_f32(pvid_weak_whiten_f32 *self, const float p[]);
+
+/* Row `row` of R0's lower triangle. */
+void pvid_weak_whiten_combine_f32(pvid_weak_whiten_f32 *self, const pvid_weak_design_f32 *design, size_t row);
+
+/* Row of L, rows 0.. in order. Where R0 cannot be factored the window keeps the whitening of its design. */
+void pvid_weak_whiten_factor_f32(pvid_weak_whiten_f32 *self, size_t row);
+
+/* Row of L^-1 x in place of the row of x, rows 0.. in order. */
+void pvid_weak_whiten_row_f32(const pvid_weak_whiten_f32 *self, size_t row, float x[][PVID_WEAK_TERMS]);
+
+/* inverse[0..row] = row `row` of L^-1. */
+void pvid_weak_whiten_inverse_f32(const pvid_weak_whiten_f32 *self, size_t row, float inverse[]);
+
+/* Adds that row's part of trace number `which`: trace(R0^-1 G22), trace(R0^-1 G20), trace(R0^-1 G00), energy of noise
+ * of unit variance in the columns chi'' phi and chi phi. The first row begins the sum, the last one scales it to a row
+ * of the window: self->trace is then what the model's `noise` wants. */
+void pvid_weak_whiten_trace_f32(pvid_weak_whiten_f32 *self, const pvid_weak_design_f32 *design, size_t row,
+                                const float inverse[], size_t which);
+
+#endif

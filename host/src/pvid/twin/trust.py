@@ -1,0 +1,112 @@
+"""Twin of trust_f32.c: which estimate is published, in every lane."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.native import Reason, TrustConfig
+from pvid.twin.estimator import RelativeEstimator
+
+Float32 = npt.NDArray[np.float32]
+Mask = npt.NDArray[np.bool_]
+
+_SHORT, _LONG, _LONG_MEMORY = 8, 16, np.float32(4096)
+_ARRIVED, _SMALL_STEP, _SURPLUS_MAX = np.float32(0.3), np.float32(1e-4), np.float32(1e6)
+_COUNT_MAX = 0xFFFF
+
+
+class Trust:
+    """pvid_trust_f32 of every lane of an estimator; `estimate` is what is published, ESTIMATE_DTYPE [lanes]."""
+
+    def __init__(self, config: TrustConfig, estimator: RelativeEstimator) -> None:
+        self.config = replace(config)
+        self.estimator = estimator
+        lanes = estimator.p.shape[1]
+        self.groups = 0
+        self.shut = np.zeros(lanes, np.int64)
+        self.judged = np.zeros(lanes, np.int64)
+        information = estimator.information
+        with np.errstate(all="ignore"):
+            memory = information.block.astype(np.float32) / (np.float32(1) - information.retention)
+        memory = np.where((information.retention < 1) & (memory < _LONG_MEMORY), memory, _LONG_MEMORY)
+        self.long_memory = np.maximum(memory, np.float32(_LONG)).astype(np.int64)
+        self.next = np.zeros(lanes, np.int64)
+        self.published = np.zeros(lanes, np.bool_)
+        self.misfit = np.zeros(lanes, np.bool_)
+        self.long_mean = np.zeros(lanes, np.float32)
+        self.recent = np.zeros((_SHORT, lanes), np.float32)
+        self.estimate = estimator.assess()
+
+    def place(self) -> None:
+        """Publishes the start again."""
+        self.estimate["p"][:, : len(self.estimator.p)] = self.estimator.p.T
+
+    @property
+    def refuge(self) -> tuple[Mask, Float32]:
+        """In which lanes p has one, and where [n_p, lanes]."""
+        some = (self.config.shut_max > 0) & (self.shut >= self.config.shut_max)
+        return some, np.ascontiguousarray(self.estimate["p"][:, : len(self.estimator.p)].T)
+
+    def _take_surplus(self, lanes: Mask, surplus: Float32) -> None:
+        x = np.where(surplus <= _SURPLUS_MAX, surplus, _SURPLUS_MAX)
+        self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
+        with np.errstate(all="ignore"):
+            mean = self.long_mean + (x - self.long_mean) / self.judged.astype(np.float32)
+        self.long_mean = np.where(lanes, mean, self.long_mean)
+        places = np.flatnonzero(lanes)
+        self.recent[self.next[places], places] = x[places]
+        self.next = np.where(lanes, (self.next + 1) % _SHORT, self.next)
+        total = np.zeros(len(x), np.float32)
+        for i in range(_SHORT):
+            total = total + self.recent[i]
+        limit = np.float32(self.config.misfit_max)
+        lately = (self.judged >= _SHORT) & (total > np.float32(1.5) * (limit * np.float32(_SHORT)))
+        at_length = (self.judged >= _LONG) & (self.long_mean > limit)
+        self.misfit = np.where(lanes, (limit > 0) & (lately | at_length), self.misfit)
+
+    def _widest(self, candidate: npt.NDArray[np.void]) -> Float32:
+        widest = np.zeros(len(candidate), np.float32)
+        for a, positive in enumerate(self.estimator.model.positive):
+            if positive:
+                relative = candidate["se"][:, a] / candidate["p"][:, a]
+                widest = np.where(relative <= widest, widest, relative)
+        return widest
+
+    def judge(
+        self,
+        reason: npt.NDArray[np.uint8],
+        size: Float32,
+        informed: Mask,
+        surplus: Float32,
+        candidate: npt.NDArray[np.void],
+    ) -> npt.NDArray[np.uint8]:
+        """pvid_trust_judge_f32 in every lane; shapes [lanes]."""
+        self.groups = min(self.groups + 1, _COUNT_MAX)
+        if (reason == Reason.ACCUMULATED).all():
+            return reason
+        stepped = reason == Reason.UPDATED
+        back = ~stepped & self.refuge[0]
+        self.shut = np.where(stepped | back, 0, np.minimum(self.shut + 1, _COUNT_MAX))
+        self._take_surplus(self.published, surplus)
+        counters = self.estimator.counters
+        with np.errstate(all="ignore"):
+            error = self._widest(candidate)
+            near = _ARRIVED * error
+            arrived = size <= np.where(near > _SMALL_STEP, near, _SMALL_STEP)
+        excited = informed & (candidate["kappa"] >= np.float32(self.config.kappa_min))
+        enough = self.groups >= self.config.groups_min
+        sure = enough & (error <= np.float32(self.config.se_max)) & arrived
+        told = reason.copy()
+        told[stepped & ~excited] = Reason.HELD_NOT_EXCITED
+        told[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
+        good = stepped & excited & sure
+        self.estimate = np.where(good, candidate, self.estimate)
+        self.published = self.published | good
+        told[good & self.misfit] = Reason.MISFIT
+        counters["misfits"] += good & self.misfit
+        counters["held_uncertain"] += told == Reason.HELD_UNCERTAIN
+        counters["held_not_excited"] += stepped & ~excited
+        return told
