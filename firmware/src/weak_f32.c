@@ -9,6 +9,10 @@
 #include "weak_front_f32.h"
 #include "weak_window_f32.h"
 
+/* Most stages of a complete window that a tick may take: more than one only where decimation is so low that every
+ * tick has two windows to fill as well. */
+#define STAGES_TOGETHER 4u
+
 static bool all_finite(const float values[], size_t n)
 {
     for (size_t i = 0; i < n; i++) {
@@ -122,10 +126,13 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     const uint32_t ticks = ticks_a_window(design->decimation);
     self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
     self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
-    if (pvid_weak_finish_stages_f32(design->functions, self->iterations, &self->estimator) >
-        (hop_of(design) * free_ticks(self))) {
+    const uint32_t stages = pvid_weak_finish_stages_f32(design->functions, self->iterations, &self->estimator);
+    const uint32_t free = hop_of(design) * free_ticks(self);
+    const uint32_t together = (stages + (free - 1u)) / free;
+    if (together > STAGES_TOGETHER) {
         return PVID_BAD_ITERATIONS;
     }
+    self->together = (uint8_t)together;
     pvid_weak_finish_init_f32(&self->finish);
     self->window[0].buffer = 0;
     self->window[1].buffer = 1;
@@ -266,6 +273,14 @@ static inline void add_slice(pvid_weak_f32 *self)
     }
 }
 
+static void work_on(pvid_weak_f32 *self, pvid_reason *reason)
+{
+    for (uint8_t i = 0; (i < self->together) && pvid_weak_finish_is_busy_f32(&self->finish); i++) {
+        pvid_weak_finish_step_f32(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
+                                  &self->estimator, &self->trust, reason);
+    }
+}
+
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
 {
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
@@ -292,9 +307,8 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
     pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
     if (dropped != PVID_ACCUMULATED) {
         reason = dropped;
-    } else if (!adding && pvid_weak_finish_is_busy_f32(&self->finish)) {
-        pvid_weak_finish_step_f32(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
-                                  &self->estimator, &self->trust, &reason);
+    } else if (!adding) {
+        work_on(self, &reason);
     }
     return reason;
 }

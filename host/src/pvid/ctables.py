@@ -75,7 +75,9 @@ def struct_initializer(struct: ctypes.Structure, pointers: Mapping[str, str]) ->
         if isinstance(value, ctypes.Structure):
             text = struct_initializer(value, pointers)
         elif isinstance(value, ctypes.Array):
-            text = "{" + ", ".join(float_literal(np.float32(entry)) for entry in value) + "}"
+            # C fills up with zeros; the device's bounds may be narrower than those of the mirror
+            used = max((place + 1 for place, entry in enumerate(value) if entry != 0), default=1)
+            text = "{" + ", ".join(float_literal(np.float32(entry)) for entry in value[:used]) + "}"
         elif kind is ctypes.c_void_p or issubclass(kind, ctypes._Pointer):
             text = pointers.get(name, "NULL")
         elif kind is ctypes.c_float:

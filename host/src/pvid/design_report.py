@@ -102,7 +102,6 @@ def report_for_tones(
     tones: Sequence[Tone],
     release: tuple[float, float],
     duration: float,
-    state_bytes: int,
 ) -> DesignReport:
     """For a simulated run of `duration` [s] of the nominal rig, driven by tones and released at rest.
 
@@ -120,10 +119,10 @@ def report_for_tones(
     prediction = predict_rig(
         design, nominal, drive, sensors_of(rig), duration, release, settings.zero, settings.forgetting_s
     )
-    return _report(rig, design, prediction, duration, state_bytes)
+    return _report(rig, design, prediction, duration)
 
 
-def report_for_run(rig: RigFile, run: Run, state_bytes: int, duration: float | None = None) -> DesignReport:
+def report_for_run(rig: RigFile, run: Run, duration: float | None = None) -> DesignReport:
     """For a recorded run, or one of `duration` [s] that goes on as the run does.
 
     The prediction is made at what the run identifies, or at the nominal where that is nothing.
@@ -137,7 +136,7 @@ def report_for_run(rig: RigFile, run: Run, state_bytes: int, duration: float | N
     p = last.p if found else settings.start
     prediction = predict(run.phi, run.y, design, p, sensors_of(rig), rig.identifier.forgetting_s)
     recorded = len(run.t) / run.sample_rate
-    return _report(rig, design, prediction, recorded, state_bytes, duration)
+    return _report(rig, design, prediction, recorded, duration)
 
 
 def _refuse_exact(rig: RigFile) -> None:
@@ -150,7 +149,6 @@ def _report(
     design: WeakDesign,
     prediction: Prediction,
     recorded: float,
-    state_bytes: int,
     duration: float | None = None,
 ) -> DesignReport:
     p, covariance = prediction.p, prediction.covariance
@@ -171,5 +169,5 @@ def _report(
         se=se,
         kappa=prediction.kappa,
         row_sd=prediction.row_sd,
-        cost=cost_of(design, state_bytes, rig.identifier.zero),
+        cost=cost_of(design, rig.identifier.zero),
     )

@@ -24,6 +24,9 @@ ZERO = "c"
 # With w known no better than this, relative, nothing is identified.
 WORST_SE = 0.1
 
+# Windows that the float64 core's alarm wants to have seen.
+MISFIT_WINDOWS = 16
+
 PHYSICAL = ("g", "l2", "rho2")
 UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", "rho2": "m"}
 
@@ -278,15 +281,33 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
             damping=rig.identifier.damping,
         ),
     )
+    # the gate and the alarm of pvid/trust.h, without the question how much of the information noise makes
+    trust = config.trust
+    relative = (result.se[:, :3] / result.p[:, :3]).max(axis=1)
+    arrived = np.arange(len(result.t)) + 1 >= trust.groups_min
+    good = result.updated & arrived & (result.kappa >= trust.kappa_min) & (relative <= trust.se_max)
+    trusted = np.flatnonzero(good)
     n_p = len(settings.start)
-    last = result.last
+    if len(trusted) == 0:
+        p, covariance = settings.start.astype(np.float64), np.diag(settings.start_sd.astype(np.float64) ** 2)
+        status, misfit, alarm = Reason.HELD_NOT_EXCITED, None, False
+    else:
+        p, covariance = result.p[trusted[-1], :n_p], result.covariance[trusted[-1], :n_p, :n_p]
+        judged = result.misfit[trusted[0] :]
+        misfit = float(np.nanmean(judged))
+        alarm = trust.misfit_max > 0 and np.isfinite(judged).sum() >= MISFIT_WINDOWS and misfit > trust.misfit_max
+        status = Reason.MISFIT if alarm else Reason.UPDATED
+        if not good[-1]:
+            status = Reason.HELD_UNCERTAIN if result.updated[-1] else Reason.HELD_NOT_EXCITED
     return _identification(
         rig,
-        p=last.p[:n_p],
-        covariance=last.covariance[:n_p, :n_p],
-        kappa=last.kappa,
-        misfit=last.residual_sd / settings.row_sd,
-        status=(Reason.UPDATED if result.updated[-1] else Reason.HELD_NOT_EXCITED).text,
+        p=p,
+        covariance=covariance,
+        kappa=float(result.kappa[trusted[-1]]) if len(trusted) else result.last.kappa,
+        trusted_s=float(run.t[0] + result.t[trusted[-1]]) if len(trusted) else None,
+        misfit=misfit,
+        alarm=alarm,
+        status=status.text,
         ticks=len(run.t),
         updates=config.iterations * int(result.updated.sum()),
         lost=0,

@@ -458,11 +458,6 @@ class Native:
         """Compiler and flags of this build."""
         return str(self._lib.pvid_native_build().decode())
 
-    @property
-    def state_bytes(self) -> dict[str, int]:
-        """Bytes of the state structs on this machine."""
-        return {"estimator": self._estimator_size, "strong": self._strong_size, "weak": self._weak_size}
-
     def arithmetic_faults(self) -> int:
         """pvid_arithmetic_faults_f32: 0 when float32 behaves as the bits need."""
         return int(self._lib.pvid_arithmetic_faults_f32())

@@ -26,9 +26,6 @@ from pvid.weak_design import WeakDesign
 
 COEFFICIENTS_FILE = Path(__file__).with_name("weak_cost.toml")
 
-# Stages of a window, at most (pvid_weak_init_f32): for K functions, and for each Gauss-Newton step.
-_STAGES_A_FUNCTION, _STAGES, _STAGES_A_STEP = 5, 6, 17
-
 # Names of the coefficients of the mean [instructions]: what is done per tick, per decimated sample, per window.
 MEAN_TERMS = (
     "tick",
@@ -46,6 +43,14 @@ MEAN_TERMS = (
 LONGEST_TERMS = ("tick", "front_pair", "stage", "factor", "factor_function_squared", "window_slice", "function")
 
 
+def stages_of(functions: int, zero_unknown: bool = True, iterations: int = 3) -> int:
+    """Stages of a complete window (pvid_weak_finish_stages_f32): rows, Gauss-Newton steps, assessment."""
+    rows = 8 * functions + 2 + 4 * -(-functions // 6)
+    projection, parameters = (11, 4) if zero_unknown else (7, 3)
+    step = projection + 6
+    return rows + 1 + iterations * step + projection + 4 + parameters
+
+
 @dataclass(frozen=True)
 class Schedule:
     """How the work of `taps`, `decimation` D, `window` W and `functions` K is spread over ticks (weak_f32.c).
@@ -59,6 +64,7 @@ class Schedule:
     window_slices : ticks of D in which one of the two windows takes the decimated sample in
     period : ticks from window to window
     free : ticks of D that are left for a complete window's stages
+    together : stages that each of them takes
     """
 
     decimation: int
@@ -70,6 +76,7 @@ class Schedule:
     window_slices: int
     period: int
     free: int
+    together: int
 
     @classmethod
     def of(cls, taps: int, decimation: int, window: int, functions: int) -> Schedule:
@@ -78,6 +85,7 @@ class Schedule:
         front_slice = -(-pairs // max(decimation // 2, 1))
         window_slice = -(-functions // max((decimation - decimation // 2) // 2, 1))
         window_slices = -(-functions // window_slice)
+        free = 1 if decimation <= 2 else decimation - 2 * window_slices
         return cls(
             decimation=decimation,
             functions=functions,
@@ -87,7 +95,8 @@ class Schedule:
             window_slice=window_slice,
             window_slices=window_slices,
             period=decimation * ((window - 1) // 2),
-            free=1 if decimation <= 2 else decimation - 2 * window_slices,
+            free=free,
+            together=-(-stages_of(functions) // (free * ((window - 1) // 2))),
         )
 
     def mean_counts(self, zero_unknown: bool) -> npt.NDArray[np.float64]:
@@ -99,7 +108,7 @@ class Schedule:
     def longest(self, coefficients: npt.NDArray[np.float64]) -> float:
         """The longest tick by coefficients in the order of LONGEST_TERMS."""
         tick, front_pair, stage, factor, factor_squared, window_slice, function = coefficients
-        work = max(stage, factor + factor_squared * self.functions**2)
+        work = self.together * max(stage, factor + factor_squared * self.functions**2)
         front = tick + front_pair * self.front_slice + work
         window = window_slice + function * self.window_slice
         if self.decimation == 1:
@@ -116,9 +125,8 @@ class WeakCost:
     delay_s : from a sample to the estimate of the last window that it is part of, at most [s]
     update_s : from estimate to estimate [s]
     flash_bytes : the tables
-    ram_bytes : sizeof(pvid_weak_f32) with the default bounds of pvid/config.h, on this machine
-    ram_bytes_fitted : with bounds that just hold the design, for a 32-bit device; None where this machine's compiler
-        cannot tell
+    ram_bytes : sizeof(pvid_weak_f32) with the default bounds of pvid/config.h, for a 32-bit device
+    ram_bytes_fitted : with bounds that just hold the design; None, both, where this machine's compiler cannot tell
     definitions : the macros of these bounds
     instructions : mean per sample (x86-64, gcc -O2, by the formula)
     longest_tick : instructions of the longest tick (same)
@@ -127,25 +135,25 @@ class WeakCost:
     delay_s: float
     update_s: float
     flash_bytes: int
-    ram_bytes: int
+    ram_bytes: int | None
     ram_bytes_fitted: int | None
     definitions: tuple[str, ...]
     instructions: float
     longest_tick: float
 
 
-def cost_of(design: WeakDesign, ram_bytes: int, zero_unknown: bool = True, iterations: int = 3) -> WeakCost:
-    """Cost of a design; `ram_bytes` is Native.state_bytes["weak"] of the build in use."""
+def cost_of(design: WeakDesign, zero_unknown: bool = True, iterations: int = 3) -> WeakCost:
+    """Cost of a design."""
     schedule = Schedule.of(design.taps, design.decimation, design.window, design.functions)
     mean, longest = instructions(schedule, zero_unknown)
-    stages = _STAGES_A_FUNCTION * design.functions + _STAGES + _STAGES_A_STEP * iterations
-    worked_off_s = -(-stages // schedule.free) * design.dt
+    stages = stages_of(design.functions, zero_unknown, iterations)
+    worked_off_s = -(-stages // (schedule.free * schedule.together)) * design.dt
     definitions = fitted_definitions(design)
     return WeakCost(
         delay_s=design.delay / design.sample_rate + design.window_s + min(worked_off_s, design.hop_s),
         update_s=design.hop_s,
         flash_bytes=design.flash_bytes,
-        ram_bytes=ram_bytes,
+        ram_bytes=state_bytes_32(),
         ram_bytes_fitted=state_bytes_32(definitions),
         definitions=definitions,
         instructions=mean,

@@ -298,7 +298,7 @@ class RelativeEstimator(Estimator):
         if self.was_due:
             if ends_group:
                 self.phase[:] = 0
-            for _ in range(self._projection_stages + 3 + -(-self.model.n_theta // self._ROWS_A_STAGE)):
+            for _ in range(self.solve_stages(False) - 1):
                 yield None
             with np.errstate(all="ignore"):
                 reason = self._commit(self.gain if ends_group else np.ones_like(self.gain), refuge)
@@ -313,6 +313,10 @@ class RelativeEstimator(Estimator):
     def _projection_stages(self) -> int:
         columns = self.model.c_column
         return 1 + sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
+
+    def solve_stages(self, ends_group: bool) -> int:
+        """Stages of a solve that is due."""
+        return self._projection_stages + 4 + -(-self.model.n_theta // self._ROWS_A_STAGE) + ends_group
 
     @property
     def assessment_stages(self) -> int:

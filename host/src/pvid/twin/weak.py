@@ -55,6 +55,7 @@ class WeakTwin:
         pattern = kapitza_weak.WEAK if config.zero_unknown else kapitza_weak.ZEROED
         self.estimator = RelativeEstimator(lanes, float(rate), pattern)
         self.iterations = 1 if self.estimator.is_rate else config.iterations
+        self.together = -(-self._stages // (config.hop * self._free_ticks))
         self.trust = Trust(config.trust, self.estimator)
         row_sd = np.array([e.row_sd for e in lanes], np.float32)
         self.row_variance = row_sd * row_sd
@@ -70,6 +71,16 @@ class WeakTwin:
         second_half = design.decimation - design.decimation // 2
         functions = -(-design.functions // max(1, second_half // 2))
         return 2 * -(-design.functions // functions)
+
+    @property
+    def _free_ticks(self) -> int:
+        """Ticks of a decimated sample that are left for a complete window."""
+        design = self.config.design
+        return 1 if design.decimation <= 2 else design.decimation - self.window_ticks
+
+    @property
+    def _stages(self) -> int:
+        return weak_finish.number_of_stages(self.config.design, self.iterations, self.estimator)
 
     def _driven(self, variance: Float32) -> Mask:
         threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)
@@ -165,7 +176,9 @@ class WeakTwin:
                     if told is None:
                         work = self._work(window)
                 if told is None and free[tick]:
-                    told = next(work, None)
+                    for _ in range(self.together):
+                        latest = next(work, None)
+                        told = told if latest is None else latest
                 usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
                 record.reason[tick] = usual if told is None else told
             record.p[tick] = estimator.p

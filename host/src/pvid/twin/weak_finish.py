@@ -54,13 +54,24 @@ def rows(sums: Float32, design: WeakTables, p: Float32) -> tuple[Float32, Float3
         return remove(remove(weak_whiten.whiten(x, low, whitened), _A), _B), noise, whitened
 
 
+def _stages_of_rows(design: WeakTables) -> int:
+    parts = -(-design.functions // _FUNCTIONS_A_STAGE)
+    return 7 * design.functions + 2 + 4 * parts
+
+
+def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEstimator) -> int:
+    """Stages of a window with all its solves."""
+    rows_and_adds = _stages_of_rows(design) + design.functions
+    solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
+    return rows_and_adds + solves + estimator.assessment_stages
+
+
 def stages(
     sums: Float32, design: WeakTables, iterations: int, estimator: RelativeEstimator, trust: Trust, expected: Float32
 ) -> Iterator[Reasons | None]:
     """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
     x, noise, whitened = rows(sums, design, estimator.p)
-    parts = -(-design.functions // _FUNCTIONS_A_STAGE)
-    for _ in range(7 * design.functions + 2 + 4 * parts):
+    for _ in range(_stages_of_rows(design)):
         yield None
     estimator.noise = np.where(whitened, noise, estimator.noise)
     for k in range(design.functions):
