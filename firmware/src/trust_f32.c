@@ -39,6 +39,15 @@ static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
     return PVID_OK;
 }
 
+static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 *estimator)
+{
+    memcpy(estimate->p, estimator->p, sizeof estimate->p);
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        estimate->se[a] = estimator->start_sd[a];
+        estimate->covariance[a][a] = estimator->start_sd[a] * estimator->start_sd[a];
+    }
+}
+
 void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
     memcpy(self->estimate.p, estimator->p, sizeof self->estimate.p);
@@ -61,7 +70,7 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
         memory = (groups < LONG_MEMORY) ? groups : LONG_MEMORY;
     }
     self->long_memory = (uint16_t)((memory < (float)PVID_TRUST_LONG) ? (float)PVID_TRUST_LONG : memory);
-    pvid_estimator_assess_f32(estimator, &self->estimate);
+    publish_start(&self->estimate, estimator);
     return PVID_OK;
 }
 

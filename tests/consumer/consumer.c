@@ -27,6 +27,7 @@ static const pvid_weak_design_f32 design = {
     .chi = chi,
     .gram = gram,
     .overlap = 1.5f,
+    .lag = 8,
 };
 
 static struct {
@@ -76,6 +77,7 @@ int main(void)
         .zero_unknown = true,
         .iterations = 1,
         .estimator = pvid_estimator_defaults_f32,
+        .trust = pvid_trust_defaults_f32,
     };
     const float start[4] = {30.0f, 9.0f, 5.0f, 0.0f};
     for (int i = 0; i < 4; i++) {

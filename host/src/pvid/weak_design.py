@@ -425,9 +425,9 @@ _GREGORY = (1 / 12, 1 / 24, 19 / 720, 3 / 160, 863 / 60480, 275 / 24192, 33953 /
 def _as_integral(chi4: Float) -> None:
     """Weights the ends of chi'''' [W, K] such that plain sums with it do what its integrals do.
 
-    It vanishes there only as (1 - x^2)^(exponent - 4): unweighted sums err by some millionths, and with an encoder's zero
-    of 0.1 rad that is as much as a row's noise. Seven differences leave a
-    fiftieth of that, and nothing that depends on the zero.
+    It vanishes there only as (1 - x^2)^(exponent - 4): unweighted sums err by some millionths, and with an encoder's
+    zero of 0.1 rad that is as much as a row's noise. Seven differences leave a fiftieth of that, and nothing that
+    depends on the zero.
     """
     weights = np.ones(len(chi4))
     for order, factor in enumerate(_GREGORY, 1):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.native import Reason, TrustConfig
+from pvid.native import ESTIMATE_DTYPE, Reason, TrustConfig
 from pvid.twin.estimator import RelativeEstimator
 
 Float32 = npt.NDArray[np.float32]
@@ -38,7 +38,11 @@ class Trust:
         self.misfit = np.zeros(lanes, np.bool_)
         self.long_mean = np.zeros(lanes, np.float32)
         self.recent = np.zeros((_SHORT, lanes), np.float32)
-        self.estimate = estimator.assess()
+        self.estimate = np.zeros(lanes, ESTIMATE_DTYPE)
+        self.place()
+        for a, sd in enumerate(estimator.start_sd):
+            self.estimate["se"][:, a] = sd
+            self.estimate["covariance"][:, a, a] = sd * sd
 
     def place(self) -> None:
         """Publishes the start again."""
