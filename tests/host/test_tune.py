@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pvid.bench.tuning import CASES, Case, Outcome, run_case
+from pvid.bench.tuning import CASES, Case, Outcome, errors, run_case
 from pvid.capture import Run, write_run
 from pvid.errors import PvidError
 from pvid.native import Native
 from pvid.rig import simulate, standard_sensors
 from pvid.rigfile import RigFile, load
-from pvid.tune import STEPS, slow_period, tune
+from pvid.tune import CLOSE, KEEP, STEPS, slow_period, tune
 
 STANDARD, SLOW, FAST, DRIFTING = (CASES[index] for index in (0, 2, 4, 5))
 
@@ -30,6 +30,20 @@ def outcome(case: Case, seeds: int) -> Outcome:
 def test_on_the_standard_rig_tuning_costs_little() -> None:
     # the issue's bound; both settings share the noise, so that a few seeds tell
     assert outcome(STANDARD, 3).ratio < 1.3
+
+
+def test_bad_settings_on_the_standard_rig_are_replaced(native: Native) -> None:
+    """Free to choose, tuning comes to what the default is worth."""
+    bad = replace(STANDARD.rig.identifier, window_s=0.6, test_functions=6)
+    runs = [STANDARD.run(seed) for seed in range(3)]
+    choices = [tune(run, replace(STANDARD.rig, identifier=bad), native) for run in runs]
+    for choice in choices:
+        assert choice.default is not None
+        assert choice.default.error > KEEP * choice.candidates[0].error
+        assert choice.chosen.error <= CLOSE * choice.candidates[0].error
+    found = [errors(native, STANDARD, choice.rig, run) for choice, run in zip(choices, runs, strict=True)]
+    default = [errors(native, STANDARD, STANDARD.rig, run) for run in runs]
+    assert np.sqrt(np.mean(np.square(found)) / np.mean(np.square(default))) < 1.3
 
 
 def test_on_a_slow_rig_tuning_halves_the_error() -> None:
@@ -66,11 +80,11 @@ def test_what_is_chosen_is_among_the_candidates_and_explained(native: Native) ->
     run = simulate(duration=20.0, seed=9).run
     done = tune(run, RigFile.standard(), native, steps.append)
     assert steps == sorted(steps) and steps[-1] == STEPS
-    assert replace(done.chosen.settings, forgetting_s=0.0) in [one.settings for one in done.candidates]
-    errors = [one.error for one in done.candidates]
-    assert errors == sorted(errors)
-    assert done.chosen.error <= 1.1 * errors[0]
-    assert str(len(errors)) in done.reason
+    assert done.chosen.settings in [one.settings for one in done.candidates]  # no drift: none forgets
+    expected = [one.error for one in done.candidates]
+    assert expected == sorted(expected)
+    assert done.chosen.error <= KEEP * expected[0]
+    assert str(len(expected)) in done.reason
     assert done.forgetting[0].forgetting_s == 0.0 and done.forgetting[0].energy == 1.0
 
 

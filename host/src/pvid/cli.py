@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage (one sentence), 
 from __future__ import annotations
 
 import json
+import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -366,7 +367,7 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
             f"{1000 * settings.smoothing_s:.4g}",
             " ".join(f"{100 * error:.2g}" for error in one.se),
             " ".join(f"{100 * bias:.2g}" for bias in one.bias),
-            f"{one.split:.2g}",
+            "-" if math.isnan(one.split) else f"{one.split:.2g}",
             f"{one.misfit:.2g}",
             f"{one.colour:.2g}",
             f"{one.delay_s:.3g}",
@@ -374,9 +375,10 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
             f"{100 * one.error:.2g}",
         )
 
-    chosen = replace(tuned.chosen.settings, forgetting_s=0.0)
+    chosen = tuned.chosen.settings
     for rank, one in enumerate(tuned.candidates):
-        is_chosen, is_default = one.settings == chosen, tuned.default is not None and one == tuned.default
+        is_chosen = replace(one.settings, forgetting_s=chosen.forgetting_s) == chosen
+        is_default = one is tuned.default
         if rank < _TUNED_SHOWN or is_chosen or is_default:
             add("chosen" if is_chosen else "rig file" if is_default else "", one)
     Console(width=None if sys.stdout.isatty() else 160).print(table)

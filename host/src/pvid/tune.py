@@ -2,18 +2,19 @@
 
 A candidate (window, test functions, decimation, smoothing) is judged by the error it must be expected to have:
 
-    error^2 = (standard error^2 + bias^2) max(1, split)
+    error^2 = (standard error^2 + bias^2) split
 
 standard error: from the run's own information matrix and residuals, shared noise of neighbouring windows counted.
-bias: how far the estimate moves when the smoothing filter is shortened by 30 %, beyond what the shorter filter's
-additional noise explains (Hausman's comparison), where that is more than the standard error: a filter that distorts
-the motion is seen by nothing else.
+bias: how far the estimate moves when the smoothing filter is shortened by 30 % (Hausman's comparison): a filter that
+distorts the motion is seen by nothing else. It hangs on the filter alone, so that it is looked for once a filter, at
+the finest decimation, where it shows best; it counts where the shorter filter's additional noise does not explain it.
 split: how far the estimates of the run's halves are apart, squared, in units of their joint covariance, per parameter
-(the square of Birge's ratio): 1 when the standard errors are honest.
+(the square of Birge's ratio): about 1 when the standard errors are honest. It counts where chance does not explain it.
 
-Where the rig file's own settings are expected within `CLOSE` of the smallest error they are kept; else, of all that
-come so close, the candidate that costs the fewest instructions is chosen. Forgetting is chosen last, by how well the
-estimate so far predicts the next window.
+Where the rig file's own settings are expected within `KEEP` of the smallest error they are kept: such differences are
+mostly noise. Else, of all candidates within `CLOSE` of it, the one that costs the fewest instructions is chosen.
+Forgetting is chosen by how well the estimate so far predicts the next window: first with the rig file's own settings,
+to see whether the parameters drift (then all candidates forget, and the halves may differ), and at last for the choice.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2
 
 from pvid.capture import Run
 from pvid.design_report import Y_NOISE_LSB
@@ -31,6 +33,7 @@ from pvid.differentiation import savitzky_golay
 from pvid.errors import PvidError
 from pvid.identify import WORST_SE
 from pvid.native import Native
+from pvid.rig import is_physical
 from pvid.rigfile import RigFile
 from pvid.setup import nominal_start, weak_config, weak_design_of
 from pvid.weak_cost import Schedule, instructions
@@ -45,23 +48,28 @@ _WINDOWS = (0.5, 0.7, 0.9, 1.1, 1.4, 1.8, 2.4)
 _SAMPLES = (80, 125, 200)
 _SMOOTHINGS = (0.35, 0.5, 0.72, 1.0, 1.15)
 _FUNCTIONS = (6, 8, 10, 12, 14, 16)
-_FORGETTING_S = (80.0, 40.0, 20.0, 10.0, 5.0)
+_FORGETTING_S = (80.0, 40.0, 20.0, 10.0, 5.0, 2.5)
 _DEFAULT_SMOOTHING_S = 0.071
+# The filter's bias is looked for with a filter this much shorter, in windows of this many slow periods.
 _SHORTER = 0.7
+_REFERENCE_WINDOW = 1.1
 _DEGREE = 6  # of the smoothing polynomial, as in weak_design
 _MIN_TAPS = _DEGREE + 3
 
 # Steps of `tune`, at most: the default, windows by decimation, smoothings, functions, windows again, forgetting.
 STEPS = 1 + 2 * len(_WINDOWS) * len(_SAMPLES) + len(_SMOOTHINGS) + len(_FUNCTIONS) + 1
 
-CLOSE = 1.2
+KEEP = 1.2
+CLOSE = 1.1
 # A pivot whose u has less rms than this, in units of its sensor's noise, counts as still; noise that passes for a
 # drive biases w with confidence.
 _DRIVEN = 10.0
 # Windows in each half of the run, for its estimate to have a covariance worth the name.
 _MIN_HALF = 4
-# Forgetting must predict better than remembering by this many standard errors of the difference.
-_FORGETTING_SIGMAS = 3.0
+# A shift by the filter, and a gain by forgetting, count from this many standard errors on; a distance of the halves
+# from this share of what chance gives.
+_SIGMAS = 3.0
+_CHANCE = 0.99
 # Core: the time constant of forgetting is at least 4 windows.
 _MIN_FORGETTING_WINDOWS = 4
 
@@ -97,7 +105,8 @@ class Judged:
     Attributes
     ----------
     p : its estimate
-    split : squared distance of the halves' estimates per parameter, in units of their joint covariance
+    split : squared distance of the halves' estimates per parameter, in units of their joint covariance; NaN where the
+        parameters drift, and may differ
     misfit : variance of the rows' residuals over that of the encoder's noise
     colour : energy of the residuals along the test function that has most of it, over the mean; 1 when white
     delay_s, instructions : what it costs
@@ -116,12 +125,14 @@ class Judged:
     @property
     def error(self) -> float:
         """Expected relative error, RMS over w, d1, d2."""
-        return math.sqrt(float(np.mean(self.se**2 + self.bias**2)) * max(1.0, self.split))
+        count = len(self.p)
+        by_chance = float(chi2.ppf(_CHANCE, count)) / count
+        return math.sqrt(float(np.mean(self.se**2 + self.bias**2)) * (self.split if self.split > by_chance else 1.0))
 
     @property
     def identified(self) -> bool:
-        """Whether w is known at all."""
-        return bool(self.se[0] <= WORST_SE)
+        """Whether w is known at all, and p is that of a pendulum."""
+        return bool(self.se[0] <= WORST_SE) and is_physical(self.p[:3])
 
 
 @dataclass(frozen=True)
@@ -177,25 +188,23 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
     rig = bench.rig
     bench.refuse_a_still_pivot()
     default, refusal = bench.default()
-    period = slow_period(default.p if default is not None and default.identified else nominal_start(rig))
-    bench.judge_all(
-        Settings(factor * period, 12, decimation, _DEFAULT_SMOOTHING_S)
-        for factor in _WINDOWS
-        for decimation in bench.decimations(factor * period)
-    )
+    if default is not None and default.identified and bench.look_for_drift(default.settings):
+        default, refusal = bench.default()
+    bench.judge_windows(Settings(bench.period, 12, 1, _DEFAULT_SMOOTHING_S))
+    if default is None and bench.look_for_drift(bench.best()):
+        bench.judge_windows(Settings(bench.period, 12, 1, _DEFAULT_SMOOTHING_S))
     best = bench.best()
     bench.judge_all(replace(best, smoothing_s=share * _DEFAULT_SMOOTHING_S) for share in _SMOOTHINGS)
     best = bench.best()
     bench.judge_all(replace(best, functions=functions) for functions in _FUNCTIONS)
-    best = bench.best()
-    bench.judge_all(
-        replace(best, window_s=factor * period, decimation=decimation)
-        for factor in _WINDOWS
-        for decimation in bench.decimations(factor * period)
-    )
+    bench.judge_windows(bench.best())
     ranked = bench.ranked()
-    close = [one for one in ranked if one.error <= CLOSE * ranked[0].error]
-    chosen = default if default in close else min(close, key=lambda one: one.instructions)
+    best_error = ranked[0].error
+    if default is not None and default.error <= KEEP * best_error:
+        chosen = default
+    else:
+        chosen = min((one for one in ranked if one.error <= CLOSE * best_error), key=lambda one: one.instructions)
+    kept = chosen is default
     forgetting = bench.forgetting(chosen.settings)
     progress(STEPS)
     keep = _chosen_forgetting(forgetting)
@@ -207,7 +216,7 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
         default_refusal=refusal,
         candidates=ranked,
         forgetting=forgetting,
-        reason=_reason(len(close), chosen is default, ranked, keep),
+        reason=_reason(kept, ranked, keep),
     )
 
 
@@ -219,16 +228,16 @@ def slow_period(p: Float) -> float:
 
 
 def _chosen_forgetting(forgetting: tuple[Forgetting, ...]) -> Forgetting:
-    useful = [one for one in forgetting[1:] if one.better_by_sigmas > _FORGETTING_SIGMAS]
+    useful = [one for one in forgetting[1:] if one.better_by_sigmas > _SIGMAS]
     return min(useful, key=lambda one: one.energy) if useful else forgetting[0]
 
 
-def _reason(close: int, own: bool, ranked: tuple[Judged, ...], keep: Forgetting) -> str:
-    why = "the rig file's own settings are one of them" if own else "this one costs the fewest instructions of them"
-    what = (
-        f"of {len(ranked)} candidates the smallest expected error is {100 * ranked[0].error:.2g} %; {close} come "
-        f"within {100 * (CLOSE - 1):.0f} % of it, and {why}"
-    )
+def _reason(kept: bool, ranked: tuple[Judged, ...], keep: Forgetting) -> str:
+    what = f"of {len(ranked)} candidates the smallest expected error is {100 * ranked[0].error:.2g} %"
+    if kept:
+        what += f", and the rig file's own settings come within {100 * (KEEP - 1):.0f} % of it"
+    else:
+        what += f"; of those within {100 * (CLOSE - 1):.0f} % of it this one costs the fewest instructions"
     if keep.forgetting_s == 0:
         return f"{what}; no forgetting predicts the next window better than remembering everything"
     return (
@@ -287,7 +296,10 @@ class _Bench:
             rig = replace(rig, identifier=replace(rig.identifier, form="weak", window_s=0.0))
         self.run, self.rig, self.native, self.progress = run, rig, native, progress
         self.bounds = Bounds()
+        self.forgetting_s = 0.0
         self.start: Float | None = None
+        self.period = slow_period(nominal_start(rig))
+        self.biases: dict[int, Float] = {}
         self.judged: dict[Settings, Judged | None] = {}
         self.steps = 0
 
@@ -305,8 +317,9 @@ class _Bench:
         u = per_metre * np.convolve(run.y, np.concatenate([second[::-1], [centre], second]), "valid")
         if float(np.std(u)) < _DRIVEN * noise or not np.ptp(run.y) > 0:
             raise PvidError(
-                "nothing can be tuned without a drive: the pivot stands still, its acceleration is no more than "
-                f"{_DRIVEN:g} times what the noise of its sensor makes of a still one"
+                "nothing can be tuned without a drive: through the longest smoothing filter that the core holds "
+                f"({1000 * taps / run.sample_rate:.3g} ms) the pivot's acceleration is less than {_DRIVEN:g} times "
+                "what the noise of its sensor makes of a still one"
             )
 
     def default(self) -> tuple[Judged | None, str | None]:
@@ -319,8 +332,12 @@ class _Bench:
                 own.test_functions,
                 design.decimation,
                 design.taps / self.run.sample_rate,
+                self.forgetting_s,
             )
             judged = self.judge(settings)
+            if judged.identified:
+                self.period = slow_period(judged.p)
+            judged = replace(judged, bias=self.bias(design.taps))
         except (PvidError, np.linalg.LinAlgError) as error:
             return None, str(error)
         finally:
@@ -338,14 +355,32 @@ class _Bench:
         self.steps = min(self.steps + 1, STEPS)
         self.progress(self.steps)
 
+    def look_for_drift(self, settings: Settings) -> bool:
+        """Whether forgetting predicts better; then it applies to all that is judged from now on."""
+        self.forgetting_s = _chosen_forgetting(self.forgetting(settings)).forgetting_s
+        if self.forgetting_s > 0:
+            self.judged.clear()
+            self.biases.clear()
+        return self.forgetting_s > 0
+
+    def judge_windows(self, settings: Settings) -> None:
+        """Judges the settings with every window and its decimations."""
+        self.judge_all(
+            replace(settings, window_s=factor * self.period, decimation=decimation)
+            for factor in _WINDOWS
+            for decimation in self.decimations(factor * self.period)
+        )
+
     def judge_all(self, candidates: Iterable[Settings]) -> None:
         """Judges candidates; those that cannot be designed, or that the core refuses, are left out."""
         for candidate in candidates:
-            smoothing_s = self.taps(candidate.smoothing_s) / self.run.sample_rate
-            settings = replace(candidate, window_s=float(f"{candidate.window_s:.3g}"), smoothing_s=smoothing_s)
+            taps = self.taps(candidate.smoothing_s)
+            smoothing_s = taps / self.run.sample_rate
+            window_s = float(f"{candidate.window_s:.3g}")
+            settings = replace(candidate, window_s=window_s, smoothing_s=smoothing_s, forgetting_s=self.forgetting_s)
             if settings not in self.judged:
                 try:
-                    self.judged[settings] = self.judge(settings)
+                    self.judged[settings] = replace(self.judge(settings), bias=self.bias(taps))
                 except (PvidError, np.linalg.LinAlgError):
                     self.judged[settings] = None
             self.advance()
@@ -369,8 +404,8 @@ class _Bench:
         known = [one for one in usable if one.identified]
         if not known:
             raise PvidError(
-                "no setting identifies w from this run (standard error above "
-                f"{100 * WORST_SE:.0f} %): is the pivot driven, and are the columns phi and y what they should be?"
+                f"no setting identifies a pendulum from this run (w to {100 * WORST_SE:.0f} %): is the pivot driven, "
+                "and are the columns phi and y what they should be?"
             )
         return tuple(sorted(known, key=lambda one: one.error))
 
@@ -385,7 +420,8 @@ class _Bench:
         return min(max(taps, _MIN_TAPS), most)
 
     def judge(self, settings: Settings) -> Judged:
-        """What the run says of a candidate."""
+        """What the run says of a candidate, but for the bias of its smoothing filter."""
+        self.native.weak(weak_config(settings.applied(self.rig), self.run.sample_rate))  # refuses what it cannot hold
         windows, estimator = self._prepared(settings)
         count = len(windows.phi)
         half = (count - 1) // 2
@@ -403,8 +439,10 @@ class _Bench:
             settings=settings,
             p=whole.p,
             se=se,
-            bias=self._bias(settings, whole.p[:3], se),
-            split=_split(windows.estimated(estimator, first), windows.estimated(estimator, second)),
+            bias=np.zeros(3),
+            split=_split(windows.estimated(estimator, first), windows.estimated(estimator, second))
+            if settings.forgetting_s == 0
+            else math.nan,
             misfit=(whole.assess().residual_sd / estimator.row_sd) ** 2,
             colour=float(energies.max() / energies.mean()),
             delay_s=design.delay / design.sample_rate + design.window_s,
@@ -415,10 +453,9 @@ class _Bench:
         return judged
 
     def _prepared(self, settings: Settings) -> tuple[_Windows, WeakSettings]:
-        """The run's windows and the estimator's settings; refuses what the core would refuse."""
+        """The run's windows and the estimator's settings."""
         rig = settings.applied(self.rig)
         config = weak_config(rig, self.run.sample_rate)
-        self.native.weak(config)
         estimator = config.estimator
         # From an estimate of an earlier candidate one step a window is enough: the sums are the same.
         return _Windows.of(self.run, weak_design_of(rig, self.run.sample_rate)), WeakSettings(
@@ -432,18 +469,28 @@ class _Bench:
             damping=rig.identifier.damping,
         )
 
-    def _bias(self, settings: Settings, p: Float, se: Float) -> Float:
-        """Relative bias of w, d1, d2 by the smoothing filter; 0 where that cannot be shortened, or is below se."""
-        taps = self.taps(settings.smoothing_s)
-        shorter = round(_SHORTER * taps) | 1
-        if shorter < _MIN_TAPS or shorter >= taps:
-            return np.zeros(3)
-        windows, estimator = self._prepared(replace(settings, smoothing_s=shorter / self.run.sample_rate))
-        other = windows.estimated(estimator)
-        shift = (other.p[:3] - p) / p
-        noise = np.maximum((other.sandwich()[:3] / p) ** 2 - se**2, 0.0)
-        bias = np.sqrt(np.maximum(shift**2 - noise, 0.0))
-        return np.where(bias > se, bias, 0.0)
+    def bias(self, taps: int) -> Float:
+        """Relative bias of w, d1, d2 by a smoothing filter; 0 where it cannot be shortened, or noise explains all."""
+        if taps not in self.biases:
+            shorter = round(_SHORTER * taps) | 1
+            self.biases[taps] = self._shift(taps, shorter) if _MIN_TAPS <= shorter < taps else np.zeros(3)
+        return self.biases[taps]
+
+    def _shift(self, taps: int, shorter: int) -> Float:
+        window_s = _REFERENCE_WINDOW * self.period
+        decimation = math.ceil(window_s * self.run.sample_rate / (self.bounds.window - 1))
+        estimates, errors = [], []
+        for length in (taps, shorter):
+            windows, estimator = self._prepared(
+                Settings(window_s, 12, decimation, length / self.run.sample_rate, self.forgetting_s)
+            )
+            oracle = windows.estimated(estimator)
+            estimates.append(oracle.p[:3])
+            errors.append(oracle.sandwich()[:3] / oracle.p[:3])
+        shift = estimates[1] / estimates[0] - 1
+        # The difference of the variances is itself known roughly, and may come out as nothing.
+        noise = np.maximum(errors[1] ** 2 - errors[0] ** 2, errors[0] ** 2 / 4)
+        return np.where(shift**2 > _SIGMAS**2 * noise, np.sqrt(np.maximum(shift**2 - noise, 0.0)), 0.0)
 
     def forgetting(self, settings: Settings) -> tuple[Forgetting, ...]:
         """No forgetting first, then every time constant that the core takes and that is shorter than the run."""

@@ -148,9 +148,9 @@ def run_case(
         run = case.run(seed)
         choice = tune(run, case.rig, native)
         choices.append(choice)
-        tuned.append(_errors(native, case, choice.rig, run))
+        tuned.append(errors(native, case, choice.rig, run))
         try:
-            default.append(_errors(native, case, case.rig, run))
+            default.append(errors(native, case, case.rig, run))
         except PvidError:
             continue
         finally:
@@ -158,7 +158,8 @@ def run_case(
     return Outcome(np.array(default) if len(default) == len(tuned) else None, np.array(tuned), choices)
 
 
-def _errors(native: Native, case: Case, rig: RigFile, run: Run) -> Float:
+def errors(native: Native, case: Case, rig: RigFile, run: Run) -> Float:
+    """Relative errors of w, d1, d2 that the C core makes of a run, started at the rig's nominal."""
     identifier = native.weak(weak_config(rig, RATE_HZ))
     identifier.run(run.phi, run.y, sums=False, hashes=False)
     return np.asarray(identifier.assess()["p"][:3].astype(np.float64) / case.truth - 1)
