@@ -143,13 +143,24 @@ def test_the_command_writes_a_rig_file_that_identifies(tmp_path: Path) -> None:
     given.write(tmp_path / "run.toml")
     done = pvid("tune", "run.csv", "-o", "better.toml", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for word in ("window s", "split", "misfit", "colour", "chosen", "better.toml", "forgetting"):
+    for word in ("window s", "split", "misfit", "colour", "chosen", "better.toml", "forgetting", "identifies w"):
         assert word in done.stdout
     better = load(tmp_path / "better.toml")
     assert RigFile.parse(better.text()) == better
     assert (better.l1, better.nominal, better.sensor) == (given.l1, given.nominal, given.sensor)
     assert better.identifier.window_s > 0 and better.identifier.decimation > 0
     assert pvid("identify", "run.csv", "--rig", "better.toml", cwd=tmp_path).returncode == 0
+
+
+def test_a_model_that_does_not_fit_is_warned_of(tmp_path: Path) -> None:
+    """Large angles: no setting cures them, and the expected errors do not hold."""
+    run = simulate(sensors=standard_sensors(14), truth="full", duration=20.0, seed=4).run
+    write_run(tmp_path / "run.csv", run)
+    RigFile.standard().write(tmp_path / "run.toml")
+    done = pvid("tune", "run.csv", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "warning" in done.stderr and "large angles" in " ".join(done.stderr.split())
+    assert (tmp_path / "run-tuned.toml").is_file()
 
 
 @pytest.mark.parametrize(

@@ -347,8 +347,9 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
 
     rig = load(rig_path or _rig_path(run_path))
     run = read_run(run_path, rig.sample_rate)
+    native = Native()
     with progress_bar("tuning", STEPS) as advance:
-        tuned = tune(run, rig, Native(), advance)
+        tuned = tune(run, rig, native, advance)
     out = out or run_path.with_name(_rig_path(run_path).stem + "-tuned.toml")
     tuned.rig.write(out)
     table = Table(title="errors in % of w / d1 / d2, best first")
@@ -390,6 +391,11 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
     if residuals:
         click.echo(f"residual of the next window with forgetting, over that without: {residuals}")
     click.echo(f"chosen: {tuned.reason}")
+    in_core = replace(tuned.rig, identifier=replace(tuned.rig.identifier, core="f32"))
+    result = identify(run, in_core, native)
+    found = ", ".join(f"{name} {result.value[name]:.6g} +- {result.se[name]:.2g}" for name in result.value)
+    click.echo(f"with it the C core identifies {found if result.identified else 'nothing: ' + result.verdict}")
+    _print_warning(result)
     click.echo(f"rig file: {out}")
     return DONE
 
