@@ -40,7 +40,8 @@ MEAN_TERMS = (
     "window_zero",
 )
 # And of the longest tick: a slice of taps beside the longest stage, or a slice of functions.
-LONGEST_TERMS = ("tick", "front_pair", "stage", "factor", "factor_function_squared", "window_slice", "function")
+# What a function costs there is what it costs in the mean.
+LONGEST_TERMS = ("tick", "front_pair", "stage", "factor", "factor_function_squared", "window_slice")
 
 
 def stages_of(functions: int, zero_unknown: bool = True, iterations: int = 3) -> int:
@@ -105,9 +106,10 @@ class Schedule:
         per_window = np.array([1.0, self.functions, self.functions**3, float(zero_unknown)])
         return np.concatenate([[1.0], per_sample / self.decimation, per_window / self.period])
 
-    def longest(self, coefficients: npt.NDArray[np.float64]) -> float:
-        """The longest tick by coefficients in the order of LONGEST_TERMS."""
-        tick, front_pair, stage, factor, factor_squared, window_slice, function = coefficients
+    def longest(self, coefficients: npt.NDArray[np.float64], mean: npt.NDArray[np.float64]) -> float:
+        """The longest tick by coefficients in the order of LONGEST_TERMS, and those of MEAN_TERMS."""
+        tick, front_pair, stage, factor, factor_squared, window_slice = coefficients
+        function = float(mean[MEAN_TERMS.index("function")])
         work = self.together * max(stage, factor + factor_squared * self.functions**2)
         front = tick + front_pair * self.front_slice + work
         window = window_slice + function * self.window_slice
@@ -164,7 +166,7 @@ def cost_of(design: WeakDesign, zero_unknown: bool = True, iterations: int = 3) 
 def instructions(schedule: Schedule, zero_unknown: bool) -> tuple[float, float]:
     """Mean instructions a sample and those of the longest tick, by the fitted formula."""
     mean, longest = coefficients()
-    return float(schedule.mean_counts(zero_unknown) @ mean), schedule.longest(longest)
+    return float(schedule.mean_counts(zero_unknown) @ mean), schedule.longest(longest, mean)
 
 
 @cache

@@ -20,7 +20,7 @@ Float = npt.NDArray[np.float64]
 HEADER = ("taps", "D", "window", "K", "zero", "mean", "formula", "longest tick", "formula")
 
 # Where the fit of the longest tick starts; it is linear but for a maximum of a few terms.
-_LONGEST_START = np.array([90.0, 15.0, 600.0, 100.0, 4.0, 200.0, 27.0])
+_LONGEST_START = np.array([90.0, 15.0, 600.0, 100.0, 4.0, 200.0])
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def fit(spreads: list[Spread]) -> tuple[Float, Float]:
     longest = np.array([spread.longest for spread in spreads], np.float64)
 
     def deviations(coefficients: Float) -> Float:
-        return np.array([sizes.schedule.longest(coefficients) for sizes in GRID]) / longest - 1
+        return np.array([sizes.schedule.longest(coefficients, mean) for sizes in GRID]) / longest - 1
 
     fitted = least_squares(deviations, _LONGEST_START, x_scale=_LONGEST_START, bounds=(0, np.inf))
     return mean, np.asarray(fitted.x)
@@ -125,7 +125,7 @@ def rows(spreads: list[Spread], mean: Float, longest: Float) -> list[tuple[str, 
             f"{spread.mean:.0f}",
             f"{sizes.schedule.mean_counts(sizes.zero_unknown) @ mean:.0f}",
             f"{spread.longest}",
-            f"{sizes.schedule.longest(longest):.0f}",
+            f"{sizes.schedule.longest(longest, mean):.0f}",
         )
         for sizes, spread in zip(GRID, spreads, strict=True)
     ]
