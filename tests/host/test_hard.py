@@ -44,11 +44,23 @@ def test_noise_makes_the_answer_worse_and_says_so(label: str) -> None:
     assert np.median(outcome(label).standard_errors[:, 0]) > 0.003  # 30 times those of the plain 14-bit run
 
 
-@pytest.mark.parametrize("label", ["no drive, free swing", "no drive, no motion", "drive, no motion"])
-def test_without_motion_or_drive_nothing_is_published(label: str) -> None:
+@pytest.mark.parametrize(
+    "label",
+    [
+        "no drive, free swing",
+        "no drive, no motion",
+        "drive, no motion",
+        "drive x0.03, 14 bits",
+        "14 bits, noise of 128 LSB",
+        "slow mode only, one tone, 14 bits",
+        "slow mode only, 12 bits",
+        "fast mode only, 12 bits",
+    ],
+)
+def test_what_the_data_cannot_carry_is_not_published(label: str) -> None:
     assert not outcome(label).published.any()
     assert len(outcome(label).held) == SEEDS
-    assert all(reason.startswith(("held", "the standard error")) for reason in outcome(label).held)
+    assert all(reason.startswith("held") for reason in outcome(label).held)
 
 
 @pytest.mark.parametrize(

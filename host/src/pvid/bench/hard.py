@@ -204,7 +204,7 @@ def run_case(
     standard_errors = np.array([[result.se[name] for name in LINEAR] for result in results])
     return Outcome(
         published=np.array([result.identified for result in results]),
-        alarmed=np.array([result.warning is not None for result in results]),
+        alarmed=np.array([result.alarm for result in results]),
         errors=values / TRUTH - 1,
         standard_errors=standard_errors / TRUTH,
         held=tuple(result.verdict for result in results if not result.identified),
