@@ -6,7 +6,6 @@ Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage (one sentence), 
 from __future__ import annotations
 
 import json
-import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -329,8 +328,6 @@ def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str |
 
 # ---- tune
 
-_TUNED_SHOWN = 12
-
 
 @commands.command(name="tune")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
@@ -343,7 +340,8 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
     much a shorter smoothing filter moves the estimate, how well the run's halves agree, energy and colour of the
     residuals. Writes a rig file with the choice.
     """
-    from pvid.tune import STEPS, Judged, tune
+    from pvid.tune import STEPS, tune
+    from pvid.tune_table import candidates_table
 
     rig = load(rig_path or _rig_path(run_path))
     run = read_run(run_path, rig.sample_rate)
@@ -352,37 +350,7 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
         tuned = tune(run, rig, native, advance)
     out = out or run_path.with_name(_rig_path(run_path).stem + "-tuned.toml")
     tuned.rig.write(out)
-    table = Table(title="errors in % of w / d1 / d2, best first")
-    for heading in ("", "window s", "functions", "decimation", "smoothing ms", "standard error", "bias", "split"):
-        table.add_column(heading, justify="right")
-    for heading in ("misfit", "colour", "delay s", "instructions", "expected error %"):
-        table.add_column(heading, justify="right")
-
-    def add(mark: str, one: Judged) -> None:
-        settings = one.settings
-        table.add_row(
-            mark,
-            f"{settings.window_s:g}",
-            f"{settings.functions}",
-            f"{settings.decimation}",
-            f"{1000 * settings.smoothing_s:.4g}",
-            " ".join(f"{100 * error:.2g}" for error in one.se),
-            " ".join(f"{100 * bias:.2g}" for bias in one.bias),
-            "-" if math.isnan(one.split) else f"{one.split:.2g}",
-            f"{one.misfit:.2g}",
-            f"{one.colour:.2g}",
-            f"{one.delay_s:.3g}",
-            f"{one.instructions:.0f}",
-            f"{100 * one.error:.2g}",
-        )
-
-    chosen = tuned.chosen.settings
-    for rank, one in enumerate(tuned.candidates):
-        is_chosen = replace(one.settings, forgetting_s=chosen.forgetting_s) == chosen
-        is_default = one is tuned.default
-        if rank < _TUNED_SHOWN or is_chosen or is_default:
-            add("chosen" if is_chosen else "rig file" if is_default else "", one)
-    Console(width=None if sys.stdout.isatty() else 160).print(table)
+    Console(width=None if sys.stdout.isatty() else 160).print(candidates_table(tuned))
     if tuned.default_refusal is not None:
         click.echo(f"the rig file's own settings cannot be used: {tuned.default_refusal}")
     residuals = ", ".join(

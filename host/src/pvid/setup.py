@@ -114,11 +114,13 @@ def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
     )
 
 
-def weak_drive_threshold(rig: RigFile, tables: WeakDesign) -> float:
-    """Rms of u [1/s^2] below which a window counts as undriven: ten times the noise of a still pivot's u."""
-    weights = tables.second
-    white_gain = np.sqrt(2 * np.sum(weights**2) + 4 * np.sum(weights) ** 2)
-    noise = NOISE_LSB * rig.sensor.y_lsb * white_gain * tables.sample_rate**2 / rig.l1
+def weak_drive_threshold(rig: RigFile, second: npt.NDArray[np.float64], sample_rate: float) -> float:
+    """Rms of u [1/s^2] below which a window counts as undriven: ten times the noise of a still pivot's u.
+
+    `second` is the folded second derivative of the front end, `WeakDesign.second`.
+    """
+    white_gain = np.sqrt(2 * np.sum(second**2) + 4 * np.sum(second) ** 2)
+    noise = NOISE_LSB * rig.sensor.y_lsb * white_gain * sample_rate**2 / rig.l1
     return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
 
 
@@ -136,7 +138,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
         l1=rig.l1,
         design=tables.f32,
         zero_unknown=settings.zero,
-        drive_min=weak_drive_threshold(rig, tables),
+        drive_min=weak_drive_threshold(rig, tables.second, sample_rate),
         pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
         trust=TrustConfig(),
         estimator=EstimatorConfig(

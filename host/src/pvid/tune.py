@@ -28,17 +28,16 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from pvid.capture import Run
-from pvid.design_report import Y_NOISE_LSB
 from pvid.differentiation import savitzky_golay
 from pvid.errors import PvidError
 from pvid.identify import WORST_SE
 from pvid.native import Native
 from pvid.rig import is_physical
 from pvid.rigfile import RigFile
-from pvid.setup import nominal_start, weak_config, weak_design_of
+from pvid.setup import nominal_start, weak_config, weak_design_of, weak_drive_threshold
 from pvid.weak_cost import Schedule, instructions
 from pvid.weak_design import Bounds, WeakDesign
-from pvid.weak_oracle import WeakOracle, WeakSettings, columns, frames, front_end, sample_sd
+from pvid.weak_oracle import WeakOracle, WeakSettings, columns, frames, front_end
 
 Float = npt.NDArray[np.float64]
 
@@ -61,9 +60,6 @@ STEPS = 1 + 2 * len(_WINDOWS) * len(_SAMPLES) + len(_SMOOTHINGS) + len(_FUNCTION
 
 KEEP = 1.2
 CLOSE = 1.1
-# A pivot whose u has less rms than this, in units of its sensor's noise, counts as still; noise that passes for a
-# drive biases w with confidence.
-_DRIVEN = 10.0
 # Windows in each half of the run, for its estimate to have a covariance worth the name.
 _MIN_HALF = 4
 # A shift by the filter, and a gain by forgetting, count from this many standard errors on; a distance of the halves
@@ -200,7 +196,7 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
     bench.judge_windows(bench.best())
     ranked = bench.ranked()
     best_error = ranked[0].error
-    if default is not None and default.error <= KEEP * best_error:
+    if default is not None and default.identified and default.error <= KEEP * best_error:
         chosen = default
     else:
         chosen = min((one for one in ranked if one.error <= CLOSE * best_error), key=lambda one: one.instructions)
@@ -301,25 +297,22 @@ class _Bench:
         self.period = slow_period(nominal_start(rig))
         self.biases: dict[int, Float] = {}
         self.judged: dict[Settings, Judged | None] = {}
+        self.refusal = ""
         self.steps = 0
 
     def refuse_a_still_pivot(self) -> None:
         """PvidError where u, smoothed as well as the core can, does not stand out of the pivot sensor's noise."""
-        run, rig = self.run, self.rig
+        rate = self.run.sample_rate
         taps = self.taps(math.inf)
-        if len(run.t) <= taps:
+        if len(self.run.t) <= taps:
             return  # too short, which `ranked` says
         second = savitzky_golay(taps, _DEGREE).weights[2]
-        gain = math.sqrt(2 * float(np.sum(second**2)) + 4 * float(np.sum(second)) ** 2)
-        per_metre = run.sample_rate**2 / rig.l1
-        noise = sample_sd(rig.sensor.y_lsb, Y_NOISE_LSB) * gain * per_metre
-        centre = -2 * float(np.sum(second))
-        u = per_metre * np.convolve(run.y, np.concatenate([second[::-1], [centre], second]), "valid")
-        if float(np.std(u)) < _DRIVEN * noise or not np.ptp(run.y) > 0:
+        kernel = np.concatenate([second[::-1], [-2 * float(np.sum(second))], second])
+        u = np.convolve(self.run.y, kernel, "valid") * rate**2 / self.rig.l1
+        if float(np.std(u)) < weak_drive_threshold(self.rig, second, rate):
             raise PvidError(
                 "nothing can be tuned without a drive: through the longest smoothing filter that the core holds "
-                f"({1000 * taps / run.sample_rate:.3g} ms) the pivot's acceleration is less than {_DRIVEN:g} times "
-                "what the noise of its sensor makes of a still one"
+                f"({1000 * taps / rate:.3g} ms) the pivot's acceleration hardly stands out of its sensor's noise"
             )
 
     def default(self) -> tuple[Judged | None, str | None]:
@@ -381,8 +374,9 @@ class _Bench:
             if settings not in self.judged:
                 try:
                     self.judged[settings] = replace(self.judge(settings), bias=self.bias(taps))
-                except (PvidError, np.linalg.LinAlgError):
+                except (PvidError, np.linalg.LinAlgError) as error:
                     self.judged[settings] = None
+                    self.refusal = str(error)
             self.advance()
 
     def ranked(self) -> tuple[Judged, ...]:
@@ -396,11 +390,13 @@ class _Bench:
         usable = [one for one in self.judged.values() if one is not None]
         if not usable:
             duration = len(self.run.t) / self.run.sample_rate
-            period = slow_period(nominal_start(self.rig))
-            raise PvidError(
-                f"the run of {duration:.3g} s is too short to be tuned: each half must hold {_MIN_HALF} windows of "
-                f"about a slow modal period ({period:.2g} s at the rig's nominal)"
-            )
+            shortest = (_MIN_HALF + 1) * _WINDOWS[0] * self.period  # half-overlapping windows: _MIN_HALF in each half
+            if duration < shortest:
+                raise PvidError(
+                    f"the run of {duration:.3g} s is too short to be tuned: each half must hold {_MIN_HALF} windows of "
+                    f"at least half a slow modal period ({self.period:.2g} s at the rig's nominal)"
+                )
+            raise PvidError(f"none of the settings tried can be used with this run: {self.refusal}")
         known = [one for one in usable if one.identified]
         if not known:
             raise PvidError(
@@ -477,13 +473,12 @@ class _Bench:
         return self.biases[taps]
 
     def _shift(self, taps: int, shorter: int) -> Float:
-        window_s = _REFERENCE_WINDOW * self.period
-        decimation = math.ceil(window_s * self.run.sample_rate / (self.bounds.window - 1))
+        rate, most = self.run.sample_rate, self.bounds.window - 1
+        window_s = min(_REFERENCE_WINDOW * self.period, most * self.bounds.decimation / rate)
+        decimation = math.ceil(window_s * rate / most)
         estimates, errors = [], []
         for length in (taps, shorter):
-            windows, estimator = self._prepared(
-                Settings(window_s, 12, decimation, length / self.run.sample_rate, self.forgetting_s)
-            )
+            windows, estimator = self._prepared(Settings(window_s, 12, decimation, length / rate, self.forgetting_s))
             oracle = windows.estimated(estimator)
             estimates.append(oracle.p[:3])
             errors.append(oracle.sandwich()[:3] / oracle.p[:3])
