@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,8 @@ import pytest
 
 from pvid import oracle
 from pvid.bench.cost import state_bytes
-from pvid.bench.design_cost import GRID, Sizes, measured
+from pvid.bench.design_cost import GRID, Sizes, as_toml, fit, measured
+from pvid.bench.spread import Spread
 from pvid.design_report import report_for_run, report_for_tones, sensors_of
 from pvid.errors import PvidError
 from pvid.native import Native
@@ -27,7 +29,7 @@ from pvid.rig import (
 )
 from pvid.rigfile import Nominal, RigFile, Sensor
 from pvid.setup import weak_config, weak_design_of
-from pvid.weak_cost import cost_of, fitted_definitions, instructions, state_bytes_32
+from pvid.weak_cost import coefficients, cost_of, fitted_definitions, instructions, state_bytes_32
 
 NAMES = ("w", "d1", "d2", "c", "g", "l2", "rho2")
 
@@ -96,6 +98,24 @@ def test_instructions_are_predicted_within_ten_per_cent(sizes: Sizes) -> None:
     mean, longest = instructions(sizes.schedule, sizes.zero_unknown)
     assert mean == pytest.approx(spread.mean, rel=0.1)
     assert longest == pytest.approx(spread.longest, rel=0.1)
+
+
+def test_the_fit_finds_the_coefficients_that_made_the_counts() -> None:
+    mean, longest = coefficients()
+    spreads = []
+    for sizes in GRID:
+        schedule = sizes.schedule
+        peak = round(schedule.longest(longest, mean))
+        rest = round(1000 * float(schedule.mean_counts(sizes.zero_unknown) @ mean) - peak)
+        spreads.append(Spread([peak, *(rest // 999 + (k < rest % 999) for k in range(999))]))
+    found = fit(spreads)
+    for sizes, spread in zip(GRID, spreads, strict=True):
+        schedule = sizes.schedule
+        assert schedule.mean_counts(sizes.zero_unknown) @ found[0] == pytest.approx(spread.mean, rel=1e-3)
+        assert schedule.longest(found[1], found[0]) == pytest.approx(spread.longest, rel=1e-2)
+    written = tomllib.loads(as_toml(*found))
+    assert list(written["mean"].values()) == pytest.approx(found[0], rel=1e-4)
+    assert list(written["longest"].values()) == pytest.approx(found[1], rel=1e-4)
 
 
 def test_ram_is_the_compilers_word(tmp_path: Path) -> None:

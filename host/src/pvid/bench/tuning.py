@@ -55,6 +55,7 @@ class Case:
     label: str
     scale: float = 1.0
     bits: int = 14
+    rate: float = RATE_HZ
     drift: float = 0.0
 
     @property
@@ -74,17 +75,17 @@ class Case:
         """What a user would write who knows l1 and the sensors."""
         l1 = self.pendulum.l1
         sensor = RigFile.standard().sensor
-        rig = RigFile(l1=l1, nominal=Nominal(l2=l1 / 3, rho2=l1 / 3), sensor=sensor, sample_rate=RATE_HZ)
+        rig = RigFile(l1=l1, nominal=Nominal(l2=l1 / 3, rho2=l1 / 3), sensor=sensor, sample_rate=self.rate)
         return rig
 
     def run(self, seed: int) -> Run:
         """A run of the linear pendulum."""
         sensors = standard_sensors(self.bits)
         if self.drift == 0.0:
-            return simulate(self.pendulum, self.tones, sensors, RATE_HZ, DURATION_S, seed=seed).run
+            return simulate(self.pendulum, self.tones, sensors, self.rate, DURATION_S, seed=seed).run
         t, phi, y = self._drifting()
         measured_phi, measured_y = sensors.measure(phi, y, seed)
-        return Run(t, measured_phi, measured_y, RATE_HZ)
+        return Run(t, measured_phi, measured_y, self.rate)
 
     @property
     def truth(self) -> Float:
@@ -94,7 +95,7 @@ class Case:
 
     def _drifting(self) -> tuple[Float, Float, Float]:
         """t, phi and y where w changes linearly: phi'' = G q, q'' = -d1 phi'' - d2 G phi with G = w(t) + u."""
-        t = np.arange(round(DURATION_S * RATE_HZ)) / RATE_HZ
+        t = np.arange(round(DURATION_S * self.rate)) / self.rate
         drive = Drive(self.tones)
         w, d1, d2 = self.pendulum.linear
         absolute1, absolute2 = STANDARD_RELEASE
@@ -118,6 +119,7 @@ CASES = (
     Case("l1 = 1.2 m, modes half as fast", 4.0),
     Case("l1 = 0.1 m, modes 1.7 times as fast", 1 / 3),
     Case("l1 = 0.05 m, modes 2.4 times as fast", 1 / 6),
+    Case("standard, 2 kHz", rate=2000.0),
     Case("standard, w falls by 5 %", drift=-0.05),
 )
 
@@ -160,7 +162,7 @@ def run_case(
 
 def errors(native: Native, case: Case, rig: RigFile, run: Run) -> Float:
     """Relative errors of w, d1, d2 that the C core makes of a run, started at the rig's nominal."""
-    identifier = native.weak(weak_config(rig, RATE_HZ))
+    identifier = native.weak(weak_config(rig, run.sample_rate))
     identifier.run(run.phi, run.y, sums=False, hashes=False)
     return np.asarray(identifier.assess()["p"][:3].astype(np.float64) / case.truth - 1)
 
