@@ -71,7 +71,10 @@ class DesignReport:
     def cost_rows(self) -> list[tuple[str, str]]:
         """What it costs, in words."""
         tables, cost = self.design, self.cost
-        fitted = "unknown here" if cost.ram_bytes_fitted is None else f"{cost.ram_bytes_fitted} bytes"
+
+        def size(ram_bytes: int | None) -> str:
+            return "unknown (this gcc has no 32-bit mode)" if ram_bytes is None else f"{ram_bytes} bytes"
+
         return [
             (
                 "tables",
@@ -81,8 +84,8 @@ class DesignReport:
             ("delay", f"{cost.delay_s:.3g} s from a sample to the last estimate it enters, at most"),
             ("estimates", f"one every {cost.update_s:.3g} s"),
             ("flash", f"{cost.flash_bytes} bytes of tables"),
-            ("RAM", f"{cost.ram_bytes} bytes with the default bounds of pvid/config.h, in this build"),
-            ("RAM, 32 bits", f"{fitted} with -D{' -D'.join(cost.definitions)}"),
+            ("RAM", f"{size(cost.ram_bytes)} with the default bounds of pvid/config.h, on a 32-bit device"),
+            ("RAM, fitted", f"{size(cost.ram_bytes_fitted)} with -D{' -D'.join(cost.definitions)}"),
             (
                 "instructions",
                 f"{cost.instructions:.0f} a sample, {cost.longest_tick:.0f} in the longest tick "
