@@ -116,6 +116,15 @@ void pvid_information_end_group_f32(pvid_information_f32 *self)
     }
 }
 
+void pvid_information_fade_f32(pvid_information_f32 *self, float factor)
+{
+    const size_t sums = number_of_sums(self);
+    for (size_t i = 0; i < sums; i++) {
+        self->high[i] *= factor;
+        self->low[i] *= factor;
+    }
+}
+
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS])
 {
     const size_t n = number_of_sums(self);

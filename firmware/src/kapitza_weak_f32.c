@@ -100,6 +100,40 @@ const pvid_model_f32 pvid_kapitza_weak_f32 = {
     .noise = noise_with_zero,
 };
 
+#if PVID_KAPITZA_HAS_FRICTION
+static void friction_theta_of(const float p[], float theta[])
+{
+    theta_of(p, theta);
+    theta[8] = p[PVID_KAPITZA_C1];
+    theta[9] = p[PVID_KAPITZA_C2];
+}
+
+static const uint8_t friction_c_row[18] = {1, 3, 4, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7, 5, 6, 7, 8, 9};
+static const uint8_t friction_c_column[18] = {W, W, W, W,  W, D1, D1, D2, D2,
+                                              D2, D2, D2, D2, C, C,  C,  PVID_KAPITZA_C1, PVID_KAPITZA_C2};
+
+static void friction_jacobian_of(const float p[], float c[])
+{
+    jacobian_of(p, c);
+    c[16] = 1.0f;
+    c[17] = 1.0f;
+}
+
+const pvid_model_f32 pvid_kapitza_friction_f32 = {
+    .n_theta = PVID_KAPITZA_FRICTION_THETA,
+    .n_p = PVID_KAPITZA_FRICTION_P,
+    .n_gated = PVID_KAPITZA_WEAK_P,
+    .n_moments = (PVID_KAPITZA_FRICTION_THETA * (PVID_KAPITZA_FRICTION_THETA + 1)) / 2,
+    .n_c = 18,
+    .positive = 7u,
+    .c_row = friction_c_row,
+    .c_column = friction_c_column,
+    .theta = friction_theta_of,
+    .jacobian = friction_jacobian_of,
+    .noise = noise_with_zero,
+};
+#endif
+
 const pvid_model_f32 pvid_kapitza_weak_zeroed_f32 = {
     .n_theta = PVID_KAPITZA_ZEROED_THETA,
     .n_p = PVID_KAPITZA_P,

@@ -100,9 +100,18 @@ static void take_surplus(pvid_trust_f32 *self, float surplus)
     self->misfit = (limit > 0.0f) && (lately || at_length);
 }
 
+void pvid_trust_restart_alarm_f32(pvid_trust_f32 *self)
+{
+    self->judged = 0;
+    self->next = 0;
+    self->long_mean = 0.0f;
+    self->misfit = false;
+    memset(self->recent, 0, sizeof self->recent);
+}
+
 /* ---- the gate ---- */
 
-static float widest(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
+float pvid_trust_widest_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
 {
     float widest = 0.0f;
     for (size_t a = 0; a < estimator->model->n_p; a++) {
@@ -123,7 +132,7 @@ static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 
     if (!informed || !(candidate->kappa >= self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    const float error = widest(estimator, candidate);
+    const float error = pvid_trust_widest_f32(estimator, candidate);
     const float near = ARRIVED * error;
     const bool arrived = size <= ((near > SMALL_STEP) ? near : SMALL_STEP);
     if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !arrived) {

@@ -5,6 +5,7 @@
 
 #include "count.h"
 #include "finite_f32.h"
+#include "weak_angle_f32.h"
 #include "weak_finish_f32.h"
 #include "weak_front_f32.h"
 #include "weak_window_f32.h"
@@ -69,12 +70,24 @@ static uint32_t free_ticks(const pvid_weak_f32 *self)
     return decimation - (2u * slices);
 }
 
+static bool angle_is_valid(const pvid_weak_config_f32 *config)
+{
+    if (!config->full_angle && !config->friction) {
+        return true;
+    }
+    const bool room = !config->friction || (config->zero_unknown && PVID_KAPITZA_HAS_FRICTION);
+    return room && (config->angle != NULL) && (config->passes >= 1u) && (config->passes <= PVID_MAX_PASSES);
+}
+
 static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
 {
     const pvid_weak_design_f32 *design = config->design;
     const float functions = (float)design->functions;
     pvid_estimator_config_f32 estimator = config->estimator;
     estimator.model = config->zero_unknown ? &pvid_kapitza_weak_f32 : &pvid_kapitza_weak_zeroed_f32;
+#if PVID_KAPITZA_HAS_FRICTION
+    estimator.model = config->friction ? &pvid_kapitza_friction_f32 : estimator.model;
+#endif
     estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)hop_of(design));
     estimator.row_weight = (functions - 2.0f) / functions;
     estimator.correlation = design->overlap;
@@ -99,6 +112,9 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     }
     if (!pvid_within_f32(config->angle_limit, 0.0f, 1.0e9f)) {
         return PVID_BAD_ANGLE_LIMIT;
+    }
+    if (!angle_is_valid(config)) {
+        return PVID_BAD_ANGLE;
     }
     if (!design_is_valid(design)) {
         return PVID_BAD_DESIGN;
@@ -126,7 +142,11 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     const uint32_t ticks = ticks_a_window(design->decimation);
     self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
     self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
-    const uint32_t stages = pvid_weak_finish_stages_f32(design->functions, self->iterations, &self->estimator);
+    if (config->full_angle || config->friction) {
+        self->angle = config->angle;
+        pvid_weak_angle_init_f32(self->angle, config);
+    }
+    const uint32_t stages = pvid_weak_finish_stages_f32(design, self->iterations, &self->estimator, self->angle);
     const uint32_t free = hop_of(design) * free_ticks(self);
     const uint32_t together = (stages + (free - 1u)) / free;
     if (together > STAGES_TOGETHER) {
@@ -229,7 +249,7 @@ static pvid_reason turn_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
     window->buffer = self->finish.buffer;
     self->finish.buffer = full;
     const float expected = self->row_variance + (self->pivot_noise * pvid_weak_window_bend_f32(window));
-    pvid_weak_finish_begin_f32(&self->finish, &self->estimator, expected);
+    pvid_weak_finish_begin_f32(&self->finish, &self->estimator, self->angle, expected);
     return PVID_ACCUMULATED;
 }
 
@@ -238,6 +258,9 @@ static pvid_reason next_sample(pvid_weak_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
     next_bend(&self->bend, self->design->lag, self->phi);
+    if (self->angle != NULL) {
+        pvid_weak_angle_keep_f32(self->angle, self->phi, self->u);
+    }
     for (size_t i = 0; i < 2u; i++) {
         pvid_weak_window_f32 *window = &self->window[i];
         window->index++;

@@ -7,14 +7,13 @@
 #include "cholesky_f32.h"
 #include "finite_f32.h"
 #include "unroll.h"
+#include "weak_angle_f32.h"
 #include "weak_whiten_f32.h"
 #include "weak_window_f32.h"
 
-/* Columns of a row once it is assembled, in place of its terms. */
-enum { COLUMN_N = 0, COLUMN_Y = 8, COLUMN_A = 9, COLUMN_B = 10, COLUMN_SPARE = 11 };
-
 enum {
     STAGE_COMBINE,    /* K times: a row of the Gram matrix at p, the columns of a function */
+    STAGE_LACK,       /* what linear rows lack, where that is asked for: stages of its own */
     STAGE_FACTOR,     /* K times: a row of its Cholesky factor */
     STAGE_TRACE,      /* 4 K times: a row of its inverse, then what noise is in it, in three sums */
     STAGE_WHITEN,     /* K times: a row of L^-1 (Y, N, a, b) */
@@ -45,22 +44,23 @@ bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self)
     return self->stage != STAGE_IDLE;
 }
 
-/* (N1..N8, Y, a, b, 0) from the terms of a function, in their place. */
+/* (N1..N8, Y, a, b, 0, 0) from the terms of a function, in their place. */
 static void assemble(float sum[PVID_WEAK_TERMS])
 {
     const float u = sum[PVID_TERM_U];
     const float ut = sum[PVID_TERM_UT];
     const float uiu = sum[PVID_TERM_UIU];
     const float ui1 = sum[PVID_TERM_UI1];
-    sum[COLUMN_N + 3] = sum[PVID_TERM_UIF] + sum[PVID_TERM_CHI_UF];
-    sum[COLUMN_N + 4] = sum[PVID_TERM_CHI_F];
-    sum[COLUMN_N + 5] = uiu;
-    sum[COLUMN_N + 6] = ui1 + sum[PVID_TERM_CHI_U];
-    sum[COLUMN_N + 7] = sum[PVID_TERM_CHI_1];
-    sum[COLUMN_Y] = sum[PVID_TERM_Y];
-    sum[COLUMN_A] = u;
-    sum[COLUMN_B] = ut;
-    sum[COLUMN_SPARE] = 0.0f;
+    sum[PVID_WEAK_COLUMN_N + 3] = sum[PVID_TERM_UIF] + sum[PVID_TERM_CHI_UF];
+    sum[PVID_WEAK_COLUMN_N + 4] = sum[PVID_TERM_CHI_F];
+    sum[PVID_WEAK_COLUMN_N + 5] = uiu;
+    sum[PVID_WEAK_COLUMN_N + 6] = ui1 + sum[PVID_TERM_CHI_U];
+    sum[PVID_WEAK_COLUMN_N + 7] = sum[PVID_TERM_CHI_1];
+    sum[PVID_WEAK_COLUMN_Y] = sum[PVID_TERM_Y];
+    sum[PVID_WEAK_COLUMN_A] = u;
+    sum[PVID_WEAK_COLUMN_B] = ut;
+    sum[PVID_WEAK_COLUMN_C1] = 0.0f;
+    sum[PVID_WEAK_COLUMN_C2] = 0.0f;
 }
 
 /* x -= a y for the columns of two functions. */
@@ -115,27 +115,40 @@ static void remove_components(const pvid_weak_finish_f32 *self, size_t first, si
     }
 }
 
-void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator, float expected)
+void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator,
+                                pvid_weak_angle_f32 *angle, float expected)
 {
     pvid_weak_whiten_begin_f32(&self->whiten, estimator->p);
+    self->angle = angle;
+    if (angle != NULL) {
+        pvid_weak_angle_begin_f32(angle, estimator->p);
+    }
     self->expected = expected;
     self->iteration = 0;
     self->index = 0;
     self->stage = STAGE_COMBINE;
 }
 
-/* What noise there is, to the estimator: where the window keeps the whitening of its design, the last known. */
-static void tell_noise(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator)
+/* Before the rows: what noise there is (where the window keeps the whitening of its design, the last known), and
+ * the past fades if it was made without the correction. */
+static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator)
 {
     if (self->whiten.whitened) {
         memcpy(estimator->noise, self->whiten.trace, sizeof estimator->noise);
+    }
+    if (self->angle != NULL) {
+        pvid_information_fade_f32(&estimator->information, pvid_weak_angle_ageing_f32(self->angle));
     }
 }
 
 /* A row to the estimator; its reason is told if it was refused. */
 static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
 {
-    const pvid_reason added = pvid_estimator_add_f32(estimator, &column[COLUMN_N], column[COLUMN_Y]);
+    float n[PVID_MAX_THETA];
+    memcpy(n, &column[PVID_WEAK_COLUMN_N], PVID_KAPITZA_WEAK_THETA * sizeof n[0]);
+    n[PVID_KAPITZA_WEAK_THETA] = column[PVID_WEAK_COLUMN_C1];
+    n[PVID_KAPITZA_WEAK_THETA + 1] = column[PVID_WEAK_COLUMN_C2];
+    const pvid_reason added = pvid_estimator_add_f32(estimator, n, column[PVID_WEAK_COLUMN_Y]);
     if (added != PVID_ACCUMULATED) {
         *reason = added;
     }
@@ -173,8 +186,15 @@ static bool assess_on(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *de
     }
     const float freedom = (float)design->functions - 2.0f;
     const float surplus = self->solve.energy / (freedom * self->expected);
+    const bool stepped = self->reason == PVID_UPDATED;
     self->reason = pvid_trust_judge_f32(trust, estimator, self->reason, self->size, self->solve.informed, surplus,
                                         &self->candidate);
+    if ((self->angle != NULL) && stepped) {
+        const float worst = pvid_trust_widest_f32(estimator, &self->candidate);
+        if (pvid_weak_angle_settle_f32(self->angle, estimator->p, worst, trust->groups)) {
+            pvid_trust_restart_alarm_f32(trust); /* until p has left where the uncorrected rows had led it */
+        }
+    }
     return true;
 }
 
@@ -193,6 +213,12 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         pvid_weak_whiten_combine_f32(&self->whiten, design, row);
         assemble(sums[row]);
         break;
+    case STAGE_LACK:
+        if ((self->angle != NULL) && !pvid_weak_angle_step_f32(self->angle, design, estimator->theta, sums)) {
+            return;
+        }
+        done = functions;
+        break;
     case STAGE_FACTOR:
         pvid_weak_whiten_factor_f32(&self->whiten, row);
         break;
@@ -209,11 +235,11 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         pvid_weak_whiten_row_f32(&self->whiten, row, sums);
         break;
     case STAGE_DIRECTION_A:
-        find_direction(self, functions, COLUMN_A, fixed);
+        find_direction(self, functions, PVID_WEAK_COLUMN_A, fixed);
         done = functions;
         break;
     case STAGE_DIRECTION_B:
-        find_direction(self, functions, COLUMN_B, fixed);
+        find_direction(self, functions, PVID_WEAK_COLUMN_B, fixed);
         done = functions;
         break;
     case STAGE_ALONG_A:
@@ -250,7 +276,7 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         self->index = 0;
         self->stage++;
         if (self->stage == STAGE_ADD) {
-            tell_noise(self, estimator);
+            begin_rows(self, estimator);
         } else if (self->stage == STAGE_SOLVE) {
             begin_solves(self, estimator, trust);
         } else if (self->stage == STAGE_ASSESS) {
@@ -259,10 +285,13 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
     }
 }
 
-uint32_t pvid_weak_finish_stages_f32(uint8_t functions, uint8_t iterations, const pvid_estimator_f32 *estimator)
+uint32_t pvid_weak_finish_stages_f32(const pvid_weak_design_f32 *design, uint8_t iterations,
+                                     const pvid_estimator_f32 *estimator, const pvid_weak_angle_f32 *angle)
 {
+    const uint32_t functions = design->functions;
+    const uint32_t lack = (angle != NULL) ? pvid_weak_angle_stages_f32(angle, design) : 1u;
     const uint32_t parts = (functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
-    const uint32_t rows = ((4u + TRACE_STAGES) * (uint32_t)functions) + 2u + (4u * parts);
+    const uint32_t rows = ((4u + TRACE_STAGES) * functions) + 2u + (4u * parts) + lack;
     const uint32_t first = pvid_estimator_stages_f32(estimator, true);
     const uint32_t more = pvid_estimator_stages_f32(estimator, false);
     return rows + first + ((iterations - 1u) * more) + pvid_estimator_assessment_stages_f32(estimator);

@@ -11,8 +11,9 @@
 void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self);
 
 /* Starts on the window whose sums stand in self->buffer, at the estimator's present p; `expected` is the
- * variance that noise gives its rows. */
-void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator, float expected);
+ * variance that noise gives its rows; angle: NULL for linear rows. */
+void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator,
+                                pvid_weak_angle_f32 *angle, float expected);
 
 /* Whether a window is in work. */
 bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self);
@@ -24,6 +25,7 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
                                pvid_reason *reason);
 
 /* Number of stages of a window. */
-uint32_t pvid_weak_finish_stages_f32(uint8_t functions, uint8_t iterations, const pvid_estimator_f32 *estimator);
+uint32_t pvid_weak_finish_stages_f32(const pvid_weak_design_f32 *design, uint8_t iterations,
+                                     const pvid_estimator_f32 *estimator, const pvid_weak_angle_f32 *angle);
 
 #endif

@@ -69,6 +69,32 @@ def test_an_ignored_zero_gives_no_answer() -> None:
     assert (ruined.standard_errors[:, 2] > 0.2).all()
 
 
+@pytest.mark.parametrize(
+    ("case", "w_allowed", "l2_allowed"),
+    [
+        (Case(14, truth="full", full_angle=True), 0.04, 0.25),
+        (Case(14, 0.1, truth="full", full_angle=True), 0.04, 0.25),
+        (Case(14, truth="full", full_angle=True, damping=1e-4, friction=True), 0.045, 0.25),
+    ],
+    ids=["full", "zero", "friction"],
+)
+def test_large_angles_and_friction_are_corrected(case: Case, w_allowed: float, l2_allowed: float) -> None:
+    assert rms_percent(case)[0] <= w_allowed
+    assert 100 * np.sqrt(np.mean(np.square(outcome(case).physical[:, 0]))) <= l2_allowed
+    if not case.friction:  # what there is to correct; friction lets the motion die and hides it
+        uncorrected = outcome(replace(case, full_angle=False, seeds=2))
+        assert (np.abs(uncorrected.errors[:, 0]) > 0.002).all()
+
+
+def test_beyond_its_range_the_correction_is_not_used(native: Native) -> None:
+    rig = RigFile.standard()
+    rig = replace(rig, identifier=replace(rig.identifier, full_angle=True))
+    run = simulate(truth="full", release=(0.09, 0.21), duration=20.0, seed=3).run  # 0.16 rad
+    result = identify(run, rig, native, start=standard_start(3))
+    assert result.status == Reason.HELD_OUT_OF_RANGE.text
+    assert not result.identified
+
+
 def test_standard_errors_are_honest() -> None:
     case = Case(14, seeds=60)
     covered = (np.abs(outcome(case).errors) < 2 * outcome(case).standard_errors).mean(axis=0)

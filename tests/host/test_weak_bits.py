@@ -12,8 +12,8 @@ import pytest
 from pvid import oracle
 from pvid.compare import first_difference
 from pvid.errors import PvidError
-from pvid.native import EstimatorConfig, Law, Native, Reason, Record, WeakConfig
-from pvid.rig import Simulation, simulate, standard_sensors, standard_start
+from pvid.native import EstimatorConfig, Law, Native, Reason, Record, TrustConfig, WeakConfig
+from pvid.rig import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
 from pvid.twin import fnv
 from pvid.twin.weak import WeakTwin
 from pvid.weak_design import design
@@ -38,6 +38,21 @@ def estimator(seed: int, zero_unknown: bool = True) -> EstimatorConfig:
         p, lower, upper, sd = (np.append(a, c) for a, c in ((p, 0.0), (lower, -1.0), (upper, 1.0), (sd, 0.5)))
     start, start_sd, low, high = (a.astype(np.float32) for a in (p, sd, lower, upper))
     return EstimatorConfig(start=start, start_sd=start_sd, lower=low, upper=high, row_sd=8e-5, kappa_min=5e-6)
+
+
+def with_friction(config: EstimatorConfig) -> EstimatorConfig:
+    """Two frictions more, of a thousandth."""
+
+    def longer(values: npt.NDArray[np.float32], value: float) -> npt.NDArray[np.float32]:
+        return np.append(values, [value, value]).astype(np.float32)
+
+    return replace(
+        config,
+        start=longer(config.start, 0.0),
+        start_sd=longer(config.start_sd, 1e-3),
+        lower=longer(config.lower, -0.1),
+        upper=longer(config.upper, 0.1),
+    )
 
 
 def configuration(zero_unknown: bool = True, **sizes: float) -> WeakConfig:
@@ -79,6 +94,29 @@ def test_twelve_lanes_equal_the_twin_in_every_build(matrix: dict[str, Native], s
         # a window every 0.624 s; this configuration takes the pivot's sensor for exact
         assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 26
         assert record.p[-1, :3] == pytest.approx(standard_14_bits.p, rel=0.005)
+
+
+@pytest.mark.parametrize(
+    ("full_angle", "friction"), [(True, False), (True, True), (False, True)], ids=["angle", "both", "friction"]
+)
+def test_the_correction_equals_the_twin_in_every_build(
+    matrix: dict[str, Native], full_angle: bool, friction: bool
+) -> None:
+    pendulum = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
+    run = simulate(pendulum, sensors=standard_sensors(14), truth="full", duration=20.0, seed=1).run
+    lanes = [with_friction(estimator(seed)) if friction else estimator(seed) for seed in range(3)]
+    config = replace(configuration(), full_angle=full_angle, friction=friction, angle_limit=0.12)
+    config = replace(config, trust=TrustConfig(misfit_max=6.0))
+    records = assert_lanes_equal([matrix[name] for name in BUILDS], config, lanes, run.phi, run.y)
+    for record in records:
+        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 20
+        assert record.published[-1, :3] == pytest.approx(STANDARD_PENDULUM.linear, rel=0.02)
+
+
+def test_the_correction_of_hostile_samples_equals_the_twin(native: Native, standard_14_bits: Simulation) -> None:
+    phi, y = hostile(standard_14_bits)
+    config = replace(configuration(), full_angle=True, friction=True)
+    assert_lanes_equal([native], config, [with_friction(estimator(seed)) for seed in range(3)], phi, y)
 
 
 def test_a_zeroed_encoder_equals_the_twin_in_every_build(
@@ -222,6 +260,13 @@ def test_what_the_core_refuses_it_names(native: Native) -> None:
         (replace(config, drive_min=-1.0), "bad drive min"),
         (replace(config, iterations=0), "bad iterations"),
         (replace(config, iterations=11), "bad iterations"),
+        (replace(config, full_angle=True, passes=0), "bad angle"),
+        (replace(config, full_angle=True, passes=9), "bad angle"),
+        (replace(config, friction=True, zero_unknown=False), "bad angle"),
+        (replace(config, angle_limit=-1.0), "bad angle limit"),
+        (replace(config, pivot_noise=float("nan")), "bad pivot noise"),
+        (replace(config, trust=TrustConfig(se_max=0.0)), "bad se max"),
+        (replace(config, estimator=replace(config.estimator, noise_margin=-1.0)), "bad noise margin"),
     ):
         with pytest.raises(PvidError, match=name):
             native.weak(wrong)

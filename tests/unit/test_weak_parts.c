@@ -178,8 +178,8 @@ static void work_off(pvid_weak_finish_f32 *finish, const pvid_weak_design_f32 *d
     assert_false(pvid_weak_finish_is_busy_f32(finish));
     pvid_trust_f32 trust;
     assert_int_equal(pvid_trust_init_f32(&trust, &pvid_trust_defaults_f32, estimator), PVID_OK);
-    pvid_weak_finish_begin_f32(finish, estimator, 1.0f);
-    for (int i = 0; i < 7 * TABLE_FUNCTIONS; i++) {
+    pvid_weak_finish_begin_f32(finish, estimator, NULL, 1.0f);
+    for (int i = 0; i < (7 * TABLE_FUNCTIONS) + 1; i++) {
         pvid_weak_finish_step_f32(finish, design, 3, sums, estimator, &trust, &reason);
     }
     memcpy(whitened, sums, TABLE_FUNCTIONS * sizeof sums[0]);

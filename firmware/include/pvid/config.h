@@ -86,6 +86,14 @@
 #error "PVID_MAX_ITERATIONS must lie in 1..255"
 #endif
 
+/* Most passes of the full-angle correction. */
+#ifndef PVID_MAX_PASSES
+#define PVID_MAX_PASSES 8
+#endif
+#if PVID_MAX_PASSES < 1 || PVID_MAX_PASSES > 255
+#error "PVID_MAX_PASSES must lie in 1..255"
+#endif
+
 /* Called on misuse (NULL where an object is needed). Replace it by your own trap or reset. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))

@@ -50,6 +50,9 @@ void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *
  * forgets when a block is complete. */
 void pvid_information_end_group_f32(pvid_information_f32 *self);
 
+/* Multiplies all that was gathered by factor, 0..1. */
+void pvid_information_fade_f32(pvid_information_f32 *self, float factor);
+
 /* sums[0 .. n_moments + n_theta + 1] = the current values, in the layout above. */
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS]);
 

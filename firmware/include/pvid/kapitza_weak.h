@@ -22,11 +22,23 @@ extern "C" {
 #define PVID_KAPITZA_WEAK_THETA 8
 #define PVID_KAPITZA_WEAK_P 4
 #define PVID_KAPITZA_ZEROED_THETA 5
+#define PVID_KAPITZA_FRICTION_THETA 10
+#define PVID_KAPITZA_FRICTION_P 6
 
-enum { PVID_KAPITZA_C = 3 }; /* index of the encoder's zero in p, after PVID_KAPITZA_D2 */
+/* Indices in p after PVID_KAPITZA_D2: the encoder's zero, friction at the pivot and at the joint [m^2/s]. */
+enum { PVID_KAPITZA_C = 3, PVID_KAPITZA_C1 = 4, PVID_KAPITZA_C2 = 5 };
+
+/* Whether the bounds of pvid/config.h have room for friction. */
+#define PVID_KAPITZA_HAS_FRICTION ((PVID_MAX_P >= 6) && (PVID_MAX_MOMENTS >= 55))
 
 /* The weak form with the encoder's zero unknown: 8 entries of theta, 4 free parameters, 36 moments. */
 extern const pvid_model_f32 pvid_kapitza_weak_f32;
+
+#if PVID_KAPITZA_HAS_FRICTION
+/* With two viscous frictions c1, c2 over the mass of body 2, that only absorb what damps the motion (c1 is biased by
+ * what the full-angle correction leaves: no measurement): 10 entries of theta, 6 free parameters, 55 moments. */
+extern const pvid_model_f32 pvid_kapitza_friction_f32;
+#endif
 
 /* The weak form of a zeroed encoder: 5 entries of theta, 3 free parameters, 15 moments. */
 extern const pvid_model_f32 pvid_kapitza_weak_zeroed_f32;

@@ -31,7 +31,9 @@ typedef enum {
     PVID_BAD_SE_MAX,          /* not finite or not positive */
     PVID_BAD_MISFIT_MAX,      /* not finite, or neither 0 nor at least 1 */
     PVID_BAD_PIVOT_NOISE,     /* not finite or negative */
-    PVID_BAD_ANGLE_LIMIT      /* not finite or negative */
+    PVID_BAD_ANGLE_LIMIT,     /* not finite or negative */
+    PVID_BAD_ANGLE            /* full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or
+                                 friction with a known zero or with bounds too small for it */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */

@@ -64,6 +64,12 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
 /* Publishes the start again, where p was placed elsewhere before the first row. */
 void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
+/* Forgets the residuals: the rows are made in another way from now on. */
+void pvid_trust_restart_alarm_f32(pvid_trust_f32 *self);
+
+/* Largest standard error of the positive parameters, relative to them. */
+float pvid_trust_widest_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate);
+
 /* Where p is to go if the coming group does not let it step; NULL: nowhere. */
 const float *pvid_trust_refuge_f32(const pvid_trust_f32 *self);
 

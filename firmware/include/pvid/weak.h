@@ -64,6 +64,8 @@ typedef struct {
                             a sixth of the fast mode's period */
 } pvid_weak_design_f32;
 
+typedef struct pvid_weak_angle_f32 pvid_weak_angle_f32;
+
 typedef struct {
     float sample_rate_hz; /* 1e-3..1e6 */
     float l1;             /* length of rod 1 [m], > 0 */
@@ -74,6 +76,13 @@ typedef struct {
                              phi'' [s^4]; 0: an exact pivot. For the alarm only */
     float angle_limit;    /* largest |phi - c| [rad] that a window may hold; 0: no limit */
     const pvid_weak_design_f32 *design; /* must outlive the identifier, as must its tables */
+    pvid_weak_angle_f32 *angle; /* storage for the two that follow, which must outlive the identifier; NULL where
+                             neither is asked for */
+    bool full_angle;      /* correct the rows for sines and cosines once the estimate has settled; set angle_limit
+                             to 0.12 rad, beyond which this is no longer enough */
+    bool friction;        /* p = (w, d1, d2, c, c1, c2): two viscous frictions absorb what damps the motion. Needs
+                             zero_unknown, PVID_MAX_P 6 and PVID_MAX_MOMENTS 55 */
+    uint8_t passes;       /* of the correction, 1..PVID_MAX_PASSES; 3 is good */
     bool zero_unknown;    /* true: p = (w, d1, d2, c), c [rad] the encoder's reading at rest; false: c = 0 */
     uint8_t iterations;   /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; 3 is good. One where
                              the estimator's law is a rate (g < 1) */
@@ -135,7 +144,17 @@ typedef struct {
 } pvid_weak_bend_f32;
 
 #define PVID_WEAK_FACTOR ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
-#define PVID_WEAK_COLUMNS 12 /* N1..N8, Y, a, b and one that stays 0 */
+
+/* Columns of a row once it is assembled, in the place of its terms: N1..N8, Y, a, b, and friction. */
+#define PVID_WEAK_COLUMNS 13
+enum {
+    PVID_WEAK_COLUMN_N = 0,
+    PVID_WEAK_COLUMN_Y = 8,
+    PVID_WEAK_COLUMN_A = 9,
+    PVID_WEAK_COLUMN_B = 10,
+    PVID_WEAK_COLUMN_C1 = 11,
+    PVID_WEAK_COLUMN_C2 = 12
+};
 
 typedef struct {
     bool whitened;                        /* the Gram matrix could be factored */
@@ -143,6 +162,48 @@ typedef struct {
     float trace[PVID_NOISE_TRACES];       /* noise in the columns, a row of unit noise variance */
     float factor[PVID_WEAK_FACTOR];       /* R0, then its Cholesky factor with inverted diagonal */
 } pvid_weak_whiten_f32;
+
+typedef struct {
+    float before; /* the integrand at the last sample */
+    float once;
+    float twice;
+} pvid_weak_integral_f32;
+
+/* What the rows lack: the remainder of Y, and the columns of c1 and c2. */
+#define PVID_WEAK_LACKS 3
+
+/* The samples of the window in work, and what its rows lack. Only the identifier writes to it. */
+struct pvid_weak_angle_f32 {
+    uint16_t length;     /* places of the ring in use: a window and a hop */
+    uint16_t window;     /* W */
+    uint16_t head;       /* place of the next decimated sample */
+    uint16_t first;      /* place of the window's first sample */
+    uint16_t place;      /* of the sample in work */
+    uint16_t index;      /* of it in the window, or of the function in work */
+    uint8_t stage;
+    uint8_t pass;
+    uint8_t passes;
+    uint8_t channels;    /* 1, or 3 with friction */
+    bool full_angle;
+    bool on;             /* the estimate has settled: rows are corrected */
+    uint8_t ageing;      /* windows before which the past is still to be aged */
+    bool sensible;       /* p is that of a pendulum */
+    float dt;
+    float inverse_l1_square; /* of rod 1 [1/m^2] */
+    float p[PVID_KAPITZA_P];
+    float zero;          /* c */
+    float friction[2];   /* c1, c2 */
+    float l1;            /* L1 and L2 of p */
+    float l2;
+    float a;             /* of the window */
+    float b;
+    float normal[5];     /* A^T A, A^T B, B^T B, A^T e, B^T e */
+    pvid_weak_integral_f32 motion;
+    pvid_weak_integral_f32 remainder[PVID_WEAK_LACKS];
+    float lack[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS]; /* by the last pass */
+    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS]; /* by this one */
+    float ring[PVID_MAX_WEAK_WINDOW + ((PVID_MAX_WEAK_WINDOW + 1) / 2)][2]; /* phi [rad], u [1/s^2] */
+};
 
 /* The complete window that is being turned into rows and steps. */
 typedef struct {
@@ -153,6 +214,7 @@ typedef struct {
     pvid_reason reason; /* of the last solve, then of the window */
     float size;         /* of the last step, relative */
     float expected;     /* variance of a row's noise */
+    pvid_weak_angle_f32 *angle; /* NULL: linear rows */
     float direction[PVID_MAX_FUNCTIONS]; /* the one that is being projected out, of length 1 or 0 */
     float along[PVID_WEAK_COLUMNS];      /* the columns' components along it */
     pvid_weak_whiten_f32 whiten;
@@ -163,6 +225,7 @@ typedef struct {
 /* State; only the functions below write to it. */
 typedef struct {
     const pvid_weak_design_f32 *design;
+    pvid_weak_angle_f32 *angle; /* NULL: linear rows */
     float dt;              /* between decimated samples [s] */
     float drive_min;       /* variance of u below which a window is dropped [1/s^4] */
     float row_variance;    /* that the encoder's noise gives a row [rad^2] */
@@ -189,7 +252,8 @@ typedef struct {
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range, a table holds a
  * number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
  * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for less than
- * 10 K + 35 stages and 19 a Gauss-Newton step, at most four of them a tick. */
+ * 10 K + 35 stages, 19 a Gauss-Newton step and K / 6 + W / 4 + 3 a pass of the correction, at most four of them a
+ * tick. */
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is

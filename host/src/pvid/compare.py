@@ -22,10 +22,13 @@ from pvid.twin.estimator import Estimator
 from pvid.twin.strong import StrongTwin, run_rows
 from pvid.twin.weak import WeakTwin
 
-P_NAMES = ("w", "d1", "d2", "c")
+P_NAMES = ("w", "d1", "d2", "c", "c1", "c2")
 
-# Moments and entries of B by the number of sums: strong form, weak form with and without the encoder's zero.
-_LAYOUTS = {n_sums: (moments, n_theta) for n_sums, moments, n_theta in ((58, 45, 11), (46, 36, 8), (22, 15, 5))}
+# Moments and entries of B by the number of sums: strong form, weak form with and without the encoder's zero, and with
+# friction.
+_LAYOUTS = {
+    n_sums: (moments, n_theta) for n_sums, moments, n_theta in ((58, 45, 11), (46, 36, 8), (22, 15, 5), (67, 55, 10))
+}
 
 
 def sum_name(index: int, n_sums: int) -> str:

@@ -80,6 +80,7 @@ class Status(IntEnum):
     BAD_MISFIT_MAX = 24
     BAD_PIVOT_NOISE = 25
     BAD_ANGLE_LIMIT = 26
+    BAD_ANGLE = 27
 
 
 class Law(IntEnum):
@@ -173,6 +174,10 @@ class WeakConfigStruct(ctypes.Structure):
         ("pivot_noise", ctypes.c_float),
         ("angle_limit", ctypes.c_float),
         ("design", ctypes.POINTER(WeakDesignStruct)),
+        ("angle", ctypes.c_void_p),
+        ("full_angle", ctypes.c_bool),
+        ("friction", ctypes.c_bool),
+        ("passes", ctypes.c_uint8),
         ("zero_unknown", ctypes.c_bool),
         ("iterations", ctypes.c_uint8),
         ("estimator", EstimatorConfigStruct),
@@ -330,7 +335,8 @@ class TrustConfig:
 class WeakConfig:
     """Settings of the weak-form identifier, as in weak.h.
 
-    The estimator's start, start_sd and bounds have four entries when the encoder's zero is unknown, else three;
+    The estimator's start, start_sd and bounds have four entries when the encoder's zero is unknown, else three, and two
+    more with friction;
     its row_weight and correlation come from the design.
     """
 
@@ -340,6 +346,9 @@ class WeakConfig:
     estimator: EstimatorConfig
     zero_unknown: bool = True
     iterations: int = 3
+    full_angle: bool = False
+    friction: bool = False
+    passes: int = 3
     drive_min: float = 0.0
     pivot_noise: float = 0.0
     angle_limit: float = 0.0
@@ -401,6 +410,8 @@ def _struct_layout() -> list[int]:
         at(WeakConfigStruct, "drive_min"),
         at(WeakConfigStruct, "pivot_noise"),
         at(WeakConfigStruct, "design"),
+        at(WeakConfigStruct, "angle"),
+        at(WeakConfigStruct, "passes"),
         at(WeakConfigStruct, "zero_unknown"),
         at(WeakConfigStruct, "iterations"),
         at(WeakConfigStruct, "estimator"),
@@ -451,7 +462,7 @@ class Native:
         self._estimator_size, self._counters_at = sizes[:2]
         self._strong_size, self._estimator_at = sizes[2:4]
         self._weak_size, self._weak_estimator_at, self._published_at, self._is_published_at = sizes[4:8]
-        self._misfit_at = sizes[8]
+        self._misfit_at, self._angle_size = sizes[8:]
 
     @property
     def build(self) -> str:
@@ -554,6 +565,9 @@ def weak_config_struct(config: WeakConfig) -> tuple[WeakConfigStruct, Tables]:
         pivot_noise=config.pivot_noise,
         angle_limit=config.angle_limit,
         design=ctypes.pointer(design_struct),
+        full_angle=config.full_angle,
+        friction=config.friction,
+        passes=config.passes,
         zero_unknown=config.zero_unknown,
         iterations=config.iterations,
         estimator=_estimator_struct(config.estimator),
@@ -666,8 +680,11 @@ class WeakIdentifier(_Stepper):
 
     def __init__(self, native: Native, config: WeakConfig) -> None:
         n_p, n_theta = (4, 8) if config.zero_unknown else (3, 5)
+        n_p, n_theta = (6, 10) if config.friction else (n_p, n_theta)
         super().__init__(native, n_p=n_p, n_sums=n_theta * (n_theta + 1) // 2 + n_theta + 2, publishes=True)
         self._config, self._tables = weak_config_struct(config)
+        self._angle = ctypes.create_string_buffer(native._angle_size)
+        self._config.angle = ctypes.addressof(self._angle)
         self._state = ctypes.create_string_buffer(native._weak_size)
         self._estimator_at = native._weak_estimator_at
         status = Status(native._lib.pvid_weak_init_f32(self._state, ctypes.byref(self._config)))

@@ -11,6 +11,7 @@ from pvid.errors import PvidError
 from pvid.native import MAX_WINDOW, EstimatorConfig, Law, StrongConfig, TrustConfig, WeakConfig
 from pvid.rigfile import RigFile
 from pvid.weak_design import WeakDesign, design
+from pvid.weak_oracle import VALID_ANGLE
 
 # The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
 START_RELATIVE_SD = 0.5
@@ -93,6 +94,13 @@ def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
 ZERO_BOUND = 3.0
 ZERO_SD = 0.5
 
+# Friction over the mass of body 2 [m^2/s]: a rig's is some 1e-4; a tenth would stop the pendulum within a second.
+FRICTION_SD = 1e-3
+FRICTION_BOUND = 0.1
+
+# Alarm of the corrected rows: the correction's own remainder is up to four times the noise at 0.107 rad and 14 bits.
+CORRECTED_MISFIT = 6.0
+
 # Noise of a sensor in LSB: rounding, and half an LSB of its own.
 NOISE_LSB = float(np.sqrt(1 / 12 + 1 / 4))
 
@@ -133,19 +141,29 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
     # An exact sensor has float32's noise. The rows listen where
     # the smoother passes, at the density of the samples' noise: what D samples average to.
     sample_sd = max(rig.sensor.phi_lsb * NOISE_LSB, 1e-8)
+    # the zero c [rad], then the frictions c1 and c2 [m^2/s]: what they may be, and how far they are expected
+    extra_sd = [ZERO_SD] * zero + [FRICTION_SD] * (2 * settings.damping)
+    extra_bound = [ZERO_BOUND] * zero + [FRICTION_BOUND] * (2 * settings.damping)
+    none = np.zeros(len(extra_sd))
+    if settings.damping and not settings.zero:
+        raise PvidError("[identifier] damping needs zero = true: friction is estimated beside the encoder's zero")
+    corrected = settings.full_angle or settings.damping
     return WeakConfig(
         sample_rate=sample_rate,
         l1=rig.l1,
         design=tables.f32,
         zero_unknown=settings.zero,
+        full_angle=settings.full_angle,
+        friction=settings.damping,
+        angle_limit=VALID_ANGLE if settings.full_angle else 0.0,
         drive_min=weak_drive_threshold(rig, tables.second, sample_rate),
         pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
-        trust=TrustConfig(),
+        trust=TrustConfig(misfit_max=CORRECTED_MISFIT) if corrected else TrustConfig(),
         estimator=EstimatorConfig(
-            start=np.append(p, [0.0] * zero).astype(np.float32),
-            start_sd=np.append(START_RELATIVE_SD * p, [ZERO_SD] * zero).astype(np.float32),
-            lower=np.append(p / BOUND_FACTOR, [-ZERO_BOUND] * zero).astype(np.float32),
-            upper=np.append(p * BOUND_FACTOR, [ZERO_BOUND] * zero).astype(np.float32),
+            start=np.concatenate([p, none]).astype(np.float32),
+            start_sd=np.concatenate([START_RELATIVE_SD * p, extra_sd]).astype(np.float32),
+            lower=np.concatenate([p / BOUND_FACTOR, np.negative(extra_bound)]).astype(np.float32),
+            upper=np.concatenate([p * BOUND_FACTOR, extra_bound]).astype(np.float32),
             row_sd=float(sample_sd / np.sqrt(tables.decimation)),
             forgetting_s=settings.forgetting_s,
             feedback_hz=0.0,

@@ -41,13 +41,18 @@ class Case:
     zero_unknown: bool = True
     truth: Truth = "linear"
     seeds: int = 20
+    full_angle: bool = False  # the correction
+    damping: float = 0.0  # of the plant, both joints [m^2/s]
+    friction: bool = False  # estimated
 
     @property
     def label(self) -> str:
         """The case in words."""
         form = "zero unknown" if self.zero_unknown else "zero taken as 0"
         runs = f", {self.seeds} seeds" if self.seeds != Case.seeds else ""
-        return f"{self.truth} equations, {self.bits} bits, c = {self.zero:.2g} rad, {form}{runs}"
+        plant = f", damping {self.damping:g}" if self.damping else ""
+        options = (", full_angle" if self.full_angle else "") + (", damping estimated" if self.friction else "")
+        return f"{self.truth} equations{plant}, {self.bits} bits, c = {self.zero:.2g} rad, {form}{options}{runs}"
 
 
 LSB_14 = 2 * np.pi / 2**14
@@ -59,6 +64,9 @@ CASES = (
     *(Case(14, zero, zero_unknown=False) for zero in (0.0, 0.3 * LSB_14, 0.02)),
     Case(14, seeds=60),
     Case(14, truth="full"),
+    *(Case(14, zero, truth="full", full_angle=True) for zero in (0.0, 0.02, 0.1)),
+    Case(14, truth="full", full_angle=True, damping=1e-4),
+    Case(14, truth="full", full_angle=True, damping=1e-4, friction=True),
 )
 
 
@@ -77,14 +85,21 @@ def run_case(native: Native, case: Case) -> Outcome:
     rig = RigFile.standard()
     rig = replace(
         rig,
-        identifier=replace(rig.identifier, form="weak", zero=case.zero_unknown),
+        identifier=replace(
+            rig.identifier,
+            form="weak",
+            zero=case.zero_unknown,
+            full_angle=case.full_angle,
+            damping=case.friction,
+        ),
         sensor=replace(rig.sensor, phi_lsb=2 * np.pi / 2**case.bits),
     )
     truth = STANDARD_PENDULUM.linear
+    pendulum = replace(STANDARD_PENDULUM, damping1=case.damping, damping2=case.damping)
     errors, standard_errors, physical, early = [], [], [], 0
     for seed in range(case.seeds):
         sensors = replace(standard_sensors(case.bits), phi_zero=case.zero)
-        run = simulate(sensors=sensors, truth=case.truth, seed=seed).run
+        run = simulate(pendulum, sensors=sensors, truth=case.truth, seed=seed).run
         identifier = native.weak(weak_config(rig, RATE_HZ, standard_start(seed)))
         record = identifier.run(run.phi, run.y, sums=False, hashes=False)
         last = identifier.estimate

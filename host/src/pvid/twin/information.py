@@ -52,6 +52,11 @@ class Information:
         self.low = self.low + terms if taken.all() else np.where(taken, self.low + terms, self.low)
         return self.read()
 
+    def fade(self, factor: Float32) -> None:
+        """Multiplies all that was gathered by factor [lanes]."""
+        self.high = self.high * factor
+        self.low = self.low * factor
+
     def end_group(self, taken: npt.NDArray[np.bool_]) -> None:
         """Folds and forgets in the lanes whose block is complete."""
         self.age += taken

@@ -70,6 +70,32 @@ WEAK = PatternModel(
     noise=_noise,
 )
 
+
+def _friction_theta(p: Float32) -> Float32:
+    return np.concatenate([_theta(p[:4]), p[4:6]])
+
+
+def _friction_jacobian(p: Float32) -> Float32:
+    one = np.ones_like(p[0])
+    return np.concatenate([_jacobian(p[:4]), np.stack([one, one])])
+
+
+def _friction_noise(p: Float32, traces: Float32) -> Float32:
+    return _noise(p[:4], traces)
+
+
+FRICTION = PatternModel(
+    n_theta=10,
+    n_p=6,
+    positive=(True, True, True, False, False, False),
+    c_row=(*WEAK.c_row, 8, 9),
+    c_column=(*WEAK.c_column, 4, 5),
+    theta=_friction_theta,
+    jacobian=_friction_jacobian,
+    noise=_friction_noise,
+    n_gated=4,
+)
+
 ZEROED = PatternModel(
     n_theta=5,
     n_p=3,

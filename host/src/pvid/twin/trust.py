@@ -71,7 +71,16 @@ class Trust:
         at_length = (self.judged >= _LONG) & (self.long_mean > limit)
         self.misfit = np.where(lanes, (limit > 0) & (lately | at_length), self.misfit)
 
-    def _widest(self, candidate: npt.NDArray[np.void]) -> Float32:
+    def restart_alarm(self, lanes: Mask) -> None:
+        """Forgets the residuals in the given lanes."""
+        self.judged = np.where(lanes, 0, self.judged)
+        self.next = np.where(lanes, 0, self.next)
+        self.long_mean = np.where(lanes, np.float32(0), self.long_mean)
+        self.misfit = self.misfit & ~lanes
+        self.recent = np.where(lanes, np.float32(0), self.recent)
+
+    def widest(self, candidate: npt.NDArray[np.void]) -> Float32:
+        """pvid_trust_widest_f32 [lanes]."""
         widest = np.zeros(len(candidate), np.float32)
         for a, positive in enumerate(self.estimator.model.positive):
             if positive:
@@ -97,7 +106,7 @@ class Trust:
         self._take_surplus(self.published, surplus)
         counters = self.estimator.counters
         with np.errstate(all="ignore"):
-            error = self._widest(candidate)
+            error = self.widest(candidate)
             near = _ARRIVED * error
             arrived = size <= np.where(near > _SMALL_STEP, near, _SMALL_STEP)
         excited = informed & (candidate["kappa"] >= np.float32(self.config.kappa_min))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,21 +15,11 @@ from pvid.twin.differentiator import segments
 from pvid.twin.estimator import RelativeEstimator
 from pvid.twin.strong import TwinRecord
 from pvid.twin.trust import Trust
+from pvid.twin.weak_angle import Angle
+from pvid.twin.weak_window import Window
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Window:
-    """A whole window at its handing over: sums [K, 13], whether it is driven, and what is known of it."""
-
-    sums: Float32
-    driven: bool
-    mean: np.float32
-    lowest: np.float32
-    highest: np.float32
-    bend: np.float32
 
 
 class WeakTwin:
@@ -53,8 +43,10 @@ class WeakTwin:
             replace(e, row_weight=float(weight), correlation=design.overlap) for e in estimators or [config.estimator]
         ]
         pattern = kapitza_weak.WEAK if config.zero_unknown else kapitza_weak.ZEROED
+        pattern = kapitza_weak.FRICTION if config.friction else pattern
         self.estimator = RelativeEstimator(lanes, float(rate), pattern)
         self.iterations = 1 if self.estimator.is_rate else config.iterations
+        self.angle = Angle(config, len(lanes)) if config.full_angle or config.friction else None
         self.together = -(-self._stages // (config.hop * self._free_ticks))
         self.trust = Trust(config.trust, self.estimator)
         row_sd = np.array([e.row_sd for e in lanes], np.float32)
@@ -80,7 +72,7 @@ class WeakTwin:
 
     @property
     def _stages(self) -> int:
-        return weak_finish.number_of_stages(self.config.design, self.iterations, self.estimator)
+        return weak_finish.number_of_stages(self.config.design, self.iterations, self.estimator, self.angle)
 
     def _driven(self, variance: Float32) -> Mask:
         threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)
@@ -104,8 +96,16 @@ class WeakTwin:
             driven = self._driven(seen.drive)
             for m, sums in enumerate(weak_window.sums(*part, design, dt)):
                 tick = first + weak_front.tick_of((m + 2) * config.hop, design.taps, design.decimation)
+                samples = slice(m * config.hop, m * config.hop + design.window)
                 complete[tick] = Window(
-                    sums, bool(driven[m]), seen.mean[m], seen.lowest[m], seen.highest[m], seen.bend[m]
+                    sums=sums,
+                    phi=part[0][samples],
+                    u=part[1][samples],
+                    driven=bool(driven[m]),
+                    mean=seen.mean[m],
+                    lowest=seen.lowest[m],
+                    highest=seen.highest[m],
+                    bend=seen.bend[m],
                 )
             for index in range(len(part[0])):
                 start = first + weak_front.tick_of(index, design.taps, design.decimation) + 1
@@ -138,7 +138,7 @@ class WeakTwin:
         with np.errstate(all="ignore"):
             expected = self.row_variance + self.pivot_noise * window.bend
         return weak_finish.stages(
-            window.sums, self.config.design, self.iterations, self.estimator, self.trust, expected
+            window, self.config.design, self.iterations, self.estimator, self.trust, self.angle, expected
         )
 
     def run(

@@ -11,24 +11,26 @@ from pvid.native import Reason, WeakTables
 from pvid.twin import weak_whiten
 from pvid.twin.estimator import RelativeEstimator
 from pvid.twin.trust import Trust
+from pvid.twin.weak_angle import Angle
+from pvid.twin.weak_window import Window
 
 Float32 = npt.NDArray[np.float32]
 Reasons = npt.NDArray[np.uint8]
 
-COLUMNS = 12
+COLUMNS = 13
 _Y, _A, _B = 8, 9, 10
 _FUNCTIONS_A_STAGE = 6
 
 
 def assemble(sums: Float32) -> Float32:
-    """Columns N1..N8, Y, a, b, 0 [12, functions] from the sums [functions, 13] of a window."""
+    """Columns N1..N8, Y, a, b, 0, 0 [13, functions] from the sums [functions, 13] of a window."""
     s = sums.T
     n = [s[0], s[1], s[2], s[3] + s[8], s[9], s[4], s[5] + s[10], s[11]]
-    return np.stack([*n, s[12], s[6], s[7], np.zeros_like(s[0])])
+    return np.stack([*n, s[12], s[6], s[7], np.zeros_like(s[0]), np.zeros_like(s[0])])
 
 
 def remove(x: Float32, column: int) -> Float32:
-    """Columns x [12, K, lanes] without their components along one of them."""
+    """Columns x [13, K, lanes] without their components along one of them."""
     functions = x.shape[1]
     square = np.zeros(x.shape[2], np.float32)
     for k in range(functions):
@@ -42,13 +44,18 @@ def remove(x: Float32, column: int) -> Float32:
     return x - direction[None] * along[:, None]
 
 
-def rows(sums: Float32, design: WeakTables, p: Float32) -> tuple[Float32, Float32, npt.NDArray[np.bool_]]:
-    """Whitened, projected columns [12, K, lanes] of a window with sums [K, 13] at p [n_p, lanes].
+def rows(
+    window: Window, design: WeakTables, estimator: RelativeEstimator, angle: Angle | None
+) -> tuple[Float32, Float32, npt.NDArray[np.bool_]]:
+    """Whitened, projected columns [13, K, lanes] of a window at the estimator's p.
 
     Also the noise traces [3, lanes] and where they hold [lanes].
     """
+    p = estimator.p
     with np.errstate(all="ignore"):
-        x = np.repeat(assemble(sums)[:, :, None], p.shape[1], axis=2)
+        x = np.repeat(assemble(window.sums)[:, :, None], p.shape[1], axis=2)
+        if angle is not None:
+            x = angle.correct(x, p, estimator.theta, window.phi, window.u)
         low, whitened = weak_whiten.factor(weak_whiten.gram(design, p), design.functions)
         noise = weak_whiten.traces(design, low)
         return remove(remove(weak_whiten.whiten(x, low, whitened), _A), _B), noise, whitened
@@ -59,23 +66,37 @@ def _stages_of_rows(design: WeakTables) -> int:
     return 7 * design.functions + 2 + 4 * parts
 
 
-def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEstimator) -> int:
+def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEstimator, angle: Angle | None) -> int:
     """Stages of a window with all its solves."""
-    rows_and_adds = _stages_of_rows(design) + design.functions
+    lack = 1 if angle is None else angle.stages
+    rows_and_adds = _stages_of_rows(design) + lack + design.functions
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
     return rows_and_adds + solves + estimator.assessment_stages
 
 
 def stages(
-    sums: Float32, design: WeakTables, iterations: int, estimator: RelativeEstimator, trust: Trust, expected: Float32
+    window: Window,
+    design: WeakTables,
+    iterations: int,
+    estimator: RelativeEstimator,
+    trust: Trust,
+    angle: Angle | None,
+    expected: Float32,
 ) -> Iterator[Reasons | None]:
     """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
-    x, noise, whitened = rows(sums, design, estimator.p)
-    for _ in range(_stages_of_rows(design)):
+    x, noise, whitened = rows(window, design, estimator, angle)
+    for _ in range(_stages_of_rows(design) + (1 if angle is None else angle.stages) - 1):
         yield None
+    # the last of these stages makes the sums ready for the rows
     estimator.noise = np.where(whitened, noise, estimator.noise)
+    if angle is not None:
+        with np.errstate(all="ignore"):
+            estimator.information.fade(angle.age())
+        estimator.sums = estimator.information.read()
+    yield None
+    places = [*range(8), 11, 12][: estimator.model.n_theta]
     for k in range(design.functions):
-        added = estimator.add(x[: estimator.model.n_theta, k], x[_Y, k])
+        added = estimator.add(x[places, k], x[_Y, k])
         yield None if (added == Reason.ACCUMULATED).all() else added
     reason = np.full(estimator.p.shape[1], Reason.ACCUMULATED, np.uint8)
     for iteration in range(iterations):
@@ -92,4 +113,10 @@ def stages(
     with np.errstate(all="ignore"):
         candidate, informed = estimator.judged()
         surplus = estimator.group_energy / ((np.float32(design.functions) - np.float32(2)) * expected)
-    yield trust.judge(reason, size, informed, surplus, candidate)
+    stepped = reason == Reason.UPDATED
+    told = trust.judge(reason, size, informed, surplus, candidate)
+    if angle is not None:
+        with np.errstate(all="ignore"):
+            switched = angle.settle(stepped, estimator.p, trust.widest(candidate), trust.groups)
+        trust.restart_alarm(switched)
+    yield told

@@ -71,6 +71,21 @@ def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
         return Observed(u_squares / n - mean * mean, phi_sum / n, lowest, highest, bend)
 
 
+@dataclass(frozen=True)
+class Window:
+    """A whole window at its handing over: sums [K, 13], samples phi [rad] and u [1/s^2] [W], whether it is driven, and
+    what `observe` says of it."""
+
+    sums: Float32
+    phi: Float32
+    u: Float32
+    driven: bool
+    mean: np.float32
+    lowest: np.float32
+    highest: np.float32
+    bend: np.float32
+
+
 def _terms(index: int, samples: int, dt: np.float32, phi: Float32, u: Float32, twice: Float32) -> Float32:
     """The 13 terms [13, windows] at a sample; twice [3, windows] are the double integrals of u phi, phi, u."""
     f = np.float32
