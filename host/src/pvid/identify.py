@@ -19,10 +19,13 @@ from pvid.weak_oracle import WeakSettings, identify_weak
 Float = npt.NDArray[np.float64]
 
 LINEAR = ("w", "d1", "d2")
+NAMED = 4  # parameters that are published; what friction the weak form estimates beside them only absorbs
 ZERO = "c"
 
 # With w known no better than this, relative, nothing is identified.
 WORST_SE = 0.1
+
+_FADING = 4  # windows after the correction's switch (weak_oracle)
 
 # Windows that the float64 core's alarm wants to have seen.
 MISFIT_WINDOWS = 16
@@ -187,7 +190,7 @@ def _in_float32(
         estimates["covariance"][:, :3, :3].astype(np.float64),
         rig.l1,
     )
-    n_p = record.p.shape[1]
+    n_p = min(record.p.shape[1], NAMED)
     return _identification(
         rig,
         p=last["p"][:n_p].astype(np.float64),
@@ -264,14 +267,15 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
     if config.estimator.law is not Law.STATIONARY or config.estimator.divider != 1:
         raise PvidError("core f64 has the weak form's stationary law with a solve at every window only: use f32")
     settings = config.estimator
+    n_p = min(len(settings.start), NAMED)
     result = identify_weak(
         run.phi,
         run.y,
         weak_design_of(rig, run.sample_rate),
         WeakSettings(
-            start=settings.start.astype(np.float64),
+            start=settings.start[:n_p].astype(np.float64),
             row_sd=settings.row_sd,
-            start_sd=settings.start_sd.astype(np.float64),
+            start_sd=settings.start_sd[:n_p].astype(np.float64),
             forgetting_s=settings.forgetting_s,
             iterations=config.iterations,
             step_limit=settings.step_limit,
@@ -287,13 +291,18 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
     arrived = np.arange(len(result.t)) + 1 >= trust.groups_min
     good = result.updated & arrived & (result.kappa >= trust.kappa_min) & (relative <= trust.se_max)
     trusted = np.flatnonzero(good)
-    n_p = len(settings.start)
     if len(trusted) == 0:
-        p, covariance = settings.start.astype(np.float64), np.diag(settings.start_sd.astype(np.float64) ** 2)
+        p, covariance = (
+            settings.start[:n_p].astype(np.float64),
+            np.diag(settings.start_sd[:n_p].astype(np.float64) ** 2),
+        )
         status, misfit, alarm = Reason.HELD_NOT_EXCITED, None, False
     else:
         p, covariance = result.p[trusted[-1], :n_p], result.covariance[trusted[-1], :n_p, :n_p]
-        judged = result.misfit[trusted[0] :]
+        # rows that are corrected later than the first publication are judged once the uncorrected past has faded
+        judged = result.misfit[
+            max(trusted[0], _FADING * int(result.corrected.any()) + int(np.argmax(result.corrected))) :
+        ]
         misfit = float(np.nanmean(judged))
         alarm = trust.misfit_max > 0 and np.isfinite(judged).sum() >= MISFIT_WINDOWS and misfit > trust.misfit_max
         status = Reason.MISFIT if alarm else Reason.UPDATED

@@ -453,11 +453,12 @@ class _Bench:
         rig = settings.applied(self.rig)
         config = weak_config(rig, self.run.sample_rate)
         estimator = config.estimator
+        n_core = 3 + rig.identifier.zero  # the oracle adds friction by itself
         # From an estimate of an earlier candidate one step a window is enough: the sums are the same.
         return _Windows.of(self.run, weak_design_of(rig, self.run.sample_rate)), WeakSettings(
-            start=estimator.start.astype(np.float64) if self.start is None else self.start,
+            start=estimator.start[:n_core].astype(np.float64) if self.start is None else self.start,
             row_sd=estimator.row_sd,
-            start_sd=estimator.start_sd.astype(np.float64),
+            start_sd=estimator.start_sd[:n_core].astype(np.float64),
             forgetting_s=rig.identifier.forgetting_s,
             iterations=config.iterations if self.start is None else 1,
             drive_min=config.drive_min,
