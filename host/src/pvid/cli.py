@@ -371,6 +371,15 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
 # ---- tables for the core
 
 
+@commands.command(name="link-schema")
+def link_schema() -> int:
+    """Prints firmware/link/schema.h: what stands in the frames of the serial link."""
+    from pvid.link import c_header
+
+    click.echo(c_header(), nl=False)
+    return DONE
+
+
 @commands.command(name="fir-table")
 @click.option("--points", default=241, show_default=True, help="Points of the Savitzky-Golay window, odd.")
 @click.option("--degree", default=12, show_default=True, help="Degree of its polynomial, 4 to 12.")

@@ -1,0 +1,157 @@
+#include "link.h"
+
+#include <string.h>
+
+#include "little_endian.h"
+
+#define GROUP 0xFFu /* code of a COBS group of 254 bytes, after which no 0 stands */
+
+/* CRC of the sixteen values of half a byte; polynomial 0xEDB88320. */
+static const uint32_t crc_of_nibble[16] = {
+    0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
+    0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu,
+};
+
+uint32_t pvid_link_crc(uint32_t crc, const uint8_t bytes[], size_t n)
+{
+    crc = ~crc;
+    for (size_t i = 0; i < n; i++) {
+        crc ^= bytes[i];
+        crc = (crc >> 4) ^ crc_of_nibble[crc & 0xFu];
+        crc = (crc >> 4) ^ crc_of_nibble[crc & 0xFu];
+    }
+    return ~crc;
+}
+
+typedef struct {
+    uint8_t *out;
+    size_t at;
+    size_t code_at; /* where the code of the present group goes */
+    uint8_t code;   /* one more than the bytes in it */
+} stuffer;
+
+static void stuff(stuffer *self, const uint8_t bytes[], size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (self->code == GROUP) { /* full: opened only now, for nothing may follow */
+            self->code_at = self->at++;
+            self->code = 1u;
+        }
+        if (bytes[i] != 0u) {
+            self->out[self->at++] = bytes[i];
+            self->code++;
+            self->out[self->code_at] = self->code;
+        } else {
+            self->out[self->code_at] = self->code;
+            self->code_at = self->at++;
+            self->code = 1u;
+        }
+    }
+    self->out[self->code_at] = self->code;
+}
+
+size_t pvid_link_encode(const pvid_link_frame *frame, uint8_t out[], size_t room)
+{
+    if ((frame->length > PVID_LINK_MAX_PAYLOAD) || (room < PVID_LINK_ENCODED_BYTES(frame->length))) {
+        return 0;
+    }
+    uint8_t header[PVID_LINK_HEADER_BYTES];
+    header[0] = PVID_LINK_VERSION;
+    header[1] = frame->type;
+    pvid_put_u32(&header[2], PVID_LINK_SCHEMA);
+    pvid_put_u16(&header[6], frame->sequence);
+    pvid_put_u32(&header[8], frame->tick);
+    uint8_t crc[PVID_LINK_CRC_BYTES];
+    const uint32_t of_header = pvid_link_crc(0u, header, sizeof header);
+    pvid_put_u32(crc, pvid_link_crc(of_header, frame->payload, frame->length));
+
+    stuffer state = {.out = out, .at = 1, .code_at = 0, .code = 1u};
+    stuff(&state, header, sizeof header);
+    stuff(&state, frame->payload, frame->length);
+    stuff(&state, crc, sizeof crc);
+    out[state.at] = 0u;
+    return state.at + 1u;
+}
+
+void pvid_link_decoder_init(pvid_link_decoder *self)
+{
+    memset(self, 0, sizeof *self);
+}
+
+static void count(uint32_t *counter, uint32_t n)
+{
+    *counter = (n > (UINT32_MAX - *counter)) ? UINT32_MAX : (*counter + n);
+}
+
+static void append(pvid_link_decoder *self, uint8_t byte)
+{
+    if (self->filled == sizeof self->raw) {
+        self->bad = true;
+    } else {
+        self->raw[self->filled++] = byte;
+    }
+}
+
+static void follow_sequence(pvid_link_decoder *self, uint16_t sequence)
+{
+    const uint16_t ahead = (uint16_t)(sequence - self->sequence);
+    if (self->synchronised && (ahead < 0x8000u)) {
+        count(&self->counters.missing, ahead);
+    }
+    self->synchronised = true;
+    self->sequence = (uint16_t)(sequence + 1u);
+}
+
+/* What stands in raw, now that the 0 has come. */
+static bool accept(pvid_link_decoder *self, pvid_link_frame *frame)
+{
+    if (self->bad || (self->left != 0u) || (self->filled < PVID_LINK_RAW_BYTES(0u))) {
+        count(&self->counters.malformed, 1u);
+        return false;
+    }
+    const size_t checked = self->filled - PVID_LINK_CRC_BYTES;
+    if (pvid_link_crc(0u, self->raw, checked) != pvid_get_u32(&self->raw[checked])) {
+        count(&self->counters.bad_crc, 1u);
+        return false;
+    }
+    if ((self->raw[0] != PVID_LINK_VERSION) || (pvid_get_u32(&self->raw[2]) != PVID_LINK_SCHEMA)) {
+        count(&self->counters.foreign, 1u);
+        return false;
+    }
+    frame->type = self->raw[1];
+    frame->sequence = pvid_get_u16(&self->raw[6]);
+    frame->tick = pvid_get_u32(&self->raw[8]);
+    frame->payload = &self->raw[PVID_LINK_HEADER_BYTES];
+    frame->length = checked - PVID_LINK_HEADER_BYTES;
+    count(&self->counters.frames, 1u);
+    follow_sequence(self, frame->sequence);
+    return true;
+}
+
+bool pvid_link_decode(pvid_link_decoder *self, uint8_t byte, pvid_link_frame *frame)
+{
+    if (byte == 0u) {
+        const bool good = self->started && accept(self, frame);
+        self->filled = 0;
+        self->left = 0;
+        self->bad = false;
+        self->started = false;
+        self->zero_due = false;
+        return good;
+    }
+    self->started = true;
+    if (self->bad) {
+        return false;
+    }
+    if (self->left == 0u) {
+        if (self->zero_due) {
+            append(self, 0u);
+        }
+        self->left = (uint8_t)(byte - 1u);
+        self->zero_due = (byte != GROUP);
+    } else {
+        append(self, byte);
+        self->left--;
+    }
+    return false;
+}

@@ -1,0 +1,87 @@
+/* link/link.h - frames on a serial line: COBS(header || payload || CRC-32) || 0x00.
+ *
+ * The header is 12 bytes: version u8, type u8, schema u32, sequence u16, tick u32; what stands in a payload
+ * says schema.h. All little-endian, stored byte by byte. The CRC (that of zlib) covers header and payload.
+ * No byte of a frame but its last is 0, so a receiver that has lost its place finds it at the next 0.
+ *
+ *   n = pvid_link_encode(&frame, bytes, sizeof bytes);             (0: does not fit)
+ *
+ *   static pvid_link_decoder decoder;
+ *   pvid_link_decoder_init(&decoder);
+ *   each byte:  if (pvid_link_decode(&decoder, byte, &frame)) ... frame.payload is valid until the next byte
+ *
+ * Never allocates, never waits. Decoding is total: whatever the bytes, a frame is handed on only when its
+ * structure, CRC, version and schema are right; what is not is counted in the decoder and dropped, and the
+ * next 0 starts anew. Neither function is reentrant on the same object.
+ * RAM: sizeof(pvid_link_decoder), PVID_LINK_MAX_PAYLOAD + 48 bytes.
+ */
+#ifndef PVID_LINK_H
+#define PVID_LINK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "schema.h"
+
+/* Longest payload [bytes]. RAM: as much in a decoder. The PC's side takes up to 1024. */
+#ifndef PVID_LINK_MAX_PAYLOAD
+#define PVID_LINK_MAX_PAYLOAD 1024
+#endif
+#if PVID_LINK_MAX_PAYLOAD < 256 || PVID_LINK_MAX_PAYLOAD > 1024
+#error "PVID_LINK_MAX_PAYLOAD must lie in 256..1024"
+#endif
+
+#define PVID_LINK_HEADER_BYTES 12u
+#define PVID_LINK_CRC_BYTES 4u
+
+/* Bytes before COBS, and room that is enough for any encoded frame with n bytes of payload. */
+#define PVID_LINK_RAW_BYTES(n) (PVID_LINK_HEADER_BYTES + (n) + PVID_LINK_CRC_BYTES)
+#define PVID_LINK_ENCODED_BYTES(n) (PVID_LINK_RAW_BYTES(n) + (PVID_LINK_RAW_BYTES(n) / 254u) + 2u)
+
+typedef struct {
+    uint8_t type;           /* one of schema.h */
+    uint16_t sequence;      /* one more than the frame before it, modulo 2^16 */
+    uint32_t tick;          /* what of, says the type: a sample's number, ticks done */
+    const uint8_t *payload; /* [length] */
+    size_t length;          /* 0..PVID_LINK_MAX_PAYLOAD */
+} pvid_link_frame;
+
+/* What has come in; each stops at 2^32 - 1. */
+typedef struct {
+    uint32_t frames;    /* good ones */
+    uint32_t missing;   /* frames that the sequence says were sent and did not arrive */
+    uint32_t malformed; /* no COBS, too short, too long */
+    uint32_t bad_crc;
+    uint32_t foreign;   /* of another version or schema */
+} pvid_link_counters;
+
+/* Only the functions below write to it. */
+typedef struct {
+    pvid_link_counters counters;
+    size_t filled;        /* bytes of raw */
+    uint16_t sequence;    /* expected next */
+    bool synchronised;    /* a frame has come in: sequence is known */
+    bool bad;             /* this frame is too long: drop all up to the next 0 */
+    bool started;         /* a byte has come in since the last 0 */
+    bool zero_due;        /* the COBS group that ended stands for a 0, if another one follows */
+    uint8_t left;         /* bytes left in the COBS group */
+    uint8_t raw[PVID_LINK_RAW_BYTES(PVID_LINK_MAX_PAYLOAD)];
+} pvid_link_decoder;
+
+/* Writes the encoded frame with its final 0; returns its length, or 0 and nothing written iff the payload is
+ * longer than PVID_LINK_MAX_PAYLOAD or room < PVID_LINK_ENCODED_BYTES(length). */
+size_t pvid_link_encode(const pvid_link_frame *frame, uint8_t out[], size_t room);
+
+/* An empty decoder that takes the first frame it meets as the start of the sequence. */
+void pvid_link_decoder_init(pvid_link_decoder *self);
+
+/* Takes one byte. Returns true iff it ended a good frame, which is then in *frame. A sequence that jumps back
+ * or by 2^15 or more is taken as a sender that has restarted, not as missing frames. Bounded: the byte that
+ * ends a frame costs a CRC over the frame. */
+bool pvid_link_decode(pvid_link_decoder *self, uint8_t byte, pvid_link_frame *frame);
+
+/* CRC-32 of zlib, continued: start with 0. */
+uint32_t pvid_link_crc(uint32_t crc, const uint8_t bytes[], size_t n);
+
+#endif

@@ -1,0 +1,46 @@
+/* Numbers as bytes, low byte first, on any machine. */
+#ifndef PVID_LITTLE_ENDIAN_H
+#define PVID_LITTLE_ENDIAN_H
+
+#include <stdint.h>
+#include <string.h>
+
+static inline void pvid_put_u16(uint8_t out[2], uint16_t value)
+{
+    out[0] = (uint8_t)(value & 0xFFu);
+    out[1] = (uint8_t)(value >> 8);
+}
+
+static inline void pvid_put_u32(uint8_t out[4], uint32_t value)
+{
+    pvid_put_u16(out, (uint16_t)(value & 0xFFFFu));
+    pvid_put_u16(&out[2], (uint16_t)(value >> 16));
+}
+
+static inline uint16_t pvid_get_u16(const uint8_t in[2])
+{
+    return (uint16_t)(in[0] | ((uint16_t)in[1] << 8));
+}
+
+static inline uint32_t pvid_get_u32(const uint8_t in[4])
+{
+    return pvid_get_u16(in) | ((uint32_t)pvid_get_u16(&in[2]) << 16);
+}
+
+/* The copy between a float and the word of its bits is the one that C99 defines. */
+static inline void pvid_put_f32(uint8_t out[4], float value)
+{
+    uint32_t word;
+    memcpy(&word, &value, sizeof word);
+    pvid_put_u32(out, word);
+}
+
+static inline float pvid_get_f32(const uint8_t in[4])
+{
+    const uint32_t word = pvid_get_u32(in);
+    float value;
+    memcpy(&value, &word, sizeof value);
+    return value;
+}
+
+#endif

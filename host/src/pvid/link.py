@@ -1,0 +1,468 @@
+"""Frames of the serial link (DESIGN.md, "Files and links"), without any input or output of its own.
+
+    COBS(header || payload || CRC-32) || 0x00
+    header: version u8, type u8, schema u32, sequence u16, tick u32; little-endian
+
+The classes below with a `TYPE` are the one definition of what stands in a payload: the schema text that a board
+sends, its hash in every header and firmware/link/schema.h are made from them (`pvid link-schema`).
+
+    decoder = Decoder()
+    for item in decoder.feed(port.read(...)):
+        match item:
+            case Loss(): ...                      # what did not come through, and why
+            case Frame(message=Estimate() as e): ...
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from enum import IntEnum
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+from cobs import cobs
+
+from pvid.errors import PvidError
+
+VERSION = 1
+MAX_PAYLOAD = 1024
+_HEADER = struct.Struct("<BBIHI")
+_CRC = struct.Struct("<I")
+_LONGEST = _HEADER.size + MAX_PAYLOAD + _CRC.size
+
+_WIRE = {"u8": ("B", 1), "u16": ("H", 2), "u32": ("I", 4), "f32": ("f", 4), "char": ("s", 1)}
+
+
+def _wire(kind: str, count: int | None = 1) -> Any:
+    """A field of `count` numbers of a kind; None: all that is left of the payload, as bytes."""
+    return field(metadata={"kind": kind, "count": count})
+
+
+@dataclass(frozen=True)
+class Layout:
+    """One payload: its type, its name and (field, kind, count) in order; count None: the rest."""
+
+    type: int
+    name: str
+    fields: tuple[tuple[str, str, int | None], ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes of the part with a fixed size."""
+        return sum(_WIRE[kind][1] * count for _, kind, count in self.fields if count is not None)
+
+    @property
+    def open_ended(self) -> bool:
+        """Whether the last field takes the rest of the payload."""
+        return self.fields[-1][2] is None
+
+    @property
+    def text(self) -> str:
+        """As it stands in the schema: `6 estimate p:f32[4] ...`."""
+        marks = {1: "", None: "[]"}
+        words = (f"{name}:{kind}{marks.get(count, f'[{count}]')}" for name, kind, count in self.fields)
+        return f"{self.type} {self.name} {' '.join(words)}"
+
+    def unpack(self, payload: bytes) -> dict[str, Any]:
+        """Values by field: int, float, tuple of them, str (char) or bytes (the rest).
+
+        Raises
+        ------
+        PvidError
+            When the payload has not the length of this layout.
+        """
+        if len(payload) < self.size or (len(payload) > self.size and not self.open_ended):
+            raise PvidError(f"a frame {self.name} of {len(payload)} bytes, where {self.size} belong")
+        values: dict[str, Any] = {}
+        at = 0
+        for name, kind, count in self.fields:
+            code, width = _WIRE[kind]
+            if count is None:
+                rest = payload[at:]
+                if len(rest) % width:
+                    raise PvidError(f"a frame {self.name} with a {name} of {len(rest)} bytes, no multiple of {width}")
+                values[name] = rest
+                break
+            found = struct.unpack_from(f"<{count}{code}", payload, at)
+            if kind == "char":
+                values[name] = found[0].rstrip(b"\0").decode("ascii", "replace")
+            else:
+                values[name] = found if count > 1 else found[0]
+            at += width * count
+        return values
+
+    def pack(self, values: dict[str, Any]) -> bytes:
+        """The payload of values by field, the inverse of `unpack`."""
+        parts = []
+        for name, kind, count in self.fields:
+            value = values[name]
+            if count is None:
+                parts.append(bytes(value))
+            elif kind == "char":
+                parts.append(struct.pack(f"<{count}s", value.encode("ascii")))
+            else:
+                numbers = value if count > 1 else (value,)
+                parts.append(struct.pack(f"<{count}{_WIRE[kind][0]}", *numbers))
+        return b"".join(parts)
+
+
+MESSAGES: dict[int, type[Message]] = {}
+
+
+@dataclass(frozen=True)
+class Message:
+    """Base of the payloads."""
+
+    TYPE: ClassVar[int] = 0
+
+    def __init_subclass__(cls) -> None:
+        MESSAGES[cls.TYPE] = cls
+
+    @classmethod
+    def layout(cls) -> Layout:
+        """Its wire format."""
+        described = tuple((f.name, f.metadata["kind"], f.metadata["count"]) for f in fields(cls))
+        return Layout(cls.TYPE, cls.__name__.lower(), described)
+
+    @property
+    def payload(self) -> bytes:
+        """Its bytes on the wire."""
+        return self.layout().pack({f.name: getattr(self, f.name) for f in fields(self)})
+
+    @classmethod
+    def of(cls, payload: bytes) -> Self:
+        """The message of these bytes."""
+        return cls(**cls.layout().unpack(payload))
+
+
+class Form(IntEnum):
+    """Which identifier an image holds."""
+
+    STRONG = 0
+    WEAK = 1
+
+
+class Code(IntEnum):
+    """What a board says of itself (Status.code)."""
+
+    WAITING = 0  # not configured
+    RUNNING = 1
+    REFUSED_BY_CORE = 2  # Status.core names the field
+    REFUSED_SETTINGS = 3  # made for other tables or settings than those in the image
+    REFUSED_FORM = 4  # the image holds the other form
+    ARITHMETIC = 5  # float arithmetic is not what the bits need
+
+
+@dataclass(frozen=True)
+class Hello(Message):
+    """Board to PC when it starts, and when the PC sends a Credit: who it is."""
+
+    TYPE = 1
+    form: int = _wire("u8")
+    n_p: int = _wire("u8")
+    window: int = _wire("u16")  # samples that may be under way without an answer
+    settings: int = _wire("u32")  # CRC-32 of the settings and tables in the image
+    session: int = _wire("u32")  # of the configuration it works with; 0: none since it started
+    board: str = _wire("char", 16)
+
+
+@dataclass(frozen=True)
+class Schema(Message):
+    """Board to PC beside Hello: the schema text."""
+
+    TYPE = 2
+    text: bytes = _wire("char", None)
+
+
+@dataclass(frozen=True)
+class Configure(Message):
+    """PC to board: starts over with these settings (estimator.h); the others are in the image, with its tables."""
+
+    TYPE = 3
+    session: int = _wire("u32")  # any number but 0; comes back in every answer
+    settings: int = _wire("u32")  # CRC-32 of the settings and tables that the image must hold
+    form: int = _wire("u8")
+    law: int = _wire("u8")
+    divider: int = _wire("u16")
+    hash_every: int = _wire("u16")  # ticks; 0: only in the credits
+    estimate_every: int = _wire("u16")  # ticks; 0: never
+    start: tuple[float, ...] = _wire("f32", 4)
+    start_sd: tuple[float, ...] = _wire("f32", 4)
+    lower: tuple[float, ...] = _wire("f32", 4)
+    upper: tuple[float, ...] = _wire("f32", 4)
+    row_sd: float = _wire("f32")
+    forgetting_s: float = _wire("f32")
+    feedback_hz: float = _wire("f32")
+
+
+@dataclass(frozen=True)
+class _Samples(Message):
+    """phi [rad], y [m] of consecutive ticks, the first of them in the frame's header."""
+
+    phi_y: bytes = _wire("f32", None)
+
+    @property
+    def values(self) -> npt.NDArray[np.float32]:
+        """float32 [n, 2]: phi, y."""
+        whole = len(self.phi_y) // 8
+        return np.frombuffer(self.phi_y[: 8 * whole], "<f4").astype(np.float32).reshape(whole, 2)
+
+    @classmethod
+    def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:
+        """From phi [n] and y [n], rounded to float32 as a board would read them."""
+        return cls(np.stack([np.asarray(phi, "<f4"), np.asarray(y, "<f4")], axis=1).tobytes())
+
+
+@dataclass(frozen=True)
+class Sample(_Samples):
+    """PC to board, to be identified with."""
+
+    TYPE = 4
+
+
+@dataclass(frozen=True)
+class Raw(_Samples):
+    """Board to PC: what its own sensors read."""
+
+    TYPE = 5
+
+
+@dataclass(frozen=True)
+class Estimate(Message):
+    """Board to PC: the estimate after the header's tick (pvid_estimate_f32)."""
+
+    TYPE = 6
+    session: int = _wire("u32")
+    updates: int = _wire("u32")
+    p: tuple[float, ...] = _wire("f32", 4)
+    covariance: tuple[float, ...] = _wire("f32", 10)  # upper triangle by rows
+    kappa: float = _wire("f32")
+    residual_sd: float = _wire("f32")
+    weight: float = _wire("f32")
+    reason: int = _wire("u8")
+
+
+@dataclass(frozen=True)
+class Status(Message):
+    """Board to PC: what it does, and what its receiver lost."""
+
+    TYPE = 7
+    session: int = _wire("u32")
+    code: int = _wire("u8")
+    core: int = _wire("u8")  # pvid_status of the init
+    updates: int = _wire("u32")
+    rejected: int = _wire("u32")  # samples that were not finite or absurd
+    repeated: int = _wire("u32")  # samples that had come before
+    skipped: int = _wire("u32")  # sample frames that were not the next ones
+    missing: int = _wire("u32")  # pvid_link_counters of the board's decoder
+    malformed: int = _wire("u32")
+    bad_crc: int = _wire("u32")
+    foreign: int = _wire("u32")
+
+
+@dataclass(frozen=True)
+class Hash(Message):
+    """Board to PC: the running hash (fnv.h) after the header's tick."""
+
+    TYPE = 8
+    session: int = _wire("u32")
+    hash: int = _wire("u32")
+
+
+@dataclass(frozen=True)
+class Credit(Message):
+    """Board to PC: all samples before the header's tick are worked off, `room` more may be sent; PC to board: say
+    so again, with hello and status."""
+
+    TYPE = 9
+    session: int = _wire("u32")
+    room: int = _wire("u32")
+    hash: int = _wire("u32")  # running, after that tick
+    reason: int = _wire("u8")  # of the last tick
+
+
+MESSAGES.pop(0)
+LAYOUTS = {number: MESSAGES[number].layout() for number in sorted(MESSAGES)}
+SCHEMA_TEXT = "\n".join([f"pvid {VERSION}", *(layout.text for layout in LAYOUTS.values())])
+SCHEMA = zlib.crc32(SCHEMA_TEXT.encode())
+
+
+def parse_schema(text: str) -> dict[int, Layout]:
+    """Layouts by type of a schema text, of this version of pvid or another.
+
+    Raises
+    ------
+    PvidError
+        When it is not one.
+    """
+    head, *lines = text.split("\n")
+    if not re.fullmatch(r"pvid \d+", head):
+        raise PvidError(f"no schema of pvid: it begins with {head[:40]!r}")
+    layouts = {}
+    for line in lines:
+        words = line.split(" ")
+        found = [re.fullmatch(r"(\w+):(u8|u16|u32|f32|char)(?:\[(\d*)\])?", word) for word in words[2:]]
+        if len(words) < 3 or not words[0].isdigit() or not all(found):
+            raise PvidError(f"no line of a schema: {line[:80]!r}")
+        described: list[tuple[str, str, int | None]] = []
+        for match in found:
+            assert match is not None
+            name, kind, count = match.groups()
+            described.append((name, kind, 1 if count is None else int(count) if count else None))
+        layouts[int(words[0])] = Layout(int(words[0]), words[1], tuple(described))
+    return layouts
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame that came through."""
+
+    sequence: int
+    tick: int
+    message: Message
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What did not: `why` is malformed, crc, foreign, layout, or sequence, of which `frames` are missing."""
+
+    why: str
+    frames: int = 0
+    bytes: int = 0
+
+
+@dataclass
+class Counters:
+    """What a decoder has seen; `missing` counts frames, the others pieces between two zeros."""
+
+    frames: int = 0
+    missing: int = 0
+    malformed: int = 0
+    crc: int = 0
+    foreign: int = 0
+    layout: int = 0
+
+    @property
+    def damaged(self) -> int:
+        """Pieces that were no frame."""
+        return self.malformed + self.crc + self.layout
+
+
+def encode(message: Message, sequence: int, tick: int = 0) -> bytes:
+    """A frame with its final 0x00; sequence modulo 2^16."""
+    return encode_raw(message.TYPE, sequence, tick, message.payload)
+
+
+def encode_raw(number: int, sequence: int, tick: int, payload: bytes) -> bytes:
+    """A frame with any payload of at most MAX_PAYLOAD bytes."""
+    if len(payload) > MAX_PAYLOAD:
+        raise PvidError(f"a payload of {len(payload)} bytes, and a frame holds {MAX_PAYLOAD}")
+    raw = _HEADER.pack(VERSION, number, SCHEMA, sequence & 0xFFFF, tick & 0xFFFFFFFF) + payload
+    return bytes(cobs.encode(raw + _CRC.pack(zlib.crc32(raw)))) + b"\0"
+
+
+@dataclass
+class Decoder:
+    """Bytes in, frames and losses out; never raises and never holds more than one frame."""
+
+    counters: Counters = field(default_factory=Counters)
+    _pending: bytearray = field(default_factory=bytearray)
+    _overflow: int = 0
+    _expected: int | None = None
+
+    def feed(self, data: bytes) -> list[Frame | Loss]:
+        """What these bytes completed, in order."""
+        return [item for piece in self._pieces(data) for item in self._judge(*piece)]
+
+    def _pieces(self, data: bytes) -> Iterator[tuple[bytes, int]]:
+        """What stands between two zeros, and how many bytes of it were too many to be kept."""
+        *ended, rest = data.split(b"\0")
+        for part in ended:
+            self._keep(part)
+            if self._pending or self._overflow:
+                yield bytes(self._pending), self._overflow
+            self._pending.clear()
+            self._overflow = 0
+        self._keep(rest)
+
+    def _keep(self, part: bytes) -> None:
+        room = _LONGEST + _LONGEST // 254 + 2 - len(self._pending)
+        self._pending += part[:room]
+        self._overflow += len(part[room:])
+
+    def _judge(self, piece: bytes, overflow: int) -> Iterator[Frame | Loss]:
+        try:
+            raw = b"" if overflow else bytes(cobs.decode(piece))
+        except cobs.DecodeError:
+            raw = b""
+        if not _HEADER.size + _CRC.size <= len(raw) <= _LONGEST:
+            yield self._lost("malformed", piece, overflow)
+            return
+        body = raw[: -_CRC.size]
+        if zlib.crc32(body) != _CRC.unpack(raw[-_CRC.size :])[0]:
+            yield self._lost("crc", piece)
+            return
+        version, number, schema, sequence, tick = _HEADER.unpack_from(body)
+        if version != VERSION or schema != SCHEMA:
+            yield self._lost("foreign", piece)
+            return
+        yield from self._gap(sequence)
+        kind: type[Message] | None = MESSAGES.get(number)
+        try:
+            if kind is None:
+                raise PvidError(f"no frame type {number}")
+            message = kind.of(body[_HEADER.size :])
+        except PvidError:
+            yield self._lost("layout", piece)
+            return
+        self.counters.frames += 1
+        yield Frame(sequence, tick, message)
+
+    def _lost(self, why: str, piece: bytes, overflow: int = 0) -> Loss:
+        setattr(self.counters, why, getattr(self.counters, why) + 1)
+        return Loss(why, bytes=len(piece) + overflow)
+
+    def _gap(self, sequence: int) -> Iterator[Loss]:
+        ahead = 0 if self._expected is None else (sequence - self._expected) & 0xFFFF
+        self._expected = (sequence + 1) & 0xFFFF
+        if 0 < ahead < 0x8000:  # else the sender has restarted
+            self.counters.missing += ahead
+            yield Loss("sequence", frames=ahead)
+
+
+def c_header() -> str:
+    """firmware/link/schema.h."""
+    text = SCHEMA_TEXT.split("\n")
+    lines = [
+        "/* Made by `pvid link-schema` from host/src/pvid/link.py, which says what the fields mean: do not edit. */",
+        "#ifndef PVID_SCHEMA_H",
+        "#define PVID_SCHEMA_H",
+        "",
+        f"#define PVID_LINK_VERSION {VERSION}u",
+        "",
+        "/* CRC-32 of the text. */",
+        f"#define PVID_LINK_SCHEMA 0x{SCHEMA:08X}u",
+        "",
+        "#define PVID_LINK_SCHEMA_TEXT \\",
+        " \\\n".join([*(f'    "{line}\\n"' for line in text[:-1]), f'    "{text[-1]}"']),
+        "",
+        "/* Frame types; offsets of their fields and the bytes before an open end. */",
+    ]
+    for layout in LAYOUTS.values():
+        stem = f"PVID_{layout.name.upper()}"
+        lines += ["", f"#define {stem} {layout.type}u"]
+        at = 0
+        for name, kind, count in layout.fields:
+            extent = "" if count == 1 else f"[{count or ''}]"
+            lines.append(f"#define {stem}_{name.upper()} {at}u /* {kind}{extent} */")
+            at += _WIRE[kind][1] * (count or 0)
+        lines.append(f"#define {stem}_BYTES {layout.size}u")
+    for title, enum in (("Status.code", Code), ("Hello.form", Form)):
+        lines += ["", f"/* {title} */"]
+        lines += [f"#define PVID_{enum.__name__.upper()}_{member.name} {member.value}u" for member in enum]
+    return "\n".join([*lines, "", "#endif", ""])

@@ -1,0 +1,213 @@
+"""The frame codec: Python against C on the same bytes, and both against damage."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pvid import link
+from pvid.errors import PvidError
+from pvid.native import default_library
+
+C = ctypes.CDLL(str(default_library()))
+HEAD = struct.Struct("<BHIH")
+
+payloads = st.integers(0, link.MAX_PAYLOAD).flatmap(lambda n: st.binary(min_size=n, max_size=n))
+repetitive = st.builds(lambda piece, n: (piece * 1024)[:n], st.binary(min_size=1, max_size=300), st.integers(0, 1024))
+frames = st.tuples(
+    st.integers(0, 255), st.integers(0, 0xFFFF), st.integers(0, 0xFFFFFFFF), st.one_of(payloads, repetitive)
+)
+
+FUZZ_RUNS = 100_000
+
+
+def c_encode(number: int, sequence: int, tick: int, payload: bytes) -> bytes:
+    out = ctypes.create_string_buffer(1100)
+    n = C.pvid_native_link_encode(
+        number, sequence, ctypes.c_uint32(tick), payload, len(payload), out, ctypes.c_uint32(len(out))
+    )
+    return out.raw[:n]
+
+
+def c_decode(data: bytes) -> tuple[list[tuple[int, int, int, bytes]], list[int]]:
+    """Frames (type, sequence, tick, payload) and counters (frames, missing, malformed, crc, foreign)."""
+    out = ctypes.create_string_buffer(2 * len(data) + 64)
+    counters = (ctypes.c_uint32 * 5)()
+    n = C.pvid_native_link_decode(data, len(data), out, counters)
+    found, at = [], 0
+    while at < n:
+        number, sequence, tick, length = HEAD.unpack_from(out, at)
+        at += HEAD.size
+        found.append((number, sequence, tick, out.raw[at : at + length]))
+        at += length
+    return found, list(counters)
+
+
+def assert_same_as_c(data: bytes) -> tuple[link.Decoder, list[link.Frame]]:
+    decoder = link.Decoder()
+    got = [item for item in decoder.feed(data) if isinstance(item, link.Frame)]
+    accepted, counters = c_decode(data)
+    kept = [frame for frame in accepted if well_laid_out(frame[0], frame[3])]
+    assert [(f.message.TYPE, f.sequence, f.tick) for f in got] == [frame[:3] for frame in kept]
+    mine = decoder.counters
+    assert [mine.frames + mine.layout, mine.missing, mine.malformed, mine.crc, mine.foreign] == counters
+    return decoder, got
+
+
+def well_laid_out(number: int, payload: bytes) -> bool:
+    try:
+        link.LAYOUTS[number].unpack(payload)
+    except (KeyError, PvidError):
+        return False
+    return True
+
+
+@settings(max_examples=300, deadline=None)
+@given(frames)
+def test_c_and_python_encode_the_same_bytes(frame: tuple[int, int, int, bytes]) -> None:
+    encoded = link.encode_raw(*frame)
+    assert c_encode(*frame) == encoded
+    assert encoded.index(0) == len(encoded) - 1
+    assert c_decode(encoded) == ([frame], [1, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize("fill", [b"\0", b"\1", b"\xff", b"\1" * 253 + b"\0", b"\1" * 254 + b"\0"])
+def test_every_length_encodes_alike_and_decodes(fill: bytes) -> None:
+    for n in range(link.MAX_PAYLOAD + 1):
+        frame = (4, n, 7, (fill * 1025)[:n])
+        encoded = link.encode_raw(*frame)
+        assert c_encode(*frame) == encoded
+        assert c_decode(encoded)[0] == [frame]
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> bytes:
+    """A few frames in garbage, with bytes flipped, dropped, inserted and the end cut off."""
+    parts = [draw(st.binary(max_size=20))]
+    for sequence in range(draw(st.integers(1, 4))):
+        samples = draw(st.integers(0, 40))
+        number = draw(st.sampled_from([1, 4, 8, 9, 77]))
+        payload = draw(st.binary(min_size=8 * samples, max_size=8 * samples))
+        parts += [link.encode_raw(number, sequence, samples, payload), draw(st.sampled_from([b"", b"\0", b"\7\7"]))]
+    data = bytearray(b"".join(parts))
+    for _ in range(draw(st.integers(0, 5))):
+        at = draw(st.integers(0, len(data) - 1)) if data else 0
+        kind = draw(st.sampled_from(["flip", "drop", "insert", "cut"]))
+        if kind == "flip" and data:
+            data[at] ^= 1 << draw(st.integers(0, 7))
+        elif kind == "drop":
+            del data[at : at + draw(st.integers(1, 3))]
+        elif kind == "insert":
+            data[at:at] = draw(st.binary(max_size=4))
+        else:
+            del data[at + 1 :]
+    return bytes(data)
+
+
+@settings(max_examples=500, deadline=None)
+@given(damaged(), st.lists(st.integers(1, 50), max_size=20))
+def test_damage_is_judged_alike_however_it_is_cut(data: bytes, cuts: list[int]) -> None:
+    decoder, _ = assert_same_as_c(data)
+    pieces, at = link.Decoder(), 0
+    for cut in [*cuts, len(data)]:
+        pieces.feed(data[at : at + cut])
+        at += cut
+    assert pieces.counters == decoder.counters
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=3000))
+def test_after_any_garbage_the_next_frame_comes_through(garbage: bytes) -> None:
+    decoder = link.Decoder()
+    decoder.feed(garbage + b"\0")
+    message = link.Hash(session=1, hash=0xDEADBEEF)
+    assert [f for f in decoder.feed(link.encode(message, 5, 99)) if isinstance(f, link.Frame)] == [
+        link.Frame(5, 99, message)
+    ]
+
+
+def test_of_many_corrupted_frames_none_is_accepted_wrong() -> None:
+    """10^5 damaged frames: CRC-32 lets one in 4e9 through, so none is to be expected."""
+    rng = np.random.default_rng(1)
+    sent = {link.encode_raw(4, n, n, rng.bytes(80)): n for n in range(200)}
+    originals = list(sent)
+    stream = bytearray()
+    for index in range(100_000):
+        frame = bytearray(originals[index % len(originals)])
+        for at in rng.integers(0, len(frame) - 1, rng.integers(1, 4)):
+            frame[at] ^= int(rng.integers(1, 256))
+        stream += frame if bytes(frame) not in sent else b""
+        stream += b"\0"
+    decoder, got = assert_same_as_c(bytes(stream))
+    assert got == []
+    assert decoder.counters.damaged > 99_000
+
+
+def test_messages_survive_the_way() -> None:
+    values = np.array([[1.5, -2.0], [np.float32(1e-45), 3e38]], np.float32)
+    sample = link.Sample.of_values(values[:, 0], values[:, 1])
+    estimate = link.Estimate(9, 4, (1.0, 2.0, 3.0, 4.0), tuple(map(float, range(10))), 0.5, 0.25, 8.0, 2)
+    hello = link.Hello(form=1, n_p=4, window=256, settings=5, session=0, board="mps2-an386")
+    data = b"".join(link.encode(m, i, i) for i, m in enumerate([sample, estimate, hello]))
+    got = [item for item in link.Decoder().feed(data) if isinstance(item, link.Frame)]
+    assert [frame.message for frame in got] == [sample, estimate, hello]
+    assert isinstance(got[0].message, link.Sample)
+    assert np.array_equal(got[0].message.values, values)
+
+
+def test_the_schema_describes_itself() -> None:
+    assert link.parse_schema(link.SCHEMA_TEXT) == link.LAYOUTS
+    assert len(link.SCHEMA_TEXT) <= link.MAX_PAYLOAD
+    for broken in ("", "pvid x", link.SCHEMA_TEXT + "\n9 q r:u7", link.SCHEMA_TEXT + "\nx"):
+        with pytest.raises(PvidError):
+            link.parse_schema(broken)
+
+
+def test_the_c_header_is_what_python_says() -> None:
+    written = (ROOT / "firmware" / "link" / "schema.h").read_text(encoding="utf-8")
+    assert written == link.c_header(), "./tools/pvid link-schema > firmware/link/schema.h"
+
+
+def test_losses_say_what_was_lost() -> None:
+    hash_frame = link.encode(link.Hash(1, 2), 0)
+    later = link.encode(link.Hash(1, 2), 3)
+    broken = bytearray(later)
+    broken[5] ^= 0x10
+    items = link.Decoder().feed(hash_frame + bytes(broken) + later)
+    assert items[1] == link.Loss("crc", bytes=len(later) - 1)
+    assert items[2] == link.Loss("sequence", frames=2)
+    assert isinstance(items[3], link.Frame)
+
+
+def test_the_c_side_withstands_fuzzing(tmp_path: Path) -> None:
+    if shutil.which("clang") is None:
+        pytest.fail("clang is not installed: ./tools/test installs it")
+    binary = link_fuzzer(tmp_path)
+    command = [
+        str(binary),
+        f"-runs={FUZZ_RUNS}",
+        "-seed=1",
+        "-max_len=1200",
+        "-timeout=10",
+        f"-artifact_prefix={tmp_path}/",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert f"Done {FUZZ_RUNS} runs" in done.stderr
+
+
+def link_fuzzer(folder: Path) -> Path:
+    binary = folder / "fuzz_link"
+    sources = [ROOT / "firmware" / "link" / "link.c", ROOT / "tests" / "fuzz" / "fuzz_link.c"]
+    options = ["-std=c99", "-g", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"]
+    subprocess.run(["clang", *options, f"-I{ROOT / 'firmware' / 'link'}", *sources, "-o", binary], check=True)
+    return binary
