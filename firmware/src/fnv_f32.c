@@ -4,14 +4,6 @@
 
 #include "finite_f32.h"
 
-uint32_t pvid_fnv_word(uint32_t hash, uint32_t word)
-{
-    for (size_t shift = 0; shift < 32u; shift = (uint8_t)(shift + 8u)) {
-        hash = (hash ^ ((word >> shift) & 0xFFu)) * 0x01000193u;
-    }
-    return hash;
-}
-
 uint32_t pvid_fnv_estimator_f32(uint32_t hash, const pvid_estimator_f32 *estimator, pvid_reason reason)
 {
     const pvid_model_f32 *model = estimator->model;

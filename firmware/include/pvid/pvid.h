@@ -8,15 +8,20 @@
 #include "pvid/arithmetic.h"
 #include "pvid/differentiator.h"
 #include "pvid/estimator.h"
+#include "pvid/estimator_q31.h"
 #include "pvid/fnv.h"
+#include "pvid/fnv_q31.h"
 #include "pvid/information.h"
 #include "pvid/kapitza.h"
 #include "pvid/kapitza_weak.h"
+#include "pvid/kapitza_weak_q31.h"
 #include "pvid/model.h"
+#include "pvid/model_q31.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
 #include "pvid/trust.h"
 #include "pvid/weak.h"
+#include "pvid/weak_q31.h"
 
 #define PVID_VERSION_MAJOR 0
 #define PVID_VERSION_MINOR 1

@@ -465,6 +465,11 @@ class Native:
         self._misfit_at, self._angle_size = sizes[8:]
 
     @property
+    def library(self) -> ctypes.CDLL:
+        """The shared library, for modules that bind more of it."""
+        return self._lib
+
+    @property
     def build(self) -> str:
         """Compiler and flags of this build."""
         return str(self._lib.pvid_native_build().decode())

@@ -43,3 +43,26 @@ def running_hashes(
         running = fold_bytes(running, data[tick * width : (tick + 1) * width])
         out[tick] = running
     return out
+
+
+def running_hashes_q31(
+    p: npt.NDArray[np.int32],
+    sums: npt.NDArray[np.int64],
+    exponent: npt.NDArray[np.uint8],
+    reason: npt.NDArray[np.uint8],
+    start: int = START,
+) -> npt.NDArray[np.uint32]:
+    """Hash after every tick of one lane of the fixed-point core (pvid/fnv_q31.h); shapes as in `running_hashes`."""
+    pieces = [
+        np.ascontiguousarray(p, "<i4").view(np.uint8),
+        np.ascontiguousarray(sums, "<i8").view(np.uint8),
+        exponent.astype("<u4")[:, None].view(np.uint8),
+        reason.astype("<u4")[:, None].view(np.uint8),
+    ]
+    data = np.concatenate(pieces, axis=1)
+    out = np.empty(len(data), np.uint32)
+    running = start
+    for tick, row in enumerate(data):
+        running = fold_bytes(running, row.tobytes())
+        out[tick] = running
+    return out

@@ -1,0 +1,169 @@
+/* pvid/estimator_q31.h - the estimator of estimator.h in integers alone.
+ *
+ * The same law, the same stages, the same reasons: see there. B and rr = sum (Y - N^T theta)^2 are always kept relative
+ * to the estimate, b = B - M theta, and moved along by b -= M dtheta at every step.
+ *
+ * Formats. Rows (N, Y) are int32 within +-PVID_ROW_LIMIT_Q31 in formats of the configuration; sums are exact int64.
+ * When one comes near 2^60, all of M, b and rr are divided by 4 (and rows, from then on, by 2): `exponent` counts how
+ * often, and forgetting brings it back. A solve works on 30-bit mantissas: M, C and S are scaled by powers of two such
+ * that their diagonals (columns) lie near 2^30, so that no format has to be right for every drive.
+ *
+ * Total and bounded: whatever the rows, no sum wraps, nothing is divided by 0, p stays inside its bounds. Not
+ * thread-safe.
+ */
+#ifndef PVID_ESTIMATOR_Q31_H
+#define PVID_ESTIMATOR_Q31_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pvid/estimator.h"
+#include "pvid/model_q31.h"
+#include "pvid/status.h"
+
+/* Largest |N_i|, |Y| and |Y - N^T theta| of a row that is taken in. */
+#define PVID_ROW_LIMIT_Q31 ((int32_t)1 << 28)
+
+/* Layout of the sums: n_theta (n_theta + 1) / 2 of M (upper triangle by rows), n_theta of b, rr, weight (Q16). */
+#define PVID_MAX_MOMENTS_Q31 ((PVID_MAX_THETA_Q31 * (PVID_MAX_THETA_Q31 + 1)) / 2)
+#define PVID_MAX_SUMS_Q31 (PVID_MAX_MOMENTS_Q31 + PVID_MAX_THETA_Q31 + 2)
+
+/* Settings; pvid.setup_q31 derives them from a rig file. */
+typedef struct {
+    const pvid_model_q31 *model;
+    int32_t start[PVID_MAX_P];    /* where p starts, within the bounds; p[i] in format p_bits[i] */
+    int32_t start_sd[PVID_MAX_P]; /* its standard deviation, > 0, in the format of p */
+    int32_t lower[PVID_MAX_P];    /* bounds of p; > 0 where the model says positive */
+    int32_t upper[PVID_MAX_P];
+    int8_t p_bits[PVID_MAX_P];    /* -64..64 */
+    int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of N, -64..64 */
+    int8_t y_bits;                /* format of Y, -64..64 */
+    int32_t row_sd;               /* expected standard deviation of Y - N^T theta, > 0 [2^-8 units of Y's integer] */
+    uint32_t forgetting_groups;   /* time constant of forgetting in groups of rows, 0: none, else 4..2^24 */
+    int32_t gain;                 /* g in Q30: 2^30 a Gauss-Newton step at every solve, 0 the paper's law */
+    uint32_t correlation;         /* Q16, 2^16..2^31: see estimator.h */
+    uint32_t row_weight;          /* Q16, 1..2^16 */
+    uint32_t step_limit;          /* Q16, 1..0.9: largest |dp/p| (|dp|/start_sd where p may be zero) */
+    int32_t kappa_min;            /* Q30, 0..0.999 */
+    uint16_t divider;             /* groups of rows a solve, 1.. */
+} pvid_estimator_config_q31;
+
+/* The sums M, b, rr and weight. */
+typedef struct {
+    uint8_t n_theta;
+    uint8_t exponent;  /* M, b and rr stand divided by 4^exponent */
+    uint16_t n_sums;
+    uint16_t block;    /* groups of rows between acts of forgetting */
+    uint16_t age;      /* groups since the last one */
+    int32_t retention; /* factor on the past, Q31; 2^31 - 1: everything is kept */
+    uint32_t row_weight;
+    int64_t sums[PVID_MAX_SUMS_Q31];
+} pvid_information_q31;
+
+/* State; only the functions below write to it. */
+typedef struct {
+    const pvid_model_q31 *model;
+    pvid_information_q31 information;
+    int32_t p[PVID_MAX_P];
+    int64_t theta[PVID_MAX_THETA_Q31];     /* f(p) */
+    int32_t mantissa[PVID_MAX_THETA_Q31];  /* of theta, 30 bits, */
+    int16_t shift[PVID_MAX_THETA_Q31];     /* and what N_i mantissa_i is shifted right by to be in units of Y */
+    int64_t fresh[PVID_MAX_THETA_Q31];     /* sum N e since the last solve; only while g < 1 */
+    int16_t align[PVID_MAX_THETA_Q31];     /* N_i theta_i 2^-align is in units of Y */
+    int16_t theta_bits[PVID_MAX_THETA_Q31];
+    int16_t c_exponent[PVID_MAX_C_Q31];    /* C_k 2^c_exponent: units of Y per N and p */
+    int32_t prior[PVID_MAX_P];             /* H0 = prior 2^-prior_exponent */
+    int16_t prior_exponent[PVID_MAX_P];
+    int32_t start_sd[PVID_MAX_P];
+    int32_t lower[PVID_MAX_P];
+    int32_t upper[PVID_MAX_P];
+    int32_t row_sd;
+    int32_t gain;
+    uint32_t correlation;
+    uint32_t step_limit;
+    int32_t kappa_min;
+    uint16_t divider;
+    uint16_t phase; /* groups since the last solve */
+    pvid_counters counters;
+} pvid_estimator_q31;
+
+/* 1/x = m 2^(k - 61), 2^30 <= m < 2^31, of an integer x. */
+typedef struct {
+    int32_t m;
+    uint8_t k;
+} pvid_reciprocal_q31;
+
+/* S = U U^T, both in Q30; elimination runs from the last index to the first, so that the last pivot is that of
+ * index 0. */
+typedef struct {
+    uint8_t n;
+    int32_t u[PVID_MAX_P][PVID_MAX_P];       /* above the diagonal */
+    pvid_reciprocal_q31 inverse[PVID_MAX_P]; /* 1 / U_jj in Q30 is m 2^(k - 31) */
+    int32_t first_pivot;                     /* pivot of index 0 over its diagonal entry, Q30 */
+} pvid_cholesky_q31;
+
+/* A solve in progress, kept by the caller; begin and advance write to it, `reason` is to be read. */
+typedef struct {
+    pvid_reason reason;
+    uint8_t stage;
+    uint8_t index; /* of the row within the stage */
+    uint8_t start; /* of the column of C in work among its non-zeros */
+    uint8_t next;  /* non-zero to be multiplied next */
+    bool ends_group;
+    int32_t gain;
+    int32_t m[PVID_MAX_MOMENTS_Q31];     /* M_ij = m_ij 2^(h_i + h_j) */
+    int16_t h[PVID_MAX_THETA_Q31];
+    int32_t c[PVID_MAX_C_Q31];           /* C_k = c_k 2^(f_column - h_row) */
+    int16_t f[PVID_MAX_P];
+    int64_t column[PVID_MAX_THETA_Q31];  /* m times a column of c */
+    int32_t force[PVID_MAX_THETA_Q31];   /* what drives the step, by rows: 2^(force_exponent + h_row) */
+    int32_t force_exponent;
+    int64_t s[PVID_MAX_P][PVID_MAX_P];   /* C^T M C + H0, in units of 2^(f_a + f_b + 32) */
+    int16_t g[PVID_MAX_P];               /* s_ab 2^-(g_a + g_b) is what is factored */
+    int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved */
+    int64_t theta[PVID_MAX_THETA_Q31];
+    int32_t theta_step[PVID_MAX_THETA_Q31]; /* theta_step_j 2^(step_exponent - h_j) in units of Y per N */
+    int32_t step_exponent;
+    int64_t moved[PVID_MAX_THETA_Q31];
+    pvid_cholesky_q31 factor;
+} pvid_estimator_solve_q31;
+
+/* What is published. */
+typedef struct {
+    int32_t p[PVID_MAX_P];  /* in the formats p_bits */
+    int32_t se[PVID_MAX_P]; /* standard errors in the same formats; start_sd where data say nothing */
+    int32_t correlation[PVID_MAX_P][PVID_MAX_P]; /* of the errors, Q30: covariance_ab = se_a se_b correlation_ab */
+    int32_t kappa;          /* Q30, 0..1: see estimator.h */
+    int32_t residual_sd;    /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1 */
+    uint32_t weight;        /* rows remembered */
+} pvid_estimate_q31;
+
+/* Prepares `self`. Fails iff a field of config is not as described there; the status names it. PVID_BAD_MODEL also
+ * where a format is out of range. */
+pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config);
+
+/* Moves p[index] to `value`, within its bounds, before the first row is taken in: a better start. */
+void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t value);
+
+/* Takes one row of a group in. Returns PVID_ACCUMULATED, or PVID_REJECTED_SATURATED with the state untouched but for
+ * the counter. */
+pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y);
+
+/* Ends a group of rows and, when the divider says so, solves and moves p. Returns PVID_UPDATED, PVID_ACCUMULATED (not
+ * due), PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT. */
+pvid_reason pvid_estimator_update_q31(pvid_estimator_q31 *self);
+
+/* One more Gauss-Newton step on the same sums, without ending a group. Same answers. */
+pvid_reason pvid_estimator_iterate_q31(pvid_estimator_q31 *self);
+
+/* The same solve in stages, as in estimator.h. */
+void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group);
+bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve);
+
+/* Number of stages of a solve that is due. */
+uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_group);
+
+/* Standard errors, kappa and residual of the present estimate, as pvid_estimator_assess_f32. Changes nothing. */
+void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31 *estimate);
+
+#endif

@@ -1,0 +1,40 @@
+/* pvid/model_q31.h - what the fixed-point estimator knows of a mechanism.
+ *
+ * The same as model.h tells the float core: theta = f(p) and the non-zeros of its Jacobian C. Numbers are integers
+ * with a format: a value is its integer times 2^-bits. The formats of p come from the configuration; the model says
+ * which formats theta and C have then. theta and C are int64 within +-2^47, so that no digit of p is lost.
+ */
+#ifndef PVID_MODEL_Q31_H
+#define PVID_MODEL_Q31_H
+
+#include <stdint.h>
+
+#include "pvid/config.h"
+
+/* Largest number of entries of theta (11: the strong form) and of non-zeros of C. */
+#ifndef PVID_MAX_THETA_Q31
+#define PVID_MAX_THETA_Q31 11
+#endif
+#if PVID_MAX_THETA_Q31 < 5 || PVID_MAX_THETA_Q31 > 12
+#error "PVID_MAX_THETA_Q31 must lie in 5..12"
+#endif
+#define PVID_MAX_C_Q31 (2 * PVID_MAX_THETA_Q31)
+
+typedef struct {
+    uint8_t n_theta;   /* entries of theta and N, 1..PVID_MAX_THETA_Q31 */
+    uint8_t n_p;       /* free parameters, 1..PVID_MAX_P; p[0] is the one kappa speaks of */
+    uint8_t n_c;       /* structural non-zeros of C, 1..PVID_MAX_C_Q31 */
+    uint32_t positive; /* bit i set: p[i] > 0 always, steps are taken relative to it */
+
+    const uint8_t *c_row;    /* [n_c] row in theta of each non-zero of C, ascending in a column */
+    const uint8_t *c_column; /* [n_c] its column (index in p), ascending */
+
+    /* theta[n_theta] = f(p) */
+    void (*theta)(const int32_t p[], int64_t theta[]);
+    /* c[n_c] = the non-zeros of d theta / d p at p, in the order of c_row */
+    void (*jacobian)(const int32_t p[], int64_t c[]);
+    /* formats of theta [n_theta] and C [n_c] for those of p [n_p] */
+    void (*formats)(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[]);
+} pvid_model_q31;
+
+#endif

@@ -1,0 +1,159 @@
+/* pvid/weak_q31.h - the weak form in integers alone: counts of the sensors in, parameters out.
+ *
+ * The same identifier as weak.h, in the same stages and the same schedule, for cores without a floating-point unit:
+ *
+ *   static pvid_weak_q31 identifier;
+ *   (config from the header that `pvid weak-table --core q31` writes)
+ *   if (pvid_weak_init_q31(&identifier, &config) != PVID_OK) ...
+ *   each tick: reason = pvid_weak_step_q31(&identifier, phi_counts, y_counts);
+ *
+ * Formats. Every number is an integer times a power of two that the design tool chose from the sensors' full scale, by
+ * interval analysis: no product or sum can exceed its type, whatever the samples. Angles are counted in fractions of
+ * the encoder's LSB (F), times in decimated samples dt, so that u and w are numbers of 1/dt^2. The inner loop
+ * multiplies a test function of 11 bits with a term of 21: one 32-bit multiplication on any core.
+ *
+ * Never allocates, never wraps, never divides by 0. A sample beyond full scale, or a pivot's acceleration beyond u_max,
+ * is counted as saturated and starts the windows again; the sums keep what they know. Not thread-safe.
+ */
+#ifndef PVID_WEAK_Q31_H
+#define PVID_WEAK_Q31_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pvid/config.h"
+#include "pvid/estimator_q31.h"
+#include "pvid/kapitza_weak_q31.h"
+
+/* What is integrated twice from a window's start: U F, F and U. */
+#define PVID_WEAK_INTEGRALS_Q31 3
+
+/* What a window gathers for each test function: ten sums with chi'', four with chi, one with chi''''. */
+#define PVID_WEAK_TERMS_Q31 15
+
+#define PVID_WEAK_GRAMS 6
+#define PVID_WEAK_COLUMNS_Q31 12 /* N1..N8, Y, a, b and one that stays 0 */
+
+/* Tables and formats of a design: constant data, made by `pvid weak-table --core q31`, kept by reference. See weak.h
+ * for what the tables are. */
+typedef struct {
+    uint16_t taps;       /* smoothing window [samples], odd, 5..PVID_MAX_TAPS */
+    uint16_t decimation; /* D, 1..PVID_MAX_DECIMATION */
+    uint16_t window;     /* W [decimated samples], odd, 9..PVID_MAX_WEAK_WINDOW */
+    uint8_t functions;   /* K, 4..PVID_MAX_FUNCTIONS */
+    uint8_t smooth_bits; /* format of smooth */
+    uint8_t phi_shift;   /* F = (centre 2^smooth_bits + sum smooth q) 2^-phi_shift */
+    uint8_t u_shift;     /* U = (sum second q) 2^-u_shift */
+    uint8_t uf_shift;    /* of the term U F */
+    uint8_t integral_shift[PVID_WEAK_INTEGRALS_Q31]; /* of the integrals in dt^2/12 */
+    uint8_t high_shift[2];    /* of the parts of U I2(U F), U I2(F) that go beyond a term */
+    uint8_t product_shift[5]; /* of what they leave, and of U I2(U), U I2(1), U t */
+    uint8_t sum_shift;        /* of chi times a term before it is added, 1.. */
+    uint8_t shift[PVID_WEAK_TERMS_Q31]; /* a term's share of its column: sum multiplier 2^-shift */
+    int8_t gram_bits[PVID_WEAK_GRAMS];
+    int32_t phi_max; /* full scale of the counts about phi_offset, y_offset */
+    int32_t y_max;
+    int32_t u_max;   /* largest |U|, below 2^18 */
+    const int32_t *smooth; /* [(taps - 1) / 2] */
+    const int32_t *second; /* [(taps - 1) / 2] */
+    const int16_t *chi;    /* [W][3][K] */
+    const int32_t *multiplier; /* [PVID_WEAK_TERMS_Q31] */
+    const int32_t *gram;   /* [6][K (K + 1) / 2] */
+} pvid_weak_design_q31;
+
+typedef struct {
+    const pvid_weak_design_q31 *design; /* must outlive the identifier, as must its tables */
+    int32_t phi_offset; /* reading of the encoder near rest [counts]; the estimated zero c is relative to it */
+    int32_t y_offset;   /* reading of the pivot's sensor in the middle of its travel [counts] */
+    int32_t drive_min;  /* rms of U over a window below which it is dropped, 0..2^18; 0: none is */
+    bool zero_unknown;  /* true: p = (w, d1, d2, c); false: p = (w, d1, d2), c = 0 */
+    uint8_t iterations; /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; one where gain < 1 */
+    pvid_estimator_config_q31 estimator; /* model is filled in by init */
+} pvid_weak_config_q31;
+
+/* The front end: a ring of counts, and the FIR job of the last complete block in slices. */
+typedef struct {
+    uint16_t half;
+    uint16_t length;
+    uint16_t decimation;
+    uint16_t slice;
+    uint16_t head;
+    uint16_t wait;
+    uint16_t pair;
+    uint16_t newer;
+    uint16_t older;
+    int32_t middle[2];
+    int64_t sum[2];
+    int32_t ring[PVID_MAX_TAPS + PVID_MAX_DECIMATION - 1][2]; /* phi, y [counts about their offsets] */
+} pvid_weak_front_q31;
+
+/* One of the two windows. */
+typedef struct {
+    uint16_t index; /* of the present decimated sample in the window, 0..W-2 */
+    bool whole;     /* the window has been filling from its first sample */
+    uint8_t buffer; /* which of the three it fills */
+    int64_t before[PVID_WEAK_INTEGRALS_Q31]; /* the integrands at the last sample */
+    int64_t once[PVID_WEAK_INTEGRALS_Q31];   /* twice their integrals */
+    int64_t twice[PVID_WEAK_INTEGRALS_Q31];  /* four times the integrals of these */
+    int64_t f_sum;
+    int64_t u_sum;
+    int64_t u_square_sum;
+} pvid_weak_window_q31;
+
+#define PVID_WEAK_FACTOR_Q31 ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
+
+/* The complete window that is being turned into rows and steps. */
+typedef struct {
+    uint8_t stage;
+    uint8_t index; /* of the function within the stage */
+    uint8_t iteration;
+    uint8_t buffer;
+    bool whitened;  /* the Gram matrix could be factored */
+    bool saturated; /* a column did not fit: none of the window's rows is taken in */
+    int16_t gram_bits; /* format of the Gram matrix at p, even */
+    int32_t combination[PVID_WEAK_GRAMS];
+    int16_t exponent[PVID_MAX_FUNCTIONS];           /* of the rows of the Gram matrix */
+    pvid_reciprocal_q31 inverse[PVID_MAX_FUNCTIONS]; /* of the factor's diagonal */
+    int32_t factor[PVID_WEAK_FACTOR_Q31];           /* R0, then its Cholesky factor, Q30 */
+    int32_t direction[PVID_MAX_FUNCTIONS];          /* that is being projected out, Q30; length 1 or 0 */
+    int64_t along[PVID_WEAK_COLUMNS_Q31];           /* the columns' components along it, Q30 */
+    pvid_estimator_solve_q31 solve;
+} pvid_weak_finish_q31;
+
+/* State; only the functions below write to it. */
+typedef struct {
+    const pvid_weak_design_q31 *design;
+    int32_t phi_offset;
+    int32_t y_offset;
+    int64_t drive_min;     /* (W - 1)^2 times the variance of U below which a window is dropped */
+    int8_t zero_bits;      /* format of c */
+    bool zero_unknown;
+    uint8_t iterations;
+    uint8_t slice;         /* functions a tick */
+    uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
+    uint8_t function;      /* functions of that window that have, 0..K-1 */
+    bool warm;             /* a window has been completed since the restart */
+    int32_t f;             /* the present decimated sample */
+    int32_t u;
+    pvid_weak_front_q31 front;
+    pvid_weak_window_q31 window[2];
+    pvid_weak_finish_q31 finish;
+    int32_t term[PVID_WEAK_TERMS_Q31]; /* of the window in work */
+    int32_t sums[3][PVID_MAX_FUNCTIONS][PVID_WEAK_TERMS_Q31];
+    pvid_estimator_q31 estimator;
+} pvid_weak_q31;
+
+/* Prepares `self`. Fails iff a field of config or of its design is out of its range (PVID_BAD_DESIGN,
+ * PVID_BAD_DRIVE_MIN, those of the estimator), or a window cannot be worked off before the next one is complete
+ * (PVID_BAD_ITERATIONS, as in weak.h). That the design's formats fit its tables is the design tool's word: it proves
+ * it before it writes them. */
+pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config);
+
+/* One tick: phi and y_A sampled together [counts]. Answers as pvid_weak_step_f32, but for a sample beyond full scale:
+ * PVID_REJECTED_SATURATED. */
+pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y);
+
+/* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
+void pvid_weak_gap_q31(pvid_weak_q31 *self);
+
+#endif

@@ -1,0 +1,101 @@
+#include "cholesky_q31.h"
+
+#include <stddef.h>
+
+int32_t pvid_half_exponent_q31(int64_t diagonal)
+{
+    const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(diagonal));
+    return (int32_t)pvid_floor_shift_q31((int64_t)length - 29, 1);
+}
+
+bool pvid_pivot_is_data_q31(int64_t pivot, int32_t diagonal)
+{
+    return (diagonal >= (PVID_ONE_Q30 / 4)) && (pivot >= ((int64_t)diagonal * (PVID_ONE_Q30 >> PVID_PIVOT_SHIFT)));
+}
+
+int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limit)
+{
+    const int64_t part = pvid_clamp_q31(pvid_round_shift_q31(total, 30), INT32_MAX);
+    return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(part * inverse.m, 31u - inverse.k), limit);
+}
+
+bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P])
+{
+    self->n = n;
+    self->first_pivot = 0;
+    for (size_t turn = 1; turn <= n; turn++) {
+        const size_t j = n - turn;
+        const int32_t diagonal = s[j][j];
+        int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
+        for (size_t k = j + 1u; k < n; k++) {
+            pivot -= (int64_t)self->u[j][k] * self->u[j][k];
+        }
+        if (!pvid_pivot_is_data_q31(pivot, diagonal)) {
+            return false;
+        }
+        if (j == 0u) {
+            self->first_pivot = (int32_t)(pivot / diagonal);
+        }
+        self->inverse[j] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
+        for (size_t i = 0; i < j; i++) {
+            int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
+            for (size_t k = j + 1u; k < n; k++) {
+                sum -= (int64_t)self->u[i][k] * self->u[j][k];
+            }
+            self->u[i][j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
+        }
+    }
+    return true;
+}
+
+void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[], int32_t x[])
+{
+    for (size_t turn = 1; turn <= self->n; turn++) {
+        const size_t i = self->n - turn;
+        int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
+        for (size_t k = i + 1u; k < self->n; k++) {
+            sum -= (int64_t)self->u[i][k] * x[k];
+        }
+        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
+    }
+}
+
+static void solve_upper(const pvid_cholesky_q31 *self, const int32_t rhs[], int32_t x[])
+{
+    for (size_t i = 0; i < self->n; i++) {
+        int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
+        for (size_t k = 0; k < i; k++) {
+            sum -= (int64_t)self->u[k][i] * x[k];
+        }
+        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
+    }
+}
+
+int32_t pvid_cholesky_solve_q31(const pvid_cholesky_q31 *self, const int64_t rhs[], int32_t x[])
+{
+    int32_t first[PVID_MAX_P];
+    int32_t middle[PVID_MAX_P];
+    int64_t wide[PVID_MAX_P];
+    const int32_t before = pvid_to_block_q31(self->n, rhs, PVID_RHS_BITS, first);
+    pvid_cholesky_lower_q31(self, first, middle);
+    for (size_t i = 0; i < self->n; i++) {
+        wide[i] = middle[i];
+    }
+    const int32_t after = pvid_to_block_q31(self->n, wide, PVID_RHS_BITS, middle);
+    solve_upper(self, middle, x);
+    return before + after;
+}
+
+int32_t pvid_to_block_q31(uint32_t n, const int64_t x[], int32_t bits, int32_t out[])
+{
+    uint32_t largest = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        const uint32_t length = pvid_bit_length_q31(pvid_magnitude_q31(x[i]));
+        largest = (length > largest) ? length : largest;
+    }
+    const int32_t exponent = (int32_t)largest - bits;
+    for (uint32_t i = 0; i < n; i++) {
+        out[i] = (int32_t)pvid_scale_q31(x[i], exponent);
+    }
+    return exponent;
+}

@@ -1,0 +1,27 @@
+/* The sums of the fixed-point estimator: exact, and never near the end of an int64. Private to the core. */
+#ifndef PVID_INFORMATION_Q31_H
+#define PVID_INFORMATION_Q31_H
+
+#include "pvid/estimator_q31.h"
+
+/* A sum of squares beyond this makes all sums of squares a quarter. */
+#define PVID_SUM_LIMIT ((int64_t)1 << 60)
+
+/* Empty sums; forgetting_groups as in pvid_estimator_config_q31. */
+void pvid_information_init_q31(pvid_information_q31 *self, uint8_t n_theta, uint32_t forgetting_groups,
+                               uint32_t row_weight);
+
+/* Adds a row (N, e) within PVID_ROW_LIMIT_Q31; fresh[n_theta] += N e too, unless NULL. */
+void pvid_information_add_q31(pvid_information_q31 *self, const int32_t n[], int32_t e, int64_t fresh[]);
+
+/* Ends a group of rows: forgets when it is time to, and keeps the sums of squares below PVID_SUM_LIMIT and, as far as
+ * they were divided before, above 2^54. fresh[n_theta] follows. */
+void pvid_information_end_group_q31(pvid_information_q31 *self, int64_t fresh[]);
+
+/* Place of M_ij, i <= j, among the sums. */
+static inline uint32_t pvid_moment_q31(uint32_t n_theta, uint32_t i, uint32_t j)
+{
+    return ((i * ((2u * n_theta) - i - 1u)) / 2u) + j;
+}
+
+#endif

@@ -1,0 +1,28 @@
+/* A complete window of the fixed-point weak form: from sums to rows to steps, one stage a call. Private to the core. */
+#ifndef PVID_WEAK_FINISH_Q31_H
+#define PVID_WEAK_FINISH_Q31_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pvid/weak_q31.h"
+
+/* No work. */
+void pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self);
+
+/* Starts on the window whose sums stand in self->buffer, at the estimator's present p. */
+void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
+                                const pvid_estimator_q31 *estimator);
+
+/* Whether a window is in work. */
+bool pvid_weak_finish_is_busy_q31(const pvid_weak_finish_q31 *self);
+
+/* One stage; sums are those of self->buffer. Writes what became of it to *reason if there is something to tell: a row
+ * was refused, or the window is done. */
+void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, uint8_t iterations,
+                               int32_t sums[][PVID_WEAK_TERMS_Q31], pvid_estimator_q31 *estimator, pvid_reason *reason);
+
+/* Number of stages of a window. */
+uint32_t pvid_weak_finish_stages_q31(uint8_t functions, uint8_t iterations, const pvid_estimator_q31 *estimator);
+
+#endif

@@ -1,0 +1,267 @@
+#include "pvid/weak_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "integer_q31.h"
+#include "weak_finish_q31.h"
+#include "weak_front_q31.h"
+#include "weak_window_q31.h"
+
+#define U_LIMIT ((int32_t)1 << 18)
+#define COUNTS_LIMIT ((int32_t)1 << 24)
+
+/* Counters stop at their end. */
+static void count(uint32_t *counter)
+{
+    if (*counter < UINT32_MAX) {
+        (*counter)++;
+    }
+}
+
+static bool is_odd_within(uint16_t n, uint16_t low, uint16_t high)
+{
+    return ((n % 2u) == 1u) && (n >= low) && (n <= high);
+}
+
+static bool is_count(int32_t x, int32_t limit)
+{
+    return (x > 0) && (x <= limit);
+}
+
+static bool shifts_are_valid(const uint8_t shift[], size_t n, uint8_t low, uint8_t high)
+{
+    bool valid = true;
+    for (size_t i = 0; i < n; i++) {
+        valid = valid && (shift[i] >= low) && (shift[i] <= high);
+    }
+    return valid;
+}
+
+static bool design_is_valid(const pvid_weak_design_q31 *design)
+{
+    if ((design == NULL) || !is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
+        !is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
+        (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
+        (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
+        (design->chi == NULL) || (design->gram == NULL) || (design->multiplier == NULL)) {
+        return false;
+    }
+    bool valid = is_count(design->phi_max, COUNTS_LIMIT) && is_count(design->y_max, COUNTS_LIMIT) &&
+                 is_count(design->u_max, U_LIMIT) && (design->smooth_bits <= 31u) && (design->phi_shift <= 62u) &&
+                 (design->u_shift <= 62u) && (design->uf_shift <= 62u) && (design->sum_shift >= 1u) &&
+                 (design->sum_shift <= 30u);
+    valid = valid && shifts_are_valid(design->integral_shift, PVID_WEAK_INTEGRALS_Q31, 0, 62) &&
+            shifts_are_valid(design->high_shift, 2, 0, 61) && shifts_are_valid(design->product_shift, 5, 0, 62) &&
+            shifts_are_valid(design->shift, PVID_WEAK_TERMS_Q31, 0, 62);
+    return valid;
+}
+
+static uint16_t hop_of(const pvid_weak_design_q31 *design)
+{
+    return (uint16_t)((design->window - 1u) / 2u);
+}
+
+/* Ticks of a block in which a window takes a sample in: the second half of a block is shared by two. At D = 2 one tick
+ * has to do for both, at D = 1 that of the front end. */
+static uint32_t ticks_a_window(uint32_t decimation)
+{
+    const uint32_t second_half = decimation - (decimation / 2u);
+    return (second_half > 1u) ? (second_half / 2u) : 1u;
+}
+
+/* Ticks of a block that are free for a window's stages. */
+static uint32_t free_ticks(const pvid_weak_q31 *self)
+{
+    const uint32_t decimation = self->design->decimation;
+    if (decimation <= 2u) {
+        return 1u;
+    }
+    const uint32_t slices = (self->design->functions + (self->slice - 1u)) / self->slice;
+    return decimation - (2u * slices);
+}
+
+pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL));
+    const pvid_weak_design_q31 *design = config->design;
+    if ((config->drive_min < 0) || (config->drive_min > U_LIMIT)) {
+        return PVID_BAD_DRIVE_MIN;
+    }
+    if (!design_is_valid(design)) {
+        return PVID_BAD_DESIGN;
+    }
+    memset(self, 0, sizeof *self);
+    pvid_estimator_config_q31 estimator = config->estimator;
+    estimator.model = config->zero_unknown ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;
+    const pvid_status status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if ((config->iterations < 1u) || (config->iterations > PVID_MAX_ITERATIONS)) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->design = design;
+    self->phi_offset = config->phi_offset;
+    self->y_offset = config->y_offset;
+    self->zero_unknown = config->zero_unknown;
+    self->zero_bits = config->zero_unknown ? config->estimator.p_bits[PVID_KAPITZA_C] : 0;
+    pvid_weak_front_init_q31(&self->front, design);
+    const int64_t drive_min = (int64_t)config->drive_min * (design->window - 1);
+    self->drive_min = drive_min * drive_min;
+    const uint32_t ticks = ticks_a_window(design->decimation);
+    self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
+    self->iterations = (uint8_t)((self->estimator.gain < PVID_ONE_Q30) ? 1u : config->iterations);
+    if (pvid_weak_finish_stages_q31(design->functions, self->iterations, &self->estimator) >
+        (hop_of(design) * free_ticks(self))) {
+        return PVID_BAD_ITERATIONS;
+    }
+    pvid_weak_finish_init_q31(&self->finish);
+    self->window[0].buffer = 0;
+    self->window[1].buffer = 1;
+    self->finish.buffer = 2;
+    pvid_weak_gap_q31(self);
+    return PVID_OK;
+}
+
+static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
+{
+    window->index = index;
+    window->whole = false;
+    for (size_t i = 0; i < PVID_WEAK_INTEGRALS_Q31; i++) {
+        window->before[i] = 0;
+        window->once[i] = 0;
+        window->twice[i] = 0;
+    }
+}
+
+/* The first window begins with the next decimated sample. The second stands in its middle then: what it gathers until
+ * its own beginning, half a window later, is thrown away, but must not come on top of what it had. */
+void pvid_weak_gap_q31(pvid_weak_q31 *self)
+{
+    const uint16_t hop = hop_of(self->design);
+    pvid_weak_front_reset_q31(&self->front);
+    restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
+    restart_window(&self->window[1], (uint16_t)(hop - 1u));
+    memset(self->sums[self->window[1].buffer], 0, sizeof self->sums[0]);
+    self->turn = 2;
+    self->warm = false;
+}
+
+/* The first window's mean angle is a better start of c than none: the pendulum swings about its rest. */
+static void place_zero(pvid_weak_q31 *self, const pvid_weak_window_q31 *window)
+{
+    if (!self->zero_unknown || (self->estimator.counters.rows > 0u)) {
+        return;
+    }
+    const uint64_t sum = pvid_magnitude_q31(pvid_scale_q31(window->f_sum, -self->zero_bits));
+    const int64_t mean = (int64_t)(sum / (self->design->window - 1u));
+    pvid_estimator_place_q31(&self->estimator, PVID_KAPITZA_C, (window->f_sum < 0) ? -mean : mean);
+}
+
+/* A window that has come round hands its sums over and goes on in the buffer that is free. Its last sample, which has
+ * no weight, is the first one of the next. Returns false if the window is dropped: its sums are cleared where they
+ * are. */
+static bool turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
+{
+    self->warm = true;
+    if (pvid_weak_window_drive_q31(window, self->design->window) < self->drive_min) {
+        count(&self->estimator.counters.held_not_excited);
+        return false;
+    }
+    const uint8_t full = window->buffer;
+    window->buffer = self->finish.buffer;
+    self->finish.buffer = full;
+    place_zero(self, window);
+    pvid_weak_finish_begin_q31(&self->finish, self->design, &self->estimator);
+    return true;
+}
+
+/* Returns false if this sample completes a window that is dropped. */
+static bool next_sample(pvid_weak_q31 *self)
+{
+    bool kept = true;
+    for (size_t i = 0; i < 2u; i++) {
+        pvid_weak_window_q31 *window = &self->window[i];
+        window->index++;
+        if (window->index == self->design->window - 1u) {
+            window->index = 0;
+            if (window->whole) {
+                kept = turn_over(self, window);
+            }
+            window->whole = true;
+        }
+    }
+    self->turn = 0;
+    self->function = 0;
+    return kept;
+}
+
+/* Adds the present sample to the next few functions: first all of one window, then all of the other. */
+static inline void add_slice(pvid_weak_q31 *self)
+{
+    const pvid_weak_design_q31 *design = self->design;
+    pvid_weak_window_q31 *window = &self->window[self->turn];
+    const size_t first = self->function;
+    const size_t end = first + self->slice;
+    const size_t last = (end < design->functions) ? end : design->functions;
+    if (first == 0u) {
+        pvid_weak_window_terms_q31(window, design, self->f, self->u, self->term);
+    }
+    pvid_weak_window_add_q31(window, design, self->term, first, last, self->sums[window->buffer]);
+    self->function = (uint8_t)last;
+    if (last == design->functions) {
+        self->function = 0;
+        self->turn++;
+    }
+}
+
+static pvid_reason reject(pvid_weak_q31 *self)
+{
+    pvid_weak_gap_q31(self);
+    count(&self->estimator.counters.rejected_saturated);
+    return PVID_REJECTED_SATURATED;
+}
+
+static bool is_within(int64_t x, int32_t limit)
+{
+    return (x >= -(int64_t)limit) && (x <= limit);
+}
+
+pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
+{
+    const pvid_weak_design_q31 *design = self->design;
+    const int64_t angle = (int64_t)phi - self->phi_offset;
+    const int64_t height = (int64_t)y - self->y_offset;
+    if (!is_within(angle, design->phi_max) || !is_within(height, design->y_max)) {
+        return reject(self);
+    }
+    bool kept = true;
+    bool adding = false;
+    int64_t u = 0;
+    if (pvid_weak_front_step_q31(&self->front, design, (int32_t)angle, (int32_t)height, &self->f, &u)) {
+        if (!is_within(u, design->u_max)) {
+            return reject(self);
+        }
+        self->u = (int32_t)u;
+        kept = next_sample(self);
+        if (design->decimation == 1u) {
+            add_slice(self);
+            add_slice(self);
+        }
+    } else if (self->turn < 2u) {
+        adding = true;
+        add_slice(self);
+        if (design->decimation == 2u) {
+            add_slice(self);
+        }
+    }
+    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+    if (!kept) {
+        reason = PVID_HELD_NOT_EXCITED;
+    } else if (!adding && pvid_weak_finish_is_busy_q31(&self->finish)) {
+        pvid_weak_finish_step_q31(&self->finish, design, self->iterations, self->sums[self->finish.buffer],
+                                  &self->estimator, &reason);
+    }
+    return reason;
+}

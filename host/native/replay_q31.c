@@ -1,0 +1,77 @@
+/* The C side of pvid.native_q31: replays a run through the shipped fixed-point core and records every tick. */
+#include "replay_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define FIELD(type, field) (uint32_t) offsetof(type, field)
+
+const uint32_t pvid_native_layout_q31[] = {
+    (uint32_t)sizeof(pvid_estimator_config_q31),
+    FIELD(pvid_estimator_config_q31, p_bits),
+    FIELD(pvid_estimator_config_q31, row_sd),
+    FIELD(pvid_estimator_config_q31, divider),
+    (uint32_t)sizeof(pvid_weak_design_q31),
+    FIELD(pvid_weak_design_q31, shift),
+    FIELD(pvid_weak_design_q31, phi_max),
+    FIELD(pvid_weak_design_q31, gram),
+    (uint32_t)sizeof(pvid_weak_config_q31),
+    FIELD(pvid_weak_config_q31, zero_unknown),
+    FIELD(pvid_weak_config_q31, estimator),
+    (uint32_t)sizeof(pvid_estimate_q31),
+    FIELD(pvid_estimate_q31, kappa),
+    (uint32_t)sizeof(pvid_estimator_q31),
+    FIELD(pvid_estimator_q31, counters),
+    (uint32_t)sizeof(pvid_weak_q31),
+    FIELD(pvid_weak_q31, estimator),
+    PVID_MAX_P,
+    PVID_MAX_THETA_Q31,
+};
+const uint32_t pvid_native_layout_q31_length = sizeof pvid_native_layout_q31 / sizeof pvid_native_layout_q31[0];
+
+static void record_tick(const pvid_record_q31 *record, uint32_t tick, const pvid_estimator_q31 *estimator,
+                        pvid_reason reason)
+{
+    const pvid_information_q31 *information = &estimator->information;
+    const size_t n_p = estimator->model->n_p;
+    const size_t n_sums = information->n_sums;
+    if (record->p != NULL) {
+        memcpy(&record->p[tick * n_p], estimator->p, n_p * sizeof estimator->p[0]);
+    }
+    if (record->sums != NULL) {
+        memcpy(&record->sums[tick * n_sums], information->sums, n_sums * sizeof information->sums[0]);
+    }
+    if (record->exponent != NULL) {
+        record->exponent[tick] = information->exponent;
+    }
+    if (record->reason != NULL) {
+        record->reason[tick] = (uint8_t)reason;
+    }
+    if (record->hash != NULL) {
+        *record->running_hash = pvid_fnv_estimator_q31(*record->running_hash, estimator, reason);
+        record->hash[tick] = *record->running_hash;
+    }
+    if ((record->estimate != NULL) && ((tick % record->estimate_every) == 0u)) {
+        pvid_estimator_assess_q31(estimator, &record->estimate[tick / record->estimate_every]);
+    }
+}
+
+void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
+                          const pvid_record_q31 *record)
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_weak_step_q31(self, phi[tick], y[tick]);
+        record_tick(record, tick, &self->estimator, reason);
+    }
+}
+
+void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_t n[], const int32_t y[],
+                          const pvid_record_q31 *record)
+{
+    const size_t n_theta = self->model->n_theta;
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason added = pvid_estimator_add_q31(self, &n[tick * n_theta], y[tick]);
+        const pvid_reason reason = (added == PVID_ACCUMULATED) ? pvid_estimator_update_q31(self) : added;
+        record_tick(record, tick, self, reason);
+    }
+}

@@ -1,0 +1,33 @@
+/* What pvid.native_q31 calls besides the core itself: the fixed-point counterpart of replay.h. */
+#ifndef PVID_REPLAY_Q31_H
+#define PVID_REPLAY_Q31_H
+
+#include <stdint.h>
+
+#include "pvid/pvid.h"
+
+/* Where a replay writes; NULL: not recorded. Rows stand one after the other, without padding. */
+typedef struct {
+    int32_t *p;             /* [ticks][n_p] */
+    int64_t *sums;          /* [ticks][n_sums] */
+    uint8_t *exponent;      /* [ticks] of the sums */
+    uint8_t *reason;        /* [ticks] */
+    uint32_t *hash;         /* [ticks] running hash after the tick */
+    uint32_t *running_hash; /* in and out; needed with hash */
+    pvid_estimate_q31 *estimate; /* [ticks / estimate_every, rounded up] */
+    uint32_t estimate_every;
+} pvid_record_q31;
+
+/* Sizes and offsets of every struct that Python mirrors, in the order of native_q31.py. */
+extern const uint32_t pvid_native_layout_q31[];
+extern const uint32_t pvid_native_layout_q31_length;
+
+/* Steps an initialised identifier through a run of counts. */
+void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
+                          const pvid_record_q31 *record);
+
+/* Steps an initialised estimator through rows n[ticks][n_theta], y[ticks], a group each. */
+void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_t n[], const int32_t y[],
+                          const pvid_record_q31 *record);
+
+#endif

@@ -1,0 +1,93 @@
+"""From a rig file to the settings of the fixed-point core."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.native import Law
+from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31
+from pvid.rigfile import RigFile
+from pvid.setup import weak_config, weak_design_of
+from pvid.weak_design_q31 import WeakTablesQ31, weak_tables_q31
+
+
+def format_of(largest: float) -> int:
+    """Bits after the point with which |x| <= largest fits an int32."""
+    return math.floor(math.log2((2**31 - 2) / largest))
+
+
+def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
+    """The tables a rig file asks for."""
+    return weak_tables_q31(
+        weak_design_of(rig, sample_rate), rig.sensor.phi_lsb, rig.sensor.y_lsb, 0.5, rig.l1 / 10, 4 * rig.nominal.g
+    )
+
+
+def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
+    """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p."""
+    tables = tables_of(rig, sample_rate)
+    float_config = weak_config(rig, sample_rate, start)
+    e = float_config.estimator
+    n_p = 4 if float_config.zero_unknown else 3
+    unit = np.array([1 / tables.dt**2, 1.0, 1.0, tables.f_unit])[:n_p]  # of p, in SI
+    # bounds, and with them formats, are the nominal start's: one program for every start
+    nominal = weak_config(rig, sample_rate).estimator
+    lower = np.asarray(nominal.lower, np.float64)[:n_p] / unit
+    upper = np.asarray(nominal.upper, np.float64)[:n_p] / unit
+    start_p = np.asarray(e.start, np.float64)[:n_p] / unit
+    sd = np.asarray(e.start_sd, np.float64)[:n_p] / unit
+    bits = [format_of(x) for x in np.maximum(np.abs(lower), upper)]
+
+    def integers(x: npt.NDArray[np.float64]) -> tuple[int, ...]:
+        return tuple(int(np.rint(v * 2.0**b)) for v, b in zip(x, bits, strict=True))
+
+    functions = tables.functions
+    y_bits = tables.column_bits[8]
+    estimator = EstimatorConfigQ31(
+        start=integers(start_p),
+        start_sd=integers(sd),
+        lower=tuple(max(1, x) if i < 3 else x for i, x in enumerate(integers(lower))),
+        upper=integers(upper),
+        p_bits=tuple(bits),
+        n_bits=tables.column_bits[: 8 if n_p == 4 else 5],
+        y_bits=y_bits,
+        row_sd=max(1, round(e.row_sd / tables.f_unit * 2.0 ** (y_bits + 8))),
+        forgetting_groups=round(e.forgetting_s * sample_rate / (tables.decimation * float_config.hop)),
+        gain=0 if e.law is Law.PSEUDOVELOCITY else 2**30,
+        correlation=round(tables.overlap * 2**16),
+        row_weight=round((functions - 2) / functions * 2**16),
+        step_limit=round(e.step_limit * 2**16),
+        kappa_min=round(e.kappa_min * 2**30),
+        divider=e.divider,
+    )
+    return WeakConfigQ31(
+        design=tables,
+        estimator=estimator,
+        zero_unknown=float_config.zero_unknown,
+        iterations=float_config.iterations,
+        drive_min=round(float_config.drive_min * tables.dt**2 * 2.0**tables.u_bits),
+    )
+
+
+def units_of(config: WeakConfigQ31) -> npt.NDArray[np.float64]:
+    """One unit of each of the core's integers p in SI [n_p]."""
+    bits = np.array(config.estimator.p_bits, np.float64)
+    unit = np.array([1 / config.design.dt**2, 1.0, 1.0, config.design.f_unit])[: len(bits)]
+    return np.asarray(unit * 2.0**-bits)
+
+
+def p_of(config: WeakConfigQ31, p: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """p = (w, d1, d2, c) in SI from the core's integers [..., n_p]; c is the encoder's reading at rest."""
+    values = np.asarray(p, np.float64) * units_of(config)
+    if values.shape[-1] > 3:
+        lsb = config.design.f_unit * 2.0 ** (config.design.smooth_bits - config.design.phi_shift)
+        values[..., 3] += config.phi_offset * lsb
+    return np.asarray(values)
+
+
+def se_of(config: WeakConfigQ31, se: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Standard errors in SI from the core's integers [..., n_p]."""
+    return np.asarray(np.asarray(se, np.float64) * units_of(config))

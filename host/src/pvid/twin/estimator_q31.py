@@ -1,0 +1,416 @@
+"""Twin of estimator_q31.c and information_q31.c: integers, one lane a start, lanes last."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.errors import PvidError
+from pvid.native import Reason
+from pvid.native_q31 import ESTIMATE_DTYPE, EstimatorConfigQ31
+from pvid.twin import cholesky_q31 as cholesky
+from pvid.twin.integer_q31 import (
+    WIDE,
+    Int,
+    bit_length,
+    clamp,
+    integers,
+    root_of,
+    round_shift,
+    scale,
+    times_q31,
+)
+from pvid.twin.kapitza_weak_q31 import ModelQ31
+
+Mask = npt.NDArray[np.bool_]
+Reasons = npt.NDArray[np.uint8]
+
+ONE = 2**30
+ROW_LIMIT = 2**28
+SUM_LIMIT = 2**60  # above it the sums are divided by 4
+SUM_LOW = 2**54  # below it, if they were divided, they are multiplied by 4 again
+STEP_MAX = 2**40  # of |dp|, far beyond the bounds of p
+TERM_MAX = 2**40  # of |N_i theta_i|, far beyond the limit of a row
+HELD_LIMIT = 2 * SUM_LIMIT  # of |b|, rr and what a step may add to them
+UNIT_BITS = cholesky.RHS_BITS - 1
+_NOTHING = -200  # exponent of a number that is 0
+_COUNTERS = (
+    "rows",
+    "updates",
+    "limited",
+    "bounded",
+    "held_not_excited",
+    "held_pivot",
+    "rejected_not_finite",
+    "rejected_saturated",
+    "held_uncertain",
+    "held_out_of_range",
+    "misfits",
+)
+
+
+def length(x: Int) -> Int:
+    """Bits of |x|; very negative for 0, so that it never is the largest."""
+    return np.where(x == 0, _NOTHING, bit_length(np.abs(x)))
+
+
+def decay(groups: int, block: int) -> int:
+    """exp(-block / groups) in Q31, block <= groups / 4."""
+    x = (block << 31) // groups
+    total = 1 << 31
+    for k in range(12, 0, -1):
+        total = (1 << 31) - (((x * total) >> 31) // k)
+    return total
+
+
+class EstimatorQ31:
+    """pvid_estimator_q31 in every lane; all lanes share model, formats, gain, divider and forgetting.
+
+    p int64 [n_p, lanes]; sums int64 [n_sums, lanes]: M, b, rr times 4^-exponent, weight in Q16.
+    """
+
+    _ROWS_A_STAGE = 4
+    _COLUMNS_A_STAGE = 3
+
+    def __init__(self, configs: Sequence[EstimatorConfigQ31], model: ModelQ31) -> None:
+        first = configs[0]
+        for c in configs:
+            if (c.p_bits, c.n_bits, c.y_bits, c.gain, c.divider, c.forgetting_groups) != (
+                first.p_bits,
+                first.n_bits,
+                first.y_bits,
+                first.gain,
+                first.divider,
+                first.forgetting_groups,
+            ):
+                raise PvidError("lanes of one twin must share formats, gain, divider and forgetting")
+        self.model = model
+        lanes = len(configs)
+
+        def stacked(name: str) -> Int:
+            return np.stack([integers(getattr(c, name))[: model.n_p] for c in configs], axis=1)
+
+        def lane(name: str) -> Int:
+            return integers([getattr(c, name) for c in configs])
+
+        self.p = stacked("start")
+        self.start_sd = stacked("start_sd")
+        self.lower = stacked("lower")
+        self.upper = stacked("upper")
+        self.row_sd = lane("row_sd")
+        self.correlation = lane("correlation")
+        self.row_weight = lane("row_weight")
+        self.step_limit = lane("step_limit")
+        self.kappa_min = lane("kappa_min")
+        self.gain = first.gain
+        self.divider = first.divider
+        self.block, self.retention = self._forgetting(first.forgetting_groups)
+        theta_bits, c_bits = model.formats(first.p_bits)
+        # e = Y - sum N_i theta_i 2^-align_i;  C in units of e per N_i per p_a is c_k 2^c_exponent_k
+        self.align = [t + n - first.y_bits for t, n in zip(theta_bits, first.n_bits, strict=True)]
+        self.c_exponent = [
+            first.y_bits - first.n_bits[row] - first.p_bits[column] - bits
+            for row, column, bits in zip(model.c_row, model.c_column, c_bits, strict=True)
+        ]
+        self.theta_bits = theta_bits
+        self.theta = model.theta(self.p)
+        self.phase = 0
+        self.age = 0
+        self.exponent = np.zeros(lanes, np.int64)
+        self.sums = np.zeros((model.n_sums, lanes), np.int64)
+        self.fresh = np.zeros((model.n_theta, lanes), np.int64)
+        self.counters = {name: np.zeros(lanes, np.int64) for name in _COUNTERS}
+        self.was_due = True
+        self.prior, self.prior_exponent = self._square_ratio(self.row_sd, integers(-8))
+
+    def _square_ratio(self, sd: Int, exponent: Int) -> tuple[Int, Int]:
+        """(sd 2^exponent / start_sd)^2 = prior 2^-prior_exponent, prior of 31 bits."""
+        ratio = (sd << 31) // self.start_sd
+        up = 31 - bit_length(ratio)
+        mantissa = scale(ratio, -up)
+        prior = np.minimum(round_shift(mantissa * mantissa, 31), 2**31 - 1)
+        return prior, 2 * ((31 + up) - exponent) - 31
+
+    @staticmethod
+    def _in_units_of_s(prior: Int, prior_exponent: Int, f: Int) -> Int:
+        return np.minimum(scale(prior, prior_exponent + 2 * f + 32), WIDE // 2)
+
+    @staticmethod
+    def _forgetting(groups: int) -> tuple[int, int]:
+        if groups == 0:
+            return 64, 2**31 - 1
+        block = 1 if groups < 32 else min(groups // 16, 64)
+        return block, min(decay(groups, block), 2**31 - 1)
+
+    @property
+    def lanes(self) -> int:
+        """Number of lanes."""
+        return int(self.p.shape[1])
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether the law is a rate (g < 1) that does not iterate."""
+        return self.gain < ONE
+
+    def mantissas(self, values: Int) -> tuple[Int, Int]:
+        """values = m 2^h with m of 30 bits."""
+        h = bit_length(np.abs(values)) - 30
+        return scale(values, h), h
+
+    def place(self, index: int, value: int) -> None:
+        """A better start of p[index], within its bounds."""
+        self.p = self.p.copy()
+        self.p[index] = np.clip(value, self.lower[index], self.upper[index])
+        self.theta = self.model.theta(self.p)
+
+    def add(self, n: Int, y: Int) -> Reasons:
+        """One row of a group: N [n_theta, lanes], Y [lanes]."""
+        m, h = self.mantissas(self.theta)
+        fits = np.abs(y) <= ROW_LIMIT
+        e = y
+        for i in range(self.model.n_theta):
+            fits = fits & (np.abs(n[i]) <= ROW_LIMIT)
+            e = e - clamp(scale(clamp(n[i], ROW_LIMIT) * m[i], self.align[i] - h[i]), TERM_MAX)
+        fits = fits & (np.abs(e) <= ROW_LIMIT)
+        e = round_shift(np.where(fits, e, 0), self.exponent)
+        row = round_shift(np.where(fits, n, 0), self.exponent)
+        upper, column = np.triu_indices(self.model.n_theta)
+        weight = np.where(fits, self.row_weight, 0)
+        self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
+        if self.is_rate:
+            self.fresh = self.fresh + row * e
+        reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
+        self.counters["rows"] += fits
+        self.counters["rejected_saturated"] += ~fits
+        return reason
+
+    def solve(self, ends_group: bool) -> Iterator[Reasons | None]:
+        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one."""
+        reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
+        self.was_due = True
+        if ends_group:
+            self.phase += 1
+            self.was_due = self.phase >= self.divider
+        elif self.is_rate:
+            yield reason
+            return
+        if self.was_due:
+            if ends_group:
+                self.phase = 0
+            for _ in range(self._stages_before_commit()):
+                yield None
+            reason = self._commit(self.gain if ends_group else ONE)
+            yield None if ends_group else reason
+        if ends_group:
+            self._end_group()
+            yield reason
+
+    def _stages_before_commit(self) -> int:
+        columns = self.model.c_column
+        projections = sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
+        return 3 + projections + -(-self.model.n_theta // self._ROWS_A_STAGE)
+
+    # ---- information ----
+
+    def _end_group(self) -> None:
+        self.age += 1
+        if self.age >= self.block:
+            self.age = 0
+            if self.retention < 2**31 - 1:
+                self.sums = times_q31(self.sums, integers(self.retention))
+        largest = np.max(self._matrix(self.sums).diagonal(axis1=0, axis2=1), axis=1)
+        largest = np.maximum(largest, self.sums[-2])
+        high = largest > SUM_LIMIT
+        low = (largest < SUM_LOW) & (self.exponent > 0)
+        change = np.where(high, 2, np.where(low, -2, 0))
+        self.sums[:-1] = scale(self.sums[:-1], change)
+        self.fresh = scale(self.fresh, change)
+        self.exponent = self.exponent + change // 2
+
+    def _matrix(self, sums: Int) -> Int:
+        n = self.model.n_theta
+        m = np.empty((n, n, sums.shape[1]), np.int64)
+        upper, column = np.triu_indices(n)
+        m[upper, column] = sums[: self.model.moments]
+        m[column, upper] = sums[: self.model.moments]
+        return m
+
+    # ---- the solve ----
+
+    def _equilibrated(self) -> tuple[Int, Int]:
+        """(m, h): M_ij = m_ij 2^(h_i + h_j), m within 30 bits."""
+        matrix = self._matrix(self.sums)
+        n = self.model.n_theta
+        h = np.stack([cholesky.half_exponent(matrix[i, i]) for i in range(n)])
+        return clamp(scale(matrix, h[:, None] + h[None]), ONE), h
+
+    def _jacobian(self, h: Int) -> tuple[Int, Int]:
+        """(c, f): C_ka = c_k 2^(f_a - h_row), c within 29 bits."""
+        model = self.model
+        c = model.jacobian(self.p)
+        f = np.full((model.n_p, self.lanes), _NOTHING, np.int64)
+        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
+            f[column] = np.maximum(f[column], length(c[k]) + self.c_exponent[k] + h[row])
+        f = f - 29
+        scaled = [
+            scale(c[k], f[column] - self.c_exponent[k] - h[row])
+            for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True))
+        ]
+        return np.stack(scaled), f
+
+    def _project(self, c: Int, m: Int) -> Int:
+        """The upper triangle of C^T M C, in units of 2^(f_a + f_b + 32) [n_p, n_p, lanes]."""
+        model = self.model
+        s = np.zeros((model.n_p, model.n_p, self.lanes), np.int64)
+        for a in range(model.n_p):
+            own = [k for k, column in enumerate(model.c_column) if column == a]
+            t = np.zeros((model.n_theta, self.lanes), np.int64)
+            for k in own:
+                t = t + m[model.c_row[k]] * c[k]
+            t = round_shift(t, 32)
+            for k in range(own[0], len(model.c_row)):
+                b = model.c_column[k]
+                s[a, b] = s[a, b] + c[k] * t[model.c_row[k]]
+        return s
+
+    def _equilibrated_system(self, s: Int) -> tuple[Int, Int]:
+        """(S in Q30, g): s_ab = S_ab 2^(g_a + g_b)."""
+        n_p = self.model.n_p
+        g = np.stack([cholesky.half_exponent(s[a, a]) for a in range(n_p)])
+        return clamp(scale(s, g[:, None] + g[None]), ONE), g
+
+    def _commit(self, gain: int) -> Reasons:
+        model = self.model
+        m, h = self._equilibrated()
+        c, f = self._jacobian(h)
+        s = self._project(c, m)
+        prior = self._in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
+        for a in range(model.n_p):
+            s[a, a] = s[a, a] + prior[a]
+        q, g = self._equilibrated_system(s)
+        factor = cholesky.factor(q)
+        own = round_shift(factor.first_pivot * q[0, 0], 31) >= scale(prior[0], 2 * g[0])
+        excited = (factor.first_pivot >= self.kappa_min) & (own | (self.kappa_min == 0))
+        reason = np.full(self.lanes, Reason.UPDATED, np.uint8)
+        reason[~excited] = Reason.HELD_NOT_EXCITED
+        reason[~factor.ok] = Reason.HELD_PIVOT
+
+        b = self.sums[model.moments : model.moments + model.n_theta]
+        force, force_h = cholesky.to_block(scale(self._driving(b, gain), h), 30)
+        self.fresh[:] = 0
+        rhs = np.zeros((model.n_p, self.lanes), np.int64)
+        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
+            rhs[column] = rhs[column] + c[k] * force[row]
+        x, x_h = cholesky.solve(factor, scale(rhs, g))
+        dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
+        p = self._limited(dp, reason == Reason.UPDATED)
+        return self._follow(p, m, h, b, reason)
+
+    def _driving(self, b: Int, gain: int) -> Int:
+        """g b + (1 - g) sum N e since the last solve."""
+        if gain == ONE:
+            return b
+        if gain == 0:
+            return self.fresh
+        return times_q31(b, integers(2 * gain)) + times_q31(self.fresh, integers(2 * (ONE - gain)))
+
+    def _limited(self, dp: Int, moving: Mask) -> Int:
+        """Where the step leads: shortened to the step limit, within the bounds; p where nothing moves."""
+        size = np.zeros(self.lanes, np.int64)
+        for a in range(self.model.n_p):
+            reference = self.p[a] if self.model.positive[a] else self.start_sd[a]
+            size = np.maximum(size, (np.abs(dp[a]) << 16) // reference)
+        limited = size > self.step_limit
+        factor = (self.step_limit << 31) // np.maximum(size, self.step_limit + 1)
+        x = self.p + np.where(limited, times_q31(dp, factor), dp)
+        above, below = x > self.upper, x < self.lower
+        x = np.where(above, self.upper, np.where(below, self.lower, x))
+        self.counters["limited"] += moving & limited
+        self.counters["bounded"] += moving & (above | below).any(axis=0)
+        return np.where(moving, x, self.p)
+
+    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons) -> Reasons:
+        """Moves p, theta, b and rr together: b -= M dtheta, rr -= dtheta^T (b_old + b_new)."""
+        model = self.model
+        theta = model.theta(p)
+        step = theta - self.theta
+        align = integers(self.align)[:, None]
+        v_h = np.max(length(step) - align + h, axis=0) - 29
+        v = scale(step, v_h + align - h)
+        b = clamp(b, HELD_LIMIT)
+        moved = np.zeros_like(b)
+        for j in range(model.n_theta):
+            moved = moved + m[j] * v[j]
+        moved = clamp(scale(moved, -(h + v_h)), HELD_LIMIT)
+        w, w_h = cholesky.to_block(scale(2 * b - moved, h), 30)
+        fall = np.zeros(self.lanes, np.int64)
+        for j in range(model.n_theta):
+            fall = fall + v[j] * w[j]
+        residual = self.sums[-2] - clamp(scale(fall, -(v_h + w_h)), HELD_LIMIT)
+        overflow = (reason == Reason.UPDATED) & ((residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0))
+        reason[overflow] = Reason.HELD_PIVOT
+        moving = reason == Reason.UPDATED
+        kept = self.sums[model.moments : -2]
+        self.sums[model.moments : -2] = np.where(moving, b - moved, kept)
+        self.sums[-2] = np.where(moving, np.maximum(residual, 0), self.sums[-2])
+        self.theta = np.where(moving, theta, self.theta)
+        self.p = np.where(moving, p, self.p)
+        self.counters["updates"] += moving
+        self.counters["held_not_excited"] += reason == Reason.HELD_NOT_EXCITED
+        self.counters["held_pivot"] += reason == Reason.HELD_PIVOT
+        return reason
+
+    # ---- what is published ----
+
+    def _row_variance(self) -> tuple[Int, Int]:
+        """(m, h): s^2 of a row is m 2^h, divided by 4^exponent as the sums are."""
+        residual, weight = self.sums[-2], self.sums[-1]
+        freedom = weight - (self.model.n_p << 16)
+        up = 62 - bit_length(residual)
+        divisor, divisor_h = self.mantissas(np.maximum(freedom, 1 << 16))
+        from_rows = self.mantissas(scale(residual, -up) // divisor)
+        from_start = self.mantissas(self.row_sd * self.row_sd)
+        few = freedom < (1 << 16)
+        m = np.where(few, from_start[0], from_rows[0])
+        h = np.where(few, from_start[1] - 2 * (8 + self.exponent), from_rows[1] - up - (divisor_h - 16))
+        return m, h
+
+    def assess(self) -> npt.NDArray[np.void]:
+        """pvid_estimator_assess_q31 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        n_p = self.model.n_p
+        out = np.zeros(self.lanes, ESTIMATE_DTYPE)
+        out["p"][:, :n_p] = self.p.T
+        out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
+        variance, variance_h = self._row_variance()
+        residual, residual_e = root_of(variance, variance_h)
+        out["residual_sd"] = clamp(scale(residual, -(residual_e + self.exponent + 8)), 2**31 - 1)
+        wide, wide_h = self.mantissas(variance * self.correlation)
+        root, root_e = root_of(wide, wide_h + variance_h - 16)
+        m, h = self._equilibrated()
+        c, f = self._jacobian(h)
+        s = self._project(c, m)
+        out["kappa"] = cholesky.factor(self._equilibrated_system(s)[0]).first_pivot
+        prior, prior_exponent = self._square_ratio(root, root_e)
+        for a in range(n_p):
+            s[a, a] = s[a, a] + self._in_units_of_s(prior[a], prior_exponent[a], f[a])
+        q, g = self._equilibrated_system(s)
+        factor = cholesky.factor(q)
+        units = [np.zeros((n_p, self.lanes), np.int64) for _ in range(n_p)]
+        for a in range(n_p):
+            units[a][a] = 1 << UNIT_BITS
+        columns = [cholesky.lower_solve(factor, unit) for unit in units]
+        roots = [root_of(np.sum(column * column, axis=0), integers(0)) for column in columns]
+        for a, (r, e) in enumerate(roots):
+            se = clamp(scale(root * r, f[a] + g[a] - (root_e + e) + 31 + UNIT_BITS), 2**31 - 1)
+            out["se"][:, a] = np.where(factor.ok, se, self.start_sd[a])
+            out["correlation"][:, a, a] = ONE
+            for b in range(a):
+                r_b, e_b = roots[b]
+                x = scale(np.sum(columns[a] * columns[b], axis=0), e + e_b)
+                part = np.sign(x) * np.minimum(((np.abs(x) // r) << 30) // r_b, ONE)
+                out["correlation"][:, a, b] = np.where(factor.ok, part, 0)
+                out["correlation"][:, b, a] = out["correlation"][:, a, b]
+        return out

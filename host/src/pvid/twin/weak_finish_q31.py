@@ -1,0 +1,156 @@
+"""Twin of weak_finish_q31.c: a complete window becomes rows and steps, one stage a tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.native import Reason
+from pvid.twin import cholesky_q31 as cholesky
+from pvid.twin.estimator_q31 import EstimatorQ31
+from pvid.twin.integer_q31 import (
+    Int,
+    clamp,
+    integers,
+    reciprocal,
+    round_shift,
+    scale,
+    square_root,
+)
+from pvid.weak_design_q31 import COLUMN_TERMS, WeakTablesQ31
+
+Mask = npt.NDArray[np.bool_]
+Reasons = npt.NDArray[np.uint8]
+
+COLUMNS = 12
+COLUMN_LIMIT = 2**28
+DIRECTION_BITS = 27
+_Y, _A, _B = 8, 9, 10
+_FUNCTIONS_A_STAGE = 6
+
+
+def assemble(sums: Int, design: WeakTablesQ31) -> Int:
+    """Columns N1..N8, Y, a, b, 0 [12, functions] from the sums [functions, 15] of a window."""
+    share = round_shift(sums * design.multiplier.astype(np.int64), np.array(design.shift)).T
+    columns = [sum((share[k] for k in parts), np.zeros_like(share[0])) for parts in COLUMN_TERMS]
+    return np.stack([*columns, np.zeros_like(share[0])])
+
+
+def gram(design: WeakTablesQ31, estimator: EstimatorQ31) -> tuple[Int, Int]:
+    """R0 at the estimator's p, as integers times 2^-bits with even bits: ([K (K + 1) / 2, lanes], bits [lanes])."""
+    theta, bits = estimator.theta, estimator.theta_bits
+    one = np.full(estimator.lanes, 1 << 29, np.int64)
+    parts = []
+    for k in (1, 4):
+        m, h = cholesky.to_block(theta[k][None], 30)
+        parts.append((m[0], bits[k] - h))
+    (two, two_bits), (zero, zero_bits) = parts
+    factors = [
+        (one, integers(29)),
+        (two, two_bits),
+        (zero, zero_bits),
+        (two * two, 2 * two_bits),
+        (two * zero, two_bits + zero_bits),
+        (zero * zero, 2 * zero_bits),
+    ]
+    scaled = []
+    for (factor, factor_bits), table_bits in zip(factors, design.gram_bits, strict=True):
+        m, h = cholesky.to_block(factor[None], 29)
+        scaled.append((m[0], factor_bits - h + table_bits))
+    common = np.min(np.stack([np.broadcast_to(b, one.shape) for _, b in scaled]), axis=0)
+    common = common - (common & 1)
+    total = np.zeros((design.gram.shape[1], estimator.lanes), np.int64)
+    for table, (m, m_bits) in zip(design.gram.astype(np.int64), scaled, strict=True):
+        total = total + table[:, None] * scale(m, m_bits - common)
+    return total, common
+
+
+def factor(packed: Int, functions: int) -> tuple[Int, Int, Int, Int, Mask]:
+    """L [K, K, lanes] in Q30, its inverse diagonal (m, k) and row exponents [K, lanes], and where there is one."""
+    lanes = packed.shape[1]
+    low = np.zeros((functions, functions, lanes), np.int64)
+    rows, columns = np.tril_indices(functions)
+    low[rows, columns] = packed
+    exponents = np.stack([cholesky.half_exponent(np.maximum(low[i, i], 1)) for i in range(functions)])
+    low = clamp(scale(low, exponents[:, None] + exponents[None]), cholesky.ONE)
+    inverse = np.zeros((functions, lanes), np.int64)
+    k = np.zeros((functions, lanes), np.int64)
+    whitened = np.ones(lanes, np.bool_)
+    for row in range(functions):
+        diagonal = low[row, row]
+        pivot = diagonal << 30
+        for j in range(row):
+            total = low[row, j] << 30
+            for i in range(j):
+                total = total - low[row, i] * low[j, i]
+            low[row, j] = cholesky.divide(total, inverse[j], k[j], cholesky.ONE)
+            pivot = pivot - low[row, j] * low[row, j]
+        whitened = whitened & (diagonal >= 2**28) & (pivot >= (diagonal << (30 - cholesky.PIVOT_SHIFT)))
+        inverse[row], k[row] = reciprocal(square_root(np.where(whitened, pivot, np.int64(1) << 60)))
+    return low, inverse, k, exponents, whitened
+
+
+class Held:
+    """Holds numbers within COLUMN_LIMIT and remembers, by lane, where they were not."""
+
+    def __init__(self, lanes: int) -> None:
+        self.saturated = np.zeros(lanes, np.bool_)
+
+    def __call__(self, x: Int, where: Mask | bool = True) -> Int:
+        """x [..., lanes] held within the limit."""
+        self.saturated |= (np.abs(x) >= COLUMN_LIMIT).reshape(-1, x.shape[-1]).any(axis=0) & where
+        return clamp(x, COLUMN_LIMIT)
+
+
+def whiten(x: Int, design: WeakTablesQ31, estimator: EstimatorQ31, held: Held) -> Int:
+    """L^-1 of the columns x [12, K, lanes]."""
+    packed, bits = gram(design, estimator)
+    low, inverse, k, exponents, whitened = factor(packed, design.functions)
+    out = np.zeros_like(x)
+    for row in range(x.shape[1]):
+        total = held(scale(x[:, row], exponents[row] - (bits - 30) // 2), whitened) << 30
+        for j in range(row):
+            total = total - low[row, j] * out[:, j]
+        out[:, row] = held(cholesky.divide(total, inverse[row], k[row], COLUMN_LIMIT), whitened)
+    return np.where(whitened, out, held(x, ~whitened))
+
+
+def remove(x: Int, column: int, held: Held) -> Int:
+    """Columns x [12, K, lanes] without their components along one of them."""
+    direction, _ = cholesky.to_block(x[column], DIRECTION_BITS)
+    square = np.sum(direction * direction, axis=0)
+    inverse, k = reciprocal(np.maximum(square_root(square), 1))
+    direction = np.where(square > 0, round_shift(direction * inverse, 31 - k), 0)
+    along = round_shift(np.sum(direction * x, axis=1), 30)
+    return held(x - round_shift(direction[None] * along[:, None], 30))
+
+
+def rows(sums: Int, design: WeakTablesQ31, estimator: EstimatorQ31) -> tuple[Int, Mask]:
+    """Whitened, projected columns [12, K, lanes] of a window with sums [K, 15], and where they did not fit."""
+    x = np.repeat(assemble(sums, design)[:, :, None], estimator.lanes, axis=2)
+    held = Held(estimator.lanes)
+    x = remove(remove(whiten(x, design, estimator, held), _A, held), _B, held)
+    return x, held.saturated
+
+
+def stages(sums: Int, design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> Iterator[Reasons | None]:
+    """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
+    x, saturated = rows(sums, design, estimator)
+    parts = -(-design.functions // _FUNCTIONS_A_STAGE)
+    for _ in range(3 * design.functions + 2 + 4 * parts):
+        yield None
+    for k in range(design.functions):
+        y = np.where(saturated, 2**31 - 1, x[_Y, k])
+        added = estimator.add(x[: estimator.model.n_theta, k], y)
+        yield None if (added == Reason.ACCUMULATED).all() else added
+    for iteration in range(iterations):
+        reason = None
+        for reason in estimator.solve(ends_group=iteration == 0):
+            if reason is None:
+                yield None
+        last = iteration + 1 == iterations or not estimator.was_due
+        yield reason if last else None
+        if last:
+            return

@@ -1,0 +1,26 @@
+"""Twin of weak_front_q31.c: exact sums of counts, one rounding each for F and U."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.twin.integer_q31 import Int, round_shift
+from pvid.twin.weak_front import outputs
+from pvid.weak_design_q31 import WeakTablesQ31
+
+
+def _folded(counts: Int, weights: npt.NDArray[np.int32], centres: Int) -> Int:
+    middle = counts[centres]
+    total = np.zeros_like(middle)
+    for i, weight in enumerate(weights):
+        total = total + int(weight) * ((counts[centres + (i + 1)] - middle) + (counts[centres - (i + 1)] - middle))
+    return total
+
+
+def decimate(phi: Int, y: Int, design: WeakTablesQ31) -> tuple[Int, Int]:
+    """F and U at the decimated instants of one stretch of counts within full scale [ticks]."""
+    half = (design.taps - 1) // 2
+    centres = half + design.decimation * np.arange(outputs(len(phi), design.taps, design.decimation))
+    f = (phi[centres] << design.smooth_bits) + _folded(phi, design.smooth, centres)
+    return round_shift(f, design.phi_shift), round_shift(_folded(y, design.second, centres), design.u_shift)

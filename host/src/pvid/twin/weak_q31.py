@@ -1,0 +1,155 @@
+"""Twin of weak_q31.c: counts in, the state after every tick out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.native import Reason
+from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31
+from pvid.twin import kapitza_weak_q31, weak_finish_q31, weak_front_q31, weak_window_q31
+from pvid.twin.differentiator import segments
+from pvid.twin.estimator_q31 import EstimatorQ31
+from pvid.twin.integer_q31 import Int, integers, scale
+from pvid.twin.weak_front import tick_of
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass
+class TwinRecordQ31:
+    """State after every tick: p [ticks, n_p, lanes], sums [ticks, n, lanes], exponent and reason [ticks, lanes]."""
+
+    p: npt.NDArray[np.int32]
+    sums: Int
+    exponent: npt.NDArray[np.uint8]
+    reason: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Window:
+    """A whole window: sums [K, 15], and the sum of F."""
+
+    sums: Int
+    angle_sum: int
+
+
+class WeakTwinQ31:
+    """The weak-form identifier in several lanes that share samples and design."""
+
+    def __init__(self, config: WeakConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
+        self.config = config
+        model = kapitza_weak_q31.WEAK if config.zero_unknown else kapitza_weak_q31.ZEROED
+        self.estimator = EstimatorQ31(estimators or [config.estimator], model)
+        self.iterations = 1 if self.estimator.is_rate else config.iterations
+
+    @property
+    def window_ticks(self) -> int:
+        """Ticks in which the windows take a decimated sample in, after the one at which it comes out."""
+        design = self.config.design
+        if design.decimation <= 2:
+            return design.decimation - 1
+        second_half = design.decimation - design.decimation // 2
+        functions = -(-design.functions // max(1, second_half // 2))
+        return 2 * -(-design.functions // functions)
+
+    def window_sums(self, phi: Int, y: Int) -> tuple[dict[int, Window | None], Mask, Mask]:
+        """Every whole window, None if it is dropped, by the tick of its handing over.
+
+        Also which samples were within full scale, and which ticks are free for the stages of a window.
+        """
+        config, design = self.config, self.config.design
+        phi = phi - config.phi_offset
+        y = y - config.y_offset
+        within = (np.abs(phi) <= design.phi_max) & (np.abs(y) <= design.y_max)
+        threshold = (config.drive_min * (design.window - 1)) ** 2
+        complete: dict[int, Window | None] = {}
+        free = within.copy()
+        for first, last in segments(within):
+            while first < last:
+                first = self._stretch(phi, y, first, last, complete, within, free, threshold)
+        return complete, within, free
+
+    def _stretch(
+        self,
+        phi: Int,
+        y: Int,
+        first: int,
+        last: int,
+        complete: dict[int, Window | None],
+        within: Mask,
+        free: Mask,
+        threshold: int,
+    ) -> int:
+        """Windows from tick `first` on, up to `last` or the first U beyond its full scale; returns where to go on."""
+        design = self.config.design
+        f, u = weak_front_q31.decimate(phi[first:last], y[first:last], design)
+        beyond = np.flatnonzero(np.abs(u) > design.u_max)
+        if len(beyond):
+            f, u = f[: beyond[0]], u[: beyond[0]]
+            last = first + tick_of(int(beyond[0]), design.taps, design.decimation)
+            within[last] = free[last] = False
+        driven = weak_window_q31.drives(u, design) >= threshold
+        angles = weak_window_q31.angle_sums(f, design)
+        for m, sums in enumerate(weak_window_q31.sums(f, u, design)):
+            tick = first + tick_of((m + 2) * self.config.hop, design.taps, design.decimation)
+            complete[tick] = Window(sums, int(angles[m])) if driven[m] else None
+        for index in range(len(f)):
+            start = first + tick_of(index, design.taps, design.decimation) + 1
+            free[start : min(start + self.window_ticks, last)] = False
+        return last + 1
+
+    def _place_zero(self, window: Window) -> None:
+        """The first window's mean angle as the start of c."""
+        if not self.config.zero_unknown or self.estimator.counters["rows"].any():
+            return
+        total = abs(int(scale(integers(window.angle_sum), -self.config.estimator.p_bits[3])))
+        mean = total // (self.config.design.window - 1)
+        self.estimator.place(3, -mean if window.angle_sum < 0 else mean)
+
+    def run(
+        self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
+    ) -> TwinRecordQ31:
+        """Steps all lanes through a run from its first sample: counts phi, y, both int64 [ticks]."""
+        complete, within, free = self.window_sums(phi, y)
+        estimator = self.estimator
+        ticks = len(within)
+        n_p, lanes = estimator.p.shape
+        record = TwinRecordQ31(
+            p=np.empty((ticks, n_p, lanes), np.int32),
+            sums=np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64),
+            exponent=np.empty((ticks, lanes), np.uint8),
+            reason=np.empty((ticks, lanes), np.uint8),
+        )
+        warm = False
+        work: Iterator[npt.NDArray[np.uint8] | None] = iter(())
+        for tick in range(ticks):
+            if not within[tick]:
+                warm = False
+                estimator.counters["rejected_saturated"] += 1
+                record.reason[tick] = Reason.REJECTED_SATURATED
+            else:
+                told = None
+                if tick in complete:
+                    warm = True
+                    window = complete[tick]
+                    if window is None:
+                        estimator.counters["held_not_excited"] += 1
+                        told = np.full(lanes, Reason.HELD_NOT_EXCITED, np.uint8)
+                    else:
+                        self._place_zero(window)
+                        work = weak_finish_q31.stages(window.sums, self.config.design, self.iterations, estimator)
+                if told is None and free[tick]:
+                    told = next(work, None)
+                usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
+                record.reason[tick] = usual if told is None else told
+            record.p[tick] = estimator.p
+            record.exponent[tick] = estimator.exponent
+            if sums:
+                record.sums[tick] = estimator.sums
+            if progress is not None and tick % 512 == 0:
+                progress(tick)
+        return record

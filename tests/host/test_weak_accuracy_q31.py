@@ -1,0 +1,64 @@
+"""The fixed-point weak form is worth as much as float32's, on the same counts of a real encoder."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.native import Native
+from pvid.native_q31 import WeakIdentifierQ31
+from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
+from pvid.rigfile import RigFile
+from pvid.setup import weak_config
+from pvid.setup_q31 import p_of, se_of, weak_config_q31
+
+RATE = 1000.0
+TRUTH = STANDARD_PENDULUM.linear
+
+
+def counts_of(values: npt.NDArray[np.float64], lsb: float) -> npt.NDArray[np.int64]:
+    """What a sensor of this resolution counts."""
+    return np.rint(values / lsb).astype(np.int64)
+
+
+def outcomes(native: Native, bits: int, seeds: int, zero: float = 0.0) -> tuple[npt.NDArray[np.float64], ...]:
+    """Relative errors of float32 and fixed point [seeds, 3], and the latter's standard errors, on the same counts."""
+    rig = RigFile.standard()
+    rig = replace(rig, sensor=replace(rig.sensor, phi_lsb=2 * np.pi / 2**bits))
+    f32, q31, errors = [], [], []
+    for seed in range(seeds):
+        run = simulate(sensors=replace(standard_sensors(bits), phi_zero=zero), truth="linear", seed=seed).run
+        phi, y = counts_of(run.phi, rig.sensor.phi_lsb), counts_of(run.y, rig.sensor.y_lsb)
+        start = standard_start(seed)
+        reference = native.weak(weak_config(rig, RATE, start))
+        reference.run(phi * rig.sensor.phi_lsb, y * rig.sensor.y_lsb, sums=False, hashes=False)
+        f32.append(reference.assess()["p"][:3] / TRUTH - 1)
+        config = weak_config_q31(rig, RATE, start)
+        core = WeakIdentifierQ31(native, config)
+        core.run(phi, y, sums=False, hashes=False)
+        last = core.assess()
+        q31.append(p_of(config, last["p"][:4])[:3] / TRUTH - 1)
+        errors.append(se_of(config, last["se"][:4])[:3] / TRUTH)
+    return np.array(f32), np.array(q31), np.array(errors)
+
+
+def rms(errors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Over seeds, [3]."""
+    return np.asarray(np.sqrt(np.mean(np.square(errors), axis=0)))
+
+
+# Issue 4 asks for 1.05 at 14 bits. At 12 bits noise hides more, at 16 the steps of F and U begin to tell.
+@pytest.mark.parametrize(("bits", "ratio"), [(12, 1.02), (14, 1.05), (16, 1.15)])
+def test_errors_are_those_of_float32(native: Native, bits: int, ratio: float) -> None:
+    f32, q31, errors = outcomes(native, bits, 20)
+    print(bits, 100 * rms(f32), 100 * rms(q31), rms(q31) / rms(f32), 100 * rms(q31 - f32))
+    assert (rms(q31) <= ratio * rms(f32)).all()
+    assert (np.abs(q31) < 3 * errors).mean() >= 0.95
+
+
+def test_a_zero_that_is_far_off_costs_no_more_than_in_float32(native: Native) -> None:
+    f32, q31, _ = outcomes(native, 14, 20, zero=0.1)
+    assert (rms(q31) <= 1.05 * rms(f32)).all()

@@ -1,0 +1,190 @@
+/* Integer arithmetic against what a wider type or a closed form says. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "cholesky_q31.h"
+#include "integer_q31.h"
+
+/* A generator of its own: the same numbers on every machine. */
+static uint64_t next_random(uint64_t *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return *state;
+}
+
+/* A number of random size within +-PVID_WIDE. */
+static int64_t random_wide(uint64_t *state)
+{
+    const uint64_t magnitude = (next_random(state) >> 2) >> (next_random(state) % 62u);
+    return ((next_random(state) & 1u) != 0u) ? -(int64_t)magnitude : (int64_t)magnitude;
+}
+
+/* floor(x / 2^s + 1/2) without a shift of a negative number. */
+static int64_t rounded(int64_t x, uint32_t s)
+{
+    const int64_t divisor = (int64_t)1 << s;
+    const int64_t rest = ((x % divisor) + divisor) % divisor;
+    return ((x - rest) / divisor) + (((2 * rest) >= divisor) ? 1 : 0);
+}
+
+static void a_shift_right_rounds_half_up(void **unused)
+{
+    (void)unused;
+    assert_int_equal(pvid_round_shift_q31(3, 1), 2);
+    assert_int_equal(pvid_round_shift_q31(-3, 1), -1);
+    assert_int_equal(pvid_round_shift_q31(-5, 0), -5);
+    assert_int_equal(pvid_round_shift_q31(PVID_WIDE, 63), 1);
+    assert_int_equal(pvid_round_shift_q31(-PVID_WIDE, 63), 0);
+    assert_int_equal(pvid_round_shift_q31(-PVID_WIDE, 64), 0);
+    assert_int_equal(pvid_round_shift_q31(INT64_MAX, 1), (int64_t)1 << 62);
+    uint64_t state = 1;
+    for (int i = 0; i < 20000; i++) {
+        const int64_t x = random_wide(&state);
+        const uint32_t s = 1u + (uint32_t)(next_random(&state) % 60u);
+        assert_int_equal(pvid_round_shift_q31(x, s), rounded(x, s));
+        assert_int_equal(pvid_scale_q31(x, (int32_t)s), rounded(x, s));
+    }
+}
+
+static void a_shift_left_saturates(void **unused)
+{
+    (void)unused;
+    assert_int_equal(pvid_scale_q31(3, -4), 48);
+    assert_int_equal(pvid_scale_q31(-3, -4), -48);
+    assert_int_equal(pvid_scale_q31(0, -500), 0);
+    assert_int_equal(pvid_scale_q31(1, -61), (int64_t)1 << 61);
+    assert_int_equal(pvid_scale_q31(1, -62), PVID_WIDE);
+    assert_int_equal(pvid_scale_q31(-1, -500), -PVID_WIDE);
+    assert_int_equal(pvid_clamp_q31(-7, 5), -5);
+    assert_int_equal(pvid_clamp_q31(7, 5), 5);
+    assert_int_equal(pvid_clamp_q31(4, 5), 4);
+}
+
+static void bits_are_counted(void **unused)
+{
+    (void)unused;
+    assert_int_equal(pvid_bit_length_q31(0), 0);
+    for (uint32_t i = 0; i < 64u; i++) {
+        assert_int_equal(pvid_bit_length_q31((uint64_t)1 << i), i + 1u);
+        assert_int_equal(pvid_bit_length_q31(((uint64_t)1 << i) - 1u), i);
+    }
+}
+
+static void a_root_is_the_largest_whose_square_fits(void **unused)
+{
+    (void)unused;
+    assert_int_equal(pvid_square_root_q31((uint64_t)PVID_WIDE), (int64_t)1 << 31);
+    assert_int_equal(pvid_square_root_q31((uint64_t)PVID_WIDE - 1u), INT32_MAX);
+    uint64_t state = 2;
+    for (int i = 0; i < 20000; i++) {
+        const uint64_t x = pvid_magnitude_q31(random_wide(&state));
+        const uint64_t r = pvid_square_root_q31(x);
+        assert_true(r * r <= x);
+        assert_true((r + 1u) * (r + 1u) > x);
+    }
+}
+
+/* r 2^e against x = m 2^exponent: r^2 within two units of its last place. */
+static void a_scaled_root_keeps_thirty_bits(void **unused)
+{
+    (void)unused;
+    assert_int_equal(pvid_root_of_q31(0, 5).r, 0);
+    uint64_t state = 3;
+    for (int i = 0; i < 20000; i++) {
+        const int64_t m = 1 + (int64_t)(next_random(&state) >> (4u + (next_random(&state) % 60u)));
+        const pvid_root_q31 root = pvid_root_of_q31(m, 7);
+        assert_true(root.r >= ((int32_t)1 << 30));
+        const uint64_t square = (uint64_t)root.r * (uint64_t)root.r;
+        const uint64_t above = (uint64_t)(root.r + (int64_t)1) * (uint64_t)(root.r + (int64_t)1);
+        const int32_t shift = 7 - (2 * root.e); /* m 2^shift is the square */
+        assert_true((shift >= 0) && (shift <= 62));
+        assert_true((square <= ((uint64_t)m << shift)) && (above > ((uint64_t)m << shift)));
+    }
+}
+
+static void a_reciprocal_is_short_by_less_than_two(void **unused)
+{
+    (void)unused;
+    uint64_t state = 4;
+    for (int i = 0; i < 20000; i++) {
+        const uint32_t x = 1u + (uint32_t)((next_random(&state) >> 33) >> (next_random(&state) % 31u)) % 0x7FFFFFFFu;
+        const pvid_reciprocal_q31 inverse = pvid_reciprocal_of_q31(x);
+        const uint64_t normal = (uint64_t)x << inverse.k;
+        assert_true((normal >> 30) == 1u);
+        assert_true((uint64_t)inverse.m * normal <= ((uint64_t)1 << 61));
+        assert_true(((uint64_t)inverse.m + 2u) * normal > ((uint64_t)1 << 61));
+    }
+}
+
+static void a_product_with_a_fraction_is_exact_before_it_is_rounded(void **unused)
+{
+    (void)unused;
+    assert_int_equal(pvid_times_q31(PVID_WIDE, INT32_MAX), PVID_WIDE - ((int64_t)1 << 31));
+    assert_int_equal(pvid_times_q31(-1, (int32_t)1 << 30), 0);
+    assert_int_equal(pvid_times_q31(1, (int32_t)1 << 30), 1);
+    uint64_t state = 5;
+    for (int i = 0; i < 20000; i++) {
+        const int64_t a = random_wide(&state) / ((int64_t)1 << 31);
+        const int32_t b = (int32_t)(random_wide(&state) / ((int64_t)1 << 31));
+        assert_int_equal(pvid_times_q31(a, b), rounded(a * b, 31));
+    }
+}
+
+/* 2 x 2 in Q30 with a closed form: S = [[1/2, r/2], [r/2, 1/2]], first pivot over diagonal 1 - r^2. */
+static void a_factor_tells_what_is_left_of_the_first(void **unused)
+{
+    (void)unused;
+    const int32_t half = PVID_ONE_Q30 / 2;
+    int32_t s[PVID_MAX_P][PVID_MAX_P] = {{half, half / 2}, {0, half}};
+    pvid_cholesky_q31 factor;
+    assert_true(pvid_cholesky_factor_q31(&factor, 2, (const int32_t(*)[PVID_MAX_P])s));
+    assert_in_range(factor.first_pivot, (PVID_ONE_Q30 / 4 * 3) - 8, (PVID_ONE_Q30 / 4 * 3) + 8);
+    /* S^-1 (1, 0) = (8/3, -4/3) */
+    const int64_t rhs[2] = {(int64_t)1 << 40, 0};
+    int32_t x[PVID_MAX_P];
+    const int32_t exponent = pvid_cholesky_solve_q31(&factor, rhs, x);
+    assert_true((exponent >= 0) && (exponent < 40));
+    const int64_t first = ((int64_t)x[0] * ((int64_t)1 << exponent)) / ((int64_t)1 << 20);
+    const int64_t second = ((int64_t)x[1] * ((int64_t)1 << exponent)) / ((int64_t)1 << 20);
+    assert_in_range(first, 2796203 - 8, 2796203 + 8); /* 8/3 2^20; a right-hand side has 20 bits */
+    assert_in_range(-second, 1398101 - 8, 1398101 + 8);
+    s[0][1] = half - 128; /* 1 - r^2 = 5e-7, below 2^-20 */
+    assert_false(pvid_cholesky_factor_q31(&factor, 2, (const int32_t(*)[PVID_MAX_P])s));
+    assert_int_equal(factor.first_pivot, 0);
+    s[1][1] = 0;
+    assert_false(pvid_cholesky_factor_q31(&factor, 2, (const int32_t(*)[PVID_MAX_P])s));
+}
+
+static void half_an_exponent_brings_a_diagonal_near_one(void **unused)
+{
+    (void)unused;
+    for (int64_t x = 1; x < PVID_WIDE; x = (x * 3) + ((x < 1000) ? 1 : 0)) {
+        const int64_t scaled = pvid_scale_q31(x, 2 * pvid_half_exponent_q31(x));
+        assert_in_range(scaled, PVID_ONE_Q30 / 4, PVID_ONE_Q30);
+        if (x > PVID_WIDE / 3) {
+            break;
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_shift_right_rounds_half_up),
+        cmocka_unit_test(a_shift_left_saturates),
+        cmocka_unit_test(bits_are_counted),
+        cmocka_unit_test(a_root_is_the_largest_whose_square_fits),
+        cmocka_unit_test(a_scaled_root_keeps_thirty_bits),
+        cmocka_unit_test(a_reciprocal_is_short_by_less_than_two),
+        cmocka_unit_test(a_product_with_a_fraction_is_exact_before_it_is_rounded),
+        cmocka_unit_test(a_factor_tells_what_is_left_of_the_first),
+        cmocka_unit_test(half_an_exponent_brings_a_diagonal_near_one),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
