@@ -16,14 +16,16 @@ from typing import Any
 
 import click
 import numpy as np
+import numpy.typing as npt
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from pvid import __version__
-from pvid.capture import read_run, write_run
+from pvid.capture import Run, read_run, write_run
 from pvid.compare import Comparison, compare_run
+from pvid.compare_q31 import compare_run_q31
 from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
@@ -42,7 +44,9 @@ from pvid.rig import (
 )
 from pvid.rigfile import RigFile, load
 from pvid.setup import config_of, weak_design_of
+from pvid.setup_q31 import config_for_run, counts_of, tables_of, weak_config_q31
 from pvid.weak_design import to_c_header
+from pvid.weak_header_q31 import to_c_header_q31
 
 DONE, DIFFERENT, BAD_INPUT, NOTHING_IDENTIFIED = 0, 1, 2, 3
 
@@ -110,8 +114,25 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     with progress_bar("comparing with the twin", len(run.t)) as advance:
         comparison = compare_run(native, config_of(rig, run.sample_rate, start), run.phi, run.y, advance)
     _print_comparison(comparison)
+    equal = comparison.equal and (form != "weak" or _demo_q31(run, rig, bits, native, start, truths))
     _write_figure(result, figure, truths)
-    return DONE if comparison.equal else DIFFERENT
+    return DONE if equal else DIFFERENT
+
+
+def _demo_q31(
+    run: Run, rig: RigFile, bits: int, native: Native, start: npt.NDArray[np.float64], truths: dict[str, float]
+) -> bool:
+    """The same run in the fixed-point core; whether it equals its twin."""
+    rig = replace(
+        rig,
+        identifier=replace(rig.identifier, core="q31"),
+        sensor=replace(rig.sensor, phi_lsb=2 * np.pi / 2**bits),
+    )
+    _print_result(identify(run, rig, native, start=start), truths)
+    with progress_bar("comparing the fixed-point core with its twin", len(run.t)) as advance:
+        comparison = compare_run_q31(native, config_for_run(rig, run, start), *counts_of(rig, run), progress=advance)
+    _print_comparison(comparison, "fixed-point core against its numpy twin")
+    return comparison.equal
 
 
 def _write_figure(result: Identification, path: Path, truths: dict[str, float] | None) -> None:
@@ -308,20 +329,30 @@ def identify_command(
 @commands.command(name="compare")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
 @_rig_options
-def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str | None) -> int:
+@click.option("--core", type=click.Choice(["f32", "q31", "all"]), help="Which arithmetic.  [default: the rig file's]")
+def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str | None, core: str | None) -> int:
     """Compares the C core with its numpy twin on RUN, after every tick, in every bit."""
     rig = _load_rig(rig_path, form=form)
     run = read_run(run_path, rig.sample_rate)
     native = Native()
     table = Table("core", "form", "law", "ticks", "hash", "verdict")
     failed = False
+    own = "q31" if rig.identifier.core == "q31" else "f32"
+    cores = ["f32", "q31"] if core == "all" else [core or own]
     for one in [law] if law else ["stationary", "pseudovelocity"]:
         chosen = replace(rig, identifier=replace(rig.identifier, law=one))  # type: ignore[arg-type]
-        with progress_bar(f"{one} law", len(run.t)) as advance:
-            outcome = compare_run(native, config_of(chosen, run.sample_rate), run.phi, run.y, advance)
-        verdict = "equal" if outcome.equal else f"DIFFERENT: {outcome.difference}"
-        table.add_row("f32", chosen.identifier.form, one, str(outcome.ticks), f"{outcome.core_hash:08x}", verdict)
-        failed |= not outcome.equal
+        for arithmetic in cores:
+            with progress_bar(f"{one} law, {arithmetic}", len(run.t)) as advance:
+                if arithmetic == "q31":
+                    outcome = compare_run_q31(
+                        native, config_for_run(chosen, run), *counts_of(chosen, run), progress=advance
+                    )
+                else:
+                    outcome = compare_run(native, config_of(chosen, run.sample_rate), run.phi, run.y, advance)
+            verdict = "equal" if outcome.equal else f"DIFFERENT: {outcome.difference}"
+            hashed = f"{outcome.core_hash:08x}"
+            table.add_row(arithmetic, chosen.identifier.form, one, str(outcome.ticks), hashed, verdict)
+            failed |= not outcome.equal
     Console(width=None if sys.stdout.isatty() else 140).print(table)
     return DIFFERENT if failed else DONE
 
@@ -398,11 +429,22 @@ def fir_table(points: int, degree: int, difference: bool, stride: int, name: str
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML).")
 @click.option("--name", default="weak_tables", show_default=True, help="Name of the design in C.")
 @click.option("--check", type=click.Path(path_type=Path), help="Only tell whether this file is what would be printed.")
-def weak_table(rig_path: Path, name: str, check: Path | None) -> int:
-    """Prints the weak form's tables for a rig as a C header for pvid_weak_config_f32."""
+@click.option("--core", type=click.Choice(["f32", "q31"]), default="f32", show_default=True, help="Which arithmetic.")
+def weak_table(rig_path: Path, name: str, check: Path | None, core: str) -> int:
+    """Prints the weak form's tables for a rig as a C header for pvid_weak_config_f32 or _q31.
+
+    For q31 the whole configuration is printed, and on standard error by how many bits each quantity stays clear of
+    overflow at full scale.
+    """
     rig = load(rig_path)
     if rig.sample_rate is None:
         raise PvidError(f"{rig_path}: sample_rate is missing, and the tables hang on it")
+    if core == "q31":
+        integers = tables_of(rig, rig.sample_rate)
+        margins = ", ".join(f"{name} {bits:.2f}" for name, bits in integers.margins.items())
+        messages.print(f"bits to spare at full scale: {margins}", highlight=False)
+        made_by = f"pvid weak-table --core q31 --rig {rig_path.name} --name {name}"
+        return _print_header(to_c_header_q31(weak_config_q31(rig, rig.sample_rate), name, made_by), check)
     tables = weak_design_of(rig, rig.sample_rate)
     messages.print(
         f"taps {tables.taps}, decimation {tables.decimation}, windows of {tables.window} samples "

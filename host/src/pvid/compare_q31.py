@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.compare import P_NAMES, Comparison
+from pvid.compare import P_NAMES, Comparison, Difference
 from pvid.native import Native
 from pvid.native_q31 import RecordQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.twin import fnv
 from pvid.twin.weak_q31 import TwinRecordQ31, WeakTwinQ31
 
 
-@dataclass(frozen=True)
-class DifferenceQ31:
+class DifferenceQ31(Difference):
     """The first integer that differs: tick, variable and both values."""
 
-    tick: int
-    variable: str
-    core: int
-    twin: int
-
     def __str__(self) -> str:
-        return f"tick {self.tick}, {self.variable}: core {self.core}, twin {self.twin}"
+        return f"tick {self.tick}, {self.variable}: core {self.core_word}, twin {self.twin_word}"
 
 
 def sum_name(index: int, n_sums: int) -> str:
@@ -77,11 +70,11 @@ def compare_run_q31(
     phi: npt.ArrayLike,
     y: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,
-) -> tuple[Comparison, DifferenceQ31 | None]:
+) -> Comparison:
     """Runs counts phi, y through the core and the twin and compares every tick."""
     core = WeakIdentifierQ31(native, config)
     record = core.run(phi, y)
     twin = WeakTwinQ31(config).run(np.asarray(phi, np.int64), np.asarray(y, np.int64), progress=progress)
     hashes = twin_hashes(twin)
     twin_hash = int(hashes[-1]) if len(hashes) else fnv.START
-    return Comparison(len(record.reason), core.running_hash, twin_hash, None), first_difference(record, twin)
+    return Comparison(len(record.reason), core.running_hash, twin_hash, first_difference(record, twin))

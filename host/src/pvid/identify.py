@@ -11,9 +11,11 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
-from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
+from pvid.native import Law, Native, Reason, StrongConfig, TrustConfig, WeakConfig, WeakIdentifier
+from pvid.native_q31 import WeakIdentifierQ31
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, config_of, weak_design_of
+from pvid.setup_q31 import config_for_run, counts_of, covariance_of, p_of
 from pvid.weak_oracle import WeakSettings, identify_weak
 
 Float = npt.NDArray[np.float64]
@@ -139,7 +141,7 @@ def identify(
     run, rig
         The samples and the rig they come from.
     native
-        The C core, used by core "f32".
+        The C core, used by cores "f32" and "q31".
     start
         p = (w, d1, d2) to start from; the rig file's nominal by default.
     points
@@ -164,7 +166,7 @@ def identify(
         if isinstance(config, StrongConfig):
             return _in_float64(run, rig, config, every)
         return _weak_in_float64(run, rig, config)
-    raise PvidError(f"core {rig.identifier.core} has no {rig.identifier.form} form yet: use f32")
+    return _weak_in_q31(run, rig, native, start, every)
 
 
 def _ticks_needed(config: StrongConfig | WeakConfig) -> int:
@@ -322,6 +324,46 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
         lost=0,
         running_hash=None,
         trajectory=_trajectory(run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig.l1),
+    )
+
+
+def _weak_in_q31(run: Run, rig: RigFile, native: Native, start: npt.ArrayLike | None, every: int) -> Identification:
+    """The fixed-point core has neither gate nor alarm yet: what it holds at the end is judged here, by the gate's
+    limits of kappa and standard errors alone."""
+    config = config_for_run(rig, run, start)
+    phi, y = counts_of(rig, run)
+    identifier = WeakIdentifierQ31(native, config)
+    record = identifier.run(phi, y, sums=False, estimate_every=every)
+    last = identifier.assess()
+    n_p = record.p.shape[1]
+    p = p_of(config, last["p"][:n_p])
+    if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
+        p[3] += float(np.mean(run.phi - phi * rig.sensor.phi_lsb))
+    covariance = covariance_of(config, last)
+    trust = TrustConfig()
+    solved = np.flatnonzero(record.reason == Reason.UPDATED)
+    kappa = float(last["kappa"]) / 2**30
+    known = kappa >= trust.kappa_min and (np.sqrt(np.diag(covariance))[:3] <= trust.se_max * p[:3]).all()
+    counters = identifier.counters
+    return _identification(
+        rig,
+        p=p,
+        covariance=covariance,
+        kappa=kappa,
+        trusted_s=float(run.t[solved[-1]]) if known and len(solved) else None,
+        misfit=None,
+        alarm=False,
+        status=_final_status(record.reason),
+        ticks=len(run.t),
+        updates=counters["updates"],
+        lost=counters["rejected_saturated"],
+        running_hash=identifier.running_hash,
+        trajectory=_trajectory(
+            run.t[::every],
+            p_of(config, record.estimate["p"][:, :n_p])[:, :3],
+            covariance_of(config, record.estimate)[:, :3, :3],
+            rig.l1,
+        ),
     )
 
 

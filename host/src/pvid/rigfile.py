@@ -51,10 +51,16 @@ class Sensor:
     ----------
     phi_lsb : angle sensor [rad]; default 14 bits a turn
     y_lsb : pivot sensor [m]
+    phi_range : largest angle from rest that the fixed-point core takes in [rad]
+    y_range : largest height of the pivot about the middle of its travel likewise [m]; 0: a tenth of l1
+    acceleration_range : largest acceleration of the pivot likewise [m/s^2]; 0: four times the nominal g
     """
 
     phi_lsb: float = _number(2.0 * math.pi / 2**14, "rad", 0.0, 1.0)
     y_lsb: float = _number(5e-6, "m", 0.0, 1.0)
+    phi_range: float = _number(0.5, "rad", 1e-6, 10.0)
+    y_range: float = _number(0.0, "m", 0.0, 1e6)
+    acceleration_range: float = _number(0.0, "m/s^2", 0.0, 1e9)
 
     def __post_init__(self) -> None:
         _check_fields(self, "[sensor] ")

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.capture import Run
+from pvid.errors import PvidError
 from pvid.native import Law
 from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31
 from pvid.rigfile import RigFile
 from pvid.setup import weak_config, weak_design_of
 from pvid.weak_design_q31 import WeakTablesQ31, weak_tables_q31
+
+Int64 = npt.NDArray[np.int64]
 
 
 def format_of(largest: float) -> int:
@@ -21,9 +26,44 @@ def format_of(largest: float) -> int:
 
 def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
     """The tables a rig file asks for."""
+    sensor = rig.sensor
+    for name, lsb in (("phi_lsb", sensor.phi_lsb), ("y_lsb", sensor.y_lsb)):
+        if not lsb > 0:
+            raise PvidError(
+                f"[sensor] {name} is 0, and the fixed-point core counts in it: say what the sensor resolves"
+            )
     return weak_tables_q31(
-        weak_design_of(rig, sample_rate), rig.sensor.phi_lsb, rig.sensor.y_lsb, 0.5, rig.l1 / 10, 4 * rig.nominal.g
+        weak_design_of(rig, sample_rate),
+        sensor.phi_lsb,
+        sensor.y_lsb,
+        sensor.phi_range,
+        sensor.y_range or rig.l1 / 10,
+        sensor.acceleration_range or 4 * rig.nominal.g,
     )
+
+
+def counts_of(rig: RigFile, run: Run) -> tuple[Int64, Int64]:
+    """What the sensors of a rig count in a run: phi and y, both [ticks]."""
+    return _counts(run.phi, rig.sensor.phi_lsb), _counts(run.y, rig.sensor.y_lsb)
+
+
+def _counts(values: npt.NDArray[np.float64], lsb: float) -> Int64:
+    """As a 32-bit register holds them; what is not a number is as far beyond full scale as can be."""
+    counts = np.rint(np.nan_to_num(values / lsb, nan=-(2.0**31), posinf=2.0**31, neginf=-(2.0**31)))
+    return np.clip(counts, -(2.0**31), 2.0**31 - 1).astype(np.int64)
+
+
+def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
+    """Settings for a run, its first sample taken for rest where that is nearer than 0."""
+    if rig.identifier.form != "weak":
+        raise PvidError("core q31 has the weak form only: use --form weak, or --core f32")
+    if rig.identifier.full_angle or rig.identifier.damping:
+        raise PvidError("core q31 has neither full_angle nor damping: use --core f32")
+    config = weak_config_q31(rig, run.sample_rate, start)
+    phi, y = counts_of(rig, run)
+    half = config.design.phi_max // 2, config.design.y_max // 2
+    first = [int(c[0]) if len(c) and abs(int(c[0])) > limit else 0 for c, limit in zip((phi, y), half, strict=True)]
+    return replace(config, phi_offset=first[0], y_offset=first[1])
 
 
 def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
@@ -91,3 +131,11 @@ def p_of(config: WeakConfigQ31, p: npt.ArrayLike) -> npt.NDArray[np.float64]:
 def se_of(config: WeakConfigQ31, se: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Standard errors in SI from the core's integers [..., n_p]."""
     return np.asarray(np.asarray(se, np.float64) * units_of(config))
+
+
+def covariance_of(config: WeakConfigQ31, estimate: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
+    """Covariance of p in SI [..., n_p, n_p] from estimates of the core."""
+    n_p = len(config.estimator.p_bits)
+    se = se_of(config, estimate["se"][..., :n_p])
+    correlation = np.asarray(estimate["correlation"], np.float64)[..., :n_p, :n_p] / 2**30
+    return np.asarray(correlation * se[..., :, None] * se[..., None, :])
