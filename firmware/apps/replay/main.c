@@ -10,14 +10,24 @@
 #include "replay_run.h"
 #include "report.h"
 
-#if REPLAY_WEAK
-typedef pvid_weak_f32 identifier_f32;
+#if REPLAY_Q31
+typedef pvid_weak_q31 identifier_type;
+typedef int32_t sample_type;
+#define INIT pvid_weak_init_q31
+#define STEP pvid_weak_step_q31
+#define HASH pvid_fnv_estimator_q31
+#elif REPLAY_WEAK
+typedef pvid_weak_f32 identifier_type;
+typedef float sample_type;
 #define INIT pvid_weak_init_f32
 #define STEP pvid_weak_step_f32
+#define HASH pvid_fnv_estimator_f32
 #else
-typedef pvid_strong_f32 identifier_f32;
+typedef pvid_strong_f32 identifier_type;
+typedef float sample_type;
 #define INIT pvid_strong_init_f32
 #define STEP pvid_strong_step_f32
+#define HASH pvid_fnv_estimator_f32
 #endif
 
 #define EXIT_REFUSED 2
@@ -30,7 +40,7 @@ typedef pvid_strong_f32 identifier_f32;
 #define SAMPLE(tick, channel) (replay_samples[tick][channel])
 #endif
 
-static identifier_f32 identifier;
+static identifier_type identifier;
 
 typedef struct {
     uint64_t total; /* counts of pvid_port_instructions */
@@ -57,15 +67,15 @@ static uint32_t play(cost *whole)
     uint32_t hash = PVID_FNV_START;
     const uint32_t reading = overhead();
     for (uint32_t tick = 0; tick < REPLAY_TICKS; tick++) {
-        const float phi = (float)SAMPLE(tick, 0) * replay_phi_lsb;
-        const float y = (float)SAMPLE(tick, 1) * replay_y_lsb;
+        const sample_type phi = (sample_type)SAMPLE(tick, 0) * replay_phi_lsb; /* fixed point: lsb 1 */
+        const sample_type y = (sample_type)SAMPLE(tick, 1) * replay_y_lsb;
         const uint32_t before = pvid_port_instructions();
         const pvid_reason reason = STEP(&identifier, phi, y);
         const uint32_t counts = pvid_port_instructions() - before - reading;
         if (tick >= REPLAY_MEASURE_FROM) {
             add(whole, counts);
         }
-        hash = pvid_fnv_estimator_f32(hash, &identifier.estimator, reason);
+        hash = HASH(hash, &identifier.estimator, reason);
         if (((tick + 1u) % REPLAY_REPORT_EVERY) == 0u) {
             report_hash_at(tick + 1u, hash);
         }
@@ -77,7 +87,11 @@ int main(void)
 {
     pvid_port_init();
     report_text("pvid replay on " PVID_BOARD_NAME ", " REPLAY_FORM " form\n");
+#if REPLAY_Q31
+    const uint32_t faults = 0; /* asked of floats, which there are none of */
+#else
     const uint32_t faults = pvid_arithmetic_faults_f32();
+#endif
     report_number("arithmetic_faults", faults);
     if (faults != 0u) {
         return EXIT_ARITHMETIC;

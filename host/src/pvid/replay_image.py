@@ -12,15 +12,20 @@ import numpy.typing as npt
 
 from pvid.boards import BUILD, Board, build
 from pvid.boards import run as run_image
+from pvid.compare_q31 import twin_hashes as twin_hashes_q31
 from pvid.ctables import float_array, float_literal, struct_initializer
 from pvid.errors import PvidError
 from pvid.native import Native, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
+from pvid.native_q31 import WeakConfigQ31, WeakIdentifierQ31
 from pvid.rig import simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
 from pvid.setup import config_of
+from pvid.setup_q31 import weak_config_q31
 from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
+from pvid.weak_header_q31 import to_c_header_q31
 
 REPORT_EVERY = 500  # ticks from one line with the running hash to the next
 
@@ -41,11 +46,16 @@ class ReplayRun:
     """
 
     form: str
-    config: StrongConfig | WeakConfig
+    config: StrongConfig | WeakConfig | WeakConfigQ31
     counts: npt.NDArray[np.int16]
     phi_lsb: np.float32
     y_lsb: np.float32
     measure_from: int
+
+    @property
+    def core(self) -> str:
+        """Which arithmetic."""
+        return "q31" if isinstance(self.config, WeakConfigQ31) else "f32"
 
     @property
     def ticks(self) -> int:
@@ -64,7 +74,7 @@ class ReplayRun:
 
 
 @cache
-def standard_run(form: str, ticks: int) -> ReplayRun:
+def standard_run(form: str, ticks: int, core: str = "f32") -> ReplayRun:
     """The standard rig (linear truth) for `ticks`: weak form at 1 kHz and 14 bits, strong form (five points) at 50 Hz
     and 20 bits."""
     sensors = replace(standard_sensors(ENCODER_BITS[form]), random_offset=False)
@@ -73,7 +83,9 @@ def standard_run(form: str, ticks: int) -> ReplayRun:
     standard = RigFile.standard()
     identifier = replace(standard.identifier, form=form, differentiator="finite-difference", stride=1)  # type: ignore[arg-type]
     rig = replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb))
-    config = config_of(rig, run.sample_rate, standard_start(1))
+    start = standard_start(1)
+    in_q31 = core == "q31"
+    config = weak_config_q31(rig, run.sample_rate, start) if in_q31 else config_of(rig, run.sample_rate, start)
     counts = np.rint(np.stack([run.phi / sensors.phi_lsb, run.y / sensors.y_lsb], axis=1))[:ticks]
     if len(counts) != ticks or np.abs(counts).max() > np.iinfo(np.int16).max:
         raise PvidError("the standard run does not fit 16-bit counts")
@@ -87,7 +99,7 @@ def standard_run(form: str, ticks: int) -> ReplayRun:
     )
 
 
-def _measure_from(config: StrongConfig | WeakConfig, ticks: int) -> int:
+def _measure_from(config: StrongConfig | WeakConfig | WeakConfigQ31, ticks: int) -> int:
     """First tick of the mean: whole periods of the weak form's windows, all of them with a solve in work."""
     if isinstance(config, StrongConfig):
         return min(STRONG_SETTLED, ticks // 2)
@@ -98,7 +110,10 @@ def _measure_from(config: StrongConfig | WeakConfig, ticks: int) -> int:
 
 def header(run: ReplayRun) -> str:
     """replay_run.h of a run."""
-    if isinstance(run.config, WeakConfig):
+    tables: dict[str, npt.NDArray[np.float32]] = {}
+    if isinstance(run.config, WeakConfigQ31):
+        settings = [to_c_header_q31(run.config, "replay_config", "pvid.replay_image")]
+    elif isinstance(run.config, WeakConfig):
         weak, tables = weak_config_struct(run.config)
         design = struct_initializer(weak.design.contents, {name: f"replay_{name}" for name in tables})
         settings = [
@@ -136,6 +151,7 @@ def header(run: ReplayRun) -> str:
             "#define REPLAY_IN_FLASH",
             "#endif",
             "",
+            f"#define REPLAY_Q31 {int(run.core == 'q31')}",
             f"#define REPLAY_WEAK {int(run.form == 'weak')}",
             f'#define REPLAY_FORM "{run.form}"',
             f"#define REPLAY_TICKS {run.ticks}u",
@@ -144,8 +160,7 @@ def header(run: ReplayRun) -> str:
             "",
             *arrays,
             *settings,
-            f"static const float replay_phi_lsb = {float_literal(run.phi_lsb)};",
-            f"static const float replay_y_lsb = {float_literal(run.y_lsb)};",
+            *_resolutions(run),
             "/* [tick][phi, y] in steps of these */",
             "static const int16_t replay_samples[REPLAY_TICKS][2] REPLAY_IN_FLASH = {",
             *samples,
@@ -157,11 +172,23 @@ def header(run: ReplayRun) -> str:
     )
 
 
+def _resolutions(run: ReplayRun) -> list[str]:
+    """What a count is worth to the core: itself in fixed point."""
+    if run.core == "q31":
+        return ["#define replay_phi_lsb 1", "#define replay_y_lsb 1"]
+    return [
+        f"static const float replay_phi_lsb = {float_literal(run.phi_lsb)};",
+        f"static const float replay_y_lsb = {float_literal(run.y_lsb)};",
+    ]
+
+
 # ---- what the host computes
 
 
 def native_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
+    if isinstance(run.config, WeakConfigQ31):
+        return WeakIdentifierQ31(native, run.config).run(run.counts[:, 0], run.counts[:, 1]).hash
     if isinstance(run.config, WeakConfig):
         return native.weak(run.config).run(run.phi, run.y).hash
     return native.strong(run.config).run(run.phi, run.y).hash
@@ -169,6 +196,9 @@ def native_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
 
 def twin_hashes(run: ReplayRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]. Cost: 0.5 ms a tick in the strong form."""
+    if isinstance(run.config, WeakConfigQ31):
+        phi, y = run.counts.astype(np.int64).T
+        return twin_hashes_q31(WeakTwinQ31(run.config).run(phi, y))
     if isinstance(run.config, WeakConfig):
         states = WeakTwin(run.config).run(run.phi, run.y)
     else:
@@ -234,7 +264,7 @@ def build_image(target: Board, run: ReplayRun) -> tuple[Path, Path]:
 
     The strong form's windows are as long as its five points, so that its state is what a board would hold.
     """
-    name = f"{run.form}-{run.ticks}"
+    name = f"{run.form}-{run.ticks}" + ("-q31" if run.core == "q31" else "")
     folder = BUILD / "runs" / name
     text = header(run)
     place = folder / "replay_run.h"

@@ -100,7 +100,7 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
         When a compiler or emulator is missing, or the image fails.
     """
     board = configuration.board
-    image, tree = build_image(board, standard_run(configuration.form, TICKS))
+    image, tree = build_image(board, standard_run(configuration.form, TICKS, configuration.core))
     map_text = image.with_suffix(".map").read_text(encoding="utf-8")
     report = play(board, image, TIMEOUT_S)
     footprint = Footprint(
