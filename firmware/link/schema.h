@@ -5,16 +5,16 @@
 #define PVID_LINK_VERSION 1u
 
 /* CRC-32 of the text. */
-#define PVID_LINK_SCHEMA 0x1552A2A3u
+#define PVID_LINK_SCHEMA 0xC04A322Cu
 
 #define PVID_LINK_SCHEMA_TEXT \
     "pvid 1\n" \
     "1 hello form:u8 n_p:u8 window:u16 settings:u32 session:u32 board:char[16]\n" \
     "2 schema text:char[]\n" \
-    "3 configure session:u32 settings:u32 form:u8 law:u8 divider:u16 hash_every:u16 estimate_every:u16 start:f32[4] start_sd:f32[4] lower:f32[4] upper:f32[4] row_sd:f32 forgetting_s:f32 feedback_hz:f32\n" \
+    "3 configure session:u32 settings:u32 form:u8 law:u8 divider:u16 hash_every:u16 estimate_every:u16 start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32\n" \
     "4 sample phi_y:f32[]\n" \
     "5 raw phi_y:f32[]\n" \
-    "6 estimate session:u32 updates:u32 p:f32[4] covariance:f32[10] kappa:f32 residual_sd:f32 weight:f32 reason:u8\n" \
+    "6 estimate session:u32 updates:u32 p:f32[6] covariance:f32[21] kappa:f32 residual_sd:f32 weight:f32 reason:u8\n" \
     "7 status session:u32 code:u8 core:u8 updates:u32 rejected:u32 repeated:u32 skipped:u32 missing:u32 malformed:u32 bad_crc:u32 foreign:u32\n" \
     "8 hash session:u32 hash:u32\n" \
     "9 credit session:u32 room:u32 hash:u32 reason:u8"
@@ -42,14 +42,14 @@
 #define PVID_CONFIGURE_DIVIDER 10u /* u16 */
 #define PVID_CONFIGURE_HASH_EVERY 12u /* u16 */
 #define PVID_CONFIGURE_ESTIMATE_EVERY 14u /* u16 */
-#define PVID_CONFIGURE_START 16u /* f32[4] */
-#define PVID_CONFIGURE_START_SD 32u /* f32[4] */
-#define PVID_CONFIGURE_LOWER 48u /* f32[4] */
-#define PVID_CONFIGURE_UPPER 64u /* f32[4] */
-#define PVID_CONFIGURE_ROW_SD 80u /* f32 */
-#define PVID_CONFIGURE_FORGETTING_S 84u /* f32 */
-#define PVID_CONFIGURE_FEEDBACK_HZ 88u /* f32 */
-#define PVID_CONFIGURE_BYTES 92u
+#define PVID_CONFIGURE_START 16u /* f32[6] */
+#define PVID_CONFIGURE_START_SD 40u /* f32[6] */
+#define PVID_CONFIGURE_LOWER 64u /* f32[6] */
+#define PVID_CONFIGURE_UPPER 88u /* f32[6] */
+#define PVID_CONFIGURE_ROW_SD 112u /* f32 */
+#define PVID_CONFIGURE_FORGETTING_S 116u /* f32 */
+#define PVID_CONFIGURE_FEEDBACK_HZ 120u /* f32 */
+#define PVID_CONFIGURE_BYTES 124u
 
 #define PVID_SAMPLE 4u
 #define PVID_SAMPLE_PHI_Y 0u /* f32[] */
@@ -62,13 +62,13 @@
 #define PVID_ESTIMATE 6u
 #define PVID_ESTIMATE_SESSION 0u /* u32 */
 #define PVID_ESTIMATE_UPDATES 4u /* u32 */
-#define PVID_ESTIMATE_P 8u /* f32[4] */
-#define PVID_ESTIMATE_COVARIANCE 24u /* f32[10] */
-#define PVID_ESTIMATE_KAPPA 64u /* f32 */
-#define PVID_ESTIMATE_RESIDUAL_SD 68u /* f32 */
-#define PVID_ESTIMATE_WEIGHT 72u /* f32 */
-#define PVID_ESTIMATE_REASON 76u /* u8 */
-#define PVID_ESTIMATE_BYTES 77u
+#define PVID_ESTIMATE_P 8u /* f32[6] */
+#define PVID_ESTIMATE_COVARIANCE 32u /* f32[21] */
+#define PVID_ESTIMATE_KAPPA 116u /* f32 */
+#define PVID_ESTIMATE_RESIDUAL_SD 120u /* f32 */
+#define PVID_ESTIMATE_WEIGHT 124u /* f32 */
+#define PVID_ESTIMATE_REASON 128u /* u8 */
+#define PVID_ESTIMATE_BYTES 129u
 
 #define PVID_STATUS 7u
 #define PVID_STATUS_SESSION 0u /* u32 */

@@ -155,7 +155,7 @@ def test_of_many_corrupted_frames_none_is_accepted_wrong() -> None:
 def test_messages_survive_the_way() -> None:
     values = np.array([[1.5, -2.0], [np.float32(1e-45), 3e38]], np.float32)
     sample = link.Sample.of_values(values[:, 0], values[:, 1])
-    estimate = link.Estimate(9, 4, (1.0, 2.0, 3.0, 4.0), tuple(map(float, range(10))), 0.5, 0.25, 8.0, 2)
+    estimate = link.Estimate(9, 4, (1.0, 2.0, 3.0, 4.0, 0.0, 0.0), tuple(map(float, range(21))), 0.5, 0.25, 8.0, 2)
     hello = link.Hello(form=1, n_p=4, window=256, settings=5, session=0, board="mps2-an386")
     data = b"".join(link.encode(m, i, i) for i, m in enumerate([sample, estimate, hello]))
     got = [item for item in link.Decoder().feed(data) if isinstance(item, link.Frame)]

@@ -31,6 +31,7 @@ from pvid.errors import PvidError
 
 VERSION = 1
 MAX_PAYLOAD = 1024
+MAX_P = 6  # places for parameters; those that a model lacks are 0
 _HEADER = struct.Struct("<BBIHI")
 _CRC = struct.Struct("<I")
 _LONGEST = _HEADER.size + MAX_PAYLOAD + _CRC.size
@@ -191,10 +192,10 @@ class Configure(Message):
     divider: int = _wire("u16")
     hash_every: int = _wire("u16")  # ticks; 0: only in the credits
     estimate_every: int = _wire("u16")  # ticks; 0: never
-    start: tuple[float, ...] = _wire("f32", 4)
-    start_sd: tuple[float, ...] = _wire("f32", 4)
-    lower: tuple[float, ...] = _wire("f32", 4)
-    upper: tuple[float, ...] = _wire("f32", 4)
+    start: tuple[float, ...] = _wire("f32", MAX_P)
+    start_sd: tuple[float, ...] = _wire("f32", MAX_P)
+    lower: tuple[float, ...] = _wire("f32", MAX_P)
+    upper: tuple[float, ...] = _wire("f32", MAX_P)
     row_sd: float = _wire("f32")
     forgetting_s: float = _wire("f32")
     feedback_hz: float = _wire("f32")
@@ -239,8 +240,8 @@ class Estimate(Message):
     TYPE = 6
     session: int = _wire("u32")
     updates: int = _wire("u32")
-    p: tuple[float, ...] = _wire("f32", 4)
-    covariance: tuple[float, ...] = _wire("f32", 10)  # upper triangle by rows
+    p: tuple[float, ...] = _wire("f32", MAX_P)
+    covariance: tuple[float, ...] = _wire("f32", MAX_P * (MAX_P + 1) // 2)  # upper triangle by rows, of all MAX_P
     kappa: float = _wire("f32")
     residual_sd: float = _wire("f32")
     weight: float = _wire("f32")

@@ -1,0 +1,213 @@
+"""A run played over a serial link: the same bits whatever the line does, and an exact account of what it did."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.errors import PvidError
+from pvid.native import Native
+from pvid.replay_image import native_hashes, standard_run
+from pvid.target import HOST_TARGET, Playback, Port, Target, judge, open_target, play
+
+TICKS = 5000
+EMULATED = (
+    "mps2-an385",
+    "mps2-an386",
+    "netduinoplus2",
+    "mps2-an500",
+    "mps2-an505",
+    "mps3-an547",
+    "virt-rv32imac",
+    "virt-rv32imafc",
+)
+
+
+@pytest.fixture(params=["weak", "strong"])
+def form(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def expected(form: str, native: Native) -> npt.NDArray[np.uint32]:
+    return native_hashes(standard_run(form, TICKS), native)
+
+
+def play_standard(
+    target: Target, form: str, reopen: Callable[[], Target] | None = None, patience_s: float = 30.0
+) -> Playback:
+    run = standard_run(form, TICKS)
+    return play(target, run.config, run.phi, run.y, reopen=reopen, patience_s=patience_s, resend_s=0.5)
+
+
+@pytest.mark.parametrize("name", [HOST_TARGET, *EMULATED])
+def test_every_target_computes_the_bits_of_the_host(name: str, form: str, native: Native) -> None:
+    run = standard_run(form, TICKS)
+    playback = play_standard(open_target(name, run.config), form)
+    verdict = judge(playback, expected(form, native))
+    assert verdict.equal, verdict.text
+    assert playback.missing_hashes == []
+    assert (playback.done, playback.restarts) == (TICKS, 0)
+    assert playback.hello is not None and name.endswith(playback.hello.board[:16])
+
+
+def test_the_last_estimate_is_that_of_the_core(native: Native) -> None:
+    run = standard_run("weak", TICKS)
+    identifier = native.weak(run.config)  # type: ignore[arg-type]
+    identifier.run(run.phi, run.y)
+    last = identifier.assess()
+    estimate = play_standard(open_target(HOST_TARGET, run.config), "weak").estimates[TICKS]
+    assert np.array_equal(np.array(estimate.p, np.float32), last["p"])
+    upper = last["covariance"][np.triu_indices(6)]
+    assert np.array_equal(np.array(estimate.covariance, np.float32), upper)
+
+
+@dataclass
+class Faulty:
+    """A line that drops, flips and inserts bytes, each with this probability, in both directions."""
+
+    port: Port
+    rate: float
+    random: np.random.Generator
+
+    def _spoil(self, data: bytes) -> bytes:
+        out = bytearray()
+        for byte, draw in zip(data, self.random.random(len(data)), strict=True):
+            if draw < self.rate:
+                continue
+            if draw < 2 * self.rate:
+                byte ^= 1 << int(self.random.integers(0, 8))
+            out.append(byte)
+            if 2 * self.rate <= draw < 3 * self.rate:
+                out.append(int(self.random.integers(0, 256)))
+        return bytes(out)
+
+    def read(self, size: int = 1, /) -> bytes:
+        return self._spoil(self.port.read(size))
+
+    def write(self, data: bytes, /) -> int | None:
+        return self.port.write(self._spoil(data))
+
+    def close(self) -> None:
+        self.port.close()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_line_that_spoils_bytes_changes_no_bit(form: str, seed: int, native: Native) -> None:
+    run = standard_run(form, TICKS)
+    random = np.random.default_rng(seed)
+    target = open_target(HOST_TARGET, run.config, lambda port: Faulty(port, 1e-4, random))
+    playback = play_standard(target, form)
+    verdict = judge(playback, expected(form, native))
+    assert verdict.equal, verdict.text
+    assert playback.board is not None
+    damage = playback.received.damaged + playback.board.malformed + playback.board.bad_crc
+    assert damage + playback.received.missing + playback.board.missing > 0  # the injector was there
+    assert playback.sent == TICKS + playback.repeated
+
+
+class KilledMidway:
+    """Ends the process behind a target once so many bytes were written to it."""
+
+    def __init__(self, port: Port, after: int, kill: Callable[[], None]) -> None:
+        self.port, self.left, self.kill = port, after, kill
+
+    def read(self, size: int = 1, /) -> bytes:
+        return self.port.read(size)
+
+    def write(self, data: bytes, /) -> int | None:
+        self.left -= len(data)
+        if self.left < 0:
+            self.kill()
+        return self.port.write(data)
+
+    def close(self) -> None:
+        self.port.close()
+
+
+def start_to_be_killed(name: str, form: str, after: int) -> Target:
+    target = open_target(name, standard_run(form, TICKS).config)
+
+    def kill() -> None:
+        assert target.process is not None
+        target.process.kill()
+        target.process.wait()
+
+    target.port = KilledMidway(target.port, after, kill)
+    return target
+
+
+@pytest.mark.parametrize("name", [HOST_TARGET, "mps2-an386"])
+def test_a_killed_emulator_is_started_again_and_the_run_over(name: str, form: str, native: Native) -> None:
+    config = standard_run(form, TICKS).config
+    playback = play_standard(
+        start_to_be_killed(name, form, 20_000), form, lambda: open_target(name, config), patience_s=10
+    )
+    verdict = judge(playback, expected(form, native))
+    assert verdict.equal, verdict.text
+    assert playback.restarts == 1
+
+
+def test_a_port_that_is_gone_for_good_ends_with_what_is_missing(native: Native) -> None:
+    began = time.monotonic()
+    playback = play_standard(start_to_be_killed(HOST_TARGET, "weak", 20_000), "weak", patience_s=3)
+    assert time.monotonic() - began < 20
+    verdict = judge(playback, expected("weak", native))
+    assert not verdict.equal
+    assert not playback.complete
+    assert 0 < playback.done < TICKS
+    assert f"{playback.done} of {TICKS} samples" in verdict.text
+
+
+@pytest.fixture
+def silent_port() -> Iterator[str]:
+    """A pseudo-terminal on which nobody answers."""
+    ours, theirs = os.openpty()
+    yield os.ttyname(theirs)
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_a_silent_port_ends_in_bounded_time(silent_port: str, native: Native) -> None:
+    config = standard_run("weak", TICKS).config
+    began = time.monotonic()
+    playback = play_standard(open_target(silent_port, config), "weak", patience_s=2)
+    assert time.monotonic() - began < 10
+    assert not judge(playback, expected("weak", native)).equal
+    assert "no answer for 2 s" in playback.account
+
+
+def test_an_image_for_other_settings_is_refused() -> None:
+    run = standard_run("weak", TICKS)
+    other = replace(run.config, l1=0.31)
+    with pytest.raises(PvidError, match="made for other settings"):
+        play(open_target(HOST_TARGET, run.config), other, run.phi, run.y)
+
+
+def test_what_the_core_refuses_is_named() -> None:
+    run = standard_run("weak", TICKS)
+    bad = replace(run.config, estimator=replace(run.config.estimator, row_sd=-1.0))
+    with pytest.raises(PvidError, match="bad row sd"):
+        play(open_target(HOST_TARGET, bad), bad, run.phi, run.y)
+
+
+def test_a_wrong_bit_is_not_called_equal(native: Native) -> None:
+    run = standard_run("weak", TICKS)
+    phi = run.phi.copy()
+    phi[2600] += run.phi_lsb  # one step of the encoder, once
+    playback = play(open_target(HOST_TARGET, run.config), run.config, phi, run.y)
+    verdict = judge(playback, expected("weak", native))
+    assert not verdict.equal
+    assert verdict.first is not None and 2500 <= verdict.first[0] < verdict.first[1]
+
+
+def test_an_unknown_target_is_named() -> None:
+    with pytest.raises(PvidError, match="there is no target mps2; there are stream-host, microbit"):
+        open_target("mps2", standard_run("weak", TICKS).config)
+    with pytest.raises(PvidError, match="cannot open the port /dev/nowhere"):
+        open_target("/dev/nowhere", standard_run("weak", TICKS).config)
