@@ -125,7 +125,7 @@ def _build_for_host(folder: Path, tree: Path) -> Path:
     firmware = ROOT / "firmware"
     application = firmware / "apps" / "stream"
     sources = [
-        *sorted((firmware / "src").glob("*_f32.c")),
+        *sorted((firmware / "src").glob("*.c")),
         firmware / "link" / "link.c",
         firmware / "ports" / "host" / "port.c",
         application / "main.c",

@@ -368,7 +368,7 @@ class Player:
 
     def _await_hello(self) -> None:
         """Lets an emulator come up: what it is sent before its UART is ready is lost, or blocks QEMU's for good."""
-        self.account.hello = None
+        self.account.hello, self.running = None, False
         limit = time.monotonic() + COMING_UP_S
         while self.target.process is not None and self.account.hello is None and time.monotonic() < limit:
             self._hear()
