@@ -13,6 +13,7 @@
 #include "pvid/fnv_q31.h"
 #include "pvid/information.h"
 #include "pvid/kapitza.h"
+#include "pvid/kapitza_q31.h"
 #include "pvid/kapitza_weak.h"
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/model.h"

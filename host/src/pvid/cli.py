@@ -444,7 +444,7 @@ def weak_table(rig_path: Path, name: str, check: Path | None, core: str) -> int:
         margins = ", ".join(f"{name} {bits:.2f}" for name, bits in integers.margins.items())
         messages.print(f"bits to spare at full scale: {margins}", highlight=False)
         made_by = f"pvid weak-table --core q31 --rig {rig_path.name} --name {name}"
-        return _print_header(to_c_header_q31(weak_config_q31(rig, rig.sample_rate), name, made_by), check)
+        return _print_header(to_c_header_q31(weak_config_q31(rig, rig.sample_rate), rig.l1, name, made_by), check)
     tables = weak_design_of(rig, rig.sample_rate)
     messages.print(
         f"taps {tables.taps}, decimation {tables.decimation}, windows of {tables.window} samples "

@@ -140,6 +140,18 @@ class RecordStruct(ctypes.Structure):
     ] + [("estimate_every", ctypes.c_uint32)]
 
 
+class ScaleStruct(ctypes.Structure):
+    """pvid_kapitza_scale_q31."""
+
+    _fields_ = [
+        ("l1", ctypes.c_int32),
+        ("g_multiplier", ctypes.c_int32),
+        ("g_shift", ctypes.c_int8),
+        ("d1_bits", ctypes.c_int8),
+        ("d2_bits", ctypes.c_int8),
+    ]
+
+
 ESTIMATE_DTYPE = np.dtype(
     [
         ("p", np.int32, (MAX_P,)),
@@ -150,6 +162,28 @@ ESTIMATE_DTYPE = np.dtype(
         ("weight", np.uint32),
     ]
 )
+
+
+@dataclass(frozen=True)
+class ScaleQ31:
+    """What turns an estimate into metres, as in kapitza_q31.h."""
+
+    l1: int
+    g_multiplier: int
+    g_shift: int
+    d1_bits: int
+    d2_bits: int
+
+
+def physical_q31(native: Native, estimate: npt.NDArray[np.void], scale: ScaleQ31) -> tuple[Int32, Int32] | None:
+    """pvid_kapitza_physical_q31: (g, l2, rho2) and standard errors in 2^-24, None outside the physical region."""
+    one = np.ascontiguousarray(estimate, ESTIMATE_DTYPE)
+    value, se = np.empty(3, np.int32), np.empty(3, np.int32)
+    struct = ScaleStruct(scale.l1, scale.g_multiplier, scale.g_shift, scale.d1_bits, scale.d2_bits)
+    function = native.library.pvid_kapitza_physical_q31
+    function.restype = ctypes.c_bool
+    places = [ctypes.c_void_p(array.ctypes.data) for array in (value, se)]
+    return (value, se) if function(ctypes.c_void_p(one.ctypes.data), ctypes.byref(struct), *places) else None
 
 
 @dataclass

@@ -112,7 +112,7 @@ def header(run: ReplayRun) -> str:
     """replay_run.h of a run."""
     tables: dict[str, npt.NDArray[np.float32]] = {}
     if isinstance(run.config, WeakConfigQ31):
-        settings = [to_c_header_q31(run.config, "replay_config", "pvid.replay_image")]
+        settings = [to_c_header_q31(run.config, RigFile.standard().l1, "replay_config", "pvid.replay_image")]
     elif isinstance(run.config, WeakConfig):
         weak, tables = weak_config_struct(run.config)
         design = struct_initializer(weak.design.contents, {name: f"replay_{name}" for name in tables})

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.native import Law
-from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31
+from pvid.native_q31 import EstimatorConfigQ31, ScaleQ31, WeakConfigQ31
 from pvid.rigfile import RigFile
 from pvid.setup import weak_config, weak_design_of
 from pvid.weak_design_q31 import WeakTablesQ31, weak_tables_q31
@@ -139,3 +139,20 @@ def covariance_of(config: WeakConfigQ31, estimate: npt.NDArray[np.void]) -> npt.
     se = se_of(config, estimate["se"][..., :n_p])
     correlation = np.asarray(estimate["correlation"], np.float64)[..., :n_p, :n_p] / 2**30
     return np.asarray(correlation * se[..., :, None] * se[..., None, :])
+
+
+LENGTH_BITS = 24  # of pvid_kapitza_q31
+
+
+def scale_of(config: WeakConfigQ31, l1: float) -> ScaleQ31:
+    """What turns the estimates of a configuration into metres for a rod of l1 [m]."""
+    if not 2.0**-LENGTH_BITS <= l1 < 2.0 ** (31 - LENGTH_BITS):
+        raise PvidError(f"l1 = {l1:g} m does not fit the fixed-point core's lengths, which end at 127 m")
+    mantissa, exponent = math.frexp(units_of(config)[0] * l1 * 2.0**LENGTH_BITS)
+    return ScaleQ31(
+        l1=round(l1 * 2.0**LENGTH_BITS),
+        g_multiplier=min(round(mantissa * 2.0**31), 2**31 - 1),
+        g_shift=31 - exponent,
+        d1_bits=config.estimator.p_bits[1],
+        d2_bits=config.estimator.p_bits[2],
+    )

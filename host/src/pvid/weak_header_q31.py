@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.native_q31 import WeakConfigQ31
-from pvid.setup_q31 import units_of
+from pvid.setup_q31 import scale_of, units_of
 
 _P_UNITS = ("1/s^2", "", "", "rad")
 _TABLES = ("smooth", "second", "chi", "multiplier", "gram")
@@ -24,8 +24,8 @@ def _list(values: Sequence[int]) -> str:
     return "{" + ", ".join(str(v) for v in values) + "}"
 
 
-def to_c_header_q31(config: WeakConfigQ31, name: str, made_by: str) -> str:
-    """A C header that defines `static const pvid_weak_config_q31 name` with its tables in name_design.
+def to_c_header_q31(config: WeakConfigQ31, l1: float, name: str, made_by: str) -> str:
+    """A C header that defines `static const pvid_weak_config_q31 name`, its tables in name_design, and NAME_SCALE.
 
     No date: the same settings make the same file.
 
@@ -33,6 +33,8 @@ def to_c_header_q31(config: WeakConfigQ31, name: str, made_by: str) -> str:
     ----------
     config
         The settings.
+    l1
+        Length of rod 1 [m].
     name
         Name of the configuration in C.
     made_by
@@ -40,6 +42,7 @@ def to_c_header_q31(config: WeakConfigQ31, name: str, made_by: str) -> str:
     """
     d, e = config.design, config.estimator
     k = d.functions
+    scale = scale_of(config, l1)
     units = [
         f" *   p[{i}] = {label}: one unit is {unit:.17g} {text}".rstrip()
         for i, (label, unit, text) in enumerate(zip(("w", "d1", "d2", "c"), units_of(config), _P_UNITS, strict=False))
@@ -69,6 +72,7 @@ def to_c_header_q31(config: WeakConfigQ31, name: str, made_by: str) -> str:
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
+            '#include "pvid/kapitza_q31.h"',
             '#include "pvid/weak_q31.h"',
             "",
             f"#if PVID_MAX_TAPS < {d.taps} || PVID_MAX_DECIMATION < {d.decimation} || \\",
@@ -111,6 +115,10 @@ def to_c_header_q31(config: WeakConfigQ31, name: str, made_by: str) -> str:
             *(f"        .{field} = {getattr(e, field)}{'u' if field in unsigned else ''}," for field in settings),
             "    },",
             "};",
+            "",
+            "/* for pvid_kapitza_physical_q31; a macro, so that who does not ask for it is not told it is unused */",
+            f"#define {name.upper()}_SCALE {{{scale.l1}, {scale.g_multiplier}, {scale.g_shift}, "
+            f"{scale.d1_bits}, {scale.d2_bits}}}",
             "",
             "#endif",
             "",
