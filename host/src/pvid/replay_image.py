@@ -46,16 +46,17 @@ class ReplayRun:
     """
 
     form: str
-    config: StrongConfig | WeakConfig | WeakConfigQ31
+    config: StrongConfig | WeakConfig
     counts: npt.NDArray[np.int16]
     phi_lsb: np.float32
     y_lsb: np.float32
     measure_from: int
+    fixed: WeakConfigQ31 | None = None  # in place of config, where the fixed-point core plays the counts
 
     @property
     def core(self) -> str:
         """Which arithmetic."""
-        return "q31" if isinstance(self.config, WeakConfigQ31) else "f32"
+        return "f32" if self.fixed is None else "q31"
 
     @property
     def ticks(self) -> int:
@@ -84,8 +85,7 @@ def standard_run(form: str, ticks: int, core: str = "f32") -> ReplayRun:
     identifier = replace(standard.identifier, form=form, differentiator="finite-difference", stride=1)  # type: ignore[arg-type]
     rig = replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb))
     start = standard_start(1)
-    in_q31 = core == "q31"
-    config = weak_config_q31(rig, run.sample_rate, start) if in_q31 else config_of(rig, run.sample_rate, start)
+    config = config_of(rig, run.sample_rate, start)
     counts = np.rint(np.stack([run.phi / sensors.phi_lsb, run.y / sensors.y_lsb], axis=1))[:ticks]
     if len(counts) != ticks or np.abs(counts).max() > np.iinfo(np.int16).max:
         raise PvidError("the standard run does not fit 16-bit counts")
@@ -96,10 +96,11 @@ def standard_run(form: str, ticks: int, core: str = "f32") -> ReplayRun:
         phi_lsb=np.float32(sensors.phi_lsb),
         y_lsb=np.float32(sensors.y_lsb),
         measure_from=_measure_from(config, ticks),
+        fixed=weak_config_q31(rig, run.sample_rate, start) if core == "q31" else None,
     )
 
 
-def _measure_from(config: StrongConfig | WeakConfig | WeakConfigQ31, ticks: int) -> int:
+def _measure_from(config: StrongConfig | WeakConfig, ticks: int) -> int:
     """First tick of the mean: whole periods of the weak form's windows, all of them with a solve in work."""
     if isinstance(config, StrongConfig):
         return min(STRONG_SETTLED, ticks // 2)
@@ -111,8 +112,8 @@ def _measure_from(config: StrongConfig | WeakConfig | WeakConfigQ31, ticks: int)
 def header(run: ReplayRun) -> str:
     """replay_run.h of a run."""
     tables: dict[str, npt.NDArray[np.float32]] = {}
-    if isinstance(run.config, WeakConfigQ31):
-        settings = [to_c_header_q31(run.config, RigFile.standard().l1, "replay_config", "pvid.replay_image")]
+    if run.fixed is not None:
+        settings = [to_c_header_q31(run.fixed, RigFile.standard().l1, "replay_config", "pvid.replay_image")]
     elif isinstance(run.config, WeakConfig):
         weak, tables = weak_config_struct(run.config)
         design = struct_initializer(weak.design.contents, {name: f"replay_{name}" for name in tables})
@@ -187,8 +188,8 @@ def _resolutions(run: ReplayRun) -> list[str]:
 
 def native_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
-    if isinstance(run.config, WeakConfigQ31):
-        return WeakIdentifierQ31(native, run.config).run(run.counts[:, 0], run.counts[:, 1]).hash
+    if run.fixed is not None:
+        return WeakIdentifierQ31(native, run.fixed).run(run.counts[:, 0], run.counts[:, 1]).hash
     if isinstance(run.config, WeakConfig):
         return native.weak(run.config).run(run.phi, run.y).hash
     return native.strong(run.config).run(run.phi, run.y).hash
@@ -196,9 +197,9 @@ def native_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
 
 def twin_hashes(run: ReplayRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]. Cost: 0.5 ms a tick in the strong form."""
-    if isinstance(run.config, WeakConfigQ31):
+    if run.fixed is not None:
         phi, y = run.counts.astype(np.int64).T
-        return twin_hashes_q31(WeakTwinQ31(run.config).run(phi, y))
+        return twin_hashes_q31(WeakTwinQ31(run.fixed).run(phi, y))
     if isinstance(run.config, WeakConfig):
         states = WeakTwin(run.config).run(run.phi, run.y)
     else:
