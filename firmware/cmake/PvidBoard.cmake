@@ -1,8 +1,8 @@
-# A build for one board: PVID_BOARD names a file of ports/boards.
-#
-# Included before the targets are made, because the core's options hold for all of them. Then
+# A build for one board: PVID_BOARD names a file of ports/boards. In a project of your own
+#     set(PVID_BOARD mps2-an386)
+#     add_subdirectory(pvid/firmware)
 #     pvid_add_image(name main.c ...)
-# makes name.elf, with the board's start-up, port and memory map.
+# makes name.elf, with the core and the board's start-up, port and memory map.
 
 set(pvid_ports ${CMAKE_CURRENT_LIST_DIR}/../ports)
 set(pvid_board_file ${pvid_ports}/boards/${PVID_BOARD}.cmake)
@@ -23,23 +23,29 @@ if(NOT CMAKE_CROSSCOMPILING)
   message(FATAL_ERROR "${PVID_BOARD} needs a cross compiler: --toolchain firmware/cmake/${pvid_toolchain}.cmake")
 endif()
 
-add_compile_options(
+# Whatever is built for the board: its core, and nothing that is not there.
+add_library(pvid_board INTERFACE)
+target_compile_options(pvid_board INTERFACE
   ${PVID_BOARD_CPU}
   -ffunction-sections
   -fdata-sections
   -fstack-usage     # read by `pvid sizes`
   -fno-math-errno   # sqrtf is one instruction where there is one
 )
-add_link_options(${PVID_BOARD_CPU})
+target_link_options(pvid_board INTERFACE ${PVID_BOARD_CPU} -Wl,--gc-sections)
 
 set(pvid_port_sources ${pvid_ports}/fault.c)
 if(PVID_BOARD_FAMILY STREQUAL "avr")
   list(APPEND pvid_port_sources ${pvid_ports}/avr/port.c)
 else()
-  # No C library: the compiler's own headers, these two, and its arithmetic (libgcc).
-  add_compile_options(-ffreestanding -fbuiltin)
-  include_directories(${pvid_ports}/freestanding/include)
-  set(PVID_MATH_LIBRARY "" CACHE STRING "The library that has sqrtf" FORCE)
+  # No C library: the compiler's own headers, the two of freestanding/, and the compiler's arithmetic (libgcc).
+  target_compile_options(pvid_board INTERFACE -ffreestanding -fbuiltin)
+  target_include_directories(pvid_board INTERFACE ${pvid_ports}/freestanding/include)
+  list(TRANSFORM PVID_BOARD_MEMORY PREPEND "-Wl,--defsym=pvid_" OUTPUT_VARIABLE pvid_memory_options)
+  set(pvid_linker_script ${pvid_ports}/${PVID_BOARD_FAMILY}/link.ld)
+  target_link_options(pvid_board INTERFACE -nostdlib -T${pvid_linker_script} ${pvid_memory_options})
+  set_target_properties(pvid_board PROPERTIES INTERFACE_LINK_DEPENDS ${pvid_linker_script})
+  target_link_libraries(pvid_board INTERFACE gcc)
   list(APPEND pvid_port_sources
     ${pvid_ports}/freestanding/memory.c
     ${pvid_ports}/freestanding/square_root.c
@@ -54,13 +60,14 @@ else()
     ${pvid_ports}/freestanding/memory.c ${pvid_ports}/start.c
     PROPERTIES COMPILE_OPTIONS -fno-tree-loop-distribute-patterns
   )
-  set(pvid_linker_script ${pvid_ports}/${PVID_BOARD_FAMILY}/link.ld)
-  list(TRANSFORM PVID_BOARD_MEMORY PREPEND "-Wl,--defsym=pvid_" OUTPUT_VARIABLE pvid_memory_options)
+  set(PVID_MATH_LIBRARY "")
 endif()
 
+# Objects, not an archive: the start-up is called by nobody.
 add_library(pvid_port OBJECT ${pvid_port_sources})
 target_include_directories(pvid_port PUBLIC ${pvid_ports})
 target_compile_definitions(pvid_port PRIVATE ${PVID_BOARD_DEFINITIONS})
+target_link_libraries(pvid_port PUBLIC pvid_board)
 set_target_properties(pvid_port PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
 pvid_developer_warnings(pvid_port)
 
@@ -71,10 +78,5 @@ function(pvid_add_image name)
   set_target_properties(${name} PROPERTIES SUFFIX .elf)
   target_compile_definitions(${name} PRIVATE PVID_BOARD_NAME="${PVID_BOARD}")
   target_link_libraries(${name} PRIVATE pvid_port pvid::pvid)
-  target_link_options(${name} PRIVATE -Wl,--gc-sections -Wl,-Map=${CMAKE_CURRENT_BINARY_DIR}/${name}.map)
-  if(pvid_linker_script)
-    target_link_options(${name} PRIVATE -nostdlib -T${pvid_linker_script} ${pvid_memory_options})
-    target_link_libraries(${name} PRIVATE gcc)
-    set_target_properties(${name} PROPERTIES LINK_DEPENDS ${pvid_linker_script})
-  endif()
+  target_link_options(${name} PRIVATE -Wl,-Map=${CMAKE_CURRENT_BINARY_DIR}/${name}.map)
 endfunction()

@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 
-extern uint32_t pvid_stack_bottom[]; /* the lowest word; below it there is no memory where the board allows it */
+extern uint32_t pvid_stack_guard[];  /* below the stack: what must not be written */
+extern uint32_t pvid_stack_bottom[]; /* the lowest word */
 extern uint32_t pvid_stack_top[];
 extern const uint32_t pvid_data_load[]; /* where .data stands in the image */
 extern uint32_t pvid_data_start[];

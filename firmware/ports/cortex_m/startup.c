@@ -1,9 +1,12 @@
 /* Start of a Cortex-M (v6-M to v8.1-M): vector table, FPU, then main; every exception is a fault here,
  * reported over the UART with its cause.
  *
- * The stack lies at the lowest address of the RAM: a stack that overflows leaves the memory and faults,
- * instead of writing over variables. The report has a stack of its own.
+ * A stack that overflows faults instead of writing over variables: it lies at the lowest address of the RAM,
+ * above a guard that no one may write (v7-M: MPU) or a limit of the stack pointer (v8-M). On a v6-M core there
+ * is only the end of the memory. The report has a stack of its own.
  */
+#include <stdbool.h>
+
 #include "../fault.h"
 #include "../memory_map.h"
 #include "../start.h"
@@ -37,11 +40,44 @@ __attribute__((section(".vectors"), used)) static const struct {
 #define HFSR SYSTEM_REGISTER(0xE000ED2Cu)
 #define BFAR SYSTEM_REGISTER(0xE000ED38u)
 
+#define MPU_CONTROL SYSTEM_REGISTER(0xE000ED94u)
+#define MPU_REGION SYSTEM_REGISTER(0xE000ED98u)
+#define MPU_BASE SYSTEM_REGISTER(0xE000ED9Cu)
+#define MPU_ATTRIBUTES SYSTEM_REGISTER(0xE000EDA0u)
+#define MPU_ENABLE_WITH_DEFAULT_MAP 0x5u
+#define MPU_512_BYTES_NO_ACCESS 0x10000011u
+
+#define CFSR_STACK_LIMIT 0x100000u   /* STKOF */
 #define CFSR_STACKING 0x1010u        /* MSTKERR, STKERR: the exception's own frame could not be written */
 #define CFSR_NO_COPROCESSOR 0x80000u /* NOCP: an FPU instruction without an FPU, or with it switched off */
 #define CFSR_UNDEFINED 0x10000u
 #define CFSR_BUS 0x0F00u
 #define CFSR_MEMORY 0x00FFu
+
+static void guard_stack(void)
+{
+#if defined(__ARM_ARCH_7M__) || defined(__ARM_ARCH_7EM__)
+    MPU_REGION = 0u;
+    MPU_BASE = (uint32_t)(uintptr_t)pvid_stack_guard;
+    MPU_ATTRIBUTES = MPU_512_BYTES_NO_ACCESS;
+    MPU_CONTROL = MPU_ENABLE_WITH_DEFAULT_MAP;
+    __asm__ volatile("dsb\n\tisb" ::: "memory");
+#elif defined(__ARM_ARCH_8M_MAIN__) || defined(__ARM_ARCH_8_1M_MAIN__)
+    __asm__ volatile("msr msplim, %0" ::"r"(pvid_stack_bottom));
+#endif
+}
+
+static bool is_stack_overflow(const uint32_t *frame)
+{
+    if (((uintptr_t)frame < (uintptr_t)pvid_stack_bottom) || ((uintptr_t)frame > ((uintptr_t)pvid_stack_top - 32u))) {
+        return true;
+    }
+#if !defined(__ARM_ARCH_6M__) && !defined(__ARM_ARCH_8M_BASE__)
+    return (CFSR & (CFSR_STACK_LIMIT | CFSR_STACKING)) != 0u;
+#else
+    return false;
+#endif
+}
 
 void pvid_reset(void)
 {
@@ -51,6 +87,7 @@ void pvid_reset(void)
 #endif
     uint32_t *stack;
     __asm__ volatile("mov %0, sp" : "=r"(stack));
+    guard_stack();
     pvid_start(stack);
 }
 
@@ -70,7 +107,7 @@ __attribute__((naked)) void pvid_exception(void)
 
 static const char *cause(const uint32_t *frame, uint32_t exception)
 {
-    if (((uintptr_t)frame < (uintptr_t)pvid_stack_bottom) || ((uintptr_t)frame > ((uintptr_t)pvid_stack_top - 32u))) {
+    if (is_stack_overflow(frame)) {
         return "stack overflow,";
     }
     if ((exception < 3u) || (exception > 6u)) {
@@ -78,9 +115,6 @@ static const char *cause(const uint32_t *frame, uint32_t exception)
     }
 #if !defined(__ARM_ARCH_6M__) && !defined(__ARM_ARCH_8M_BASE__)
     const uint32_t status = CFSR;
-    if ((status & CFSR_STACKING) != 0u) {
-        return "stack overflow,";
-    }
     if ((status & CFSR_NO_COPROCESSOR) != 0u) {
         return "FPU instruction and no FPU,";
     }
@@ -101,7 +135,7 @@ void pvid_exception_report(const uint32_t *frame, uint32_t exception)
 {
     pvid_fault_begin(cause(frame, exception));
     pvid_fault_word("exception", exception);
-    if (((uintptr_t)frame >= (uintptr_t)pvid_stack_bottom) && ((uintptr_t)frame <= ((uintptr_t)pvid_stack_top - 32u))) {
+    if (!is_stack_overflow(frame)) { /* else there is no frame */
         pvid_fault_word("pc", frame[6]);
         pvid_fault_word("lr", frame[5]);
     }

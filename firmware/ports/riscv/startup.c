@@ -29,6 +29,12 @@ __attribute__((naked, section(".reset"))) void pvid_reset(void)
                      "csrs mstatus, t0\n\t"
                      "csrw fcsr, zero\n\t" /* to nearest even */
 #endif
+                     /* The page below the stack is nobody's: protected (PMP, NAPOT of 4 kB), locked. */
+                     "la t0, pvid_stack_guard + 0x7FF\n\t"
+                     "srli t0, t0, 2\n\t"
+                     "csrw pmpaddr0, t0\n\t"
+                     "li t0, 0x98\n\t"
+                     "csrw pmpcfg0, t0\n\t"
                      "mv a0, sp\n\t"
                      "la t0, pvid_start\n\t"
                      "jr t0\n\t"
@@ -44,12 +50,19 @@ __attribute__((naked, aligned(4))) void pvid_trap(void)
                      : "i"(REPORT_STACK_BYTES));
 }
 
-static const char *cause(uint32_t code)
+#define LOAD_FAULT 5u
+#define STORE_FAULT 7u
+
+static const char *cause(uint32_t code, uint32_t address)
 {
     static const char *const causes[8] = {
         "misaligned jump,", "no memory to execute,", "illegal instruction,", "breakpoint,",
         "misaligned load,", "no memory to load,",    "misaligned store,",    "no memory to store,",
     };
+    if (((code == LOAD_FAULT) || (code == STORE_FAULT)) && (address >= (uintptr_t)pvid_stack_guard) &&
+        (address < (uintptr_t)pvid_stack_bottom)) {
+        return "stack overflow,";
+    }
     return (code < 8u) ? causes[code] : "unexpected trap,";
 }
 
@@ -61,7 +74,7 @@ void pvid_trap_report(void)
     READ_CSR("mcause", code);
     READ_CSR("mepc", pc);
     READ_CSR("mtval", value);
-    pvid_fault_begin(cause(code));
+    pvid_fault_begin(cause(code, value));
     pvid_fault_word("mcause", code);
     pvid_fault_word("pc", pc);
     pvid_fault_word("mtval", value);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import select
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -107,8 +108,13 @@ def board(name: str) -> Board:
     return BOARDS[name]
 
 
-def build(target: Board, tree: Path, options: Mapping[str, str]) -> Path:
+def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = ROOT / "firmware") -> Path:
     """Builds firmware/ for a board into `tree` with these CMake variables; returns `tree`.
+
+    Parameters
+    ----------
+    source
+        Another CMake project, which contains it.
 
     Raises
     ------
@@ -117,9 +123,8 @@ def build(target: Board, tree: Path, options: Mapping[str, str]) -> Path:
     """
     if shutil.which(target.compiler) is None:
         raise PvidError(f"{target.compiler} is not installed: it comes with ./tools/test")
-    firmware = ROOT / "firmware"
-    configure = ["cmake", "-S", str(firmware), "-B", str(tree), "-G", "Ninja"]
-    configure += [f"-DCMAKE_TOOLCHAIN_FILE={firmware / 'cmake' / target.toolchain}.cmake"]
+    configure = ["cmake", "-S", str(source), "-B", str(tree), "-G", "Ninja"]
+    configure += [f"-DCMAKE_TOOLCHAIN_FILE={ROOT / 'firmware' / 'cmake' / target.toolchain}.cmake"]
     configure += [f"-DPVID_BOARD={target.name}", "-DPVID_DEVELOPER=ON"]
     configure += [f"-D{name}={value}" for name, value in options.items()]
     for command in (configure, ["cmake", "--build", str(tree)]):
@@ -159,15 +164,23 @@ def prepare_emulator(target: Board) -> None:
 class Outcome:
     """What a run in an emulator left."""
 
-    text: str
+    sent: bytes  # over the UART
     exit_code: int
+    complaints: str  # the emulator's own
+
+    @property
+    def text(self) -> str:
+        """What was sent, as lines."""
+        return self.sent.decode("ascii", "replace").replace("\r", "")
 
 
-def run(target: Board, image: Path, timeout: float, machine: str | None = None) -> Outcome:
+def run(target: Board, image: Path, timeout: float, machine: str | None = None, heard: bytes = b"") -> Outcome:
     """Runs an image in its board's emulator until it exits, `timeout` seconds at most.
 
     Parameters
     ----------
+    heard
+        What the image receives over its UART, from when it has sent something.
     machine
         Another machine of the same emulator.
 
@@ -178,11 +191,19 @@ def run(target: Board, image: Path, timeout: float, machine: str | None = None) 
     """
     prepare_emulator(target)
     command = [machine if machine and part == target.machine else part for part in target.command(image)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=timeout, check=False)
+        if heard:  # a UART that is not yet switched on drops what comes
+            select.select([process.stdout], [], [], timeout)
+        sent, complaints = process.communicate(heard, timeout=timeout)
     except subprocess.TimeoutExpired as error:
-        heard = (error.stdout or b"").decode("ascii", "replace").strip().splitlines()
+        process.kill()
+        sent, _ = process.communicate()
+        said = sent.decode("ascii", "replace").strip().splitlines()
         raise PvidError(
-            f"{target.name}: no end after {timeout:g} s; last heard: {heard[-1] if heard else 'nothing'}"
+            f"{target.name}: no end after {timeout:g} s; its last words: {said[-1] if said else 'nothing'}"
         ) from error
-    return Outcome((done.stdout + done.stderr).decode("ascii", "replace"), done.returncode)
+    except BaseException:
+        process.kill()
+        raise
+    return Outcome(sent, process.returncode, complaints.decode("utf-8", "replace"))
