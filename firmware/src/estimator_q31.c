@@ -91,16 +91,16 @@ static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
         return PVID_BAD_ROW_SD;
     }
     if ((config->forgetting_groups != 0u) &&
-        ((config->forgetting_groups < 4u) || (config->forgetting_groups > (1u << 24)))) {
+        ((config->forgetting_groups < 4u) || (config->forgetting_groups > ((uint32_t)1 << 24)))) {
         return PVID_BAD_FORGETTING;
     }
     if ((config->gain < 0) || (config->gain > PVID_ONE_Q30)) {
         return PVID_BAD_FEEDBACK;
     }
-    if ((config->correlation < (1u << 16)) || (config->correlation > (1u << 31))) {
+    if ((config->correlation < ((uint32_t)1 << 16)) || (config->correlation > ((uint32_t)1 << 31))) {
         return PVID_BAD_CORRELATION;
     }
-    if ((config->row_weight < 1u) || (config->row_weight > (1u << 16))) {
+    if ((config->row_weight < 1u) || (config->row_weight > ((uint32_t)1 << 16))) {
         return PVID_BAD_ROW_WEIGHT;
     }
     if ((config->step_limit < 1u) || (config->step_limit > 58982u)) {
@@ -269,10 +269,10 @@ static size_t column_end(const pvid_model_q31 *model, size_t start)
 /* t += m e_j a for the symmetric m whose upper triangle is packed by rows. */
 static void add_column(uint32_t n, const int32_t m[], uint32_t j, int32_t a, int64_t t[])
 {
-    size_t at = j;
+    size_t at = (size_t)j;
     for (uint32_t i = 0; i < j; i++) {
         t[i] += (int64_t)m[at] * a;
-        at += (n - 1u) - i;
+        at += (size_t)((n - 1u) - i);
     }
     for (uint32_t i = j; i < n; i++) {
         t[i] += (int64_t)m[at] * a;

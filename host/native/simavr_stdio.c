@@ -23,13 +23,14 @@
 #define INSTRUCTIONS_PER_LOOK 512u /* at standard input */
 
 static bool room; /* the USART takes another byte */
+static int sent;  /* descriptor of what was standard output: the library prints there, too */
 
 static void on_byte(avr_irq_t *irq, uint32_t value, void *unused)
 {
     (void)irq;
     (void)unused;
     const uint8_t byte = (uint8_t)value;
-    while ((write(STDOUT_FILENO, &byte, 1) < 0) && (errno == EINTR)) {
+    while ((write(sent, &byte, 1) < 0) && (errno == EINTR)) {
     }
 }
 
@@ -71,6 +72,8 @@ static void no_sleep(avr_t *avr, avr_cycle_count_t cycles)
 
 int main(int argc, char **argv)
 {
+    sent = dup(STDOUT_FILENO);
+    (void)dup2(STDERR_FILENO, STDOUT_FILENO);
     elf_firmware_t firmware = {0};
     if ((argc != 3) || (elf_read_firmware(argv[2], &firmware) != 0)) {
         fprintf(stderr, "usage: simavr_stdio PART IMAGE.elf\n");
