@@ -193,7 +193,7 @@ def run(target: Board, image: Path, timeout: float, machine: str | None = None, 
     command = [machine if machine and part == target.machine else part for part in target.command(image)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        if heard:  # a UART that is not yet switched on drops what comes
+        if heard and process.stdout is not None:  # a UART that is not yet switched on drops what comes
             select.select([process.stdout], [], [], timeout)
         sent, complaints = process.communicate(heard, timeout=timeout)
     except subprocess.TimeoutExpired as error:
