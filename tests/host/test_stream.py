@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from pvid.errors import PvidError
-from pvid.native import Native
-from pvid.replay_image import native_hashes, standard_run
+from pvid.native import Native, StrongConfig, WeakConfig
+from pvid.replay_image import ReplayRun, native_hashes, standard_run
 from pvid.target import HOST_TARGET, Playback, Port, Target, judge, open_target, play
 
 TICKS = 5000
@@ -34,6 +38,12 @@ def form(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
+def config_for(run: ReplayRun) -> StrongConfig | WeakConfig:
+    """Its configuration; the link carries float32 alone."""
+    assert isinstance(run.config, StrongConfig | WeakConfig)
+    return run.config
+
+
 def expected(form: str, native: Native) -> npt.NDArray[np.uint32]:
     return native_hashes(standard_run(form, TICKS), native)
 
@@ -42,13 +52,13 @@ def play_standard(
     target: Target, form: str, reopen: Callable[[], Target] | None = None, patience_s: float = 30.0
 ) -> Playback:
     run = standard_run(form, TICKS)
-    return play(target, run.config, run.phi, run.y, reopen=reopen, patience_s=patience_s, resend_s=0.5)
+    return play(target, config_for(run), run.phi, run.y, reopen=reopen, patience_s=patience_s, resend_s=0.5)
 
 
 @pytest.mark.parametrize("name", [HOST_TARGET, *EMULATED])
 def test_every_target_computes_the_bits_of_the_host(name: str, form: str, native: Native) -> None:
     run = standard_run(form, TICKS)
-    playback = play_standard(open_target(name, run.config), form)
+    playback = play_standard(open_target(name, config_for(run)), form)
     verdict = judge(playback, expected(form, native))
     assert verdict.equal, verdict.text
     assert playback.missing_hashes == []
@@ -58,10 +68,12 @@ def test_every_target_computes_the_bits_of_the_host(name: str, form: str, native
 
 def test_the_last_estimate_is_that_of_the_core(native: Native) -> None:
     run = standard_run("weak", TICKS)
-    identifier = native.weak(run.config)  # type: ignore[arg-type]
+    config = config_for(run)
+    assert isinstance(config, WeakConfig)
+    identifier = native.weak(config)
     identifier.run(run.phi, run.y)
     last = identifier.assess()
-    estimate = play_standard(open_target(HOST_TARGET, run.config), "weak").estimates[TICKS]
+    estimate = play_standard(open_target(HOST_TARGET, config_for(run)), "weak").estimates[TICKS]
     assert np.array_equal(np.array(estimate.p, np.float32), last["p"])
     upper = last["covariance"][np.triu_indices(6)]
     assert np.array_equal(np.array(estimate.covariance, np.float32), upper)
@@ -101,7 +113,7 @@ class Faulty:
 def test_a_line_that_spoils_bytes_changes_no_bit(form: str, seed: int, native: Native) -> None:
     run = standard_run(form, TICKS)
     random = np.random.default_rng(seed)
-    target = open_target(HOST_TARGET, run.config, lambda port: Faulty(port, 1e-4, random))
+    target = open_target(HOST_TARGET, config_for(run), lambda port: Faulty(port, 1e-4, random))
     playback = play_standard(target, form)
     verdict = judge(playback, expected(form, native))
     assert verdict.equal, verdict.text
@@ -131,7 +143,7 @@ class KilledMidway:
 
 
 def start_to_be_killed(name: str, form: str, after: int) -> Target:
-    target = open_target(name, standard_run(form, TICKS).config)
+    target = open_target(name, config_for(standard_run(form, TICKS)))
 
     def kill() -> None:
         assert target.process is not None
@@ -144,7 +156,7 @@ def start_to_be_killed(name: str, form: str, after: int) -> Target:
 
 @pytest.mark.parametrize("name", [HOST_TARGET, "mps2-an386"])
 def test_a_killed_emulator_is_started_again_and_the_run_over(name: str, form: str, native: Native) -> None:
-    config = standard_run(form, TICKS).config
+    config = config_for(standard_run(form, TICKS))
     playback = play_standard(
         start_to_be_killed(name, form, 20_000), form, lambda: open_target(name, config), patience_s=10
     )
@@ -174,7 +186,7 @@ def silent_port() -> Iterator[str]:
 
 
 def test_a_silent_port_ends_in_bounded_time(silent_port: str, native: Native) -> None:
-    config = standard_run("weak", TICKS).config
+    config = config_for(standard_run("weak", TICKS))
     began = time.monotonic()
     playback = play_standard(open_target(silent_port, config), "weak", patience_s=2)
     assert time.monotonic() - began < 10
@@ -184,14 +196,14 @@ def test_a_silent_port_ends_in_bounded_time(silent_port: str, native: Native) ->
 
 def test_an_image_for_other_settings_is_refused() -> None:
     run = standard_run("weak", TICKS)
-    other = replace(run.config, l1=0.31)
+    other = replace(config_for(run), l1=0.31)
     with pytest.raises(PvidError, match="made for other settings"):
-        play(open_target(HOST_TARGET, run.config), other, run.phi, run.y)
+        play(open_target(HOST_TARGET, config_for(run)), other, run.phi, run.y)
 
 
 def test_what_the_core_refuses_is_named() -> None:
     run = standard_run("weak", TICKS)
-    bad = replace(run.config, estimator=replace(run.config.estimator, row_sd=-1.0))
+    bad = replace(config_for(run), estimator=replace(config_for(run).estimator, row_sd=-1.0))
     with pytest.raises(PvidError, match="bad row sd"):
         play(open_target(HOST_TARGET, bad), bad, run.phi, run.y)
 
@@ -200,7 +212,7 @@ def test_a_wrong_bit_is_not_called_equal(native: Native) -> None:
     run = standard_run("weak", TICKS)
     phi = run.phi.copy()
     phi[2600] += run.phi_lsb  # one step of the encoder, once
-    playback = play(open_target(HOST_TARGET, run.config), run.config, phi, run.y)
+    playback = play(open_target(HOST_TARGET, config_for(run)), config_for(run), phi, run.y)
     verdict = judge(playback, expected("weak", native))
     assert not verdict.equal
     assert verdict.first is not None and 2500 <= verdict.first[0] < verdict.first[1]
@@ -208,6 +220,21 @@ def test_a_wrong_bit_is_not_called_equal(native: Native) -> None:
 
 def test_an_unknown_target_is_named() -> None:
     with pytest.raises(PvidError, match="there is no target mps2; there are stream-host, microbit"):
-        open_target("mps2", standard_run("weak", TICKS).config)
+        open_target("mps2", config_for(standard_run("weak", TICKS)))
     with pytest.raises(PvidError, match="cannot open the port /dev/nowhere"):
-        open_target("/dev/nowhere", standard_run("weak", TICKS).config)
+        open_target("/dev/nowhere", config_for(standard_run("weak", TICKS)))
+
+
+def test_identify_and_compare_on_targets(tmp_path: Path) -> None:
+    def pvid(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "pvid", *arguments]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
+
+    assert pvid("simulate", "run.csv", "--duration", "8", "--truth", "linear").returncode == 0
+    done = pvid("identify", "run.csv", "--rig", "run.toml", "--on", "mps2-an386", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["on"] == "mps2-an386"
+    both = pvid("compare", "run.csv", "--rig", "run.toml", "--on", HOST_TARGET, "--on", "virt-rv32imac")
+    assert both.returncode == 0, both.stderr
+    assert both.stdout.count("equal") == 6 and "DIFFERENT" not in both.stdout
+    assert pvid("identify", "run.csv", "--rig", "run.toml", "--on", "nowhere").returncode == 2

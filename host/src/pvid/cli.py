@@ -298,6 +298,9 @@ def _load_rig(path: Path, **overrides: str | None) -> RigFile:
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
 @_rig_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Overrides the rig file.")
+@click.option(
+    "--on", "target", metavar="TARGET", help="An emulator, stream-host or a serial port: computed there, too."
+)
 @click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
 @click.option("--figure", type=click.Path(path_type=Path), help="Writes the convergence (png, svg, pdf).")
 def identify_command(
@@ -306,13 +309,31 @@ def identify_command(
     law: str | None,
     form: str | None,
     core: str | None,
+    target: str | None,
     as_json: bool,
     figure: Path | None,
 ) -> int:
-    """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m]."""
+    """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m].
+
+    With --on the run is streamed to a target as well, and the answer is given only if the target reached the same
+    bits at every tick that it reported and at the end.
+    """
     rig = _load_rig(rig_path, law=law, form=form, core=core)
     run = read_run(run_path, rig.sample_rate)
-    result = identify(run, rig, Native())
+    native = Native()
+    result = identify(run, rig, native)
+    if target is not None:
+        from pvid.target import verify
+
+        if rig.identifier.core != "f32":
+            raise PvidError(f"targets hold the core f32, and core {rig.identifier.core} was asked for")
+        with progress_bar(f"streaming to {target}", len(run.t)) as advance:
+            verdict = verify(target, config_of(rig, run.sample_rate), native, run.phi, run.y, advance)
+        messages.print(f"{target}: {verdict.playback.account}")
+        if not verdict.equal:
+            click.echo(f"pvid: {target}: {verdict.text}", err=True)
+            return DIFFERENT
+        result = replace(result, on=target)
     if as_json:
         click.echo(json.dumps(result.as_json()))
     else:
@@ -330,12 +351,22 @@ def identify_command(
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
 @_rig_options
 @click.option("--core", type=click.Choice(["f32", "q31", "all"]), help="Which arithmetic.  [default: the rig file's]")
-def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str | None, core: str | None) -> int:
-    """Compares the C core with its numpy twin on RUN, after every tick, in every bit."""
+@click.option("--on", "targets", metavar="TARGET", multiple=True, help="Also there: emulator, serial port, all.")
+def compare_command(
+    run_path: Path, rig_path: Path, law: str | None, form: str | None, core: str | None, targets: tuple[str, ...]
+) -> int:
+    """Compares the C core with its numpy twin on RUN, after every tick, in every bit.
+
+    With --on the run is streamed to targets, too (core f32), and their running hashes are held against the host's.
+    """
+    from pvid.target import targets_of, verify
+
     rig = _load_rig(rig_path, form=form)
     run = read_run(run_path, rig.sample_rate)
     native = Native()
-    table = Table("core", "form", "law", "ticks", "hash", "verdict")
+    if targets and core == "q31":
+        raise PvidError("targets hold the core f32, and core q31 was asked for")
+    table = Table("target", "core", "form", "law", "ticks", "hash", "verdict")
     failed = False
     own = "q31" if rig.identifier.core == "q31" else "f32"
     cores = ["f32", "q31"] if core == "all" else [core or own]
@@ -351,8 +382,14 @@ def compare_command(run_path: Path, rig_path: Path, law: str | None, form: str |
                     outcome = compare_run(native, config_of(chosen, run.sample_rate), run.phi, run.y, advance)
             verdict = "equal" if outcome.equal else f"DIFFERENT: {outcome.difference}"
             hashed = f"{outcome.core_hash:08x}"
-            table.add_row(arithmetic, chosen.identifier.form, one, str(outcome.ticks), hashed, verdict)
+            table.add_row("host", arithmetic, chosen.identifier.form, one, str(outcome.ticks), hashed, verdict)
             failed |= not outcome.equal
+        for target in targets_of(targets) if "f32" in cores else []:
+            with progress_bar(f"{one} law on {target}", len(run.t)) as advance:
+                there = verify(target, config_of(chosen, run.sample_rate), native, run.phi, run.y, advance)
+            done, hashed = str(there.playback.done), f"{there.playback.hash or 0:08x}"
+            table.add_row(target, "f32", chosen.identifier.form, one, done, hashed, there.text)
+            failed |= not there.equal
     Console(width=None if sys.stdout.isatty() else 140).print(table)
     return DIFFERENT if failed else DONE
 

@@ -38,7 +38,7 @@ from pvid.link import (
     encode,
 )
 from pvid.link import Status as BoardStatus
-from pvid.native import Status, StrongConfig, WeakConfig
+from pvid.native import Native, Status, StrongConfig, WeakConfig
 from pvid.stream_image import build_image, settings_number
 
 SAMPLES_A_FRAME = 64
@@ -505,3 +505,40 @@ def judge(playback: Playback, expected: npt.NDArray[np.uint32]) -> Verdict:
             break
         good = at
     return Verdict(playback, int(expected[-1]), first)
+
+
+def targets_of(names: tuple[str, ...]) -> list[str]:
+    """The targets that `--on` asks for; "all": this machine and every emulator that is installed with its compiler.
+
+    Raises
+    ------
+    PvidError
+        When all are asked for and no emulator is there.
+    """
+    if "all" not in names:
+        return list(names)
+    present = [name for name in EMULATORS if not BOARDS[name].missing]
+    if not present:
+        raise PvidError("no emulator and cross compiler is installed: ./tools/test installs them")
+    return [HOST_TARGET, *present]
+
+
+def verify(
+    name: str,
+    config: StrongConfig | WeakConfig,
+    native: Native,
+    phi: npt.ArrayLike,
+    y: npt.ArrayLike,
+    progress: Callable[[int], None] | None = None,
+) -> Verdict:
+    """Plays a run on a target, an emulator being started again should it die, and judges it by the host's core.
+
+    Raises
+    ------
+    PvidError
+        When the target cannot be started or refuses the configuration.
+    """
+    identifier = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
+    expected = identifier.run(phi, y, sums=False).hash
+    reopen = (lambda: open_target(name, config)) if name in (HOST_TARGET, *EMULATORS) else None
+    return judge(play(open_target(name, config), config, phi, y, reopen=reopen, progress=progress), expected)
