@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import shutil
 import struct
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pvid import link
+from pvid.bench.fuzz import fuzz_link
 from pvid.errors import PvidError
 from pvid.native import default_library
 
@@ -189,25 +188,4 @@ def test_losses_say_what_was_lost() -> None:
 
 
 def test_the_c_side_withstands_fuzzing(tmp_path: Path) -> None:
-    if shutil.which("clang") is None:
-        pytest.fail("clang is not installed: ./tools/test installs it")
-    binary = link_fuzzer(tmp_path)
-    command = [
-        str(binary),
-        f"-runs={FUZZ_RUNS}",
-        "-seed=1",
-        "-max_len=1200",
-        "-timeout=10",
-        f"-artifact_prefix={tmp_path}/",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert f"Done {FUZZ_RUNS} runs" in done.stderr
-
-
-def link_fuzzer(folder: Path) -> Path:
-    binary = folder / "fuzz_link"
-    sources = [ROOT / "firmware" / "link" / "link.c", ROOT / "tests" / "fuzz" / "fuzz_link.c"]
-    options = ["-std=c99", "-g", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"]
-    subprocess.run(["clang", *options, f"-I{ROOT / 'firmware' / 'link'}", *sources, "-o", binary], check=True)
-    return binary
+    assert fuzz_link(tmp_path, FUZZ_RUNS) == FUZZ_RUNS

@@ -689,6 +689,17 @@ def bench_noise(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="fuzz-link")
+@click.option("--runs", default=10_000_000, show_default=True)
+def bench_fuzz_link(runs: int) -> int:
+    """The C side of the serial link under libFuzzer, with sanitizers (needs clang)."""
+    from pvid.bench.fuzz import fuzz_link
+
+    folder = Path(tempfile.mkdtemp(prefix="pvid-fuzz-"))
+    click.echo(f"{fuzz_link(folder, runs)} inputs, none broke the codec")
+    return DONE
+
+
 @bench.command(name="side-by-side")
 @_UPDATE
 def bench_side_by_side(update: Path | None) -> int:
