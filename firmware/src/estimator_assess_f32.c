@@ -48,8 +48,22 @@ bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float 
 void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],
                                    pvid_estimate_f32 *estimate)
 {
+    const uint8_t n = pvid_gated_f32(self->model);
     pvid_cholesky_f32 factor;
-    estimate->kappa = pvid_cholesky_factor_f32(&factor, pvid_gated_f32(self->model), s) ? factor.first_pivot : 0.0f;
+    estimate->kappa = 0.0f;
+    estimate->least_pivot = 0.0f;
+    if (!pvid_cholesky_factor_f32(&factor, n, s)) {
+        return;
+    }
+    /* the factor holds 1 / U_jj: diagonal over pivot is D S D_jj / U_jj^2 */
+    float most = 1.0f;
+    for (size_t j = 0; j < n; j++) {
+        const float scaled = factor.u[j][j] * factor.scale[j];
+        const float imitated = (scaled * scaled) * s[j][j];
+        most = (imitated > most) ? imitated : most;
+    }
+    estimate->kappa = factor.first_pivot;
+    estimate->least_pivot = 1.0f / most;
 }
 
 bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PVID_MAX_P], float wide,

@@ -99,7 +99,7 @@ bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float 
 /* s^2 of a row: residual sum of squares over degrees of freedom; row_sd^2 while there are none. */
 float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy);
 
-/* estimate->kappa from S, the upper triangle s. */
+/* estimate->kappa and least_pivot from S, the upper triangle s. */
 void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],
                                    pvid_estimate_f32 *estimate);
 

@@ -129,7 +129,8 @@ static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 
     if (reason != PVID_UPDATED) {
         return reason;
     }
-    if (!informed || !(candidate->kappa >= self->config.kappa_min)) {
+    if (!informed || !(candidate->kappa >= self->config.kappa_min) ||
+        !(candidate->least_pivot >= self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
     const float error = pvid_trust_widest_f32(estimator, candidate);

@@ -41,6 +41,7 @@ static pvid_estimate_f32 candidate(float error, float kappa)
         estimate.se[i] = 20.0f * error;
     }
     estimate.kappa = kappa;
+    estimate.least_pivot = 1.0e-2f;
     return estimate;
 }
 
@@ -80,6 +81,9 @@ static void what_is_held_leaves_the_published_estimate_and_says_why(void **state
     assert_int_equal(judge(PVID_UPDATED, 0.0f, false, 1.0f, fine), PVID_HELD_NOT_EXCITED);
     assert_int_equal(judge(PVID_UPDATED, 0.0f, true, 1.0f, candidate(0.02f, 2.9e-5f)), PVID_HELD_NOT_EXCITED);
     assert_int_equal(judge(PVID_UPDATED, 0.0f, true, 1.0f, candidate(0.02f, NAN)), PVID_HELD_NOT_EXCITED);
+    pvid_estimate_f32 imitated = fine;
+    imitated.least_pivot = 2.0e-5f; /* one mode of motion */
+    assert_int_equal(judge(PVID_UPDATED, 0.0f, true, 1.0f, imitated), PVID_HELD_NOT_EXCITED);
     assert_int_equal(judge(PVID_UPDATED, 0.0f, true, 1.0f, candidate(0.051f, 1.0e-2f)), PVID_HELD_UNCERTAIN);
     assert_int_equal(judge(PVID_UPDATED, 0.0f, true, 1.0f, candidate(NAN, 1.0e-2f)), PVID_HELD_UNCERTAIN);
     assert_int_equal(judge(PVID_UPDATED, 0.0061f, true, 1.0f, fine), PVID_HELD_UNCERTAIN); /* 0.3 of 2 % is 0.6 % */

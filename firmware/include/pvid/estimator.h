@@ -122,6 +122,8 @@ typedef struct {
     float se[PVID_MAX_P];                      /* standard errors; start_sd where data say nothing */
     float covariance[PVID_MAX_P][PVID_MAX_P];  /* of p, symmetric */
     float kappa;       /* part of p[0]'s information that the other parameters cannot imitate, 0..1 */
+    float least_pivot; /* least part of any parameter's information that those after it cannot imitate, 0..1: near
+                          1e-6 it is made by the rounding of float32 */
     float residual_sd; /* of Y - N^T theta [units of Y] */
     float weight;      /* rows remembered */
 } pvid_estimate_f32;

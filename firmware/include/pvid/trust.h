@@ -25,7 +25,8 @@ extern "C" {
 #endif
 
 typedef struct {
-    float kappa_min;     /* least kappa, 0 <= . < 1 */
+    float kappa_min;     /* least kappa and least pivot, 0 <= . < 1: what one mode of motion alone says of d1 and d2
+                            is rounding, and stays below 2e-5 */
     float se_max;        /* largest standard error of the positive parameters, relative to them, > 0 */
     float misfit_max;    /* alarm when the residuals' variance exceeds what is expected of it so many times, on
                             the mean over PVID_TRUST_LONG groups and more; half as much again on the mean

@@ -214,6 +214,7 @@ class EstimateStruct(ctypes.Structure):
         ("se", ctypes.c_float * MAX_P),
         ("covariance", (ctypes.c_float * MAX_P) * MAX_P),
         ("kappa", ctypes.c_float),
+        ("least_pivot", ctypes.c_float),
         ("residual_sd", ctypes.c_float),
         ("weight", ctypes.c_float),
     ]
@@ -240,6 +241,7 @@ ESTIMATE_DTYPE = np.dtype(
         ("se", np.float32, (MAX_P,)),
         ("covariance", np.float32, (MAX_P, MAX_P)),
         ("kappa", np.float32),
+        ("least_pivot", np.float32),
         ("residual_sd", np.float32),
         ("weight", np.float32),
     ]

@@ -201,6 +201,11 @@ class Estimator:
         n_p = len(self.p)
         weight = sums[-1]
         kappa = self._kappa(s, cholesky.factor(s))
+        most = np.ones(len(weight), np.float32)
+        for j in range(len(kappa.u)):
+            scaled = kappa.u[j, j] * kappa.scale[j]
+            imitated = (scaled * scaled) * s[j, j]
+            most = np.where(imitated > most, imitated, most)
         wide = variance * self.correlation
         for a in range(n_p):
             s[a, a] = s[a, a] + wide / (self.start_sd[a] * self.start_sd[a])
@@ -211,6 +216,7 @@ class Estimator:
         out = np.zeros(self.p.shape[1], ESTIMATE_DTYPE)
         out["p"][:, :n_p] = self.p.T
         out["kappa"] = np.where(kappa.ok, kappa.first_pivot, np.float32(0))
+        out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))
         out["residual_sd"] = np.sqrt(variance)
         out["weight"] = weight
         for a in range(n_p):

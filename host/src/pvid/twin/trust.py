@@ -109,7 +109,8 @@ class Trust:
             error = self.widest(candidate)
             near = _ARRIVED * error
             arrived = size <= np.where(near > _SMALL_STEP, near, _SMALL_STEP)
-        excited = informed & (candidate["kappa"] >= np.float32(self.config.kappa_min))
+        enough_kappa = np.float32(self.config.kappa_min)
+        excited = informed & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         enough = self.groups >= self.config.groups_min
         sure = enough & (error <= np.float32(self.config.se_max)) & arrived
         told = reason.copy()
