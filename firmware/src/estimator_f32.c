@@ -14,7 +14,7 @@ const pvid_estimator_config_f32 pvid_estimator_defaults_f32 = {
     .row_weight = 1.0f,
     .step_limit = 0.3f,
     .kappa_min = 1.0e-5f,
-    .noise_margin = 4.0f,
+    .noise_margin = 16.0f,
     .law = PVID_LAW_STATIONARY,
     .divider = 1,
 };

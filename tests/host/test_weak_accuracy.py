@@ -26,6 +26,7 @@ from pvid.rig import (
     standard_start,
 )
 from pvid.rigfile import RigFile
+from pvid.setup import weak_config
 
 
 @lru_cache
@@ -127,6 +128,33 @@ def test_a_drive_that_goes_away_leaves_the_answer(native: Native) -> None:
         parts.append(np.array([result.value[name] for name in ("w", "d1", "d2")]))
     assert np.abs(parts[1] / parts[0] - 1).max() < 0.01
     assert np.abs(parts[2] / parts[0] - 1).max() < 0.01
+
+
+def test_an_hour_without_a_drive_changes_no_bit_of_the_estimate(native: Native) -> None:
+    """Driven for 15 s, an hour of free swing in both modes before a still pivot, driven again."""
+    sensors = standard_sensors(14)
+    first = simulate(drive=Drive(STANDARD_DRIVE, on=((0.0, 15.0),)), sensors=sensors, duration=20.0, seed=2).run
+    again = simulate(drive=Drive(STANDARD_DRIVE, on=((3.0, 30.0),)), sensors=sensors, duration=30.0, seed=3).run
+    w, d1, d2 = STANDARD_PENDULUM.linear
+    slow, fast = np.sqrt(w * (d1 + np.array([-1, 1]) * np.sqrt(d1**2 - 4 * d2)) / 2)
+    t = np.arange(3_600_000) / 1000.0
+    swing = 0.06 * np.cos(slow * t) + 0.03 * np.cos(fast * t + 1.0)
+    noise = np.random.default_rng(4).normal(0.0, 0.5, len(t))
+    swing = LSB_14 * np.rint(swing / LSB_14 + noise)
+    identifier = native.weak(weak_config(RigFile.standard(), 1000.0, standard_start(2)))
+    identifier.run(first.phi, first.y, sums=False, hashes=False)
+    before = identifier.estimate
+    hour = identifier.run(swing, np.full(len(t), first.y[-1]), sums=False, hashes=False)
+    assert (hour.reason == Reason.HELD_NOT_EXCITED).sum() > 5700  # a window every 0.624 s
+    assert not np.isin(hour.reason, (Reason.UPDATED, Reason.MISFIT)).any()
+    assert identifier.estimate.tobytes() == before.tobytes()
+    assert (hour.p == hour.p[0]).all()
+    resumed = identifier.run(again.phi, again.y, sums=False, hashes=False)
+    assert (resumed.reason == Reason.UPDATED).sum() > 35
+    after = identifier.estimate
+    truth = STANDARD_PENDULUM.linear
+    assert (np.abs(after["p"][:3] - truth) < 3 * after["se"][:3]).all()
+    assert (after["se"][:3] < before["se"][:3]).all()
 
 
 def test_the_command_line_publishes_the_zero(tmp_path: Path) -> None:

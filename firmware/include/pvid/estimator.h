@@ -66,7 +66,7 @@ typedef struct {
 } pvid_estimator_config_f32;
 
 /* Defaults: stationary law, Gauss-Newton at every tick, no forgetting, row_weight 1, step_limit 0.3,
- * kappa_min 1e-5, noise_margin 4. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
+ * kappa_min 1e-5, noise_margin 16. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
 extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
 
 typedef struct {

@@ -263,7 +263,7 @@ class EstimatorConfig:
     row_weight: float = 1.0
     step_limit: float = 0.3
     kappa_min: float = 1e-5
-    noise_margin: float = 4.0
+    noise_margin: float = 16.0
     law: Law = Law.STATIONARY
     divider: int = 1
 

@@ -27,6 +27,7 @@ HEADER = (
     "l2 %",
     "rho2 %",
     "ratio to the bound in w",
+    "published",
     "within 1 % after 3 s",
     "in 2 s.e.",
 )
@@ -72,12 +73,16 @@ CASES = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """Relative errors and standard errors of w, d1, d2 [seeds, 3]; physical errors [seeds, 2] (l2, rho2)."""
+    """Relative errors and standard errors of w, d1, d2 [seeds, 3]; physical errors [seeds, 2] (l2, rho2).
+
+    Of the runs that published nothing it is the start's.
+    """
 
     errors: Float
     standard_errors: Float
     physical: Float
     early: int
+    published: int
 
 
 def run_case(native: Native, case: Case) -> Outcome:
@@ -96,7 +101,7 @@ def run_case(native: Native, case: Case) -> Outcome:
     )
     truth = STANDARD_PENDULUM.linear
     pendulum = replace(STANDARD_PENDULUM, damping1=case.damping, damping2=case.damping)
-    errors, standard_errors, physical, early = [], [], [], 0
+    errors, standard_errors, physical, early, published = [], [], [], 0, 0
     for seed in range(case.seeds):
         sensors = replace(standard_sensors(case.bits), phi_zero=case.zero)
         run = simulate(pendulum, sensors=sensors, truth=case.truth, seed=seed).run
@@ -108,8 +113,9 @@ def run_case(native: Native, case: Case) -> Outcome:
         standard_errors.append(last["se"][:3] / truth)
         lengths = oracle.physical(p, STANDARD_PENDULUM.l1)[1:]
         physical.append(lengths / [STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2] - 1)
+        published += identifier.published is not None
         early += bool(np.abs(record.published[3000:, :3] / truth - 1).max() < 0.01)
-    return Outcome(np.array(errors), np.array(standard_errors), np.array(physical), early)
+    return Outcome(np.array(errors), np.array(standard_errors), np.array(physical), early, published)
 
 
 def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
@@ -122,6 +128,7 @@ def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
         case.label,
         *(f"{value:.2g}" for value in (*rms, *lengths)),
         f"{rms[0] / bound:.2f}" if case.truth == "linear" else "-",
+        f"{outcome.published}/{case.seeds}",
         f"{outcome.early}/{case.seeds}",
         "/".join(f"{100 * share:.0f}" for share in covered),
     )
@@ -136,6 +143,7 @@ def weak_table(native: Native, progress: Callable[[int], None] = lambda _: None)
             "-",
             "-",
             "1",
+            "-",
             "-",
             "-",
         )
