@@ -25,12 +25,13 @@ static bool model_is_valid(const pvid_model_f32 *model)
 {
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
-           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && (model->n_p <= model->n_theta) && (model->n_gated <= model->n_p) &&
-           (model->n_c >= 1u) &&
-           (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) && (model->n_moments >= 1u) &&
-           (model->n_moments <= PVID_MAX_MOMENTS) && ((model->accumulate == NULL) == (model->project == NULL)) &&
+           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && (model->n_p <= model->n_theta) &&
+           (model->n_gated <= model->n_p) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) &&
+           (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
+           ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
-           ((model->accumulate != NULL) || (model->n_moments == ((uint16_t)model->n_theta * (model->n_theta + 1u)) / 2u));
+           ((model->accumulate != NULL) ||
+            (model->n_moments == ((uint16_t)model->n_theta * (model->n_theta + 1u)) / 2u));
 }
 
 static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config)
@@ -257,7 +258,8 @@ static inline pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, co
 /* Ends a group whose sums are known and solves if it is time to. */
 static inline pvid_reason end_group(pvid_estimator_f32 *self, const float sums[])
 {
-    const pvid_reason reason = pvid_estimator_is_due_f32(self) ? solve_at_once(self, self->gain, sums) : PVID_ACCUMULATED;
+    const pvid_reason reason =
+        pvid_estimator_is_due_f32(self) ? solve_at_once(self, self->gain, sums) : PVID_ACCUMULATED;
     pvid_information_end_group_f32(&self->information);
     return reason;
 }

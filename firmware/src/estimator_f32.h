@@ -1,4 +1,5 @@
-/* What the parts of the estimator share: the solve at once, the solve in stages, the assessment. Private to the core. */
+/* What the parts of the estimator share: the solve at once, the solve in stages, the assessment. Private to the core.
+ */
 #ifndef PVID_ESTIMATOR_F32_H
 #define PVID_ESTIMATOR_F32_H
 
@@ -107,7 +108,8 @@ void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s
 bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PVID_MAX_P], float wide,
                                     pvid_cholesky_f32 *factor);
 
-/* Scales estimate->covariance, that factor's inverse, by `wide` and takes its roots; what the start said where `known` is false or the result not finite. */
+/* Scales estimate->covariance, that factor's inverse, by `wide` and takes its roots; what the start said where `known`
+ * is false or the result not finite. */
 void pvid_estimator_scale_f32(const pvid_estimator_f32 *self, float wide, bool known, pvid_estimate_f32 *estimate);
 
 #endif

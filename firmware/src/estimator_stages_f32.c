@@ -14,14 +14,14 @@ enum {
     STAGE_PROJECT, /* n_p times: M c_a, a few non-zeros of c_a at a time, then row a of S and F */
     STAGE_INFORM,  /* is there more in S than noise puts there? */
     STAGE_FACTOR,
-    STAGE_STEP,    /* dp, and where p and theta go with it */
-    STAGE_FOLLOW,  /* a few rows of M dtheta at a time */
+    STAGE_STEP,   /* dp, and where p and theta go with it */
+    STAGE_FOLLOW, /* a few rows of M dtheta at a time */
     STAGE_COMMIT,
     STAGE_FOLD,
     STAGE_DONE,
-    STAGE_KAPPA,   /* of an assessment, after STAGE_INFORM */
+    STAGE_KAPPA, /* of an assessment, after STAGE_INFORM */
     STAGE_WIDEN,
-    STAGE_INVERT,  /* n_p times: a column */
+    STAGE_INVERT, /* n_p times: a column */
     STAGE_SCALE
 };
 

@@ -109,8 +109,8 @@ static void friction_theta_of(const float p[], float theta[])
 }
 
 static const uint8_t friction_c_row[18] = {1, 3, 4, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7, 5, 6, 7, 8, 9};
-static const uint8_t friction_c_column[18] = {W, W, W, W,  W, D1, D1, D2, D2,
-                                              D2, D2, D2, D2, C, C,  C,  PVID_KAPITZA_C1, PVID_KAPITZA_C2};
+static const uint8_t friction_c_column[18] = {
+    W, W, W, W, W, D1, D1, D2, D2, D2, D2, D2, D2, C, C, C, PVID_KAPITZA_C1, PVID_KAPITZA_C2};
 
 static void friction_jacobian_of(const float p[], float c[])
 {

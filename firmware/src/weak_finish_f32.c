@@ -12,20 +12,20 @@
 #include "weak_window_f32.h"
 
 enum {
-    STAGE_COMBINE,    /* K times: a row of the Gram matrix at p, the columns of a function */
-    STAGE_LACK,       /* what linear rows lack, where that is asked for: stages of its own */
-    STAGE_FACTOR,     /* K times: a row of its Cholesky factor */
-    STAGE_TRACE,      /* 4 K times: a row of its inverse, then what noise is in it, in three sums */
-    STAGE_WHITEN,     /* K times: a row of L^-1 (Y, N, a, b) */
+    STAGE_COMBINE, /* K times: a row of the Gram matrix at p, the columns of a function */
+    STAGE_LACK,    /* what linear rows lack, where that is asked for: stages of its own */
+    STAGE_FACTOR,  /* K times: a row of its Cholesky factor */
+    STAGE_TRACE,   /* 4 K times: a row of its inverse, then what noise is in it, in three sums */
+    STAGE_WHITEN,  /* K times: a row of L^-1 (Y, N, a, b) */
     STAGE_DIRECTION_A,
-    STAGE_ALONG_A,    /* a few functions at a time */
-    STAGE_REMOVE_A,   /* likewise */
+    STAGE_ALONG_A,  /* a few functions at a time */
+    STAGE_REMOVE_A, /* likewise */
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
-    STAGE_ADD,        /* K times: a row to the estimator */
-    STAGE_SOLVE,      /* `iterations` solves of several stages each */
-    STAGE_ASSESS,     /* several stages; the last one publishes or not */
+    STAGE_ADD,    /* K times: a row to the estimator */
+    STAGE_SOLVE,  /* `iterations` solves of several stages each */
+    STAGE_ASSESS, /* several stages; the last one publishes or not */
     STAGE_IDLE
 };
 

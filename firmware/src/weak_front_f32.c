@@ -29,7 +29,8 @@ static void begin_job(pvid_weak_front_f32 *self)
 {
     /* the newest sample stands before head, the centre `half` before that */
     const uint16_t back = (uint16_t)(self->half + 1u);
-    const uint16_t centre = (uint16_t)((self->head >= back) ? (self->head - back) : ((self->head + self->length) - back));
+    const uint16_t centre =
+        (uint16_t)((self->head >= back) ? (self->head - back) : ((self->head + self->length) - back));
     self->middle[PHI] = self->ring[centre][PHI];
     self->middle[Y] = self->ring[centre][Y];
     self->sum[PHI] = 0.0f;

@@ -18,9 +18,10 @@
  * samples, half a window apart, gather sums; every H = (W - 1) / 2 decimated samples one of them is
  * complete. Of D ticks the first half smooths, a slice of the taps each; the second half adds the result
  * to the windows, a slice of the functions each. In the first half, too, a complete window is turned
- * into rows and Gauss-Newton steps, one small stage a tick, while the others fill. No tick is long: the
- * longest costs less than three times the mean one, and what a tick does depends on its place in this
- * schedule, never on the data.
+ * into rows and Gauss-Newton steps, one small stage a tick, while the others fill; then the estimate is judged,
+ * and published or not. No tick is long: the longest costs less than three times the mean one up to K = 12, four
+ * times at K = 16. What a tick does depends on its place in this schedule, not on the data: only a window that is
+ * dropped, for want of drive or for its angle, leaves its stages out.
  *
  * The first window that is taken in sets c to the mean of phi over it: an encoder's zero may be far from 0.
  *
