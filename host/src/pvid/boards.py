@@ -39,6 +39,11 @@ class Board:
         return self.compiler.removesuffix("gcc")
 
     @property
+    def entry(self) -> str:
+        """The function that starts on an empty stack."""
+        return {"cortex-m": "pvid_reset", "riscv": "pvid_start", "avr": "main"}[self.toolchain]
+
+    @property
     def unit(self) -> str:
         """What the emulator counts."""
         return "cycles" if self.toolchain == "avr" else "instructions"

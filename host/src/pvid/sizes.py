@@ -46,9 +46,12 @@ class Configuration:
         return f"{self.board.name} {self.form} {self.core}"
 
 
-# Not here: float32 on an AVR, whose RAM does not hold the weak form's tables and which ships fixed point.
+# Not here: the AVRs, whose RAM does not hold the weak form's tables in either arithmetic.
 CONFIGURATIONS = tuple(
-    Configuration(board, form) for board in BOARDS.values() if board.toolchain != "avr" for form in ("weak", "strong")
+    Configuration(board, form, core)
+    for board in BOARDS.values()
+    if board.toolchain != "avr"
+    for form, core in (("weak", "f32"), ("weak", "q31"), ("strong", "f32"))
 )
 
 
@@ -58,7 +61,7 @@ class Footprint:
 
     text: the core's code and constants; arithmetic: what the compiler adds for it (soft float, division, memcpy);
     tables: the design's; data, bss: the core's variables, of which bss is the identifier's state; stack_bound and
-    stack_seen: proven from the code and found by painting, for the whole image from main on.
+    stack_seen: proven from the code and found by painting, for the whole image.
     """
 
     text: int
@@ -106,10 +109,12 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     footprint = Footprint(
         text=_bytes_of(map_text, _CODE, _CORE),
         arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),
-        tables=_bytes_of(map_text, r"\.s?rodata\.replay_(smooth|second|chi|gram|weights)", "replay"),
+        tables=_bytes_of(
+            map_text, r"\.s?rodata\.replay_(config_)?(smooth|second|chi|gram|multiplier|weights)$", "replay"
+        ),
         data=_bytes_of(map_text, r"\.s?data", _CORE),
         bss=_bytes_of(map_text, r"\.s?bss|COMMON", _CORE) + report.state_bytes,
-        stack_bound=stack_bound(board.tool_prefix, image, tree),
+        stack_bound=stack_bound(board.tool_prefix, image, tree, board.entry),
         stack_seen=report.stack_used,
         mean=round(report.instructions_mean),
         longest=round(report.instructions_longest),

@@ -63,7 +63,7 @@ def _pushed(mnemonic: str, operands: str) -> int:
         return (8 if "{d" in operands else 4) * _registers(operands)
     if down := re.match(r"^sp, (?:sp, )?#(\d+)", operands):
         return int(down.group(1)) if mnemonic in ("sub", "sub.w", "subw") else 0
-    if down := re.match(r"^\w+, \[sp, #-(\d+)\]!", operands):
+    if down := re.search(r", \[sp, #-(\d+)\]!", operands):
         return int(down.group(1))
     if down := re.match(r"^sp,sp,-(\d+)$", operands):
         return int(down.group(1)) if mnemonic == "addi" else 0
@@ -119,13 +119,15 @@ def _pointed_to(relocations: str) -> set[str]:
     return names
 
 
-def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str = "main") -> int:
+def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
     """Bytes of stack that `entry` and all it can call need at most.
 
     Parameters
     ----------
     tool_prefix
         What stands before objdump.
+    entry
+        Where the stack is still empty.
     image, tree
         The linked image, and the build tree with the compiler's records (*.su) and libpvid.a.
 
