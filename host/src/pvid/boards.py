@@ -24,7 +24,6 @@ class Board:
     name: str
     core: str
     toolchain: str
-    fpu: bool
     emulator: str
     machine: str
 
@@ -42,11 +41,6 @@ class Board:
     def entry(self) -> str:
         """The function that starts on an empty stack."""
         return {"cortex-m": "pvid_reset", "riscv": "pvid_start", "avr": "main"}[self.toolchain]
-
-    @property
-    def unit(self) -> str:
-        """What the emulator counts."""
-        return "cycles" if self.toolchain == "avr" else "instructions"
 
     def command(self, image: Path) -> list[str]:
         """Runs `image` with the UART on standard input and output; instructions are counted, not timed.
@@ -78,24 +72,24 @@ class Board:
         return [tool for tool in (self.compiler, self.emulator) if shutil.which(tool) is None]
 
 
-def _cortex_m(name: str, core: str, fpu: bool) -> Board:
-    return Board(name, core, "cortex-m", fpu, "qemu-system-arm", name)
+def _cortex_m(name: str, core: str) -> Board:
+    return Board(name, core, "cortex-m", "qemu-system-arm", name)
 
 
 BOARDS = {
     board.name: board
     for board in (
-        _cortex_m("microbit", "Cortex-M0", False),
-        _cortex_m("mps2-an385", "Cortex-M3", False),
-        _cortex_m("mps2-an386", "Cortex-M4F", True),
-        _cortex_m("netduinoplus2", "Cortex-M4F", True),
-        _cortex_m("mps2-an500", "Cortex-M7F", True),
-        _cortex_m("mps2-an505", "Cortex-M33F", True),
-        _cortex_m("mps3-an547", "Cortex-M55F", True),
-        Board("virt-rv32imac", "RV32IMAC", "riscv", False, "qemu-system-riscv32", "virt"),
-        Board("virt-rv32imafc", "RV32IMAFC", "riscv", True, "qemu-system-riscv32", "virt"),
-        Board("atmega2560", "ATmega2560", "avr", False, "simavr", "atmega2560"),
-        Board("atmega328p", "ATmega328P", "avr", False, "simavr", "atmega328p"),
+        _cortex_m("microbit", "Cortex-M0"),
+        _cortex_m("mps2-an385", "Cortex-M3"),
+        _cortex_m("mps2-an386", "Cortex-M4F"),
+        _cortex_m("netduinoplus2", "Cortex-M4F"),
+        _cortex_m("mps2-an500", "Cortex-M7F"),
+        _cortex_m("mps2-an505", "Cortex-M33F"),
+        _cortex_m("mps3-an547", "Cortex-M55F"),
+        Board("virt-rv32imac", "RV32IMAC", "riscv", "qemu-system-riscv32", "virt"),
+        Board("virt-rv32imafc", "RV32IMAFC", "riscv", "qemu-system-riscv32", "virt"),
+        Board("atmega2560", "ATmega2560", "avr", "simavr", "atmega2560"),
+        Board("atmega328p", "ATmega328P", "avr", "simavr", "atmega328p"),
     )
 }
 
