@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cholesky_q31.h"
+#include "count.h"
 #include "information_q31.h"
 #include "integer_q31.h"
 
@@ -20,13 +21,6 @@
 static bool is_positive(const pvid_model_q31 *model, size_t i)
 {
     return ((model->positive >> i) & 1u) != 0u;
-}
-
-static void count(uint32_t *counter)
-{
-    if (*counter < UINT32_MAX) {
-        (*counter)++;
-    }
 }
 
 /* Bits of |x|, or NOTHING. */
@@ -205,11 +199,11 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
         e -= pvid_clamp_q31(pvid_scale_q31(held * self->mantissa[i], self->shift[i]), TERM_MAX);
     }
     if (!fits || !within_row_limit(e)) {
-        count(&self->counters.rejected_saturated);
+        pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
     pvid_information_add_q31(&self->information, n, (int32_t)e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
-    count(&self->counters.rows);
+    pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;
 }
 
@@ -346,7 +340,7 @@ enum {
 
 static void hold(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
 {
-    count((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
+    pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
     solve->reason = reason;
 }
 
@@ -457,10 +451,10 @@ static void take_step(pvid_estimator_q31 *self, const int64_t dp[], int32_t p[])
         p[a] = (int32_t)x;
     }
     if (limited) {
-        count(&self->counters.limited);
+        pvid_count_up(&self->counters.limited);
     }
     if (bounded) {
-        count(&self->counters.bounded);
+        pvid_count_up(&self->counters.bounded);
     }
 }
 
@@ -571,7 +565,7 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     sums[n] = (residual > 0) ? residual : 0;
     take_theta(self, solve->theta);
     memcpy(self->p, solve->p, sizeof self->p);
-    count(&self->counters.updates);
+    pvid_count_up(&self->counters.updates);
 }
 
 /* Counts a group; whether a solve is due. */

@@ -2,15 +2,8 @@
 
 #include <stddef.h>
 
+#include "count.h"
 #include "finite_f32.h"
-
-/* Counters stop at their end. */
-static void count(uint32_t *counter)
-{
-    if (*counter < UINT32_MAX) {
-        (*counter)++;
-    }
-}
 
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
 {
@@ -49,7 +42,7 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
 {
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
         pvid_strong_gap_f32(self);
-        count(&self->estimator.counters.rejected_not_finite);
+        pvid_count_up(&self->estimator.counters.rejected_not_finite);
         return PVID_REJECTED_NOT_FINITE;
     }
     float d_phi[PVID_ORDERS];
@@ -63,7 +56,7 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
     const float drive = self->drive + (self->drive_forgetting * ((u[0] * u[0]) - self->drive));
     self->drive = pvid_finite_f32(drive) ? drive : self->drive;
     if (self->drive < self->drive_min) {
-        count(&self->estimator.counters.held_not_excited);
+        pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
     float n[PVID_KAPITZA_STRONG_THETA];

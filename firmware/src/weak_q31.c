@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "count.h"
 #include "integer_q31.h"
 #include "weak_finish_q31.h"
 #include "weak_front_q31.h"
@@ -10,14 +11,6 @@
 
 #define U_LIMIT ((int32_t)1 << 18)
 #define COUNTS_LIMIT ((int32_t)1 << 24)
-
-/* Counters stop at their end. */
-static void count(uint32_t *counter)
-{
-    if (*counter < UINT32_MAX) {
-        (*counter)++;
-    }
-}
 
 static bool is_odd_within(uint16_t n, uint16_t low, uint16_t high)
 {
@@ -166,7 +159,7 @@ static bool turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 {
     self->warm = true;
     if (pvid_weak_window_drive_q31(window, self->design->window) < self->drive_min) {
-        count(&self->estimator.counters.held_not_excited);
+        pvid_count_up(&self->estimator.counters.held_not_excited);
         return false;
     }
     const uint8_t full = window->buffer;
@@ -219,7 +212,7 @@ static inline void add_slice(pvid_weak_q31 *self)
 static pvid_reason reject(pvid_weak_q31 *self)
 {
     pvid_weak_gap_q31(self);
-    count(&self->estimator.counters.rejected_saturated);
+    pvid_count_up(&self->estimator.counters.rejected_saturated);
     return PVID_REJECTED_SATURATED;
 }
 
