@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -189,3 +190,30 @@ def test_losses_say_what_was_lost() -> None:
 
 def test_the_c_side_withstands_fuzzing(tmp_path: Path) -> None:
     assert fuzz_link(tmp_path, FUZZ_RUNS) == FUZZ_RUNS
+
+
+def test_a_decoder_learns_the_schema_of_another_version() -> None:
+    text = link.SCHEMA_TEXT.replace("8 hash session:u32 hash:u32", "8 hash session:u32 hash:u64 phase:u8")
+    other = zlib.crc32(text.encode())
+    sent = [
+        link.encode_raw(link.Schema.TYPE, 0, 0, text.encode(), other),
+        link.encode_raw(link.Hash.TYPE, 1, 9, struct.pack("<IQB", 7, 2**40, 3), other),
+        link.encode(link.Credit(1, 2, 3, 4), 4, 9, other),
+    ]
+    learning = link.Decoder(learns=True)
+    frames = [item for item in learning.feed(b"".join(sent)) if isinstance(item, link.Frame)]
+    assert [frame.message for frame in frames[1:]] == [
+        link.Described("hash", {"session": 7, "hash": 2**40, "phase": 3}),
+        link.Credit(1, 2, 3, 4),  # laid out as today
+    ]
+    assert learning.counters == link.Counters(frames=3, missing=2)
+    assert link.Decoder().feed(b"".join(sent)) == [link.Loss("foreign", bytes=len(one) - 1) for one in sent]
+
+
+def test_only_a_schema_that_is_its_own_number_is_learnt() -> None:
+    forged = link.encode_raw(link.Schema.TYPE, 0, 0, link.SCHEMA_TEXT.encode() + b" ", 12345)
+    garbage = b"pvid 1\n\xff\xfe"
+    senseless = link.encode_raw(link.Schema.TYPE, 0, 0, garbage, zlib.crc32(garbage))
+    decoder = link.Decoder(learns=True)
+    decoder.feed(forged + senseless)
+    assert decoder.counters == link.Counters(foreign=2)

@@ -15,10 +15,11 @@ sends, its hash in every header and firmware/link/schema.h are made from them (`
 
 from __future__ import annotations
 
+import contextlib
 import re
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import Any, ClassVar, Self
@@ -36,7 +37,7 @@ _HEADER = struct.Struct("<BBIHI")
 _CRC = struct.Struct("<I")
 _LONGEST = _HEADER.size + MAX_PAYLOAD + _CRC.size
 
-_WIRE = {"u8": ("B", 1), "u16": ("H", 2), "u32": ("I", 4), "f32": ("f", 4), "char": ("s", 1)}
+_WIRE = {"u8": ("B", 1), "u16": ("H", 2), "u32": ("I", 4), "u64": ("Q", 8), "f32": ("f", 4), "char": ("s", 1)}
 
 
 def _wire(kind: str, count: int | None = 1) -> Any:
@@ -117,12 +118,12 @@ MESSAGES: dict[int, type[Message]] = {}
 
 @dataclass(frozen=True)
 class Message:
-    """Base of the payloads."""
+    """Base of the payloads; a subclass enters itself among the `messages` it belongs to, the link's by default."""
 
     TYPE: ClassVar[int] = 0
 
-    def __init_subclass__(cls) -> None:
-        MESSAGES[cls.TYPE] = cls
+    def __init_subclass__(cls, messages: dict[int, type[Message]] = MESSAGES) -> None:
+        messages[cls.TYPE] = cls
 
     @classmethod
     def layout(cls) -> Layout:
@@ -288,8 +289,15 @@ class Credit(Message):
 
 
 MESSAGES.pop(0)
+
+
+def schema_text(messages: Mapping[int, type[Message]]) -> str:
+    """What `parse_schema` reads; its CRC-32 stands in the header of every frame."""
+    return "\n".join([f"pvid {VERSION}", *(messages[number].layout().text for number in sorted(messages))])
+
+
 LAYOUTS = {number: MESSAGES[number].layout() for number in sorted(MESSAGES)}
-SCHEMA_TEXT = "\n".join([f"pvid {VERSION}", *(layout.text for layout in LAYOUTS.values())])
+SCHEMA_TEXT = schema_text(MESSAGES)
 SCHEMA = zlib.crc32(SCHEMA_TEXT.encode())
 
 
@@ -307,7 +315,7 @@ def parse_schema(text: str) -> dict[int, Layout]:
     layouts = {}
     for line in lines:
         words = line.split(" ")
-        found = [re.fullmatch(r"(\w+):(u8|u16|u32|f32|char)(?:\[(\d*)\])?", word) for word in words[2:]]
+        found = [re.fullmatch(rf"(\w+):({'|'.join(_WIRE)})(?:\[(\d*)\])?", word) for word in words[2:]]
         if len(words) < 3 or not words[0].isdigit() or not all(found):
             raise PvidError(f"no line of a schema: {line[:80]!r}")
         described: list[tuple[str, str, int | None]] = []
@@ -317,6 +325,41 @@ def parse_schema(text: str) -> dict[int, Layout]:
             described.append((name, kind, 1 if count is None else int(count) if count else None))
         layouts[int(words[0])] = Layout(int(words[0]), words[1], tuple(described))
     return layouts
+
+
+@dataclass(frozen=True)
+class Described(Message, messages={}):
+    """A payload that only a schema text describes: of another version of pvid. `kind` is the frame's name there."""
+
+    kind: str
+    values: dict[str, Any]
+
+
+# The message of a payload by frame type; each raises PvidError where the payload has not its layout.
+Readers = Mapping[int, Callable[[bytes], Message]]
+
+
+def readers(messages: Mapping[int, type[Message]]) -> Readers:
+    """What a decoder reads these messages with."""
+    return {number: kind.of for number, kind in messages.items()}
+
+
+def described_readers(text: str) -> Readers:
+    """What a decoder reads frames with that `text` describes: a message of today where the layout is the same.
+
+    Raises
+    ------
+    PvidError
+        When it is no schema.
+    """
+
+    def reader(layout: Layout) -> Callable[[bytes], Message]:
+        known = MESSAGES.get(layout.type)
+        if known is not None and layout == LAYOUTS[layout.type]:
+            return known.of
+        return lambda payload: Described(layout.name, layout.unpack(payload))
+
+    return {number: reader(layout) for number, layout in parse_schema(text).items()}
 
 
 @dataclass(frozen=True)
@@ -354,27 +397,33 @@ class Counters:
         return self.malformed + self.crc + self.layout
 
 
-def encode(message: Message, sequence: int, tick: int = 0) -> bytes:
+def encode(message: Message, sequence: int, tick: int = 0, schema: int = SCHEMA) -> bytes:
     """A frame with its final 0x00; sequence modulo 2^16."""
-    return encode_raw(message.TYPE, sequence, tick, message.payload)
+    return encode_raw(message.TYPE, sequence, tick, message.payload, schema)
 
 
-def encode_raw(number: int, sequence: int, tick: int, payload: bytes) -> bytes:
+def encode_raw(number: int, sequence: int, tick: int, payload: bytes, schema: int = SCHEMA) -> bytes:
     """A frame with any payload of at most MAX_PAYLOAD bytes."""
     if len(payload) > MAX_PAYLOAD:
         raise PvidError(f"a payload of {len(payload)} bytes, and a frame holds {MAX_PAYLOAD}")
-    raw = _HEADER.pack(VERSION, number, SCHEMA, sequence & 0xFFFF, tick & 0xFFFFFFFF) + payload
+    raw = _HEADER.pack(VERSION, number, schema, sequence & 0xFFFF, tick & 0xFFFFFFFF) + payload
     return bytes(cobs.encode(raw + _CRC.pack(zlib.crc32(raw)))) + b"\0"
 
 
 @dataclass
 class Decoder:
-    """Bytes in, frames and losses out; never raises and never holds more than one frame."""
+    """Bytes in, frames and losses out; never raises and never holds more than one frame.
+
+    `schemas` says what frames of which schema mean, the others are foreign; sequences are followed for each on its
+    own. With `learns` a foreign Schema frame whose text has the CRC-32 of its own header adds to them.
+    """
 
     counters: Counters = field(default_factory=Counters)
+    schemas: dict[int, Readers] = field(default_factory=lambda: {SCHEMA: readers(MESSAGES)})
+    learns: bool = False
     _pending: bytearray = field(default_factory=bytearray)
     _overflow: int = 0
-    _expected: int | None = None
+    _expected: dict[int, int] = field(default_factory=dict)
 
     def feed(self, data: bytes) -> list[Frame | Loss]:
         """What these bytes completed, in order."""
@@ -409,28 +458,36 @@ class Decoder:
             yield self._lost("crc", piece)
             return
         version, number, schema, sequence, tick = _HEADER.unpack_from(body)
-        if version != VERSION or schema != SCHEMA:
+        payload = body[_HEADER.size :]
+        if self.learns and schema not in self.schemas and number == Schema.TYPE:
+            self._learn(schema, payload)
+        if version != VERSION or schema not in self.schemas:
             yield self._lost("foreign", piece)
             return
-        yield from self._gap(sequence)
-        kind: type[Message] | None = MESSAGES.get(number)
+        yield from self._gap(schema, sequence)
+        read = self.schemas[schema].get(number)
         try:
-            if kind is None:
+            if read is None:
                 raise PvidError(f"no frame type {number}")
-            message = kind.of(body[_HEADER.size :])
+            message = read(payload)
         except PvidError:
             yield self._lost("layout", piece)
             return
         self.counters.frames += 1
         yield Frame(sequence, tick, message)
 
+    def _learn(self, schema: int, text: bytes) -> None:
+        if zlib.crc32(text) == schema:
+            with contextlib.suppress(PvidError, UnicodeDecodeError):
+                self.schemas[schema] = described_readers(text.decode("ascii"))
+
     def _lost(self, why: str, piece: bytes, overflow: int = 0) -> Loss:
         setattr(self.counters, why, getattr(self.counters, why) + 1)
         return Loss(why, bytes=len(piece) + overflow)
 
-    def _gap(self, sequence: int) -> Iterator[Loss]:
-        ahead = 0 if self._expected is None else (sequence - self._expected) & 0xFFFF
-        self._expected = (sequence + 1) & 0xFFFF
+    def _gap(self, schema: int, sequence: int) -> Iterator[Loss]:
+        ahead = (sequence - self._expected.get(schema, sequence)) & 0xFFFF
+        self._expected[schema] = (sequence + 1) & 0xFFFF
         if 0 < ahead < 0x8000:  # else the sender has restarted
             self.counters.missing += ahead
             yield Loss("sequence", frames=ahead)
