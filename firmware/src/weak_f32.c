@@ -8,11 +8,8 @@
 #include "weak_angle_f32.h"
 #include "weak_finish_f32.h"
 #include "weak_front_f32.h"
+#include "weak_schedule.h"
 #include "weak_window_f32.h"
-
-/* Most stages of a complete window that a tick may take: more than one only where decimation is so low that every
- * tick has two windows to fill as well. */
-#define STAGES_TOGETHER 4u
 
 static bool all_finite(const float values[], size_t n)
 {
@@ -24,15 +21,10 @@ static bool all_finite(const float values[], size_t n)
     return true;
 }
 
-static bool is_odd_within(uint16_t n, uint16_t low, uint16_t high)
-{
-    return ((n % 2u) == 1u) && (n >= low) && (n <= high);
-}
-
 static bool design_is_valid(const pvid_weak_design_f32 *design)
 {
-    if ((design == NULL) || !is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
-        !is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
+    if ((design == NULL) || !pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
+        !pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
         (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
         (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
         (design->chi == NULL) || (design->gram == NULL) || (design->lag < 1u) ||
@@ -44,30 +36,6 @@ static bool design_is_valid(const pvid_weak_design_f32 *design)
     return all_finite(design->smooth, half) && all_finite(design->second, half) &&
            all_finite(design->chi, 3u * functions * design->window) &&
            all_finite(design->gram, 3u * functions * (functions + 1u));
-}
-
-static uint16_t hop_of(const pvid_weak_design_f32 *design)
-{
-    return (uint16_t)((design->window - 1u) / 2u);
-}
-
-/* Ticks of a block in which a window takes a sample in: the second half of a block is shared by two. At
- * D = 2 one tick has to do for both, at D = 1 that of the front end. */
-static uint32_t ticks_a_window(uint32_t decimation)
-{
-    const uint32_t second_half = decimation - (decimation / 2u);
-    return (second_half > 1u) ? (second_half / 2u) : 1u;
-}
-
-/* Ticks of a block that are free for a window's stages. */
-static uint32_t free_ticks(const pvid_weak_f32 *self)
-{
-    const uint32_t decimation = self->design->decimation;
-    if (decimation <= 2u) {
-        return 1u;
-    }
-    const uint32_t slices = (self->design->functions + (self->slice - 1u)) / self->slice;
-    return decimation - (2u * slices);
 }
 
 static bool angle_is_valid(const pvid_weak_config_f32 *config)
@@ -88,7 +56,7 @@ static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f3
 #if PVID_KAPITZA_HAS_FRICTION
     estimator.model = config->friction ? &pvid_kapitza_friction_f32 : estimator.model;
 #endif
-    estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)hop_of(design));
+    estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)pvid_weak_hop(design->window));
     estimator.row_weight = (functions - 2.0f) / functions;
     estimator.correlation = design->overlap;
     return pvid_estimator_init_f32(&self->estimator, &estimator);
@@ -139,20 +107,17 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     self->row_variance = config->estimator.row_sd * config->estimator.row_sd;
     self->pivot_noise = config->pivot_noise / ((lag * lag) * (lag * lag));
     self->angle_limit = config->angle_limit;
-    const uint32_t ticks = ticks_a_window(design->decimation);
-    self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
+    self->slice = pvid_weak_functions_a_tick(design->decimation, design->functions);
     self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
     if (config->full_angle || config->friction) {
         self->angle = config->angle;
         pvid_weak_angle_init_f32(self->angle, config);
     }
     const uint32_t stages = pvid_weak_finish_stages_f32(design, self->iterations, &self->estimator, self->angle);
-    const uint32_t free = hop_of(design) * free_ticks(self);
-    const uint32_t together = (stages + (free - 1u)) / free;
-    if (together > STAGES_TOGETHER) {
+    self->together = pvid_weak_stages_together(stages, design->window, design->decimation, design->functions);
+    if (self->together == 0u) {
         return PVID_BAD_ITERATIONS;
     }
-    self->together = (uint8_t)together;
     pvid_weak_finish_init_f32(&self->finish);
     self->window[0].buffer = 0;
     self->window[1].buffer = 1;
@@ -176,7 +141,7 @@ static void restart_window(pvid_weak_window_f32 *window, uint16_t index)
  * it gathers until its own beginning, half a window later, is thrown away. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self)
 {
-    const uint16_t hop = hop_of(self->design);
+    const uint16_t hop = pvid_weak_hop(self->design->window);
     pvid_weak_front_reset_f32(&self->front);
     restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
     restart_window(&self->window[1], (uint16_t)(hop - 1u));

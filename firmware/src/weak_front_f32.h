@@ -16,7 +16,4 @@ void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self);
  * in `decimation` samples, in the first half of these. */
 bool pvid_weak_front_step_f32(pvid_weak_front_f32 *self, float phi, float y, float *smooth_phi, float *u);
 
-/* Ticks that a FIR job takes. */
-uint16_t pvid_weak_front_ticks_f32(const pvid_weak_front_f32 *self);
-
 #endif

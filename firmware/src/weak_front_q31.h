@@ -15,7 +15,4 @@ void pvid_weak_front_reset_q31(pvid_weak_front_q31 *self);
 bool pvid_weak_front_step_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design, int32_t phi, int32_t y,
                               int32_t *f, int64_t *u);
 
-/* Ticks that a FIR job takes. */
-uint16_t pvid_weak_front_ticks_q31(const pvid_weak_front_q31 *self);
-
 #endif

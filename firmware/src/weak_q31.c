@@ -7,15 +7,11 @@
 #include "integer_q31.h"
 #include "weak_finish_q31.h"
 #include "weak_front_q31.h"
+#include "weak_schedule.h"
 #include "weak_window_q31.h"
 
 #define U_LIMIT ((int32_t)1 << 18)
 #define COUNTS_LIMIT ((int32_t)1 << 24)
-
-static bool is_odd_within(uint16_t n, uint16_t low, uint16_t high)
-{
-    return ((n % 2u) == 1u) && (n >= low) && (n <= high);
-}
 
 static bool is_count(int32_t x, int32_t limit)
 {
@@ -33,8 +29,8 @@ static bool shifts_are_valid(const uint8_t shift[], size_t n, uint8_t low, uint8
 
 static bool design_is_valid(const pvid_weak_design_q31 *design)
 {
-    if ((design == NULL) || !is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
-        !is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
+    if ((design == NULL) || !pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
+        !pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
         (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
         (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
         (design->chi == NULL) || (design->gram == NULL) || (design->multiplier == NULL)) {
@@ -48,30 +44,6 @@ static bool design_is_valid(const pvid_weak_design_q31 *design)
             shifts_are_valid(design->high_shift, 2, 0, 61) && shifts_are_valid(design->product_shift, 5, 0, 62) &&
             shifts_are_valid(design->shift, PVID_WEAK_TERMS_Q31, 0, 62);
     return valid;
-}
-
-static uint16_t hop_of(const pvid_weak_design_q31 *design)
-{
-    return (uint16_t)((design->window - 1u) / 2u);
-}
-
-/* Ticks of a block in which a window takes a sample in: the second half of a block is shared by two. At D = 2 one tick
- * has to do for both, at D = 1 that of the front end. */
-static uint32_t ticks_a_window(uint32_t decimation)
-{
-    const uint32_t second_half = decimation - (decimation / 2u);
-    return (second_half > 1u) ? (second_half / 2u) : 1u;
-}
-
-/* Ticks of a block that are free for a window's stages. */
-static uint32_t free_ticks(const pvid_weak_q31 *self)
-{
-    const uint32_t decimation = self->design->decimation;
-    if (decimation <= 2u) {
-        return 1u;
-    }
-    const uint32_t slices = (self->design->functions + (self->slice - 1u)) / self->slice;
-    return decimation - (2u * slices);
 }
 
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
@@ -102,11 +74,11 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     pvid_weak_front_init_q31(&self->front, design);
     const int64_t drive_min = (int64_t)config->drive_min * (design->window - 1);
     self->drive_min = drive_min * drive_min;
-    const uint32_t ticks = ticks_a_window(design->decimation);
-    self->slice = (uint8_t)((design->functions + (ticks - 1u)) / ticks);
+    self->slice = pvid_weak_functions_a_tick(design->decimation, design->functions);
     self->iterations = (uint8_t)((self->estimator.gain < PVID_ONE_Q30) ? 1u : config->iterations);
-    if (pvid_weak_finish_stages_q31(design->functions, self->iterations, &self->estimator) >
-        (hop_of(design) * free_ticks(self))) {
+    const uint32_t stages = pvid_weak_finish_stages_q31(design->functions, self->iterations, &self->estimator);
+    self->together = pvid_weak_stages_together(stages, design->window, design->decimation, design->functions);
+    if (self->together == 0u) {
         return PVID_BAD_ITERATIONS;
     }
     pvid_weak_finish_init_q31(&self->finish);
@@ -132,7 +104,7 @@ static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
  * its own beginning, half a window later, is thrown away, but must not come on top of what it had. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self)
 {
-    const uint16_t hop = hop_of(self->design);
+    const uint16_t hop = pvid_weak_hop(self->design->window);
     pvid_weak_front_reset_q31(&self->front);
     restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
     restart_window(&self->window[1], (uint16_t)(hop - 1u));
@@ -216,6 +188,14 @@ static pvid_reason reject(pvid_weak_q31 *self)
     return PVID_REJECTED_SATURATED;
 }
 
+static void work_on(pvid_weak_q31 *self, pvid_reason *reason)
+{
+    for (uint8_t i = 0; (i < self->together) && pvid_weak_finish_is_busy_q31(&self->finish); i++) {
+        pvid_weak_finish_step_q31(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
+                                  &self->estimator, reason);
+    }
+}
+
 static bool is_within(int64_t x, int32_t limit)
 {
     return (x >= -(int64_t)limit) && (x <= limit);
@@ -252,9 +232,8 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
     pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
     if (!kept) {
         reason = PVID_HELD_NOT_EXCITED;
-    } else if (!adding && pvid_weak_finish_is_busy_q31(&self->finish)) {
-        pvid_weak_finish_step_q31(&self->finish, design, self->iterations, self->sums[self->finish.buffer],
-                                  &self->estimator, &reason);
+    } else if (!adding) {
+        work_on(self, &reason);
     }
     return reason;
 }

@@ -11,6 +11,7 @@
 #include "pvid/pvid.h"
 #include "weak_finish_f32.h"
 #include "weak_front_f32.h"
+#include "weak_schedule.h"
 #include "weak_table.h"
 #include "weak_window_f32.h"
 
@@ -26,7 +27,7 @@ static void the_front_end_keeps_its_schedule_and_reproduces_a_parabola(void **st
     (void)state;
     static pvid_weak_front_f32 front;
     pvid_weak_front_init_f32(&front, &table_design, 1000.0f, 0.5f);
-    assert_int_equal(pvid_weak_front_ticks_f32(&front), 2); /* two pairs of taps, one a tick */
+    assert_int_equal(pvid_weak_job_ticks(&front.job), 2); /* two pairs of taps, one a tick */
     int outputs = 0;
     for (int i = 0; i < 200; i++) {
         float phi = -1.0f;

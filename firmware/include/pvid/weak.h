@@ -39,6 +39,7 @@
 #include "pvid/estimator.h"
 #include "pvid/kapitza_weak.h"
 #include "pvid/trust.h"
+#include "pvid/weak_job.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -95,15 +96,7 @@ typedef struct {
 
 /* The front end: a ring of samples, and the FIR job of the last complete block in slices. */
 typedef struct {
-    uint16_t half;       /* pairs of taps */
-    uint16_t length;     /* places of the ring in use: taps + decimation - 1, for a job may last a block */
-    uint16_t decimation;
-    uint16_t slice;      /* pairs a tick: a job lasts half a block */
-    uint16_t head;       /* place of the next sample */
-    uint16_t wait;       /* samples until the next block is complete */
-    uint16_t pair;       /* pairs done; half: the job is done */
-    uint16_t newer;      /* places of the last pair */
-    uint16_t older;
+    pvid_weak_job job;
     const float *smooth;
     const float *second;
     float u_scale;       /* sample rate^2 / l1 [1/(m s^2)] */

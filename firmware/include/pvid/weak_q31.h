@@ -24,6 +24,7 @@
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/kapitza_weak_q31.h"
+#include "pvid/weak_job.h"
 
 /* What is integrated twice from a window's start: U F, F and U. */
 #define PVID_WEAK_INTEGRALS_Q31 3
@@ -73,15 +74,7 @@ typedef struct {
 
 /* The front end: a ring of counts, and the FIR job of the last complete block in slices. */
 typedef struct {
-    uint16_t half;
-    uint16_t length;
-    uint16_t decimation;
-    uint16_t slice;
-    uint16_t head;
-    uint16_t wait;
-    uint16_t pair;
-    uint16_t newer;
-    uint16_t older;
+    pvid_weak_job job;
     int32_t middle[2];
     int64_t sum[2];
     int32_t ring[PVID_MAX_TAPS + PVID_MAX_DECIMATION - 1][2]; /* phi, y [counts about their offsets] */
@@ -130,6 +123,7 @@ typedef struct {
     bool zero_unknown;
     uint8_t iterations;
     uint8_t slice;         /* functions a tick */
+    uint8_t together;      /* stages of a complete window a tick */
     uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
     uint8_t function;      /* functions of that window that have, 0..K-1 */
     bool warm;             /* a window has been completed since the restart */

@@ -208,6 +208,10 @@ class EstimatorQ31:
             self._end_group()
             yield reason
 
+    def solve_stages(self, ends_group: bool) -> int:
+        """Stages of a solve that is due."""
+        return self._stages_before_commit() + 1 + ends_group
+
     def _stages_before_commit(self) -> int:
         columns = self.model.c_column
         projections = sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +16,10 @@ from pvid.twin.estimator import RelativeEstimator
 from pvid.twin.strong import TwinRecord
 from pvid.twin.trust import Trust
 from pvid.twin.weak_angle import Angle
+from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
 from pvid.twin.weak_window import Window
 
 Float32 = npt.NDArray[np.float32]
-Mask = npt.NDArray[np.bool_]
 
 
 class WeakTwin:
@@ -47,32 +47,15 @@ class WeakTwin:
         self.estimator = RelativeEstimator(lanes, float(rate), pattern)
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.angle = Angle(config, len(lanes)) if config.full_angle or config.friction else None
-        self.together = -(-self._stages // (config.hop * self._free_ticks))
+        self.schedule = Schedule.of(design)
+        self.together = self.schedule.together(
+            weak_finish.number_of_stages(design, self.iterations, self.estimator, self.angle)
+        )
         self.trust = Trust(config.trust, self.estimator)
         row_sd = np.array([e.row_sd for e in lanes], np.float32)
         self.row_variance = row_sd * row_sd
         lag = (np.float32(design.decimation) / np.float32(config.sample_rate)) * np.float32(design.lag)
         self.pivot_noise = np.float32(config.pivot_noise) / ((lag * lag) * (lag * lag))
-
-    @property
-    def window_ticks(self) -> int:
-        """Ticks in which the windows take a decimated sample in, after the one at which it comes out."""
-        design = self.config.design
-        if design.decimation <= 2:
-            return design.decimation - 1
-        second_half = design.decimation - design.decimation // 2
-        functions = -(-design.functions // max(1, second_half // 2))
-        return 2 * -(-design.functions // functions)
-
-    @property
-    def _free_ticks(self) -> int:
-        """Ticks of a decimated sample that are left for a complete window."""
-        design = self.config.design
-        return 1 if design.decimation <= 2 else design.decimation - self.window_ticks
-
-    @property
-    def _stages(self) -> int:
-        return weak_finish.number_of_stages(self.config.design, self.iterations, self.estimator, self.angle)
 
     def _driven(self, variance: Float32) -> Mask:
         threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)
@@ -95,7 +78,7 @@ class WeakTwin:
             seen = weak_window.observe(*part, design)
             driven = self._driven(seen.drive)
             for m, sums in enumerate(weak_window.sums(*part, design, dt)):
-                tick = first + weak_front.tick_of((m + 2) * config.hop, design.taps, design.decimation)
+                tick = first + self.schedule.tick_of_window(m)
                 samples = slice(m * config.hop, m * config.hop + design.window)
                 complete[tick] = Window(
                     sums=sums,
@@ -107,12 +90,10 @@ class WeakTwin:
                     highest=seen.highest[m],
                     bend=seen.bend[m],
                 )
-            for index in range(len(part[0])):
-                start = first + weak_front.tick_of(index, design.taps, design.decimation) + 1
-                free[start : min(start + self.window_ticks, last)] = False
+            self.schedule.occupy(free, first, last, len(part[0]))
         return complete, finite, free
 
-    def _objection(self, window: Window) -> npt.NDArray[np.uint8] | None:
+    def _objection(self, window: Window) -> Reasons | None:
         """Why a window is dropped [lanes], None if it is not; all lanes must agree."""
         estimator = self.estimator
         lanes = estimator.p.shape[1]
@@ -134,12 +115,20 @@ class WeakTwin:
             return np.full(lanes, Reason.HELD_OUT_OF_RANGE, np.uint8)
         return None
 
-    def _work(self, window: Window) -> Iterator[npt.NDArray[np.uint8] | None]:
+    def _take(self, window: Window) -> Reasons | Work:
+        """Why a window is dropped, or its stages."""
+        objection = self._objection(window)
+        if objection is not None:
+            return objection
         with np.errstate(all="ignore"):
             expected = self.row_variance + self.pivot_noise * window.bend
         return weak_finish.stages(
             window, self.config.design, self.iterations, self.estimator, self.trust, self.angle, expected
         )
+
+    def _reject(self) -> Reason:
+        self.estimator.counters["rejected_not_finite"] += 1
+        return Reason.REJECTED_NOT_FINITE
 
     def run(
         self,
@@ -154,37 +143,17 @@ class WeakTwin:
         estimator = self.estimator
         ticks = len(finite)
         n_p, lanes = estimator.p.shape
-        record = TwinRecord(
-            p=np.empty((ticks, n_p, lanes), np.float32),
-            sums=np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.float32),
-            reason=np.empty((ticks, lanes), np.uint8),
-            published=np.empty((ticks, n_p, lanes), np.float32),
-        )
-        warm = False
-        work: Iterator[npt.NDArray[np.uint8] | None] = iter(())
-        for tick in range(ticks):
-            if not finite[tick]:
-                warm = False
-                estimator.counters["rejected_not_finite"] += 1
-                record.reason[tick] = Reason.REJECTED_NOT_FINITE
-            else:
-                told = None
-                if tick in complete:
-                    warm = True
-                    window = complete[tick]
-                    told = self._objection(window)
-                    if told is None:
-                        work = self._work(window)
-                if told is None and free[tick]:
-                    for _ in range(self.together):
-                        latest = next(work, None)
-                        told = told if latest is None else latest
-                usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
-                record.reason[tick] = usual if told is None else told
-            record.p[tick] = estimator.p
-            record.published[tick] = self.trust.estimate["p"][:, :n_p].T
+        p = np.empty((ticks, n_p, lanes), np.float32)
+        state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.float32)
+        published = np.empty((ticks, n_p, lanes), np.float32)
+
+        def record(tick: int) -> None:
+            p[tick] = estimator.p
+            published[tick] = self.trust.estimate["p"][:, :n_p].T
             if sums:
-                record.sums[tick] = estimator.sums
+                state[tick] = estimator.sums
             if progress is not None and tick % 512 == 0:
                 progress(tick)
-        return record
+
+        reason = play(finite, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=record)
+        return TwinRecord(p=p, sums=state, reason=reason, published=published)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
-import numpy.typing as npt
 
 from pvid.native import Reason
 from pvid.twin import cholesky_q31 as cholesky
@@ -19,10 +16,8 @@ from pvid.twin.integer_q31 import (
     scale,
     square_root,
 )
+from pvid.twin.weak_schedule import Mask, Work
 from pvid.weak_design_q31 import COLUMN_TERMS, WeakTablesQ31
-
-Mask = npt.NDArray[np.bool_]
-Reasons = npt.NDArray[np.uint8]
 
 COLUMNS = 12
 COLUMN_LIMIT = 2**28
@@ -135,11 +130,20 @@ def rows(sums: Int, design: WeakTablesQ31, estimator: EstimatorQ31) -> tuple[Int
     return x, held.saturated
 
 
-def stages(sums: Int, design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> Iterator[Reasons | None]:
+def _stages_before_add(design: WeakTablesQ31) -> int:
+    return 3 * design.functions + 2 + 4 * -(-design.functions // _FUNCTIONS_A_STAGE)
+
+
+def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> int:
+    """Stages of a window."""
+    solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
+    return _stages_before_add(design) + design.functions + solves
+
+
+def stages(sums: Int, design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> Work:
     """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
     x, saturated = rows(sums, design, estimator)
-    parts = -(-design.functions // _FUNCTIONS_A_STAGE)
-    for _ in range(3 * design.functions + 2 + 4 * parts):
+    for _ in range(_stages_before_add(design)):
         yield None
     for k in range(design.functions):
         y = np.where(saturated, 2**31 - 1, x[_Y, k])

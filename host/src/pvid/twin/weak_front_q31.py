@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.twin.integer_q31 import Int, round_shift
-from pvid.twin.weak_front import outputs
+from pvid.twin.weak_schedule import Schedule
 from pvid.weak_design_q31 import WeakTablesQ31
 
 
@@ -20,7 +20,6 @@ def _folded(counts: Int, weights: npt.NDArray[np.int32], centres: Int) -> Int:
 
 def decimate(phi: Int, y: Int, design: WeakTablesQ31) -> tuple[Int, Int]:
     """F and U at the decimated instants of one stretch of counts within full scale [ticks]."""
-    half = (design.taps - 1) // 2
-    centres = half + design.decimation * np.arange(outputs(len(phi), design.taps, design.decimation))
+    centres = Schedule.of(design).centres(len(phi))
     f = (phi[centres] << design.smooth_bits) + _folded(phi, design.smooth, centres)
     return round_shift(f, design.phi_shift), round_shift(_folded(y, design.second, centres), design.u_shift)

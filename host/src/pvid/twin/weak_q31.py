@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +14,7 @@ from pvid.twin import kapitza_weak_q31, weak_finish_q31, weak_front_q31, weak_wi
 from pvid.twin.differentiator import segments
 from pvid.twin.estimator_q31 import EstimatorQ31
 from pvid.twin.integer_q31 import Int, integers, scale
-from pvid.twin.weak_front import tick_of
-
-Mask = npt.NDArray[np.bool_]
+from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
 
 
 @dataclass
@@ -45,16 +43,10 @@ class WeakTwinQ31:
         model = kapitza_weak_q31.WEAK if config.zero_unknown else kapitza_weak_q31.ZEROED
         self.estimator = EstimatorQ31(estimators or [config.estimator], model)
         self.iterations = 1 if self.estimator.is_rate else config.iterations
-
-    @property
-    def window_ticks(self) -> int:
-        """Ticks in which the windows take a decimated sample in, after the one at which it comes out."""
-        design = self.config.design
-        if design.decimation <= 2:
-            return design.decimation - 1
-        second_half = design.decimation - design.decimation // 2
-        functions = -(-design.functions // max(1, second_half // 2))
-        return 2 * -(-design.functions // functions)
+        self.schedule = Schedule.of(config.design)
+        self.together = self.schedule.together(
+            weak_finish_q31.number_of_stages(config.design, self.iterations, self.estimator)
+        )
 
     def window_sums(self, phi: Int, y: Int) -> tuple[dict[int, Window | None], Mask, Mask]:
         """Every whole window, None if it is dropped, by the tick of its handing over.
@@ -90,16 +82,14 @@ class WeakTwinQ31:
         beyond = np.flatnonzero(np.abs(u) > design.u_max)
         if len(beyond):
             f, u = f[: beyond[0]], u[: beyond[0]]
-            last = first + tick_of(int(beyond[0]), design.taps, design.decimation)
+            last = first + self.schedule.tick_of(int(beyond[0]))
             within[last] = free[last] = False
         driven = weak_window_q31.drives(u, design) >= threshold
         angles = weak_window_q31.angle_sums(f, design)
         for m, sums in enumerate(weak_window_q31.sums(f, u, design)):
-            tick = first + tick_of((m + 2) * self.config.hop, design.taps, design.decimation)
+            tick = first + self.schedule.tick_of_window(m)
             complete[tick] = Window(sums, int(angles[m])) if driven[m] else None
-        for index in range(len(f)):
-            start = first + tick_of(index, design.taps, design.decimation) + 1
-            free[start : min(start + self.window_ticks, last)] = False
+        self.schedule.occupy(free, first, last, len(f))
         return last + 1
 
     def _place_zero(self, window: Window) -> None:
@@ -110,6 +100,18 @@ class WeakTwinQ31:
         mean = total // (self.config.design.window - 1)
         self.estimator.place(3, -mean if window.angle_sum < 0 else mean)
 
+    def _take(self, window: Window | None) -> Reasons | Work:
+        """Why a window is dropped, or its stages."""
+        if window is None:
+            self.estimator.counters["held_not_excited"] += 1
+            return np.full(self.estimator.lanes, Reason.HELD_NOT_EXCITED, np.uint8)
+        self._place_zero(window)
+        return weak_finish_q31.stages(window.sums, self.config.design, self.iterations, self.estimator)
+
+    def _reject(self) -> Reason:
+        self.estimator.counters["rejected_saturated"] += 1
+        return Reason.REJECTED_SATURATED
+
     def run(
         self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
     ) -> TwinRecordQ31:
@@ -118,38 +120,17 @@ class WeakTwinQ31:
         estimator = self.estimator
         ticks = len(within)
         n_p, lanes = estimator.p.shape
-        record = TwinRecordQ31(
-            p=np.empty((ticks, n_p, lanes), np.int32),
-            sums=np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64),
-            exponent=np.empty((ticks, lanes), np.uint8),
-            reason=np.empty((ticks, lanes), np.uint8),
-        )
-        warm = False
-        work: Iterator[npt.NDArray[np.uint8] | None] = iter(())
-        for tick in range(ticks):
-            if not within[tick]:
-                warm = False
-                estimator.counters["rejected_saturated"] += 1
-                record.reason[tick] = Reason.REJECTED_SATURATED
-            else:
-                told = None
-                if tick in complete:
-                    warm = True
-                    window = complete[tick]
-                    if window is None:
-                        estimator.counters["held_not_excited"] += 1
-                        told = np.full(lanes, Reason.HELD_NOT_EXCITED, np.uint8)
-                    else:
-                        self._place_zero(window)
-                        work = weak_finish_q31.stages(window.sums, self.config.design, self.iterations, estimator)
-                if told is None and free[tick]:
-                    told = next(work, None)
-                usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
-                record.reason[tick] = usual if told is None else told
-            record.p[tick] = estimator.p
-            record.exponent[tick] = estimator.exponent
+        p = np.empty((ticks, n_p, lanes), np.int32)
+        state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64)
+        exponent = np.empty((ticks, lanes), np.uint8)
+
+        def record(tick: int) -> None:
+            p[tick] = estimator.p
+            exponent[tick] = estimator.exponent
             if sums:
-                record.sums[tick] = estimator.sums
+                state[tick] = estimator.sums
             if progress is not None and tick % 512 == 0:
                 progress(tick)
-        return record
+
+        reason = play(within, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=record)
+        return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)

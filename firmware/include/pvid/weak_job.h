@@ -1,0 +1,22 @@
+/* pvid/weak_job.h - how the front end of the weak form, in either arithmetic, keeps its place.
+ *
+ * Samples stand in a ring; every `decimation` samples a block is complete, and the FIR job at its centre is done in
+ * slices, outwards from there, while the next samples arrive. */
+#ifndef PVID_WEAK_JOB_H
+#define PVID_WEAK_JOB_H
+
+#include <stdint.h>
+
+typedef struct {
+    uint16_t half;       /* pairs of taps */
+    uint16_t length;     /* places of the ring in use: taps + decimation - 1, for a job may last a block */
+    uint16_t decimation;
+    uint16_t slice;      /* pairs a tick: a job lasts half a block */
+    uint16_t head;       /* place of the next sample */
+    uint16_t wait;       /* samples until the next block is complete */
+    uint16_t pair;       /* pairs done; half: the job is done */
+    uint16_t newer;      /* places of the last pair */
+    uint16_t older;
+} pvid_weak_job;
+
+#endif

@@ -1,0 +1,150 @@
+"""Twin of weak_schedule.h: at which tick the weak form does what, whatever its arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.native import Reason
+
+Mask = npt.NDArray[np.bool_]
+Reasons = npt.NDArray[np.uint8]
+Work = Iterator[Reasons | None]
+WindowT = TypeVar("WindowT")
+
+
+class Sizes(Protocol):
+    """What the schedule depends on."""
+
+    @property
+    def taps(self) -> int: ...
+
+    @property
+    def decimation(self) -> int: ...
+
+    @property
+    def window(self) -> int: ...
+
+    @property
+    def functions(self) -> int: ...
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The ticks of a design; those of a stretch count from its first sample."""
+
+    taps: int
+    decimation: int
+    window: int
+    functions: int
+
+    @classmethod
+    def of(cls, design: Sizes) -> Schedule:
+        """The schedule of a design's tables."""
+        return cls(design.taps, design.decimation, design.window, design.functions)
+
+    @property
+    def hop(self) -> int:
+        """Decimated samples from the start of a window to the start of the next."""
+        return (self.window - 1) // 2
+
+    @property
+    def job_ticks(self) -> int:
+        """Ticks that the FIR job of a block takes."""
+        half = (self.taps - 1) // 2
+        slice_pairs = -(-half // max(1, self.decimation // 2))
+        return -(-half // slice_pairs)
+
+    def outputs(self, samples: int) -> int:
+        """Decimated samples that come out of a stretch of `samples`."""
+        return max(0, (samples - self.taps - self.job_ticks + 1) // self.decimation + 1)
+
+    def centres(self, samples: int) -> npt.NDArray[np.int64]:
+        """Ticks of the stretch that the decimated samples speak of."""
+        return (self.taps - 1) // 2 + self.decimation * np.arange(self.outputs(samples))
+
+    def tick_of(self, index: int) -> int:
+        """Tick at which decimated sample `index` comes out."""
+        return self.taps - 1 + index * self.decimation + self.job_ticks - 1
+
+    def tick_of_window(self, index: int) -> int:
+        """Tick at which window `index` is handed over."""
+        return self.tick_of((index + 2) * self.hop)
+
+    @property
+    def window_ticks(self) -> int:
+        """Ticks in which the windows take a decimated sample in, after the one at which it comes out."""
+        if self.decimation <= 2:
+            return self.decimation - 1
+        second_half = self.decimation - self.decimation // 2
+        functions = -(-self.functions // max(1, second_half // 2))
+        return 2 * -(-self.functions // functions)
+
+    def occupy(self, free: Mask, first: int, last: int, outputs: int) -> None:
+        """Marks in `free` the ticks at which a stretch first..last-1 adds its decimated samples to the windows."""
+        for index in range(outputs):
+            start = first + self.tick_of(index) + 1
+            free[start : min(start + self.window_ticks, last)] = False
+
+    def together(self, stages: int) -> int:
+        """Stages a tick that work a window off before the next one is complete."""
+        free_ticks = 1 if self.decimation <= 2 else self.decimation - self.window_ticks
+        return -(-stages // (self.hop * free_ticks))
+
+
+def play(
+    usable: Mask,
+    free: Mask,
+    complete: Mapping[int, WindowT],
+    together: int,
+    lanes: int,
+    *,
+    reject: Callable[[], Reason],
+    take: Callable[[WindowT], Reasons | Work],
+    record: Callable[[int], None],
+) -> Reasons:
+    """Steps through a run and returns what every tick told, [ticks, lanes].
+
+    Parameters
+    ----------
+    usable, free
+        Which samples are taken in, and which ticks are free for the stages of a window, [ticks].
+    complete
+        Every whole window, by the tick of its handing over.
+    together
+        Stages a tick.
+    reject
+        Counts an unusable sample, and names what it was.
+    take
+        Takes a window in: returns why it is dropped, or its stages.
+    record
+        Called after every tick.
+    """
+    reason = np.empty((len(usable), lanes), np.uint8)
+    warm = False
+    work: Work = iter(())
+    for tick in range(len(usable)):
+        if not usable[tick]:
+            warm = False
+            reason[tick] = reject()
+        else:
+            told = None
+            if tick in complete:
+                warm = True
+                taken = take(complete[tick])
+                if isinstance(taken, np.ndarray):
+                    told = taken
+                else:
+                    work = taken
+            if told is None and free[tick]:
+                for _ in range(together):
+                    latest = next(work, None)
+                    told = told if latest is None else latest
+            usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
+            reason[tick] = usual if told is None else told
+        record(tick)
+    return reason

@@ -1,0 +1,106 @@
+/* The schedule of the weak form, for every size that the configuration allows. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "pvid/config.h"
+#include "weak_schedule.h"
+
+/* A block has ticks enough: two windows of slices and the stages' own. */
+static void every_block_has_room(void **state)
+{
+    (void)state;
+    for (uint32_t decimation = 3; decimation <= PVID_MAX_DECIMATION; decimation++) {
+        for (uint32_t functions = 4; functions <= PVID_MAX_FUNCTIONS; functions++) {
+            const uint32_t slice = pvid_weak_functions_a_tick(decimation, functions);
+            const uint32_t ticks = decimation - pvid_weak_free_ticks(decimation, functions);
+            assert_true((slice >= 1u) && (slice <= functions));
+            assert_true((ticks / 2u) * slice >= functions);          /* a window takes a sample in */
+            assert_true(((ticks / 2u) - 1u) * slice < functions);    /* and wastes no tick */
+            assert_true(ticks <= decimation - (decimation / 2u));    /* in the second half */
+        }
+    }
+}
+
+/* Without a tick to spare, everything is done in the one there is. */
+static void low_decimation_does_all_at_once(void **state)
+{
+    (void)state;
+    for (uint32_t decimation = 1; decimation <= 2u; decimation++) {
+        assert_int_equal(pvid_weak_functions_a_tick(decimation, 12), 12);
+        assert_int_equal(pvid_weak_free_ticks(decimation, 12), 1);
+    }
+}
+
+static void stages_go_together_only_where_they_must(void **state)
+{
+    (void)state;
+    /* D = 8, K = 12: windows in 4 of 8 ticks; W = 9: a hop of 4, so 16 ticks for a window's stages */
+    assert_int_equal(pvid_weak_stages_together(16, 9, 8, 12), 1);
+    assert_int_equal(pvid_weak_stages_together(17, 9, 8, 12), 2);
+    assert_int_equal(pvid_weak_stages_together(16 * PVID_STAGES_TOGETHER, 9, 8, 12), PVID_STAGES_TOGETHER);
+    assert_int_equal(pvid_weak_stages_together((16 * PVID_STAGES_TOGETHER) + 1, 9, 8, 12), 0);
+}
+
+static void what_is_odd_and_within(void **state)
+{
+    (void)state;
+    assert_true(pvid_is_odd_within(5, 5, 9) && pvid_is_odd_within(9, 5, 9));
+    assert_false(pvid_is_odd_within(3, 5, 9) || pvid_is_odd_within(11, 5, 9) || pvid_is_odd_within(6, 5, 9));
+}
+
+/* Ticks of a job and the pairs it visits, for a ring that turns many times: each pair once, in order, at the places
+ * of the samples that stand as far from the centre. */
+static void a_job_visits_every_pair_at_its_place(void **state)
+{
+    (void)state;
+    pvid_weak_job job;
+    uint32_t sample_at[32] = {0};
+    pvid_weak_job_init(&job, 9, 5);
+    assert_int_equal(job.length, 13);
+    assert_int_equal(pvid_weak_job_ticks(&job), 2); /* four pairs in half of five ticks */
+    uint32_t begun = 0;
+    for (uint32_t tick = 0; tick < 200u; tick++) {
+        sample_at[job.head] = tick;
+        if (pvid_weak_job_begins(&job)) {
+            assert_int_equal(tick, 8u + (5u * begun));
+            assert_int_equal(sample_at[job.newer], tick - 4u); /* the centre of nine */
+            begun++;
+        }
+        size_t newer = job.newer;
+        size_t older = job.older;
+        const size_t last = pvid_weak_job_end(&job);
+        size_t i = job.pair;
+        while (i < last) {
+            const size_t run = pvid_weak_job_outwards(&job, last - i, &newer, &older);
+            const uint32_t centre = 4u + (5u * (begun - 1u));
+            for (size_t k = 0; k < run; k++) {
+                i++;
+                assert_int_equal(sample_at[newer + k], centre + i);
+                assert_int_equal(sample_at[older - k], centre - i);
+            }
+            newer += run - 1u;
+            older -= run - 1u;
+        }
+        job.newer = (uint16_t)newer;
+        job.older = (uint16_t)older;
+        job.pair = (uint16_t)last;
+    }
+    assert_int_equal(begun, 39);
+    assert_int_equal(job.pair, job.half);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_block_has_room),
+        cmocka_unit_test(low_decimation_does_all_at_once),
+        cmocka_unit_test(stages_go_together_only_where_they_must),
+        cmocka_unit_test(what_is_odd_and_within),
+        cmocka_unit_test(a_job_visits_every_pair_at_its_place),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
