@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from filelock import FileLock
+
 from pvid.errors import PvidError
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -126,13 +128,32 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
     configure += [f"-DCMAKE_TOOLCHAIN_FILE={ROOT / 'firmware' / 'cmake' / target.toolchain}.cmake"]
     configure += [f"-DPVID_BOARD={target.name}", "-DPVID_DEVELOPER=ON"]
     configure += [f"-D{name}={value}" for name, value in options.items()]
-    for command in (configure, ["cmake", "--build", str(tree)]):
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            lines = (done.stdout + done.stderr).strip().splitlines()
-            errors = [line for line in lines if re.search(r"error|undefined|overflowed|CMake Error", line)]
-            raise PvidError(f"{target.name}: the build failed: {' '.join((errors or lines or ['no output'])[:2])}")
+    with one_at_a_time(tree):
+        for command in (configure, ["cmake", "--build", str(tree)]):
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            if done.returncode != 0:
+                lines = (done.stdout + done.stderr).strip().splitlines()
+                errors = [line for line in lines if re.search(r"error|undefined|overflowed|CMake Error", line)]
+                raise PvidError(f"{target.name}: the build failed: {' '.join((errors or lines or ['no output'])[:2])}")
     return tree
+
+
+def one_at_a_time(made: Path) -> FileLock:
+    """A lock for who makes `made`, a file or a tree: tests run in several processes, and users in several terminals."""
+    made.parent.mkdir(parents=True, exist_ok=True)
+    return FileLock(made.with_name(f".{made.name}.lock"))
+
+
+def keep_header(folder: Path, name: str, text: str) -> None:
+    """Writes a generated header where it is not there yet, whole or not at all: else the build has nothing to do."""
+    place = folder / name
+    with one_at_a_time(folder):
+        if place.exists() and place.read_text(encoding="utf-8") == text:
+            return
+        folder.mkdir(parents=True, exist_ok=True)
+        fresh = place.with_suffix(".new")
+        fresh.write_text(text, encoding="utf-8")
+        fresh.replace(place)
 
 
 def prepare_emulator(target: Board) -> None:
@@ -145,12 +166,15 @@ def prepare_emulator(target: Board) -> None:
     """
     if shutil.which(target.emulator) is None:
         raise PvidError(f"{target.emulator} is not installed: it comes with ./tools/test")
+    if target.emulator == "simavr":
+        with one_at_a_time(SIMAVR_STDIO):
+            _build_simavr_stdio()
+
+
+def _build_simavr_stdio() -> None:
     source = ROOT / "host" / "native" / "simavr_stdio.c"
-    if target.emulator != "simavr" or (
-        SIMAVR_STDIO.exists() and SIMAVR_STDIO.stat().st_mtime >= source.stat().st_mtime
-    ):
+    if SIMAVR_STDIO.exists() and SIMAVR_STDIO.stat().st_mtime >= source.stat().st_mtime:
         return
-    BUILD.mkdir(parents=True, exist_ok=True)
     fresh = SIMAVR_STDIO.with_suffix(".new")
     command = ["gcc", "-std=gnu99", "-O2", "-I/usr/include/simavr", str(source), "-lsimavr", "-lelf", "-o", str(fresh)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

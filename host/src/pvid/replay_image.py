@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zlib
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from pvid.boards import BUILD, Board, build
+from pvid.boards import BUILD, Board, build, keep_header
 from pvid.boards import run as run_image
 from pvid.compare_q31 import twin_hashes as twin_hashes_q31
 from pvid.ctables import float_array, float_literal, struct_initializer
@@ -265,13 +266,10 @@ def build_image(target: Board, run: ReplayRun) -> tuple[Path, Path]:
 
     The strong form's windows are as long as its five points, so that its state is what a board would hold.
     """
-    name = f"{run.form}-{run.ticks}" + ("-q31" if run.core == "q31" else "")
-    folder = BUILD / "runs" / name
     text = header(run)
-    place = folder / "replay_run.h"
-    if not place.exists() or place.read_text(encoding="utf-8") != text:  # else the build has nothing to do
-        folder.mkdir(parents=True, exist_ok=True)
-        place.write_text(text, encoding="utf-8")
+    name = f"{run.form}-{run.core}-{run.ticks}-{zlib.crc32(text.encode()):08x}"
+    folder = BUILD / "runs" / name
+    keep_header(folder, "replay_run.h", text)
     options = {"PVID_REPLAY_RUN": str(folder)}
     if isinstance(run.config, StrongConfig):
         options["PVID_MAX_WINDOW"] = str(2 * run.config.half * run.config.stride + 1)

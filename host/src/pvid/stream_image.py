@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pvid.boards import BUILD, ROOT, Board, build
+from pvid.boards import BUILD, ROOT, Board, build, keep_header, one_at_a_time
 from pvid.ctables import float_array, struct_initializer
 from pvid.errors import PvidError
 from pvid.native import Law, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
@@ -106,13 +106,11 @@ def build_image(config: StrongConfig | WeakConfig, board: Board | None) -> Path:
     """
     name = f"stream-{settings_number(config):08x}"
     folder = BUILD / "runs" / name
-    text = header(config)
-    place = folder / "stream_rig.h"
-    if not place.exists() or place.read_text(encoding="utf-8") != text:
-        folder.mkdir(parents=True, exist_ok=True)
-        place.write_text(text, encoding="utf-8")
+    keep_header(folder, "stream_rig.h", header(config))
     if board is None:
-        return _build_for_host(folder, BUILD / f"{HOST}-{name}")
+        tree = BUILD / f"{HOST}-{name}"
+        with one_at_a_time(tree):
+            return _build_for_host(folder, tree)
     options = {"PVID_STREAM_RIG": str(folder)}
     if isinstance(config, StrongConfig):
         options["PVID_MAX_WINDOW"] = str(max(2 * config.half * config.stride + 1, 5))
