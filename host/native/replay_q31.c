@@ -18,12 +18,16 @@ const uint32_t pvid_native_layout_q31[] = {
     (uint32_t)sizeof(pvid_weak_config_q31),
     FIELD(pvid_weak_config_q31, zero_unknown),
     FIELD(pvid_weak_config_q31, estimator),
+    (uint32_t)sizeof(pvid_fir_bank_q31),
+    FIELD(pvid_fir_bank_q31, phi_shift),
+    FIELD(pvid_fir_bank_q31, weights),
     (uint32_t)sizeof(pvid_estimate_q31),
     FIELD(pvid_estimate_q31, kappa),
     (uint32_t)sizeof(pvid_estimator_q31),
     FIELD(pvid_estimator_q31, counters),
     (uint32_t)sizeof(pvid_weak_q31),
     FIELD(pvid_weak_q31, estimator),
+    (uint32_t)sizeof(pvid_differentiator_q31),
     PVID_MAX_P,
     PVID_MAX_THETA_Q31,
 };
@@ -73,5 +77,16 @@ void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_
         const pvid_reason added = pvid_estimator_add_q31(self, &n[tick * n_theta], y[tick]);
         const pvid_reason reason = (added == PVID_ACCUMULATED) ? pvid_estimator_update_q31(self) : added;
         record_tick(record, tick, self, reason);
+    }
+}
+
+void pvid_replay_derivatives_q31(pvid_differentiator_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
+                                 int32_t d_phi[], int32_t d_y[], uint8_t ready[])
+{
+    for (size_t tick = 0; tick < ticks; tick++) {
+        ready[tick] = pvid_differentiator_step_q31(self, phi[tick], y[tick], &d_phi[tick * PVID_ORDERS],
+                                                   &d_y[tick * PVID_Y_ORDERS_Q31])
+                          ? 1u
+                          : 0u;
     }
 }

@@ -30,4 +30,8 @@ void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi
 void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_t n[], const int32_t y[],
                           const pvid_record_q31 *record);
 
+/* Derivatives of counts within full scale after every tick: d_phi[ticks][5], d_y[ticks][3], ready[ticks]. */
+void pvid_replay_derivatives_q31(pvid_differentiator_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
+                                 int32_t d_phi[], int32_t d_y[], uint8_t ready[]);
+
 #endif

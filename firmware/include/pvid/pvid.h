@@ -7,6 +7,7 @@
 
 #include "pvid/arithmetic.h"
 #include "pvid/differentiator.h"
+#include "pvid/differentiator_q31.h"
 #include "pvid/estimator.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/fnv.h"

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import ctypes
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -583,51 +584,58 @@ def weak_config_struct(config: WeakConfig) -> tuple[WeakConfigStruct, Tables]:
     return struct, tables
 
 
-@dataclass
-class _Stepper:
-    """A state block in C memory and the replay function that steps it."""
+RecordT = TypeVar("RecordT")
 
-    native: Native
-    n_p: int = 3
-    n_sums: int = 45 + MAX_THETA + 2
-    publishes: bool = False
-    _hash: npt.NDArray[np.uint32] = field(default_factory=lambda: np.array([0x811C9DC5], np.uint32))
-    _state: Any = None
-    _estimator_at: int = 0
 
-    def _replay(
+class Stepper(ABC, Generic[RecordT]):
+    """An initialised object of the core in C memory, stepped through runs.
+
+    Its state persists between calls of `run`, so a run may come in pieces.
+
+    A class of identifiers names the replay function that steps it, the type of its samples and that of its estimates.
+    """
+
+    REPLAY: ClassVar[str]
+    SAMPLE: ClassVar[type[np.generic]]
+    ASSESS: ClassVar[str]
+    ESTIMATE: ClassVar[np.dtype[np.void]]
+
+    def __init__(
+        self, native: Native, init: str, config: ctypes.Structure, size: int, estimator_at: int, counters_at: int
+    ) -> None:
+        """Runs the C function `init` on `size` bytes; what `config` points to must outlive this object."""
+        self.native = native
+        self._config = config
+        self._estimator_at = estimator_at
+        self._counters_at = estimator_at + counters_at
+        self._hash = np.array([0x811C9DC5], np.uint32)
+        self._state: Any = ctypes.create_string_buffer(size)
+        status = Status(getattr(native.library, init)(self._state, ctypes.byref(config)))
+        if status is not Status.OK:
+            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
+
+    @abstractmethod
+    def _recording(self, ticks: int, sums: bool, hashes: bool, estimate_every: int) -> tuple[RecordT, ctypes.Structure]:
+        """An empty record and the C struct that points to it."""
+
+    def run(
         self,
-        symbol: str,
-        first: Float32,
-        second: Float32,
-        want_sums: bool,
-        want_hash: bool,
-        estimate_every: int,
-    ) -> Record:
-        ticks = len(second)
-        estimates = -(-ticks // estimate_every) if estimate_every else 0
-        record = Record(
-            p=np.empty((ticks, self.n_p), np.float32),
-            published=np.empty((ticks if self.publishes else 0, self.n_p), np.float32),
-            sums=np.empty((ticks if want_sums else 0, self.n_sums), np.float32),
-            reason=np.empty(ticks, np.uint8),
-            hash=np.empty(ticks if want_hash else 0, np.uint32),
-            estimate=np.empty(estimates, ESTIMATE_DTYPE),
-            estimate_every=estimate_every,
-        )
-        struct = RecordStruct(
-            p=record.p.ctypes.data,
-            published=record.published.ctypes.data if self.publishes else None,
-            sums=record.sums.ctypes.data if want_sums else None,
-            reason=record.reason.ctypes.data,
-            hash=record.hash.ctypes.data if want_hash else None,
-            running_hash=self._hash.ctypes.data,
-            estimate=record.estimate.ctypes.data if estimates else None,
-            estimate_every=estimate_every,
-        )
-        getattr(self.native._lib, symbol)(
-            self._state, ctypes.c_uint32(ticks), _pointer(first), _pointer(second), ctypes.byref(struct)
-        )
+        first: npt.ArrayLike,
+        second: npt.ArrayLike,
+        *,
+        sums: bool = True,
+        hashes: bool = True,
+        estimate_every: int = 0,
+    ) -> RecordT:
+        """Steps through phi and y, both [ticks], or rows N [ticks, n_theta] and Y [ticks].
+
+        Floats are converted to float32 as a board would read them; the fixed-point core takes counts.
+        """
+        one = np.ascontiguousarray(first, self.SAMPLE)
+        other = np.ascontiguousarray(second, self.SAMPLE)
+        record, struct = self._recording(len(other), sums, hashes, estimate_every)
+        replay = getattr(self.native.library, self.REPLAY)
+        replay(self._state, ctypes.c_uint32(len(other)), _pointer(one), _pointer(other), ctypes.byref(struct))
         return record
 
     @property
@@ -638,84 +646,78 @@ class _Stepper:
     @property
     def counters(self) -> dict[str, int]:
         """pvid_counters by name."""
-        start = self._estimator_at + self.native._counters_at
-        struct = CountersStruct.from_buffer(self._state, start)
+        struct = CountersStruct.from_buffer(self._state, self._counters_at)
         return {name: int(getattr(struct, name)) for name, *_ in CountersStruct._fields_}
 
     def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimator_assess_f32 at the present state, dtype ESTIMATE_DTYPE, shape ()."""
-        out = np.empty((), ESTIMATE_DTYPE)
+        """Standard errors and kappa at the present state, dtype ESTIMATE, shape ()."""
+        out = np.empty((), self.ESTIMATE)
         estimator = ctypes.c_void_p(ctypes.addressof(self._state) + self._estimator_at)
-        self.native._lib.pvid_estimator_assess_f32(estimator, _pointer(out))
+        getattr(self.native.library, self.ASSESS)(estimator, _pointer(out))
         return out
 
 
-class StrongIdentifier(_Stepper):
-    """pvid_strong_f32. State persists between calls of `run`, so a run may come in pieces."""
+class _FloatStepper(Stepper[Record]):
+    """With records of float32."""
+
+    SAMPLE = np.float32
+    ASSESS = "pvid_estimator_assess_f32"
+    ESTIMATE = ESTIMATE_DTYPE
+    n_p = 3
+    n_sums = 45 + MAX_THETA + 2
+    publishes = False
+
+    def _recording(self, ticks: int, sums: bool, hashes: bool, estimate_every: int) -> tuple[Record, RecordStruct]:
+        estimates = -(-ticks // estimate_every) if estimate_every else 0
+        record = Record(
+            p=np.empty((ticks, self.n_p), np.float32),
+            published=np.empty((ticks if self.publishes else 0, self.n_p), np.float32),
+            sums=np.empty((ticks if sums else 0, self.n_sums), np.float32),
+            reason=np.empty(ticks, np.uint8),
+            hash=np.empty(ticks if hashes else 0, np.uint32),
+            estimate=np.empty(estimates, ESTIMATE_DTYPE),
+            estimate_every=estimate_every,
+        )
+        struct = RecordStruct(
+            p=record.p.ctypes.data,
+            published=record.published.ctypes.data if self.publishes else None,
+            sums=record.sums.ctypes.data if sums else None,
+            reason=record.reason.ctypes.data,
+            hash=record.hash.ctypes.data if hashes else None,
+            running_hash=self._hash.ctypes.data,
+            estimate=record.estimate.ctypes.data if estimates else None,
+            estimate_every=estimate_every,
+        )
+        return record, struct
+
+
+class StrongIdentifier(_FloatStepper):
+    """pvid_strong_f32: phi [rad], y [m]."""
+
+    REPLAY = "pvid_replay_strong_f32"
 
     def __init__(self, native: Native, config: StrongConfig) -> None:
-        super().__init__(native)
-        self._config, self._tables = strong_config_struct(config)
-        self._state = ctypes.create_string_buffer(native._strong_size)
-        self._estimator_at = native._estimator_at
-        status = Status(native._lib.pvid_strong_init_f32(self._state, ctypes.byref(self._config)))
-        if status is not Status.OK:
-            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
-
-    def run(
-        self,
-        phi: npt.ArrayLike,
-        y: npt.ArrayLike,
-        *,
-        sums: bool = True,
-        hashes: bool = True,
-        estimate_every: int = 0,
-    ) -> Record:
-        """Steps through phi [rad] and y [m], both [ticks], converted to float32 as a board would read them."""
-        return self._replay(
-            "pvid_replay_strong_f32",
-            np.ascontiguousarray(phi, np.float32),
-            np.ascontiguousarray(y, np.float32),
-            sums,
-            hashes,
-            estimate_every,
-        )
+        struct, self._tables = strong_config_struct(config)
+        size, at = native._strong_size, native._estimator_at
+        super().__init__(native, "pvid_strong_init_f32", struct, size, at, native._counters_at)
 
 
-class WeakIdentifier(_Stepper):
-    """pvid_weak_f32. State persists between calls of `run`, so a run may come in pieces."""
+class WeakIdentifier(_FloatStepper):
+    """pvid_weak_f32: phi [rad], y [m]."""
+
+    REPLAY = "pvid_replay_weak_f32"
+    publishes = True
 
     def __init__(self, native: Native, config: WeakConfig) -> None:
-        n_p, n_theta = (4, 8) if config.zero_unknown else (3, 5)
-        n_p, n_theta = (6, 10) if config.friction else (n_p, n_theta)
-        super().__init__(native, n_p=n_p, n_sums=n_theta * (n_theta + 1) // 2 + n_theta + 2, publishes=True)
-        self._config, self._tables = weak_config_struct(config)
+        self.n_p, n_theta = (4, 8) if config.zero_unknown else (3, 5)
+        if config.friction:
+            self.n_p, n_theta = 6, 10
+        self.n_sums = n_theta * (n_theta + 1) // 2 + n_theta + 2
+        struct, self._tables = weak_config_struct(config)
         self._angle = ctypes.create_string_buffer(native._angle_size)
-        self._config.angle = ctypes.addressof(self._angle)
-        self._state = ctypes.create_string_buffer(native._weak_size)
-        self._estimator_at = native._weak_estimator_at
-        status = Status(native._lib.pvid_weak_init_f32(self._state, ctypes.byref(self._config)))
-        if status is not Status.OK:
-            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
-
-    def run(
-        self,
-        phi: npt.ArrayLike,
-        y: npt.ArrayLike,
-        *,
-        sums: bool = True,
-        hashes: bool = True,
-        estimate_every: int = 0,
-    ) -> Record:
-        """Steps through phi [rad] and y [m], both [ticks], converted to float32 as a board would read them."""
-        return self._replay(
-            "pvid_replay_weak_f32",
-            np.ascontiguousarray(phi, np.float32),
-            np.ascontiguousarray(y, np.float32),
-            sums,
-            hashes,
-            estimate_every,
-        )
+        struct.angle = ctypes.addressof(self._angle)
+        size, at = native._weak_size, native._weak_estimator_at
+        super().__init__(native, "pvid_weak_init_f32", struct, size, at, native._counters_at)
 
     @property
     def published(self) -> npt.NDArray[np.void] | None:
@@ -741,37 +743,16 @@ class WeakIdentifier(_Stepper):
         self.native._lib.pvid_weak_gap_f32(self._state)
 
 
-class RowEstimator(_Stepper):
+class RowEstimator(_FloatStepper):
     """pvid_estimator_f32 on the strong form's model, fed rows."""
 
+    REPLAY = "pvid_replay_rows_f32"
+
     def __init__(self, native: Native, config: EstimatorConfig, update_rate: float) -> None:
-        super().__init__(native)
         struct = _estimator_struct(config)
         struct.model = ctypes.addressof(ctypes.c_char.in_dll(native._lib, "pvid_kapitza_strong_f32"))
         struct.update_rate_hz = update_rate
-        self._state = ctypes.create_string_buffer(native._estimator_size)
-        status = Status(native._lib.pvid_estimator_init_f32(self._state, ctypes.byref(struct)))
-        if status is not Status.OK:
-            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
-
-    def run(
-        self,
-        n: npt.ArrayLike,
-        y: npt.ArrayLike,
-        *,
-        sums: bool = True,
-        hashes: bool = True,
-        estimate_every: int = 0,
-    ) -> Record:
-        """Steps through rows N [ticks, 11] and Y [ticks]."""
-        return self._replay(
-            "pvid_replay_rows_f32",
-            np.ascontiguousarray(n, np.float32),
-            np.ascontiguousarray(y, np.float32),
-            sums,
-            hashes,
-            estimate_every,
-        )
+        super().__init__(native, "pvid_estimator_init_f32", struct, native._estimator_size, 0, native._counters_at)
 
 
 def chunks(ticks: int, size: int) -> Iterator[slice]:

@@ -6,14 +6,16 @@ The structs of the public headers are mirrored here; sizes and offsets are check
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.differentiation_q31 import FirBankQ31
 from pvid.errors import PvidError
-from pvid.native import MAX_P, CountersStruct, Native, Status
+from pvid.native import MAX_P, Native, Status, Stepper
 from pvid.weak_design_q31 import TERMS, WeakTablesQ31
 
 Int32 = npt.NDArray[np.int32]
@@ -132,6 +134,21 @@ class WeakConfigStruct(ctypes.Structure):
     ]
 
 
+class FirBankStruct(ctypes.Structure):
+    """pvid_fir_bank_q31."""
+
+    _fields_ = [
+        ("half", ctypes.c_uint16),
+        ("stride", ctypes.c_uint16),
+        ("phi_max", ctypes.c_int32),
+        ("y_max", ctypes.c_int32),
+        ("centre", ctypes.c_int32),
+        ("phi_shift", ctypes.c_uint8 * 5),
+        ("y_shift", ctypes.c_uint8 * 3),
+        ("weights", ctypes.c_void_p),
+    ]
+
+
 class RecordStruct(ctypes.Structure):
     """pvid_record_q31 of host/native/replay_q31.h."""
 
@@ -199,8 +216,18 @@ class RecordQ31:
     estimate: npt.NDArray[np.void]
 
 
-def _checked_layout(native: Native) -> list[int]:
-    """Sizes and offsets that only C knows: of the estimator, its counters, the weak form, its estimator."""
+class _Layout(NamedTuple):
+    """Sizes and offsets that only C knows."""
+
+    estimator_size: int
+    counters_at: int  # in the estimator
+    weak_size: int
+    weak_estimator_at: int
+    differentiator_size: int
+
+
+def _checked_layout(native: Native) -> _Layout:
+    """What the C core says of its structs, after comparing it with those mirrored here."""
     length = ctypes.c_uint32.in_dll(native.library, "pvid_native_layout_q31_length").value
     layout = list((ctypes.c_uint32 * length).in_dll(native.library, "pvid_native_layout_q31"))
     mirrored = [
@@ -215,12 +242,15 @@ def _checked_layout(native: Native) -> list[int]:
         ctypes.sizeof(WeakConfigStruct),
         WeakConfigStruct.zero_unknown.offset,
         WeakConfigStruct.estimator.offset,
+        ctypes.sizeof(FirBankStruct),
+        FirBankStruct.phi_shift.offset,
+        FirBankStruct.weights.offset,
         ESTIMATE_DTYPE.itemsize,
         int(ESTIMATE_DTYPE.fields["kappa"][1]) if ESTIMATE_DTYPE.fields else 0,
     ]
     if layout[: len(mirrored)] != mirrored or layout[-2:] != [MAX_P, MAX_THETA]:
         raise PvidError(f"the fixed-point core was built with other struct sizes than this package: {layout}")
-    return layout[len(mirrored) : -2]
+    return _Layout(*layout[len(mirrored) : -2])
 
 
 def estimator_struct(config: EstimatorConfigQ31) -> EstimatorConfigStruct:
@@ -236,94 +266,63 @@ def estimator_struct(config: EstimatorConfigQ31) -> EstimatorConfigStruct:
     return struct
 
 
-@dataclass
-class _Stepper:
-    """A state block in C memory and the replay function that steps it."""
+class _IntegerStepper(Stepper[RecordQ31]):
+    """With records of integers; samples are counts."""
 
-    native: Native
+    SAMPLE = np.int32
+    ASSESS = "pvid_estimator_assess_q31"
+    ESTIMATE = ESTIMATE_DTYPE
     n_p: int
     n_theta: int
-    _hash: npt.NDArray[np.uint32] = field(default_factory=lambda: np.array([0x811C9DC5], np.uint32))
-    _state: Any = None
-    _estimator_at: int = 0
-    _counters_at: int = 0
 
-    def _initialised(self, size: int, init: str, struct: ctypes.Structure) -> None:
-        self._state = ctypes.create_string_buffer(size)
-        status = Status(getattr(self.native.library, init)(self._state, ctypes.byref(struct)))
-        if status is not Status.OK:
-            raise PvidError(f"the core refused the configuration: {status.name.lower().replace('_', ' ')}")
-
-    def _replay(
-        self, symbol: str, first: Int32, second: Int32, want_sums: bool, want_hash: bool, estimate_every: int
-    ) -> RecordQ31:
-        ticks = len(second)
+    def _recording(self, ticks: int, sums: bool, hashes: bool, estimate_every: int) -> tuple[RecordQ31, RecordStruct]:
         n_sums = self.n_theta * (self.n_theta + 1) // 2 + self.n_theta + 2
         estimates = -(-ticks // estimate_every) if estimate_every else 0
         record = RecordQ31(
             p=np.empty((ticks, self.n_p), np.int32),
-            sums=np.empty((ticks if want_sums else 0, n_sums), np.int64),
+            sums=np.empty((ticks if sums else 0, n_sums), np.int64),
             exponent=np.empty(ticks, np.uint8),
             reason=np.empty(ticks, np.uint8),
-            hash=np.empty(ticks if want_hash else 0, np.uint32),
+            hash=np.empty(ticks if hashes else 0, np.uint32),
             estimate=np.empty(estimates, ESTIMATE_DTYPE),
         )
         struct = RecordStruct(
             p=record.p.ctypes.data,
-            sums=record.sums.ctypes.data if want_sums else None,
+            sums=record.sums.ctypes.data if sums else None,
             exponent=record.exponent.ctypes.data,
             reason=record.reason.ctypes.data,
-            hash=record.hash.ctypes.data if want_hash else None,
+            hash=record.hash.ctypes.data if hashes else None,
             running_hash=self._hash.ctypes.data,
             estimate=record.estimate.ctypes.data if estimates else None,
             estimate_every=estimate_every,
         )
-        getattr(self.native.library, symbol)(
-            self._state,
-            ctypes.c_uint32(ticks),
-            ctypes.c_void_p(first.ctypes.data),
-            ctypes.c_void_p(second.ctypes.data),
-            ctypes.byref(struct),
-        )
-        return record
-
-    @property
-    def running_hash(self) -> int:
-        """FNV-1a after the last recorded tick."""
-        return int(self._hash[0])
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """pvid_counters by name."""
-        struct = CountersStruct.from_buffer(self._state, self._estimator_at + self._counters_at)
-        return {name: int(getattr(struct, name)) for name, *_ in CountersStruct._fields_}
-
-    def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimator_assess_q31 at the present state, dtype ESTIMATE_DTYPE, shape ()."""
-        out = np.empty((), ESTIMATE_DTYPE)
-        estimator = ctypes.c_void_p(ctypes.addressof(self._state) + self._estimator_at)
-        self.native.library.pvid_estimator_assess_q31(estimator, ctypes.c_void_p(out.ctypes.data))
-        return out
+        return record, struct
 
 
-class WeakIdentifierQ31(_Stepper):
-    """pvid_weak_q31. State persists between calls of `run`, so a run may come in pieces."""
+def _fill(struct: ctypes.Structure, values: object, pointers: Mapping[str, object]) -> None:
+    """Copies the attributes of the fields' names into a struct; `pointers` are set already."""
+    for name, *_ in struct._fields_:
+        if name in pointers:
+            continue
+        value = getattr(values, name)
+        if isinstance(value, tuple):
+            getattr(struct, name)[:] = value
+        else:
+            setattr(struct, name, value)
+
+
+class WeakIdentifierQ31(_IntegerStepper):
+    """pvid_weak_q31: phi, y in counts."""
+
+    REPLAY = "pvid_replay_weak_q31"
 
     def __init__(self, native: Native, config: WeakConfigQ31) -> None:
-        super().__init__(native, *((4, 8) if config.zero_unknown else (3, 5)))
-        _, self._counters_at, size, self._estimator_at = _checked_layout(native)
-        design = config.design
+        self.n_p, self.n_theta = (4, 8) if config.zero_unknown else (3, 5)
+        layout = _checked_layout(native)
         kinds = {"smooth": np.int32, "second": np.int32, "chi": np.int16, "multiplier": np.int32, "gram": np.int32}
-        self._tables = {name: np.ascontiguousarray(getattr(design, name), kind) for name, kind in kinds.items()}
+        self._tables = {name: np.ascontiguousarray(getattr(config.design, name), kind) for name, kind in kinds.items()}
         self._design = WeakDesignStruct(**{name: table.ctypes.data for name, table in self._tables.items()})
-        for name, *_ in WeakDesignStruct._fields_:
-            if name in kinds:
-                continue
-            value = getattr(design, name)
-            if isinstance(value, tuple):
-                getattr(self._design, name)[:] = value
-            else:
-                setattr(self._design, name, value)
+        _fill(self._design, config.design, self._tables)
         struct = WeakConfigStruct(
             design=ctypes.pointer(self._design),
             phi_offset=config.phi_offset,
@@ -333,57 +332,44 @@ class WeakIdentifierQ31(_Stepper):
             iterations=config.iterations,
             estimator=estimator_struct(config.estimator),
         )
-        self._initialised(size, "pvid_weak_init_q31", struct)
-
-    def run(
-        self,
-        phi: npt.ArrayLike,
-        y: npt.ArrayLike,
-        *,
-        sums: bool = True,
-        hashes: bool = True,
-        estimate_every: int = 0,
-    ) -> RecordQ31:
-        """Steps through counts phi and y, both [ticks]."""
-        return self._replay(
-            "pvid_replay_weak_q31",
-            np.ascontiguousarray(phi, np.int32),
-            np.ascontiguousarray(y, np.int32),
-            sums,
-            hashes,
-            estimate_every,
-        )
+        size, at = layout.weak_size, layout.weak_estimator_at
+        super().__init__(native, "pvid_weak_init_q31", struct, size, at, layout.counters_at)
 
     def gap(self) -> None:
         """pvid_weak_gap_q31: samples are missing before the next call of `run`."""
         self.native.library.pvid_weak_gap_q31(self._state)
 
 
-class RowEstimatorQ31(_Stepper):
+class RowEstimatorQ31(_IntegerStepper):
     """pvid_estimator_q31 on the weak form's model with its zero unknown, fed rows, a group each."""
 
+    REPLAY = "pvid_replay_rows_q31"
+    n_p, n_theta = 4, 8
+
     def __init__(self, native: Native, config: EstimatorConfigQ31) -> None:
-        super().__init__(native, 4, 8)
-        size, self._counters_at, _, _ = _checked_layout(native)
+        layout = _checked_layout(native)
         struct = estimator_struct(config)
         struct.model = ctypes.addressof(ctypes.c_char.in_dll(native.library, "pvid_kapitza_weak_q31"))
-        self._initialised(size, "pvid_estimator_init_q31", struct)
+        super().__init__(native, "pvid_estimator_init_q31", struct, layout.estimator_size, 0, layout.counters_at)
 
-    def run(
-        self,
-        n: npt.ArrayLike,
-        y: npt.ArrayLike,
-        *,
-        sums: bool = True,
-        hashes: bool = True,
-        estimate_every: int = 0,
-    ) -> RecordQ31:
-        """Steps through rows N [ticks, 8] and Y [ticks]."""
-        return self._replay(
-            "pvid_replay_rows_q31",
-            np.ascontiguousarray(n, np.int32),
-            np.ascontiguousarray(y, np.int32),
-            sums,
-            hashes,
-            estimate_every,
-        )
+
+def derivatives_q31(
+    native: Native, bank: FirBankQ31, phi: npt.ArrayLike, y: npt.ArrayLike
+) -> tuple[Int32, Int32, npt.NDArray[np.bool_]]:
+    """pvid_differentiator_q31 on counts within full scale: derivatives [ticks, 5] of phi and [ticks, 3] of y after
+    every tick, and whether there were any."""
+    layout = _checked_layout(native)
+    weights = np.ascontiguousarray(bank.weights, np.int32)
+    struct = FirBankStruct(weights=weights.ctypes.data)
+    _fill(struct, bank, {"weights": weights})
+    state = ctypes.create_string_buffer(layout.differentiator_size)
+    status = Status(native.library.pvid_differentiator_init_q31(state, ctypes.byref(struct)))
+    if status is not Status.OK:
+        raise PvidError(f"the core refused the bank: {status.name.lower().replace('_', ' ')}")
+    counts = [np.ascontiguousarray(x, np.int32) for x in (phi, y)]
+    ticks = len(counts[0])
+    out = np.zeros((ticks, 5), np.int32), np.zeros((ticks, 3), np.int32), np.zeros(ticks, np.uint8)
+    addresses = [array.ctypes.data for array in counts] + [array.ctypes.data for array in out]
+    places = [ctypes.c_void_p(place) for place in addresses]
+    native.library.pvid_replay_derivatives_q31(state, ctypes.c_uint32(ticks), *places)
+    return out[0], out[1], out[2].astype(np.bool_)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.errors import PvidError
+from pvid.shaped_rounding import bits_for, shaped
 from pvid.weak_design import WeakDesign
 
 Float = npt.NDArray[np.float64]
@@ -122,22 +123,15 @@ class WeakTablesQ31:
     margins: dict[str, float]
 
 
-def _bits_for(largest: float, bits: int) -> int:
-    """Largest shift left that keeps |x| <= largest within a signed integer of `bits` bits, with room for rounding."""
-    if not largest > 0:
-        return 0
-    return math.floor(math.log2((2 ** (bits - 1) - 2) / largest))
-
-
 def _shift_to(largest: float, bits: int) -> int:
     """Shift right, not negative, that brings |x| <= largest into `bits` bits."""
-    return max(0, -_bits_for(largest, bits))
+    return max(0, -bits_for(largest, bits))
 
 
 def _integer_weights(weights: Float, reach: int, factor: float) -> tuple[Int32, int]:
     """weights * factor as integers of the finest format in which weight times `reach` fits 31 bits, and the format."""
     scaled = weights * factor
-    bits = min(_bits_for(float(np.abs(scaled).max()) * reach, 32), _bits_for(float(np.abs(scaled).max()), 31))
+    bits = min(bits_for(float(np.abs(scaled).max()) * reach, 32), bits_for(float(np.abs(scaled).max()), 31))
     return np.rint(scaled * 2.0**bits).astype(np.int32), bits
 
 
@@ -176,12 +170,12 @@ def weak_tables_q31(
     u_sum = 4.0 * y_max * float(np.abs(second).sum())
     fits("smoothing sum", f_sum, 63)
     fits("second-derivative sum", u_sum, 63)
-    phi_shift = smooth_bits - _bits_for(f_sum / 2.0**smooth_bits, TERM_BITS)
+    phi_shift = smooth_bits - bits_for(f_sum / 2.0**smooth_bits, TERM_BITS)
     if phi_shift < 0:
         raise PvidError("phi_range is so few counts that F would need bits that the smoothing weights do not have")
     f_max = f_sum / 2.0**phi_shift + 1
     u_range = acceleration_range / design.l1 * dt**2
-    u_bits = _bits_for(u_range, U_BITS)
+    u_bits = bits_for(u_range, U_BITS)
     u_shift = second_bits - u_bits
     if u_shift < 0:
         raise PvidError(
@@ -260,7 +254,7 @@ def weak_tables_q31(
     for parts in COLUMN_TERMS:
         largest = sum(sum_max[k] / twelfth[k] / 2.0 ** sum_bits[k] for k in parts)
         expected = sum(sum_max[k] * _EXPECTED[k] / twelfth[k] / 2.0 ** sum_bits[k] for k in parts)
-        bits = min(_bits_for(largest, COLUMN_BITS), _bits_for(expected, EXPECTED_BITS))
+        bits = min(bits_for(largest, COLUMN_BITS), bits_for(expected, EXPECTED_BITS))
         column_bits.append(bits)
         for k in parts:
             part, exponent = math.frexp(1 / twelfth[k])  # 0.5 <= part < 1
@@ -307,12 +301,12 @@ def _integer_chi(chi: Float) -> tuple[Int16, tuple[int, ...]]:
     The rounding errors of a function are chosen such that what moves slowly does not see them: 12 bits are then worth
     16 and more.
     """
-    bits = tuple(_bits_for(float(np.abs(chi[:, order]).max()) * _ROOM, CHI_BITS) for order in range(3))
+    bits = tuple(bits_for(float(np.abs(chi[:, order]).max()) * _ROOM, CHI_BITS) for order in range(3))
     slow = _slow_signals(len(chi))
     out = np.zeros(chi.shape, np.int16)
     for order, b in enumerate(bits):
         for k in range(chi.shape[2]):
-            out[1:-1, order, k] = _shaped(chi[1:-1, order, k] * 2.0**b, slow[1:-1])
+            out[1:-1, order, k] = shaped(chi[1:-1, order, k] * 2.0**b, slow[1:-1], _OWN_WEIGHT)
     return out, bits
 
 
@@ -333,24 +327,10 @@ def _slow_signals(window: int) -> Float:
 _OWN_WEIGHT = 1e-4
 
 
-def _shaped(values: Float, slow: Float) -> Float:
-    """Integers near `values` [n] whose errors have almost no part along the columns of `slow` [n, signals].
-
-    Rounds one entry after the other, each such that it makes up for the errors of those before (Babai's nearest plane).
-    """
-    form = slow @ slow.T / slow.shape[1] + _OWN_WEIGHT * np.eye(len(values))
-    factor = np.linalg.cholesky(form).T
-    out = np.zeros_like(values)
-    for i in range(len(values) - 1, -1, -1):
-        owed = factor[i, i + 1 :] @ (out[i + 1 :] - values[i + 1 :])
-        out[i] = np.rint(values[i] - owed / factor[i, i])
-    return out
-
-
 def _integer_gram(gram: Float, dt: float) -> tuple[Int32, tuple[int, ...]]:
     """The six Gram tables [6, K (K + 1) / 2] in the units of w in 1/dt^2, one format each."""
     unit = [dt ** -(8 - orders) for orders in (8, 6, 4, 4, 2, 0)]
     scaled = gram * np.array(unit)[:, None]
-    bits = tuple(_bits_for(float(np.abs(table).max()), GRAM_BITS) for table in scaled)
+    bits = tuple(bits_for(float(np.abs(table).max()), GRAM_BITS) for table in scaled)
     integers = [np.rint(table * 2.0**b) for table, b in zip(scaled, bits, strict=True)]
     return np.stack(integers).astype(np.int32), bits

@@ -1,0 +1,82 @@
+/* pvid/differentiator_q31.h - derivatives of two sensors' counts in integers alone.
+ *
+ * The bank of differentiator.h with integer weights, over two channels that are sampled together: orders 0 to 4 of phi,
+ * 2 to 4 of y, all for the instant of the window's centre. The sums are exact; each is shifted right once, half up.
+ *
+ *   pvid_differentiator_q31 differentiator;                              (static)
+ *   if (pvid_differentiator_init_q31(&differentiator, &bank) != PVID_OK) ...
+ *   if (pvid_differentiator_step_q31(&differentiator, phi, y, d_phi, d_y)) use them
+ *
+ * Never wraps: init does the sum over the weights' magnitudes and refuses a bank in which any counts within full scale
+ * could leave a product 32 bits or a derivative its limit. A weight times a difference of counts is one 32-bit
+ * multiplication on any core. Not thread-safe.
+ */
+#ifndef PVID_DIFFERENTIATOR_Q31_H
+#define PVID_DIFFERENTIATOR_Q31_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pvid/config.h"
+#include "pvid/differentiator.h"
+#include "pvid/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Largest magnitude of a derivative. */
+#define PVID_DERIVATIVE_LIMIT_Q31 ((int32_t)1 << 30)
+
+/* Largest full scale of a sensor, about its offset [counts]. */
+#define PVID_COUNTS_LIMIT_Q31 ((int32_t)1 << 24)
+
+/* Orders of y that are computed: 2, 3, 4. */
+#define PVID_Y_ORDERS_Q31 3
+#define PVID_Y_LOWEST_Q31 2
+
+/* A folded bank as in differentiator.h, with integers w for weights and the centre sample itself weighted in order 0:
+ *   order 0:  centre x[0] + sum w[0][i-1] q_i,   2, 4:  sum w[k][i-1] q_i,   1, 3:  sum w[k][i-1] d_i
+ * times 2^-shift. A format is the design tool's affair: an order k whose weights are 2^b times those of a derivative
+ * per time unit^k comes out in 2^(shift - b) counts per time unit^k. */
+typedef struct {
+    uint16_t half;    /* points on each side, 2..; 2 half stride + 1 <= PVID_MAX_WINDOW */
+    uint16_t stride;  /* samples between points, 1.. */
+    int32_t phi_max;  /* full scale of the counts, 1..PVID_COUNTS_LIMIT_Q31 */
+    int32_t y_max;
+    int32_t centre;   /* 1..2^30 */
+    uint8_t phi_shift[PVID_ORDERS];     /* 0..62 */
+    uint8_t y_shift[PVID_Y_ORDERS_Q31]; /* of orders 2, 3, 4 */
+    const int32_t *weights; /* [PVID_ORDERS][half]; kept by reference */
+} pvid_fir_bank_q31;
+
+/* Central differences on five points in twelfths: centre 12, no shift, exact. */
+extern const int32_t pvid_five_points_q31[PVID_ORDERS * 2];
+#define PVID_FIVE_POINTS_CENTRE_Q31 12
+
+/* Only the functions below write to it. */
+typedef struct {
+    pvid_fir_bank_q31 bank;
+    uint16_t length; /* samples in the window */
+    uint16_t head;   /* place of the oldest sample */
+    uint16_t filled; /* samples since the reset, at most length */
+    int32_t history[PVID_MAX_WINDOW][2]; /* phi, y */
+} pvid_differentiator_q31;
+
+/* Prepares `self`. Returns PVID_BAD_BANK iff the bank is not as described above or counts within full scale could
+ * overflow it. */
+pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
+
+/* Empties the window: after a gap the samples no longer stand at equal distances. */
+void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self);
+
+/* Takes one sample of each channel in, within full scale, and, once the window is full, writes the derivatives of phi
+ * and y. Returns whether it did. Cost: 8 half multiplications. */
+bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, int32_t y, int32_t d_phi[PVID_ORDERS],
+                                  int32_t d_y[PVID_Y_ORDERS_Q31]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

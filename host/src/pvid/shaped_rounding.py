@@ -1,0 +1,32 @@
+"""Rounding to integers whose errors what moves slowly does not see."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+
+
+def bits_for(largest: float, bits: int) -> int:
+    """Largest shift left that keeps |x| <= largest within a signed integer of `bits` bits, with room for rounding."""
+    if not largest > 0:
+        return 0
+    return math.floor(math.log2((2 ** (bits - 1) - 2) / largest))
+
+
+def shaped(values: Float, slow: Float, own_weight: float) -> Float:
+    """Integers near `values` [n] whose errors have almost no part along the columns of `slow` [n, signals].
+
+    Rounds one entry after the other, each such that it makes up for the errors of those before (Babai's nearest plane).
+    `own_weight` is that of the errors themselves beside their part along slow signals: it keeps them small.
+    """
+    form = slow @ slow.T / slow.shape[1] + own_weight * np.eye(len(values))
+    factor = np.linalg.cholesky(form).T
+    out = np.zeros_like(values)
+    for i in range(len(values) - 1, -1, -1):
+        owed = factor[i, i + 1 :] @ (out[i + 1 :] - values[i + 1 :])
+        out[i] = np.rint(values[i] - owed / factor[i, i])
+    return out
