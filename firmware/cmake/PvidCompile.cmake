@@ -3,14 +3,15 @@
 # Without these the compiler may fuse a*b+c or reassociate, and the bits are no longer those of the twin.
 set(PVID_CORE_OPTIONS -ffp-contract=off -fno-fast-math)
 
-# Strict C99 (or what CMAKE_C_STANDARD names), without GNU extensions: ISO mode itself forbids excess
-# precision.
+# Strict C99 (or what CMAKE_C_STANDARD names), without GNU extensions (ISO mode itself forbids excess precision), but
+# for a board whose constants stay in flash only by one of them: PVID_C_EXTENSIONS.
+set(PVID_C_EXTENSIONS OFF)
 function(pvid_compile_as_core target)
   target_compile_options(${target} PRIVATE ${PVID_CORE_OPTIONS})
   if(NOT CMAKE_C_STANDARD)
     set_target_properties(${target} PROPERTIES C_STANDARD 99)
   endif()
-  set_target_properties(${target} PROPERTIES C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+  set_target_properties(${target} PROPERTIES C_STANDARD_REQUIRED ON C_EXTENSIONS ${PVID_C_EXTENSIONS})
 endfunction()
 
 set(PVID_DEVELOPER_WARNINGS

@@ -97,7 +97,7 @@ static size_t row_start(size_t row)
     return (row * (row + 1u)) / 2u;
 }
 
-static int64_t combined(const pvid_weak_finish_q31 *self, const int32_t gram[], size_t size)
+static int64_t combined(const pvid_weak_finish_q31 *self, const PVID_TABLE int32_t *gram, size_t size)
 {
     int64_t sum = 0;
     for (size_t i = 0; i < PVID_WEAK_GRAMS; i++) {

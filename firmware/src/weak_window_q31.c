@@ -100,7 +100,7 @@ void pvid_weak_window_add_q31(const pvid_weak_window_q31 *self, const pvid_weak_
                               int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
     const size_t functions = design->functions;
-    const int16_t *chi = &design->chi[3u * functions * self->index];
+    const PVID_TABLE int16_t *chi = &design->chi[3u * functions * self->index];
     if (self->index == 0u) {
         memset(&sums[first], 0, (last - first) * sizeof sums[0]);
         return;

@@ -94,6 +94,12 @@
 #error "PVID_MAX_PASSES must lie in 1..255"
 #endif
 
+/* Qualifier of the fixed-point tables: empty where constants are read from where they stand. On an AVR, whose constants
+ * are copied into RAM, __flash (and -std=gnu99) leaves them in the first 64 kB of the flash. */
+#ifndef PVID_TABLE
+#define PVID_TABLE
+#endif
+
 /* Called on misuse (NULL where an object is needed). Replace it by your own trap or reset. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))

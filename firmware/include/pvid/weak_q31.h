@@ -55,11 +55,11 @@ typedef struct {
     int32_t phi_max; /* full scale of the counts about phi_offset, y_offset */
     int32_t y_max;
     int32_t u_max;   /* largest |U|, below 2^18 */
-    const int32_t *smooth; /* [(taps - 1) / 2] */
-    const int32_t *second; /* [(taps - 1) / 2] */
-    const int16_t *chi;    /* [W][3][K] */
-    const int32_t *multiplier; /* [PVID_WEAK_TERMS_Q31] */
-    const int32_t *gram;   /* [6][K (K + 1) / 2] */
+    const PVID_TABLE int32_t *smooth; /* [(taps - 1) / 2] */
+    const PVID_TABLE int32_t *second; /* [(taps - 1) / 2] */
+    const PVID_TABLE int16_t *chi;    /* [W][3][K] */
+    const PVID_TABLE int32_t *multiplier; /* [PVID_WEAK_TERMS_Q31] */
+    const PVID_TABLE int32_t *gram;   /* [6][K (K + 1) / 2] */
 } pvid_weak_design_q31;
 
 typedef struct {

@@ -273,6 +273,10 @@ def build_image(target: Board, run: ReplayRun) -> tuple[Path, Path]:
     options = {"PVID_REPLAY_RUN": str(folder)}
     if isinstance(run.config, StrongConfig):
         options["PVID_MAX_WINDOW"] = str(2 * run.config.half * run.config.stride + 1)
+    elif target.toolchain == "avr":
+        design = run.config.design
+        options |= {"PVID_MAX_TAPS": str(design.taps), "PVID_MAX_DECIMATION": str(design.decimation)}
+        options |= {"PVID_MAX_FUNCTIONS": str(design.functions)}
     tree = build(target, BUILD / f"{target.name}-{name}", options)
     return tree / "apps" / "replay" / "replay.elf", tree
 

@@ -17,7 +17,7 @@ _TABLES = ("smooth", "second", "chi", "multiplier", "gram")
 def _array(kind: str, name: str, values: npt.NDArray[np.integer], columns: int, comment: str) -> str:
     rows = values.reshape(-1, columns) if columns else values.reshape(1, -1)
     lines = ["    " + ", ".join(str(int(v)) for v in row) + "," for row in rows]
-    return "\n".join([f"/* {comment} */", f"static const {kind} {name}[{values.size}] = {{", *lines, "};"])
+    return "\n".join([f"/* {comment} */", f"static const PVID_TABLE {kind} {name}[{values.size}] = {{", *lines, "};"])
 
 
 def _list(values: Sequence[int]) -> str:
