@@ -2,26 +2,10 @@
 
 #include <string.h>
 
-#include "little_endian.h"
+#include "pvid/crc32.h"
+#include "pvid/little_endian.h"
 
 #define GROUP 0xFFu /* code of a COBS group of 254 bytes, after which no 0 stands */
-
-/* CRC of the sixteen values of half a byte; polynomial 0xEDB88320. */
-static const uint32_t crc_of_nibble[16] = {
-    0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
-    0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu,
-};
-
-uint32_t pvid_link_crc(uint32_t crc, const uint8_t bytes[], size_t n)
-{
-    crc = ~crc;
-    for (size_t i = 0; i < n; i++) {
-        crc ^= bytes[i];
-        crc = (crc >> 4) ^ crc_of_nibble[crc & 0xFu];
-        crc = (crc >> 4) ^ crc_of_nibble[crc & 0xFu];
-    }
-    return ~crc;
-}
 
 typedef struct {
     uint8_t *out;
@@ -62,8 +46,8 @@ size_t pvid_link_encode(const pvid_link_frame *frame, uint8_t out[], size_t room
     pvid_put_u16(&header[6], frame->sequence);
     pvid_put_u32(&header[8], frame->tick);
     uint8_t crc[PVID_LINK_CRC_BYTES];
-    const uint32_t of_header = pvid_link_crc(0u, header, sizeof header);
-    pvid_put_u32(crc, pvid_link_crc(of_header, frame->payload, frame->length));
+    const uint32_t of_header = pvid_crc32(0u, header, sizeof header);
+    pvid_put_u32(crc, pvid_crc32(of_header, frame->payload, frame->length));
 
     stuffer state = {.out = out, .at = 1, .code_at = 0, .code = 1u};
     stuff(&state, header, sizeof header);
@@ -110,7 +94,7 @@ static bool accept(pvid_link_decoder *self, pvid_link_frame *frame)
         return false;
     }
     const size_t checked = self->filled - PVID_LINK_CRC_BYTES;
-    if (pvid_link_crc(0u, self->raw, checked) != pvid_get_u32(&self->raw[checked])) {
+    if (pvid_crc32(0u, self->raw, checked) != pvid_get_u32(&self->raw[checked])) {
         count(&self->counters.bad_crc, 1u);
         return false;
     }

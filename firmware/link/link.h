@@ -81,7 +81,4 @@ void pvid_link_decoder_init(pvid_link_decoder *self);
  * ends a frame costs a CRC over the frame. */
 bool pvid_link_decode(pvid_link_decoder *self, uint8_t byte, pvid_link_frame *frame);
 
-/* CRC-32 of zlib, continued: start with 0. */
-uint32_t pvid_link_crc(uint32_t crc, const uint8_t bytes[], size_t n);
-
 #endif

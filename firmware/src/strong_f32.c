@@ -1,6 +1,7 @@
 #include "pvid/strong.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "count.h"
 #include "finite_f32.h"
@@ -14,6 +15,7 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
     if (!pvid_within_f32(config->drive_min, 0.0f, 1.0e9f)) {
         return PVID_BAD_DRIVE_MIN;
     }
+    memset(self, 0, sizeof *self);
     pvid_status status = pvid_differentiator_init_f32(&self->phi, &config->bank, config->sample_rate_hz);
     if (status != PVID_OK) {
         return status;
@@ -23,7 +25,6 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
         return status;
     }
     self->inverse_l1 = 1.0f / config->l1;
-    self->drive = 0.0f;
     self->drive_forgetting = (config->sample_rate_hz > 1.0f) ? (1.0f / config->sample_rate_hz) : 1.0f;
     self->drive_min = config->drive_min * config->drive_min;
     pvid_estimator_config_f32 estimator = config->estimator;

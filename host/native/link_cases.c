@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "link.h"
-#include "little_endian.h"
+#include "pvid/little_endian.h"
 
 #define FRAME_HEAD 9u /* type u8, sequence u16, tick u32, length u16 */
 

@@ -25,7 +25,8 @@ from pvid.setup_q31 import counts_of, weak_config_q31
 from pvid.weak_design_q31 import weak_tables_q31
 
 FIRMWARE = ROOT / "firmware"
-SOURCES = sorted([*(FIRMWARE / "src").glob("*_q31.c"), FIRMWARE / "src" / "fnv.c"])
+SHARED = [FIRMWARE / "src" / name for name in ("crc32.c", "fnv.c", "snapshot.c")]  # what both cores need
+SOURCES = sorted([*(FIRMWARE / "src").glob("*_q31.c"), *SHARED])
 COMPILERS = {
     "arm-none-eabi": ["-mcpu=cortex-m0plus", "-mthumb"],
     "riscv64-unknown-elf": ["-march=rv32imac", "-mabi=ilp32"],

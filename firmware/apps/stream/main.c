@@ -13,7 +13,7 @@
 
 #include "answers.h"
 #include "link.h"
-#include "little_endian.h"
+#include "pvid/little_endian.h"
 #include "port.h"
 #include "pvid/pvid.h"
 #include "stream_rig.h"

@@ -6,6 +6,7 @@
 #define PVID_PVID_H
 
 #include "pvid/arithmetic.h"
+#include "pvid/crc32.h"
 #include "pvid/differentiator.h"
 #include "pvid/differentiator_q31.h"
 #include "pvid/estimator.h"
@@ -17,8 +18,10 @@
 #include "pvid/kapitza_q31.h"
 #include "pvid/kapitza_weak.h"
 #include "pvid/kapitza_weak_q31.h"
+#include "pvid/little_endian.h"
 #include "pvid/model.h"
 #include "pvid/model_q31.h"
+#include "pvid/snapshot.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
 #include "pvid/trust.h"

@@ -639,6 +639,16 @@ class Stepper(ABC, Generic[RecordT]):
         return record
 
     @property
+    def state(self) -> Any:
+        """The identifier's state block, for modules that bind more of the core."""
+        return self._state
+
+    @property
+    def config_struct(self) -> Any:
+        """The configuration it was initialised with, likewise."""
+        return self._config
+
+    @property
     def running_hash(self) -> int:
         """FNV-1a after the last recorded tick."""
         return int(self._hash[0])

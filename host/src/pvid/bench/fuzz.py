@@ -19,9 +19,10 @@ def fuzz_link(folder: Path, runs: int, seed: int = 1) -> int:
         When clang is missing, it does not build, or an input breaks the codec; the input is kept in `folder`.
     """
     binary = folder / "fuzz_link"
-    link = ROOT / "firmware" / "link"
+    link, core = ROOT / "firmware" / "link", ROOT / "firmware"
     options = ["-std=c99", "-g", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"]
-    build = ["clang", *options, f"-I{link}", str(link / "link.c"), str(ROOT / "tests" / "fuzz" / "fuzz_link.c")]
+    sources = [link / "link.c", core / "src" / "crc32.c", ROOT / "tests" / "fuzz" / "fuzz_link.c"]
+    build = ["clang", *options, f"-I{link}", f"-I{core / 'include'}", *map(str, sources)]
     for command in (
         [*build, "-o", str(binary)],
         [str(binary), f"-runs={runs}", f"-seed={seed}", "-max_len=1200", "-timeout=10", f"-artifact_prefix={folder}/"],

@@ -1,0 +1,11 @@
+/* One number for a fixed-point configuration with all its tables, as fingerprint_f32.h. Private to the core. */
+#ifndef PVID_FINGERPRINT_Q31_H
+#define PVID_FINGERPRINT_Q31_H
+
+#include <stdint.h>
+
+#include "pvid/weak_q31.h"
+
+uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config);
+
+#endif

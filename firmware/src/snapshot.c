@@ -1,0 +1,107 @@
+#include "snapshot.h"
+
+#include "pvid/crc32.h"
+#include "pvid/fnv.h"
+#include "pvid/little_endian.h"
+#include "pvid/pvid.h"
+
+#define MAGIC 0x53535650u /* "PVSS" */
+#define VERSION                                                                                                       \
+    (((uint32_t)PVID_VERSION_MAJOR << 24) | ((uint32_t)PVID_VERSION_MINOR << 16) | (uint32_t)PVID_VERSION_PATCH)
+#define CRC_BYTES 4u
+#define BYTE_ORDER 0x01020304u
+
+/* Places of the header. */
+enum {
+    AT_MAGIC = 0,
+    AT_LENGTH = 4,
+    AT_VERSION = 8,
+    AT_KIND = 12,
+    AT_LAYOUT = 16,
+    AT_CONFIG = 20,
+    AT_GENERATION = 24
+};
+
+size_t pvid_snapshot_seal(uint8_t image[], const pvid_snapshot_identity *identity, uint32_t generation)
+{
+    const size_t sealed = PVID_SNAPSHOT_HEADER + identity->bytes;
+    pvid_put_u32(&image[AT_MAGIC], MAGIC);
+    pvid_put_u32(&image[AT_LENGTH], (uint32_t)(sealed + CRC_BYTES));
+    pvid_put_u32(&image[AT_VERSION], VERSION);
+    pvid_put_u32(&image[AT_KIND], (uint32_t)identity->kind);
+    pvid_put_u32(&image[AT_LAYOUT], identity->layout);
+    pvid_put_u32(&image[AT_CONFIG], identity->config);
+    pvid_put_u32(&image[AT_GENERATION], generation);
+    pvid_put_u32(&image[sealed], pvid_crc32(0u, image, sealed));
+    return sealed + CRC_BYTES;
+}
+
+/* Whole and undamaged, whatever it is of. */
+static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
+{
+    if ((length < PVID_SNAPSHOT_HEADER + CRC_BYTES) || (pvid_get_u32(&image[AT_MAGIC]) != MAGIC)) {
+        return PVID_SNAPSHOT_NONE;
+    }
+    const uint32_t said = pvid_get_u32(&image[AT_LENGTH]);
+    if (said > length) {
+        return PVID_SNAPSHOT_CUT_SHORT;
+    }
+    if (said < PVID_SNAPSHOT_HEADER + CRC_BYTES) {
+        return PVID_SNAPSHOT_DAMAGED;
+    }
+    const size_t sealed = (size_t)said - CRC_BYTES;
+    return (pvid_crc32(0u, image, sealed) == pvid_get_u32(&image[sealed])) ? PVID_SNAPSHOT_RESTORED
+                                                                          : PVID_SNAPSHOT_DAMAGED;
+}
+
+pvid_snapshot_status pvid_snapshot_inspect(const uint8_t image[], size_t length,
+                                           const pvid_snapshot_identity *identity)
+{
+    const pvid_snapshot_status sound = soundness(image, length);
+    if (sound != PVID_SNAPSHOT_RESTORED) {
+        return sound;
+    }
+    if (pvid_get_u32(&image[AT_VERSION]) != VERSION) {
+        return PVID_SNAPSHOT_OTHER_VERSION;
+    }
+    if (pvid_get_u32(&image[AT_KIND]) != (uint32_t)identity->kind) {
+        return PVID_SNAPSHOT_OTHER_KIND;
+    }
+    if (pvid_get_u32(&image[AT_LAYOUT]) != identity->layout) {
+        return PVID_SNAPSHOT_OTHER_LAYOUT;
+    }
+    if ((pvid_get_u32(&image[AT_CONFIG]) != identity->config) ||
+        (pvid_get_u32(&image[AT_LENGTH]) != PVID_SNAPSHOT_BYTES(identity->bytes))) {
+        return PVID_SNAPSHOT_OTHER_CONFIG;
+    }
+    return PVID_SNAPSHOT_RESTORED;
+}
+
+uint32_t pvid_snapshot_layout(const uint32_t words[], size_t n)
+{
+    const uint32_t probe = BYTE_ORDER;
+    uint8_t bytes[sizeof probe];
+    memcpy(bytes, &probe, sizeof probe);
+    uint32_t hash = pvid_fnv_word(PVID_FNV_START, pvid_get_u32(bytes));
+    for (size_t i = 0; i < n; i++) {
+        hash = pvid_fnv_word(hash, words[i]);
+    }
+    return hash;
+}
+
+pvid_snapshot_choice pvid_snapshot_choose(const uint8_t slot_0[], const uint8_t slot_1[], size_t size)
+{
+    const bool sound_0 = soundness(slot_0, size) == PVID_SNAPSHOT_RESTORED;
+    const bool sound_1 = soundness(slot_1, size) == PVID_SNAPSHOT_RESTORED;
+    pvid_snapshot_choice choice = {.newest = -1, .next = 0u, .generation = 1u};
+    if (!sound_0 && !sound_1) {
+        return choice;
+    }
+    const uint32_t generation_0 = sound_0 ? pvid_get_u32(&slot_0[AT_GENERATION]) : 0u;
+    const uint32_t generation_1 = sound_1 ? pvid_get_u32(&slot_1[AT_GENERATION]) : 0u;
+    const bool second = sound_1 && (!sound_0 || ((uint32_t)(generation_1 - generation_0) < ((uint32_t)1 << 31)));
+    choice.newest = (int8_t)(second ? 1 : 0);
+    choice.next = (uint8_t)(second ? 0u : 1u);
+    choice.generation = (second ? generation_1 : generation_0) + 1u;
+    return choice;
+}

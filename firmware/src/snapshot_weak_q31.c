@@ -1,0 +1,75 @@
+#include <stddef.h>
+#include <string.h>
+
+#include "fingerprint_q31.h"
+#include "snapshot.h"
+
+#define PLACE(field) ((uint32_t)offsetof(pvid_weak_q31, field))
+
+static const uint32_t layout[] = {
+    sizeof(pvid_weak_q31),
+    sizeof(void *),
+    PLACE(f),
+    PLACE(front),
+    PLACE(front.ring),
+    PLACE(window),
+    PLACE(finish),
+    PLACE(finish.factor),
+    PLACE(finish.solve),
+    PLACE(finish.solve.column),
+    PLACE(finish.solve.factor),
+    PLACE(term),
+    PLACE(sums),
+    PLACE(estimator),
+    PLACE(estimator.information.sums),
+    PLACE(estimator.p),
+    PLACE(estimator.fresh),
+    PLACE(estimator.counters),
+    PVID_MAX_P,
+    PVID_MAX_THETA_Q31,
+    PVID_MAX_TAPS,
+    PVID_MAX_DECIMATION,
+    PVID_MAX_FUNCTIONS,
+};
+
+static pvid_snapshot_identity identity_of(const pvid_weak_config_q31 *config)
+{
+    const pvid_snapshot_identity identity = {
+        .kind = PVID_SNAPSHOT_KIND_WEAK_Q31,
+        .layout = pvid_snapshot_layout(layout, sizeof layout / sizeof layout[0]),
+        .config = pvid_fingerprint_weak_q31(config),
+        .bytes = sizeof(pvid_weak_q31),
+    };
+    return identity;
+}
+
+size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_config_q31 *config, uint32_t generation,
+                                   uint8_t image[], size_t room)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
+    if (room < PVID_SNAPSHOT_WEAK_Q31) {
+        return 0;
+    }
+    uint8_t *object = &image[PVID_SNAPSHOT_HEADER];
+    memcpy(object, self, sizeof *self);
+    pvid_snapshot_put_pointer(object, PLACE(design), self->design);
+    pvid_snapshot_put_pointer(object, PLACE(estimator.model), self->estimator.model);
+    const pvid_snapshot_identity identity = identity_of(config);
+    return pvid_snapshot_seal(image, &identity, generation);
+}
+
+pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config,
+                                                    const uint8_t image[], size_t length)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
+    const pvid_snapshot_identity identity = identity_of(config);
+    const pvid_snapshot_status status = pvid_snapshot_inspect(image, length, &identity);
+    if (status == PVID_SNAPSHOT_RESTORED) {
+        const pvid_weak_design_q31 *design = self->design;
+        const pvid_model_q31 *model = self->estimator.model;
+        memcpy(self, &image[PVID_SNAPSHOT_HEADER], sizeof *self);
+        self->design = design;
+        self->estimator.model = model;
+    }
+    return status;
+}
