@@ -30,6 +30,7 @@ from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
 from pvid.identify import LINEAR, PHYSICAL, UNITS, ZERO, Identification, identify
+from pvid.logreader import Account
 from pvid.native import Native
 from pvid.rig import (
     STANDARD_DRIVE,
@@ -392,6 +393,58 @@ def compare_command(
             failed |= not there.equal
     Console(width=None if sys.stdout.isatty() else 140).print(table)
     return DIFFERENT if failed else DONE
+
+
+# ---- log
+
+
+@commands.command(name="log")
+@click.argument("port")
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file: goes into the log, for verify.")
+@click.option("--append", is_flag=True, help="OUT may exist: the new segments go behind its old ones.")
+@click.option("--duration", type=click.FloatRange(min=0), help="Ends after so many seconds.  [default: at Ctrl-C]")
+@click.option(
+    "--allow-loss",
+    default=0.001,
+    show_default=True,
+    type=click.FloatRange(0, 1),
+    help="Share of frames or samples that may be lost without exit code 1.",
+)
+def log_command(
+    port: str, out: Path, rig_path: Path | None, append: bool, duration: float | None, allow_loss: float
+) -> int:
+    """Records what a board sends on PORT into the log OUT, until Ctrl-C.
+
+    PORT is a serial device or a URL of pyserial. A link that breaks off is taken up again when the board is back, in
+    a new segment of the same log. The file holds every byte that came, and opens even if this program is killed.
+    """
+    from pvid.logger import Logger, PortSource
+    from pvid.logstatus import StatusLine
+
+    rig = None
+    if rig_path is not None:
+        load(rig_path)
+        rig = rig_path.read_text(encoding="utf-8")
+    messages.print(f"{port} -> {out}; Ctrl-C ends the recording", highlight=False)
+    logger = Logger(PortSource(port), out, [StatusLine(sys.stderr)], rig, append, duration)
+    return _print_account(logger.run(), allow_loss)
+
+
+def _print_account(account: Account, allow_loss: float) -> int:
+    """The summary of a log; the exit code."""
+    for one in account.segments:
+        lasted = (one.ended_ns - one.began_ns) / 1e9 if one.why is not None else None
+        missing = f", {one.missing_samples} missing" if one.missing_samples else ""
+        click.echo(
+            f"segment {one.number}, {one.port}: {one.samples} samples{missing}, "
+            + (f"{lasted:.1f} s, {one.why}" if lasted is not None else "not closed")
+        )
+    click.echo(account.text)
+    if account.lost_share > allow_loss:
+        click.echo(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed", err=True)
+        return DIFFERENT
+    return DONE
 
 
 # ---- tune

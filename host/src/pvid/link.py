@@ -369,6 +369,7 @@ class Frame:
     sequence: int
     tick: int
     message: Message
+    schema: int = SCHEMA
 
 
 @dataclass(frozen=True)
@@ -427,7 +428,21 @@ class Decoder:
 
     def feed(self, data: bytes) -> list[Frame | Loss]:
         """What these bytes completed, in order."""
-        return [item for piece in self._pieces(data) for item in self._judge(*piece)]
+        return list(self.items(data))
+
+    def items(self, data: bytes) -> Iterator[Frame | Loss]:
+        """Like `feed`, each judged only when it is asked for; to be exhausted before the next call."""
+        for piece in self._pieces(data):
+            yield from self._judge(*piece)
+
+    def expect_anew(self, schema: int) -> None:
+        """Another sender begins: the next frame of this schema is the start of its sequence."""
+        self._expected.pop(schema, None)
+
+    @property
+    def unfinished(self) -> int:
+        """Bytes since the last 0x00."""
+        return len(self._pending) + self._overflow
 
     def _pieces(self, data: bytes) -> Iterator[tuple[bytes, int]]:
         """What stands between two zeros, and how many bytes of it were too many to be kept."""
@@ -474,7 +489,7 @@ class Decoder:
             yield self._lost("layout", piece)
             return
         self.counters.frames += 1
-        yield Frame(sequence, tick, message)
+        yield Frame(sequence, tick, message, schema)
 
     def _learn(self, schema: int, text: bytes) -> None:
         if zlib.crc32(text) == schema:

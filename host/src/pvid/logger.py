@@ -1,0 +1,252 @@
+"""`pvid log`: the bytes of a port to disk first, then their records to whoever looks on.
+
+One thread does nothing but read the port and append to the log (pvid.logfile). The caller's thread follows the file,
+like any other reader of it might, so that a slow screen or a slow consumer costs no byte; its memory is a chunk and
+the account.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import serial
+from serial.tools import list_ports
+
+from pvid.errors import PvidError
+from pvid.link import Credit, encode
+from pvid.logfile import LogWriter
+from pvid.logreader import Account, LogStream, Observer
+from pvid.target import Port, Target, open_port
+
+_CHUNK = 1 << 14
+_RETRY_S = 0.25
+_DRAIN_S = 1.0
+_LOOK_S = 0.05
+
+
+class Source(Protocol):
+    """Where the bytes come from."""
+
+    @property
+    def name(self) -> str:
+        """As it is shown and written into the log."""
+
+    def open(self) -> Target:
+        """Opens it, for the first time or again.
+
+        Raises
+        ------
+        PvidError
+            When it is not there.
+        """
+
+    @property
+    def usb(self) -> dict[str, Any] | None:
+        """The identity by which it is found again; None: by its name."""
+
+
+@dataclass
+class PortSource:
+    """A serial port, a pseudo-terminal or a URL of pyserial.
+
+    A USB device is found again by vendor, product and serial number, whichever port it then has; without a serial
+    number by the socket that it is plugged into. Anything else is found again by its name.
+    """
+
+    name: str
+    usb: dict[str, Any] | None = None
+
+    def open(self) -> Target:
+        """See Source."""
+        place = self.name
+        if self.usb is None:
+            self.usb = next((_identity(one) for one in list_ports.comports() if one.device == place), None)
+        else:
+            place = next((one.device for one in list_ports.comports() if _identity(one) == self.usb), "")
+            if not place:
+                raise PvidError(f"the device of {self.name} is not plugged in")
+        return Target(self.name, "unknown", open_port(place))
+
+
+def _identity(info: Any) -> dict[str, Any] | None:
+    """Of a port as pyserial lists it; None when it is no USB device."""
+    if info.vid is None:
+        return None
+    where = {"serial": info.serial_number} if info.serial_number else {"location": info.location}
+    return {"vid": info.vid, "pid": info.pid, **where}
+
+
+@dataclass
+class EmulatorSource:
+    """An emulator that is started, and started again when it has gone."""
+
+    name: str
+    start: Callable[[], Target]
+    usb: None = None
+
+    def open(self) -> Target:
+        """See Source."""
+        return self.start()
+
+
+class Recorder(threading.Thread):
+    """Reads a source into a log until `stop` is set; then it takes in what is still under way and ends.
+
+    `error` is what ended it before that, if anything did; `greeting` is sent whenever the link has come up.
+    """
+
+    def __init__(self, source: Source, writer: LogWriter, greeting: bytes) -> None:
+        super().__init__(name="recorder", daemon=True)
+        self.source = source
+        self.writer = writer
+        self.greeting = greeting
+        self.stop = threading.Event()
+        self.why = "ended"
+        self.connected = False
+        self.error: PvidError | None = None
+        self._target: Target | None = None
+
+    def run(self) -> None:
+        """See the class."""
+        try:
+            target = self.source.open()  # not being there at all is an error
+            while True:
+                self._segment(target)
+                reopened = self._reopen()
+                if reopened is None:
+                    return
+                target = reopened
+        except PvidError as error:
+            self.error = error
+        finally:
+            self.connected = False
+            with contextlib.suppress(OSError):
+                self.writer.close()
+
+    def send(self, data: bytes) -> None:
+        """To the board, if it is there; whether it arrived shows in what it answers."""
+        target = self._target
+        if target is not None:
+            with contextlib.suppress(serial.SerialException, OSError):
+                target.port.write(data)
+
+    def _segment(self, target: Target) -> None:
+        self.writer.begin(self.source.name, self.source.usb)
+        self._target, self.connected = target, True
+        try:
+            why = self._read(target.port)
+        finally:
+            self._target, self.connected = None, False
+            with contextlib.suppress(serial.SerialException, OSError):
+                target.close()
+        self.writer.end(why)
+
+    def _read(self, port: Port) -> str:
+        """Until the port is gone or the end is asked for; returns which."""
+        self.send(self.greeting)
+        try:
+            while not self.stop.is_set():
+                self.writer.take(port.read(_CHUNK))
+            limit = time.monotonic() + _DRAIN_S
+            while time.monotonic() < limit and (data := port.read(_CHUNK)):
+                self.writer.take(data)
+        except (serial.SerialException, OSError) as error:
+            return f"the port is gone: {error}"
+        return self.why
+
+    def _reopen(self) -> Target | None:
+        while not self.stop.wait(_RETRY_S):
+            with contextlib.suppress(PvidError):
+                return self.source.open()
+        return None
+
+
+@contextlib.contextmanager
+def _asked_to_end(recorder: Recorder) -> Iterator[None]:
+    """SIGINT and SIGTERM end the recording instead of the program; a second one ends the program."""
+
+    def ask(number: int, _: object) -> None:
+        recorder.why = f"ended by {signal.Signals(number).name}"
+        recorder.stop.set()
+        signal.signal(number, previous[signal.Signals(number)])
+
+    previous = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in previous:
+        signal.signal(number, ask)
+    try:
+        yield
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+@dataclass
+class Logger:
+    """Records a source and hands every record to the observers.
+
+    Parameters
+    ----------
+    rig
+        Text of the rig file that is written into the log.
+    append
+        Whether `out` may exist.
+    duration_s
+        Ends by itself after this time; None: when it is asked to.
+    """
+
+    source: Source
+    out: Path
+    observers: Sequence[Observer] = ()
+    rig: str | None = None
+    append: bool = False
+    duration_s: float | None = None
+    stream: LogStream = field(default_factory=LogStream)
+
+    def run(self) -> Account:
+        """Until SIGINT, SIGTERM or the duration; in the main thread.
+
+        Raises
+        ------
+        PvidError
+            When the source is not there at the start, or the log cannot be written; what came is in the log.
+        """
+        writer = LogWriter(self.out, rig=self.rig, append=self.append)
+        recorder = Recorder(self.source, writer, encode(Credit(0, 0, 0, 0), 0))
+        with _asked_to_end(recorder), self.out.open("rb") as file:
+            file.seek(writer.start)
+            recorder.start()
+            limit = None if self.duration_s is None else time.monotonic() + self.duration_s
+            while True:
+                ended = not recorder.is_alive()
+                if not self._catch_up(file.read(1 << 16)):
+                    if ended:
+                        break
+                    recorder.stop.wait(_LOOK_S) if not recorder.stop.is_set() else time.sleep(_LOOK_S)
+                if limit is not None and time.monotonic() >= limit and not recorder.stop.is_set():
+                    recorder.why = f"{self.duration_s:g} s are over"
+                    recorder.stop.set()
+        for record in self.stream.end():
+            for one in self.observers:
+                one.take(record, self.stream.account)
+        for one in self.observers:
+            one.close(self.stream.account)
+        if recorder.error is not None:
+            if not self.stream.account.segments and writer.start == 0:
+                self.out.unlink()
+            raise recorder.error
+        return self.stream.account
+
+    def _catch_up(self, data: bytes) -> bool:
+        for record in self.stream.feed(data):
+            for one in self.observers:
+                one.take(record, self.stream.account)
+        for one in self.observers:
+            one.idle(self.stream.account)
+        return bool(data)

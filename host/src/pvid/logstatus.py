@@ -1,0 +1,60 @@
+"""How a recording goes, in one line: rewritten on a terminal, a new one every ten seconds elsewhere."""
+
+from __future__ import annotations
+
+import time
+from typing import TextIO
+
+from pvid.link import Estimate
+from pvid.logreader import Account, Record
+from pvid.native import Reason
+
+_ON_TERMINAL_S = 0.25
+_ELSEWHERE_S = 10.0
+
+
+class StatusLine:
+    """An observer that writes to a stream, standard error in general."""
+
+    def __init__(self, to: TextIO) -> None:
+        self._to = to
+        self._terminal = to.isatty()
+        self._period = _ON_TERMINAL_S if self._terminal else _ELSEWHERE_S
+        self._written = self._rated = time.monotonic()
+        self._samples = 0
+        self._tick = 0
+
+    def take(self, record: Record, account: Account) -> None:
+        """See logreader.Observer."""
+        if isinstance(record.item, Estimate):
+            self._tick = record.tick
+
+    def idle(self, account: Account) -> None:
+        """See logreader.Observer."""
+        now = time.monotonic()
+        if now - self._written >= self._period:
+            self._written = now
+            line = self.line(account, now)
+            self._to.write(f"\r\x1b[2K{line}" if self._terminal else f"{line}\n")
+            self._to.flush()
+
+    def close(self, account: Account) -> None:
+        """See logreader.Observer."""
+        if self._terminal:
+            self._to.write("\r\x1b[2K")
+            self._to.flush()
+
+    def line(self, account: Account, now: float) -> str:
+        """Rate since the last line, losses, the last estimate."""
+        rate = (account.samples - self._samples) / max(now - self._rated, 1e-9)
+        self._rated, self._samples = now, account.samples
+        text = f"{account.samples} samples, {rate:.0f}/s, lost {account.missing_samples}, damaged {account.damaged}"
+        if account.segments and account.segments[-1].why is not None:
+            text += f"; waiting for the link ({account.segments[-1].why})"
+        estimate = account.lasting.get(Estimate)
+        if isinstance(estimate, Estimate):
+            names = {one.value: one.text for one in Reason}
+            w, d1, d2 = estimate.p[:3]
+            reason = names.get(estimate.reason, str(estimate.reason))
+            text += f"; tick {self._tick}: w {w:.5g} 1/s^2, d1 {d1:.5g}, d2 {d2:.5g}, {reason}"
+        return text

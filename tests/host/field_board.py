@@ -1,0 +1,148 @@
+"""A board in the field, played by the C core on this machine: what it would send, and the same on a pseudo-terminal.
+
+python field_board.py LINK '{"ticks": 5000, ...}'     one run; LINK becomes a symbolic link to the terminal
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import sys
+import tty
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid import link
+from pvid.capture import Run
+from pvid.native import Native, WeakConfig
+from pvid.rig import simulate, standard_sensors, standard_start
+from pvid.rigfile import RigFile
+from pvid.setup import config_of
+from pvid.target import configure_of
+
+SAMPLES_A_FRAME = 16
+
+
+@dataclass(frozen=True)
+class Field:
+    """A board's run: samples from tick 0, an estimate and a hash every so many ticks, who it is every `hello_every`."""
+
+    ticks: int
+    seed: int = 1
+    estimate_every: int = 500
+    hash_every: int = 500
+    hello_every: int = 2000
+
+    @property
+    def run(self) -> Run:
+        """What its sensors read: the standard rig, 14 bits."""
+        duration = self.ticks / 1000
+        return simulate(sensors=standard_sensors(14), truth="linear", duration=duration, seed=self.seed).run
+
+
+def rig() -> RigFile:
+    """The rig file that goes with it."""
+    standard = RigFile.standard()
+    sensors = standard_sensors(14)
+    return replace(
+        standard,
+        sample_rate=1000.0,
+        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+    )
+
+
+def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[int, link.Message]]:
+    """(tick, message) in the order in which a board sends them."""
+    run = field.run
+    config = config_of(rig(), run.sample_rate, standard_start(field.seed))
+    assert isinstance(config, WeakConfig)
+    configure = replace(configure_of(config, field.hash_every, field.estimate_every), session=session)
+    identifier = native.weak(config)
+    phi, y = run.phi.astype(np.float32)[: field.ticks], run.y.astype(np.float32)[: field.ticks]
+    reason = 0
+    for first in range(0, field.ticks, SAMPLES_A_FRAME):
+        if first % field.hello_every < SAMPLES_A_FRAME:
+            yield first, link.Hello(1, len(config.estimator.start), 256, configure.settings, session, "field")
+            yield first, link.Schema(link.SCHEMA_TEXT.encode())
+            yield first, configure
+            yield first, link.Status(session, link.Code.RUNNING, 0, identifier.counters["updates"], *[0] * 7)
+        last = min(first + SAMPLES_A_FRAME, field.ticks)
+        yield first, link.Raw.of_values(phi[first:last], y[first:last])
+        for tick in range(first, last):
+            reason = int(identifier.run(phi[tick : tick + 1], y[tick : tick + 1], sums=False).reason[0])
+            if field.estimate_every and (tick + 1) % field.estimate_every == 0:
+                yield tick + 1, _estimate(session, identifier.counters["updates"], identifier.assess(), reason)
+            if field.hash_every and (tick + 1) % field.hash_every == 0:
+                yield tick + 1, link.Hash(session, identifier.running_hash)
+
+
+def _estimate(session: int, updates: int, assessed: npt.NDArray[np.void], reason: int) -> link.Estimate:
+    covariance = assessed["covariance"][np.triu_indices(link.MAX_P)]
+    return link.Estimate(
+        session,
+        updates,
+        tuple(map(float, assessed["p"])),
+        tuple(map(float, covariance)),
+        float(assessed["kappa"]),
+        float(assessed["residual_sd"]),
+        float(assessed["weight"]),
+        reason,
+    )
+
+
+def frames(sent: Iterable[tuple[int, link.Message]], first_sequence: int = 0) -> Iterator[bytes]:
+    """Encoded."""
+    for sequence, (tick, message) in zip(itertools.count(first_sequence), sent):  # noqa: B905
+        yield link.encode(message, sequence, tick)
+
+
+def cheap_frames(count: int) -> Iterator[bytes]:
+    """`count` frames of samples that cost next to nothing to make, for measurements."""
+    payload = link.Raw.of_values(np.zeros(SAMPLES_A_FRAME), np.zeros(SAMPLES_A_FRAME)).payload
+    for sequence in range(count):
+        yield link.encode_raw(link.Raw.TYPE, sequence, SAMPLES_A_FRAME * sequence, payload)
+
+
+class PtyLine:
+    """A pseudo-terminal with a symbolic link to its other end, as a serial adapter would have a fixed name."""
+
+    def __init__(self, place: Path) -> None:
+        self.ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        fresh = place.with_name(place.name + ".new")
+        fresh.symlink_to(os.ttyname(theirs))
+        fresh.replace(place)
+        self._theirs = theirs  # kept open: without it writing fails while nobody listens
+
+    def await_word(self) -> None:
+        """Until the other end has sent something: what was written before it opened is thrown away when it does."""
+        os.read(self.ours, 4096)
+
+    def write(self, data: bytes) -> None:
+        """All of it, however slowly it is read."""
+        while data:
+            data = data[os.write(self.ours, data) :]
+
+
+def main() -> None:
+    """See the module."""
+    place, settings = Path(sys.argv[1]), json.loads(sys.argv[2])
+    line = PtyLine(place)
+    if "cheap" in settings:
+        sent = cheap_frames(settings["cheap"])
+    else:
+        sent = frames(messages(Field(settings["ticks"], settings.get("seed", 1)), Native()))
+    line.await_word()
+    for frame in sent:
+        line.write(frame)
+    print("sent", flush=True)
+    sys.stdin.readline()  # what was sent and not yet read is lost with this process
+
+
+if __name__ == "__main__":
+    main()

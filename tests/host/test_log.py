@@ -1,0 +1,410 @@
+"""The log: what a board sent is in it, whatever becomes of the line, the board and the logger."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import signal
+import subprocess
+import sys
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import field_board
+import numpy as np
+import numpy.typing as npt
+import pytest
+from conftest import ROOT
+
+from pvid import link
+from pvid.errors import PvidError
+from pvid.logfile import LOG_SCHEMA, LOG_SCHEMA_TEXT, Close, LogWriter, Mark, Segment
+from pvid.logger import PortSource
+from pvid.logreader import Account, Gap, LogReader, LogStream, Record, Restart
+from pvid.native import Native
+
+TICKS = 4000
+
+
+@pytest.fixture(scope="module")
+def sent(native: Native) -> list[bytes]:
+    """The frames of a run of TICKS."""
+    return list(field_board.frames(field_board.messages(field_board.Field(TICKS), native)))
+
+
+def written(path: Path, *segments: list[bytes], cut: int = 0) -> Path:
+    """A log of these segments, `cut` bytes short of the last one's end."""
+    writer = LogWriter(path)
+    for frames in segments:
+        writer.begin("a port", None)
+        data = b"".join(frames)
+        writer.take(data[: len(data) - cut] if frames is segments[-1] else data)
+        writer.end("the end")
+    writer.close()
+    return path
+
+
+def read(path: Path) -> tuple[list[Record], Account]:
+    reader = LogReader(path)
+    return list(reader), reader.account
+
+
+def samples_of(records: list[Record]) -> npt.NDArray[np.float32]:
+    return np.concatenate([record.item.values for record in records if isinstance(record.item, link.Raw)])
+
+
+def board_frames(data: bytes) -> bytes:
+    """What is left of a log without the logger's frames."""
+    decoder = link.Decoder(schemas={LOG_SCHEMA: {}})
+    kept = []
+    for piece in data.split(b"\0")[:-1]:
+        decoder.counters = link.Counters()
+        decoder.feed(piece + b"\0")
+        if not decoder.counters.layout:
+            kept.append(piece + b"\0")
+    return b"".join(kept)
+
+
+def test_a_log_holds_what_was_sent_and_describes_itself(tmp_path: Path, sent: list[bytes]) -> None:
+    path = written(tmp_path / "a.pvlog", sent)
+    data = path.read_bytes()
+    assert board_frames(data) == b"".join(sent)
+    records, account = read(path)
+    run = field_board.Field(TICKS).run
+    expected = np.stack([run.phi, run.y], axis=1)[:TICKS].astype(np.float32)
+    assert np.array_equal(samples_of(records), expected)
+    assert (account.frames, account.samples, account.lost_share) == (len(sent), TICKS, 0)
+    kinds = {type(record.item).__name__ for record in records}
+    assert kinds >= {"Segment", "Close", "LinkSchema", "Hello", "Configure", "Status", "Raw", "Estimate", "Hash"}
+    told = next(record.item for record in records if isinstance(record.item, Segment)).told
+    assert told["port"] == "a port"
+    assert LOG_SCHEMA_TEXT.encode() in data and link.SCHEMA_TEXT.encode()[:200] in data
+
+
+def test_every_byte_more_gives_the_same_records_or_more(tmp_path: Path, sent: list[bytes]) -> None:
+    """A logger may be killed at any byte: what opens is a beginning of what would have been there."""
+    data = written(tmp_path / "a.pvlog", sent[:40]).read_bytes()
+    whole = [(record.tick, record.item) for record in LogStream().feed(data)]
+    before = 0
+    for end in range(0, len(data), 7):
+        stream = LogStream()
+        got = [(record.tick, record.item) for record in stream.feed(data[:end])]
+        assert got == whole[: len(got)] and len(got) >= before
+        before = len(got)
+        rest = list(stream.end())
+        assert stream.account.damaged == stream.account.missing == 0
+        assert len(rest) <= 1 and all(isinstance(one.item, link.Loss) and one.item.why == "cut" for one in rest)
+
+
+def test_a_log_read_in_pieces_is_the_same(tmp_path: Path, sent: list[bytes]) -> None:
+    data = written(tmp_path / "a.pvlog", sent[:30], sent[30:50]).read_bytes()
+    whole, pieces = LogStream(), LogStream()
+    expected = [*whole.feed(data), *whole.end()]
+    got = list(itertools.chain.from_iterable(pieces.feed(data[i : i + 3]) for i in range(0, len(data), 3)))
+    assert [*got, *pieces.end()] == expected
+    assert pieces.account.text == whole.account.text
+
+
+def test_what_is_missing_is_told_once_and_exactly(tmp_path: Path, sent: list[bytes]) -> None:
+    raw = [i for i, frame in enumerate(link.Decoder().feed(b"".join(sent))) if isinstance(frame.message, link.Raw)]  # type: ignore[union-attr]
+    lost, spoilt = raw[5], raw[20]
+    broken = bytearray(sent[spoilt])
+    broken[30] ^= 0x41 if broken[30] != 0x41 else 0x42
+    line = [bytes(broken) if i == spoilt else frame for i, frame in enumerate(sent) if i != lost]
+    records, account = read(written(tmp_path / "a.pvlog", line))
+    told = [record.item for record in records if isinstance(record.item, link.Loss | Gap)]
+    n = field_board.SAMPLES_A_FRAME
+    assert [one for one in told if isinstance(one, Gap)] == [Gap(5 * n, n), Gap(20 * n, n)]
+    assert [one.why for one in told if isinstance(one, link.Loss)] == ["sequence", "crc", "sequence"]
+    assert (account.missing, account.damaged, account.missing_samples) == (2, 1, 2 * n)
+    assert account.samples + account.missing_samples == TICKS
+    assert account.lost_share == pytest.approx(2 * n / TICKS)
+
+
+def test_joining_and_leaving_amidst_a_frame_is_no_loss(tmp_path: Path, sent: list[bytes]) -> None:
+    path = written(tmp_path / "a.pvlog", [sent[7][9:], *sent[8:60]], cut=11)
+    records, account = read(path)
+    cuts = [record.item for record in records if isinstance(record.item, link.Loss)]
+    assert [one.why for one in cuts] == ["cut", "cut"]
+    assert (account.cut, account.damaged, account.missing, account.lost_share) == (2, 0, 0, 0)
+
+
+def test_garbage_alone_is_no_log_and_a_loss_beside_frames(tmp_path: Path, sent: list[bytes]) -> None:
+    noise = tmp_path / "noise"
+    noise.write_bytes(np.random.default_rng(1).bytes(100_000))
+    with pytest.raises(PvidError, match="is no log of pvid: not one frame in 100000 bytes"):
+        list(LogReader(noise))
+    with pytest.raises(PvidError, match="cannot read"):
+        list(LogReader(tmp_path / "nothing"))
+    bare = tmp_path / "bare"
+    bare.write_bytes(b"".join(sent[:20]) + noise.read_bytes() + b"\0" + b"".join(sent[20:]))
+    _, account = read(bare)
+    assert account.frames == len(sent)
+    assert account.damaged > 100 and account.missing == 0
+
+
+def test_a_board_that_began_anew_is_no_loss(tmp_path: Path, sent: list[bytes]) -> None:
+    records, account = read(written(tmp_path / "a.pvlog", [*sent[:200], *sent]))
+    assert (account.restarts, account.missing, account.missing_samples) == (1, 0, 0)
+    assert sum(isinstance(record.item, Restart) for record in records) == 1
+    without_hello = [*sent[:200], *sent[4:]]
+    _, account = read(written(tmp_path / "b.pvlog", without_hello))
+    assert (account.restarts, account.missing_samples) == (1, 0)
+
+
+def test_segments_follow_each_other_in_one_file(tmp_path: Path, sent: list[bytes]) -> None:
+    path = written(tmp_path / "a.pvlog", sent[:50], sent[80:])
+    with pytest.raises(PvidError, match="exists; --append adds to it"):
+        LogWriter(path)
+    with path.open("ab") as file:
+        file.write(sent[3][:20])  # as if the logger had been killed
+    writer = LogWriter(path, append=True)
+    writer.begin("another port", {"vid": 1})
+    writer.take(b"".join(sent))
+    writer.end("again")
+    writer.close()
+    records, account = read(path)
+    assert [(one.port, one.why) for one in account.segments] == [
+        ("a port", "the end"),
+        ("a port", "the end"),
+        ("another port", "again"),
+    ]
+    assert (account.cut, account.damaged, account.missing, account.restarts) == (1, 0, 0, 0)
+    assert account.frames == 50 + len(sent[80:]) + len(sent)
+    assert sorted({record.segment for record in records}) == [-1, 0, 1, 2]
+
+
+def test_marks_stand_between_frames_and_count(
+    tmp_path: Path, sent: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = itertools.count(10**18, 400_000_000)
+    monkeypatch.setattr(time, "time_ns", lambda: next(clock))
+    writer = LogWriter(tmp_path / "a.pvlog")
+    writer.begin("a port", None)
+    data = b"".join(sent)
+    for at in range(0, len(data), 1000):
+        writer.take(data[at : at + 1000])
+    writer.end("the end")
+    writer.close()
+    content = (tmp_path / "a.pvlog").read_bytes()
+    assert board_frames(content) == data
+    records, account = read(tmp_path / "a.pvlog")
+    marks = [record.item for record in records if isinstance(record.item, Mark)]
+    assert len(marks) > len(data) / 1000 / 4
+    assert [one.unix_ns for one in marks] == sorted(one.unix_ns for one in marks)
+    assert all(data[: one.received].endswith(b"\0") for one in marks)
+    assert (account.frames, account.lost_share) == (len(sent), 0)
+    assert next(record.item for record in records if isinstance(record.item, Close)).received == len(data)
+
+
+def test_the_rig_file_is_in_the_log(tmp_path: Path, sent: list[bytes]) -> None:
+    text = "# " + "x" * 2500 + "\nl1 = 0.3\n"
+    writer = LogWriter(tmp_path / "a.pvlog", rig=text)
+    writer.begin("a port", None)
+    writer.take(sent[0])
+    writer.close()
+    reader = LogReader(tmp_path / "a.pvlog")
+    list(reader)
+    assert reader.rig == text
+
+
+def test_a_log_of_another_version_opens(tmp_path: Path) -> None:
+    text = link.SCHEMA_TEXT.replace("hash session:u32 hash:u32", "hash session:u32 hash:u64")
+    number = zlib.crc32(text.encode())
+    frames = [
+        link.encode_raw(link.Schema.TYPE, 0, 0, text.encode(), number),
+        link.encode_raw(link.Hash.TYPE, 1, 5, bytes(range(12)), number),
+        link.encode(link.Raw.of_values([1.0], [2.0]), 2, 0, number),
+    ]
+    records, account = read(written(tmp_path / "a.pvlog", frames))
+    assert account.by_kind == {"schema": 1, "hash": 1, "raw": 1}
+    assert [record.item.values for record in records if isinstance(record.item, link.Described)] == [
+        {"session": 0x03020100, "hash": 0x0B0A090807060504}
+    ]
+    assert samples_of(records).tolist() == [[1, 2]]
+
+
+# ---- the program
+
+
+class Board:
+    """field_board.py as a process behind a symbolic link."""
+
+    def __init__(self, place: Path, **settings: int) -> None:
+        command = [sys.executable, str(ROOT / "tests" / "host" / "field_board.py"), str(place), json.dumps(settings)]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def has_sent(self) -> None:
+        """Waits until it has sent all."""
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline() == "sent\n"
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+
+Boards = Callable[..., Board]
+Loggers = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def boards(tmp_path: Path) -> Iterator[Boards]:
+    """Starts boards behind tmp_path/board."""
+    started = []
+
+    def start(**settings: int) -> Board:
+        started.append(Board(tmp_path / "board", **settings))
+        limit = time.monotonic() + 20
+        while not (tmp_path / "board").exists() and time.monotonic() < limit:
+            time.sleep(0.02)
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.kill()
+
+
+@pytest.fixture
+def pvid(tmp_path: Path) -> Iterator[Loggers]:
+    """Starts `pvid log board out.pvlog ...` in tmp_path."""
+    started = []
+
+    def start(*arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "pvid", "log", "board", "out.pvlog", *arguments]
+        started.append(
+            subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        )
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.kill()
+        one.communicate()
+
+
+def wait_for(path: Path, condition: Callable[[Account], bool]) -> Account:
+    """Until the account of a log that grows is so."""
+    limit = time.monotonic() + 60
+    while time.monotonic() < limit:
+        if path.exists():
+            stream = LogStream()
+            list(stream.feed(path.read_bytes()))
+            if condition(stream.account):
+                return stream.account
+        time.sleep(0.05)
+    raise AssertionError("the log never came so far")
+
+
+def test_log_records_all_and_ends_with_a_summary(tmp_path: Path, boards: Boards, pvid: Loggers) -> None:
+    boards(ticks=TICKS)
+    process = pvid()
+    wait_for(tmp_path / "out.pvlog", lambda account: account.samples == TICKS)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 0, err
+    assert f"{TICKS} samples in 1 segment; lost 0 frames, 0 samples; 0 damaged" in out
+    assert "ended by SIGINT" in out
+    records, account = read(tmp_path / "out.pvlog")
+    assert isinstance(records[-1].item, Close)
+    assert account.cut == 0
+
+
+def test_a_killed_logger_leaves_a_file_that_opens_and_is_appended_to(
+    tmp_path: Path, boards: Boards, pvid: Loggers
+) -> None:
+    boards(ticks=20 * TICKS)
+    process = pvid()
+    wait_for(tmp_path / "out.pvlog", lambda account: account.samples > TICKS)
+    process.kill()
+    process.communicate()
+    _, account = read(tmp_path / "out.pvlog")
+    assert account.segments[0].why is None
+    assert (account.missing, account.damaged, account.missing_samples) == (0, 0, 0)
+    before = account.samples
+    again = pvid("--append")
+    wait_for(tmp_path / "out.pvlog", lambda account: len(account.segments) == 2 and account.samples > before + TICKS)
+    again.send_signal(signal.SIGTERM)
+    out, err = again.communicate(timeout=20)
+    assert again.returncode == 0, err
+    assert "ended by SIGTERM" in out
+    _, account = read(tmp_path / "out.pvlog")
+    assert [one.why for one in account.segments] == [None, "ended by SIGTERM"]
+    assert (account.missing, account.damaged) == (0, 0)
+
+
+def test_a_link_that_breaks_is_taken_up_in_a_new_segment(tmp_path: Path, boards: Boards, pvid: Loggers) -> None:
+    first = boards(ticks=TICKS)
+    process = pvid()
+    wait_for(tmp_path / "out.pvlog", lambda account: account.samples == TICKS)
+    first.kill()
+    wait_for(tmp_path / "out.pvlog", lambda account: account.segments[0].why is not None)
+    boards(ticks=2 * TICKS, seed=2)
+    wait_for(tmp_path / "out.pvlog", lambda account: account.samples == 3 * TICKS)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 0, err
+    _, account = read(tmp_path / "out.pvlog")
+    assert [one.samples for one in account.segments] == [TICKS, 2 * TICKS]
+    assert account.segments[0].why is not None and "the port is gone" in account.segments[0].why
+    assert account.lost_share == 0
+
+
+def test_a_port_that_is_not_there_and_a_log_that_is(tmp_path: Path, pvid: Loggers) -> None:
+    process = pvid()
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert err.splitlines()[-1].startswith("pvid: cannot open the port board")
+    assert not (tmp_path / "out.pvlog").exists()
+    (tmp_path / "out.pvlog").write_bytes(b"")
+    again = pvid()
+    assert "exists; --append adds to it" in again.communicate(timeout=30)[1]
+    assert again.returncode == 2
+
+
+def test_too_much_loss_is_exit_code_1(tmp_path: Path, pvid: Loggers) -> None:
+    frames = list(field_board.cheap_frames(20))
+    line = field_board.PtyLine(tmp_path / "board")
+    process = pvid("--duration", "1")
+    line.await_word()
+    line.write(b"".join(frames[:9] + frames[10:]))
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "5 % lost, 0.1 % are allowed" in err
+    (tmp_path / "out.pvlog").unlink()
+    lenient = pvid("--duration", "1", "--allow-loss", "0.05")
+    line.await_word()
+    line.write(b"".join(frames[:9] + frames[10:]))
+    assert lenient.wait(timeout=30) == 0
+
+
+def test_a_usb_device_is_found_again_by_its_identity(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Info:
+        def __init__(self, device: str, serial_number: str | None, location: str) -> None:
+            self.device, self.serial_number, self.location = device, serial_number, location
+            self.vid, self.pid = 0x0483, 0x5740
+
+    ports = [Info("/dev/ttyACM0", "A1", "1-1"), Info("/dev/ttyACM1", "B2", "1-2"), Info("/dev/ttyACM2", None, "1-3")]
+    opened: list[str] = []
+    monkeypatch.setattr("pvid.logger.list_ports.comports", lambda: ports)
+    monkeypatch.setattr("pvid.logger.open_port", opened.append)
+    with_serial, without = PortSource("/dev/ttyACM1"), PortSource("/dev/ttyACM2")
+    with_serial.open()
+    without.open()
+    assert with_serial.usb == {"vid": 0x0483, "pid": 0x5740, "serial": "B2"}
+    assert without.usb == {"vid": 0x0483, "pid": 0x5740, "location": "1-3"}
+    ports[:] = [Info("/dev/ttyACM1", "A1", "1-1"), Info("/dev/ttyACM7", "B2", "2-4")]
+    with_serial.open()
+    assert opened == ["/dev/ttyACM1", "/dev/ttyACM2", "/dev/ttyACM7"]
+    with pytest.raises(PvidError, match="the device of /dev/ttyACM2 is not plugged in"):
+        without.open()
+
+
+def test_dtr_and_rts_are_set_before_the_port_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Opening must reset no board: pyserial raises both lines at opening unless they were set low before."""
+    seen: list[tuple[bool, bool]] = []
+    monkeypatch.setattr("serial.Serial.open", lambda port: seen.append((port.dtr, port.rts)))
+    PortSource("/dev/ttyS0").open()
+    assert seen == [(False, False)]
