@@ -75,6 +75,14 @@ class StrongTwin:
                 driven[tick] = mean_square >= threshold
         return driven
 
+    def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: Callable[[int, Reasons], None]) -> Reasons:
+        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+
+        Returns what every tick told, [ticks, lanes].
+        """
+        n, row_y, fate = self.rows(phi, y)
+        return follow_rows(self.estimator, n, row_y, fate, after)
+
     def run(
         self,
         phi: npt.ArrayLike,
@@ -103,27 +111,41 @@ def run_rows(
     """
     ticks = len(y)
     lanes = estimator.p.shape[1]
-    record = TwinRecord(
-        p=np.empty((ticks, model.N_P, lanes), np.float32),
-        sums=np.empty((ticks if sums else 0, model.SUMS, lanes), np.float32),
-        reason=np.empty((ticks, lanes), np.uint8),
-        published=np.empty((0, model.N_P, lanes), np.float32),
-    )
+    p = np.empty((ticks, model.N_P, lanes), np.float32)
+    state = np.empty((ticks if sums else 0, model.SUMS, lanes), np.float32)
+
+    def record(tick: int, _: Reasons) -> None:
+        p[tick] = estimator.p
+        if sums:
+            state[tick] = estimator.sums
+        if progress is not None and tick % 512 == 0:
+            progress(tick)
+
+    reason = follow_rows(estimator, n, y, fate, record)
+    return TwinRecord(p=p, sums=state, reason=reason, published=np.empty((0, model.N_P, lanes), np.float32))
+
+
+def follow_rows(
+    estimator: Estimator, n: Float32, y: Float32, fate: Reasons | None, after: Callable[[int, Reasons], None]
+) -> Reasons:
+    """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+
+    Returns what every tick told, [ticks, lanes].
+    """
+    ticks = len(y)
+    lanes = estimator.p.shape[1]
+    reason = np.empty((ticks, lanes), np.uint8)
     wide_n = np.broadcast_to(n[:, :, None], (ticks, model.N_THETA, lanes))
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
         if fate is None or fate[tick] == Reason.ACCUMULATED:
-            record.reason[tick] = estimator.step(wide_n[tick], wide_y[tick])
+            reason[tick] = estimator.step(wide_n[tick], wide_y[tick])
         else:
-            record.reason[tick] = fate[tick]
+            reason[tick] = fate[tick]
             if fate[tick] != Reason.WARMING_UP:
                 estimator.counters[Reason(fate[tick]).name.lower()] += 1
-        record.p[tick] = estimator.p
-        if sums:
-            record.sums[tick] = estimator.sums
-        if progress is not None and tick % 512 == 0:
-            progress(tick)
-    return record
+        after(tick, reason[tick])
+    return reason
 
 
 def lanes_of(config: EstimatorConfig, starts: npt.ArrayLike) -> list[EstimatorConfig]:

@@ -130,6 +130,15 @@ class WeakTwin:
         self.estimator.counters["rejected_not_finite"] += 1
         return Reason.REJECTED_NOT_FINITE
 
+    def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: Callable[[int, Reasons], None]) -> Reasons:
+        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+
+        Returns what every tick told, [ticks, lanes].
+        """
+        complete, finite, free = self.windows(phi, y)
+        lanes = self.estimator.p.shape[1]
+        return play(finite, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=after)
+
     def run(
         self,
         phi: npt.ArrayLike,
@@ -139,15 +148,14 @@ class WeakTwin:
         progress: Callable[[int], None] | None = None,
     ) -> TwinRecord:
         """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
-        complete, finite, free = self.windows(phi, y)
         estimator = self.estimator
-        ticks = len(finite)
+        ticks = np.size(phi)
         n_p, lanes = estimator.p.shape
         p = np.empty((ticks, n_p, lanes), np.float32)
         state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.float32)
         published = np.empty((ticks, n_p, lanes), np.float32)
 
-        def record(tick: int) -> None:
+        def record(tick: int, _: Reasons) -> None:
             p[tick] = estimator.p
             published[tick] = self.trust.estimate["p"][:, :n_p].T
             if sums:
@@ -155,5 +163,5 @@ class WeakTwin:
             if progress is not None and tick % 512 == 0:
                 progress(tick)
 
-        reason = play(finite, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=record)
+        reason = self.follow(phi, y, record)
         return TwinRecord(p=p, sums=state, reason=reason, published=published)

@@ -112,19 +112,27 @@ class WeakTwinQ31:
         self.estimator.counters["rejected_saturated"] += 1
         return Reason.REJECTED_SATURATED
 
+    def follow(self, phi: Int, y: Int, after: Callable[[int, Reasons], None]) -> Reasons:
+        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+
+        Returns what every tick told, [ticks, lanes].
+        """
+        complete, within, free = self.window_sums(phi, y)
+        lanes = self.estimator.lanes
+        return play(within, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=after)
+
     def run(
         self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
     ) -> TwinRecordQ31:
         """Steps all lanes through a run from its first sample: counts phi, y, both int64 [ticks]."""
-        complete, within, free = self.window_sums(phi, y)
         estimator = self.estimator
-        ticks = len(within)
+        ticks = len(phi)
         n_p, lanes = estimator.p.shape
         p = np.empty((ticks, n_p, lanes), np.int32)
         state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64)
         exponent = np.empty((ticks, lanes), np.uint8)
 
-        def record(tick: int) -> None:
+        def record(tick: int, _: Reasons) -> None:
             p[tick] = estimator.p
             exponent[tick] = estimator.exponent
             if sums:
@@ -132,5 +140,5 @@ class WeakTwinQ31:
             if progress is not None and tick % 512 == 0:
                 progress(tick)
 
-        reason = play(within, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=record)
+        reason = self.follow(phi, y, record)
         return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)

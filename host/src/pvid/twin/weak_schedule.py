@@ -105,7 +105,7 @@ def play(
     *,
     reject: Callable[[], Reason],
     take: Callable[[WindowT], Reasons | Work],
-    record: Callable[[int], None],
+    record: Callable[[int, Reasons], None],
 ) -> Reasons:
     """Steps through a run and returns what every tick told, [ticks, lanes].
 
@@ -122,7 +122,7 @@ def play(
     take
         Takes a window in: returns why it is dropped, or its stages.
     record
-        Called after every tick.
+        Called after every tick, with what it told [lanes].
     """
     reason = np.empty((len(usable), lanes), np.uint8)
     warm = False
@@ -146,5 +146,5 @@ def play(
                     told = told if latest is None else latest
             usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
             reason[tick] = usual if told is None else told
-        record(tick)
+        record(tick, reason[tick])
     return reason
