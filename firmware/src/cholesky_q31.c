@@ -19,33 +19,45 @@ int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limi
     return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(part * inverse.m, 31u - inverse.k), limit);
 }
 
-bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P])
+void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n)
 {
     self->n = n;
+    self->positive = true;
     self->first_pivot = 0;
-    for (size_t turn = 1; turn <= n; turn++) {
-        const size_t j = n - turn;
-        const int32_t diagonal = s[j][j];
-        int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
-        for (size_t k = j + 1u; k < n; k++) {
-            pivot -= (int64_t)self->u[j][k] * self->u[j][k];
-        }
-        if (!pvid_pivot_is_data_q31(pivot, diagonal)) {
-            return false;
-        }
-        if (j == 0u) {
-            self->first_pivot = (int32_t)(pivot / diagonal);
-        }
-        self->inverse[j] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
-        for (size_t i = 0; i < j; i++) {
-            int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
-            for (size_t k = j + 1u; k < n; k++) {
-                sum -= (int64_t)self->u[i][k] * self->u[j][k];
-            }
-            self->u[i][j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
-        }
+}
+
+void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j)
+{
+    const size_t n = self->n;
+    const int32_t diagonal = s[j][j];
+    int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
+    for (size_t k = j + 1u; k < n; k++) {
+        pivot -= (int64_t)self->u[j][k] * self->u[j][k];
     }
-    return true;
+    self->positive = self->positive && pvid_pivot_is_data_q31(pivot, diagonal);
+    if (!self->positive) {
+        return;
+    }
+    if (j == 0u) {
+        self->first_pivot = (int32_t)(pivot / diagonal);
+    }
+    self->inverse[j] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
+    for (size_t i = 0; i < j; i++) {
+        int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
+        for (size_t k = j + 1u; k < n; k++) {
+            sum -= (int64_t)self->u[i][k] * self->u[j][k];
+        }
+        self->u[i][j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
+    }
+}
+
+bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P])
+{
+    pvid_cholesky_begin_q31(self, n);
+    for (size_t turn = 1; turn <= n; turn++) {
+        pvid_cholesky_eliminate_q31(self, s, n - turn);
+    }
+    return self->positive;
 }
 
 void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[], int32_t x[])

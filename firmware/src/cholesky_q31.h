@@ -3,6 +3,7 @@
 #define PVID_CHOLESKY_Q31_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "integer_q31.h"
@@ -22,6 +23,10 @@ bool pvid_pivot_is_data_q31(int64_t pivot, int32_t diagonal);
 
 /* total 2^-30 times the reciprocal in Q30, within +-limit, limit < 2^31. */
 int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limit);
+
+/* The same in steps: begin, then eliminate index j = n - 1 .. 0; `positive` says whether it can still be done. */
+void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n);
+void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j);
 
 /* Factors the n x n matrix whose upper triangle is s, diagonal in [2^28, 2^30), the others within +-2^30. Returns
  * false iff a diagonal entry is below that or a relative pivot is below 2^-PVID_PIVOT_SHIFT; first_pivot is 0 then. */

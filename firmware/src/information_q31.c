@@ -1,5 +1,6 @@
 #include "information_q31.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -75,31 +76,52 @@ static int64_t largest_of(const pvid_information_q31 *self)
     return largest;
 }
 
-void pvid_information_end_group_q31(pvid_information_q31 *self, int64_t fresh[])
+/* Lets the sums first..last-1 fade if it is time to. */
+static void forget(pvid_information_q31 *self, size_t first, size_t last)
 {
-    self->age++;
-    if (self->age >= self->block) {
-        self->age = 0;
-        if (self->retention < KEEP) {
-            for (size_t i = 0; i < self->n_sums; i++) {
-                self->sums[i] = pvid_times_q31(self->sums[i], self->retention);
-            }
-        }
+    if ((self->age < self->block) || (self->retention == KEEP)) {
+        return;
     }
+    for (size_t i = first; i < last; i++) {
+        self->sums[i] = pvid_times_q31(self->sums[i], self->retention);
+    }
+}
+
+static int64_t quarter(int64_t x)
+{
+    return pvid_round_shift_q31(x, 2);
+}
+
+static int64_t four_times(int64_t x)
+{
+    return 4 * pvid_clamp_q31(x, PVID_WIDE / 4);
+}
+
+static void rescale(pvid_information_q31 *self, int64_t fresh[])
+{
     const int64_t largest = largest_of(self);
-    int32_t change = 0;
-    if (largest > PVID_SUM_LIMIT) {
-        change = 1;
-    } else if ((largest < SUM_LOW) && (self->exponent > 0u)) {
-        change = -1;
-    } else {
+    const bool less = largest > PVID_SUM_LIMIT;
+    if (!less && ((largest >= SUM_LOW) || (self->exponent == 0u))) {
         return;
     }
     for (size_t i = 0; i < (self->n_sums - 1u); i++) {
-        self->sums[i] = pvid_scale_q31(self->sums[i], 2 * change);
+        self->sums[i] = less ? quarter(self->sums[i]) : four_times(self->sums[i]);
     }
     for (size_t i = 0; i < self->n_theta; i++) {
-        fresh[i] = pvid_scale_q31(fresh[i], 2 * change);
+        fresh[i] = less ? quarter(fresh[i]) : four_times(fresh[i]);
     }
-    self->exponent = (uint8_t)((int32_t)self->exponent + change);
+    self->exponent = (uint8_t)(less ? (self->exponent + 1u) : (self->exponent - 1u));
+}
+
+void pvid_information_end_group_q31(pvid_information_q31 *self, size_t part, int64_t fresh[])
+{
+    const size_t half = self->n_sums / 2u;
+    if (part == 0u) {
+        self->age++;
+        forget(self, 0, half);
+        return;
+    }
+    forget(self, half, self->n_sums);
+    self->age = (uint16_t)((self->age < self->block) ? self->age : 0u);
+    rescale(self, fresh);
 }

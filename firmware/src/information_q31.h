@@ -2,6 +2,8 @@
 #ifndef PVID_INFORMATION_Q31_H
 #define PVID_INFORMATION_Q31_H
 
+#include <stddef.h>
+
 #include "pvid/estimator_q31.h"
 
 /* A sum of squares beyond this makes all sums of squares a quarter. */
@@ -15,8 +17,9 @@ void pvid_information_init_q31(pvid_information_q31 *self, uint8_t n_theta, uint
 void pvid_information_add_q31(pvid_information_q31 *self, const int32_t n[], int32_t e, int64_t fresh[]);
 
 /* Ends a group of rows: forgets when it is time to, and keeps the sums of squares below PVID_SUM_LIMIT and, as far as
- * they were divided before, above 2^54. fresh[n_theta] follows. */
-void pvid_information_end_group_q31(pvid_information_q31 *self, int64_t fresh[]);
+ * they were divided before, above 2^54. fresh[n_theta] follows. Call it for part = 0, 1.. of the work. */
+#define PVID_INFORMATION_END_PARTS 2u
+void pvid_information_end_group_q31(pvid_information_q31 *self, size_t part, int64_t fresh[]);
 
 /* Place of M_ij, i <= j, among the sums. */
 static inline uint32_t pvid_moment_q31(uint32_t n_theta, uint32_t i, uint32_t j)

@@ -9,7 +9,7 @@ int64_t pvid_scale_q31(int64_t x, int32_t s)
         return 0;
     }
     const uint32_t left = (uint32_t)-s;
-    if ((pvid_bit_length_q31(pvid_magnitude_q31(x)) + left) > 62u) {
+    if ((left > 62u) || ((pvid_magnitude_q31(x) >> (62u - left)) != 0u)) {
         return (x < 0) ? -PVID_WIDE : PVID_WIDE;
     }
     return x * ((int64_t)1 << left);
@@ -17,14 +17,16 @@ int64_t pvid_scale_q31(int64_t x, int32_t s)
 
 uint32_t pvid_bit_length_q31(uint64_t x)
 {
-    uint32_t length = 0;
-    for (uint32_t step = 32; step > 0u; step >>= 1) {
-        if ((x >> step) != 0u) {
-            x >>= step;
+    const uint32_t high = (uint32_t)(x >> 32);
+    uint32_t rest = (high != 0u) ? high : (uint32_t)(x & 0xFFFFFFFFu);
+    uint32_t length = (high != 0u) ? 32u : 0u;
+    for (uint32_t step = 16; step > 0u; step >>= 1) {
+        if ((rest >> step) != 0u) {
+            rest >>= step;
             length += step;
         }
     }
-    return length + ((x != 0u) ? 1u : 0u);
+    return length + rest; /* what is left is 0 or 1 */
 }
 
 /* Digit by digit, in base 4: `rest` is what is left of x, `root` the digits found, moved along with them. */

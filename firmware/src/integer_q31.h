@@ -31,13 +31,13 @@ static inline int32_t pvid_floor_shift_32_q31(int32_t x, uint32_t s)
     return x >> s;
 }
 
-/* x 2^-s rounded half up; any s >= 0, any x. */
+/* x 2^-s rounded half up; any s >= 0, x < INT64_MAX. */
 static inline int64_t pvid_round_shift_q31(int64_t x, uint32_t s)
 {
     if (s == 0u) {
         return x;
     }
-    return (s > 63u) ? 0 : (pvid_floor_shift_q31(x, s) + (pvid_floor_shift_q31(x, s - 1u) & 1));
+    return (s > 63u) ? 0 : pvid_floor_shift_q31(pvid_floor_shift_q31(x, s - 1u) + 1, 1);
 }
 
 /* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0. */

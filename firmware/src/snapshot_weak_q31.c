@@ -16,7 +16,7 @@ static const uint32_t layout[] = {
     PLACE(finish),
     PLACE(finish.factor),
     PLACE(finish.solve),
-    PLACE(finish.solve.column),
+    PLACE(finish.solve.q),
     PLACE(finish.solve.factor),
     PLACE(term),
     PLACE(sums),

@@ -11,12 +11,15 @@
 enum { COLUMN_N = 0, COLUMN_Y = 8, COLUMN_A = 9, COLUMN_B = 10, COLUMN_SPARE = 11 };
 
 enum {
-    STAGE_COMBINE, /* K times: a row of the Gram matrix at p, the columns of a function */
-    STAGE_FACTOR,  /* K times: a row of its Cholesky factor */
-    STAGE_WHITEN,  /* K times: a row of L^-1 (Y, N, a, b) */
+    STAGE_COMBINE,  /* K times: a row of the Gram matrix at p */
+    STAGE_ASSEMBLE, /* the columns of a few functions at a time */
+    STAGE_FACTOR,   /* K times, long rows in parts: a row of its Cholesky factor */
+    STAGE_WHITEN,   /* likewise: a row of L^-1 (Y, N, a, b) */
+    STAGE_SQUARE_A, /* the length of a */
     STAGE_DIRECTION_A,
     STAGE_ALONG_A,  /* a few functions at a time */
     STAGE_REMOVE_A, /* likewise */
+    STAGE_SQUARE_B,
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
@@ -25,8 +28,14 @@ enum {
     STAGE_IDLE
 };
 
-/* Functions whose columns one stage of the projection takes. */
-#define FUNCTIONS_A_STAGE 6u
+/* Functions whose columns one stage takes that assembles them, looks along a direction, removes it. */
+#define ASSEMBLED_A_STAGE 2u
+#define ALONG_A_STAGE 6u
+#define REMOVED_A_STAGE 3u
+
+/* Parts of a long row. WHITEN_PARTS divides PVID_WEAK_COLUMNS_Q31. */
+#define FACTOR_PARTS 2u
+#define WHITEN_PARTS 3u
 
 /* Largest entry of a column once it is whitened: that of a row. */
 #define COLUMN_LIMIT PVID_ROW_LIMIT_Q31
@@ -141,25 +150,69 @@ static void assemble(const pvid_weak_design_q31 *design, int32_t sum[PVID_WEAK_T
     sum[COLUMN_SPARE] = 0;
 }
 
-/* Row of L with L L^T = R0, in place. Where R0 cannot be factored the window keeps the whitening of its design. */
-static void factor_row(pvid_weak_finish_q31 *self, size_t row)
+/* Work on a triangle by rows, those beyond the first third in several parts each: what stage `index` does. */
+typedef struct {
+    size_t row;
+    size_t part;
+    size_t parts;
+} row_part;
+
+static row_part part_of_triangle(size_t functions, size_t parts, size_t index)
+{
+    const size_t whole = functions / 3u;
+    row_part part = {index, 0, 1};
+    if (index >= whole) {
+        const size_t beyond = index - whole;
+        part.row = whole + (beyond / parts);
+        part.part = beyond % parts;
+        part.parts = parts;
+    }
+    return part;
+}
+
+static size_t parts_of_triangle(size_t functions, size_t parts)
+{
+    const size_t whole = functions / 3u;
+    return whole + (parts * (functions - whole));
+}
+
+/* Entries first..last-1 of a row of L with L L^T = R0, in place. */
+static void factor_entries(pvid_weak_finish_q31 *self, size_t row, size_t first, size_t last)
 {
     int32_t *l = &self->factor[row_start(row)];
-    const int32_t *above = self->factor;
-    const int32_t diagonal = l[row];
-    int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
-    for (size_t j = 0; j < row; j++) {
+    const int32_t *above = &self->factor[row_start(first)];
+    for (size_t j = first; j < last; j++) {
         int64_t sum = (int64_t)l[j] * PVID_ONE_Q30;
         for (size_t i = 0; i < j; i++) {
             sum -= (int64_t)l[i] * above[i];
         }
         l[j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
-        pivot -= (int64_t)l[j] * l[j];
         above += j + 1u;
     }
-    self->whitened = self->whitened && pvid_pivot_is_data_q31(pivot, diagonal);
+}
+
+/* The diagonal entry, kept inverted. Where R0 cannot be factored the window keeps the whitening of its design. */
+static void factor_diagonal(pvid_weak_finish_q31 *self, size_t row)
+{
+    const int32_t *l = &self->factor[row_start(row)];
+    int64_t pivot = (int64_t)l[row] * PVID_ONE_Q30;
+    for (size_t j = 0; j < row; j++) {
+        pivot -= (int64_t)l[j] * l[j];
+    }
+    self->whitened = self->whitened && pvid_pivot_is_data_q31(pivot, l[row]);
     const uint64_t square = self->whitened ? (uint64_t)pivot : (uint64_t)((int64_t)1 << 60);
     self->inverse[row] = pvid_reciprocal_of_q31(pvid_square_root_q31(square));
+}
+
+/* The first of two parts of a row ends where it has cost as much as the second will, with its root. */
+static void factor_part(pvid_weak_finish_q31 *self, row_part part)
+{
+    const size_t middle = part.row - (part.row / 4u);
+    const bool completes = part.part + 1u == part.parts;
+    factor_entries(self, part.row, (part.part == 0u) ? 0u : middle, completes ? part.row : middle);
+    if (completes) {
+        factor_diagonal(self, part.row);
+    }
 }
 
 /* x held within COLUMN_LIMIT, and noted if it was not. */
@@ -169,12 +222,16 @@ static int32_t held(pvid_weak_finish_q31 *self, int64_t x)
     return (int32_t)pvid_clamp_q31(x, COLUMN_LIMIT);
 }
 
-static void whiten_row(pvid_weak_finish_q31 *self, size_t row, int32_t sums[][PVID_WEAK_TERMS_Q31])
+/* A row of L^-1 times the columns, a part of them at a time. */
+static void whiten_part(pvid_weak_finish_q31 *self, row_part part, int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
+    const size_t row = part.row;
+    const size_t columns = PVID_WEAK_COLUMNS_Q31 / part.parts;
+    const size_t first = part.part * columns;
     const int32_t *l = &self->factor[row_start(row)];
     const int32_t shift = self->exponent[row] - ((self->gram_bits - 30) / 2);
     int32_t *x = sums[row];
-    for (size_t i = 0; i < PVID_WEAK_COLUMNS_Q31; i++) {
+    for (size_t i = first; i < first + columns; i++) {
         if (!self->whitened) {
             x[i] = held(self, x[i]);
             continue;
@@ -187,10 +244,10 @@ static void whiten_row(pvid_weak_finish_q31 *self, size_t row, int32_t sums[][PV
     }
 }
 
-/* The direction of a column over the functions; none, that is zero, where the column is (no drive: then there is
- * nothing to remove either). */
-static void find_direction(pvid_weak_finish_q31 *self, size_t functions, size_t column,
-                           int32_t sums[][PVID_WEAK_TERMS_Q31])
+/* A column over the functions with its length, whose reciprocal is left in self->length; 0 where the column is: no
+ * drive, then there is nothing to remove either. */
+static void find_length(pvid_weak_finish_q31 *self, size_t functions, size_t column,
+                        int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
     int64_t wide[PVID_MAX_FUNCTIONS] = {0};
     uint64_t square = 0;
@@ -201,13 +258,16 @@ static void find_direction(pvid_weak_finish_q31 *self, size_t functions, size_t 
     for (size_t k = 0; k < functions; k++) {
         square += (uint64_t)((int64_t)self->direction[k] * self->direction[k]);
     }
-    if (square == 0u) {
-        return;
-    }
-    const pvid_reciprocal_q31 inverse = pvid_reciprocal_of_q31(pvid_square_root_q31(square));
+    const pvid_reciprocal_q31 none = {0, 0};
+    self->length = (square > 0u) ? pvid_reciprocal_of_q31(pvid_square_root_q31(square)) : none;
+}
+
+/* The direction: length 1 or 0. */
+static void find_direction(pvid_weak_finish_q31 *self, size_t functions)
+{
     for (size_t k = 0; k < functions; k++) {
-        const int64_t product = (int64_t)self->direction[k] * inverse.m;
-        self->direction[k] = (int32_t)pvid_round_shift_q31(product, 31u - inverse.k);
+        const int64_t product = (int64_t)self->direction[k] * self->length.m;
+        self->direction[k] = (int32_t)pvid_round_shift_q31(product, 31u - self->length.k);
     }
 }
 
@@ -260,57 +320,85 @@ static bool solve_on(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estima
     return false;
 }
 
-void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, uint8_t iterations,
-                               int32_t sums[][PVID_WEAK_TERMS_Q31], pvid_estimator_q31 *estimator, pvid_reason *reason)
+static size_t at_most(size_t first, size_t few, size_t all)
+{
+    return ((all - first) > few) ? (first + few) : all;
+}
+
+/* The stages up to the rows: those that the window's sums go through. Returns the index after the stage, and writes
+ * where the stage is over to *all. */
+static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
+                      int32_t sums[][PVID_WEAK_TERMS_Q31], size_t *all)
 {
     const size_t functions = design->functions;
-    const size_t row = self->index;
-    const size_t few = ((functions - row) > FUNCTIONS_A_STAGE) ? (row + FUNCTIONS_A_STAGE) : functions;
-    size_t done = row + 1u; /* functions, after this stage; all of them end it */
+    const size_t index = self->index;
+    size_t next = index + 1u;
+    *all = functions;
     switch (self->stage) {
     case STAGE_COMBINE:
-        combine_row(self, design, row);
-        assemble(design, sums[row]);
+        combine_row(self, design, index);
+        break;
+    case STAGE_ASSEMBLE:
+        next = at_most(index, ASSEMBLED_A_STAGE, functions);
+        for (size_t k = index; k < next; k++) {
+            assemble(design, sums[k]);
+        }
         break;
     case STAGE_FACTOR:
-        factor_row(self, row);
+        factor_part(self, part_of_triangle(functions, FACTOR_PARTS, index));
+        *all = parts_of_triangle(functions, FACTOR_PARTS);
         break;
     case STAGE_WHITEN:
-        whiten_row(self, row, sums);
+        whiten_part(self, part_of_triangle(functions, WHITEN_PARTS, index), sums);
+        *all = parts_of_triangle(functions, WHITEN_PARTS);
+        break;
+    case STAGE_SQUARE_A:
+    case STAGE_SQUARE_B:
+        find_length(self, functions, (self->stage == STAGE_SQUARE_A) ? COLUMN_A : COLUMN_B, sums);
+        next = functions;
         break;
     case STAGE_DIRECTION_A:
-        find_direction(self, functions, COLUMN_A, sums);
-        done = functions;
-        break;
     case STAGE_DIRECTION_B:
-        find_direction(self, functions, COLUMN_B, sums);
-        done = functions;
+        find_direction(self, functions);
+        next = functions;
         break;
     case STAGE_ALONG_A:
     case STAGE_ALONG_B:
-        find_components(self, row, few, sums);
-        done = few;
+        next = at_most(index, ALONG_A_STAGE, functions);
+        find_components(self, index, next, sums);
         break;
-    case STAGE_REMOVE_A:
-    case STAGE_REMOVE_B:
-        remove_components(self, row, few, sums);
-        done = few;
+    default: /* STAGE_REMOVE_A, STAGE_REMOVE_B */
+        next = at_most(index, REMOVED_A_STAGE, functions);
+        remove_components(self, index, next, sums);
         break;
+    }
+    return next;
+}
+
+void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, uint8_t iterations,
+                               int32_t sums[][PVID_WEAK_TERMS_Q31], pvid_estimator_q31 *estimator, pvid_reason *reason)
+{
+    size_t next = (size_t)self->index + 1u;
+    size_t all = design->functions;
+    switch (self->stage) {
     case STAGE_ADD:
-        add_row(self, sums[row], estimator, reason);
+        add_row(self, sums[self->index], estimator, reason);
         break;
     case STAGE_SOLVE:
         if (!solve_on(self, iterations, estimator)) {
             return;
         }
         *reason = self->solve.reason;
-        done = functions;
+        next = all;
         break;
-    default:
+    case STAGE_IDLE:
         return;
+    default:
+        next = prepare(self, design, sums, &all);
+        break;
     }
-    self->index = (uint8_t)done;
-    if (done == functions) {
+    self->index = (uint8_t)next;
+    if (next >= all) {
         self->index = 0;
         self->stage++;
         if (self->stage == STAGE_SOLVE) {
@@ -321,8 +409,12 @@ void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_desig
 
 uint32_t pvid_weak_finish_stages_q31(uint8_t functions, uint8_t iterations, const pvid_estimator_q31 *estimator)
 {
-    const uint32_t parts = (functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
-    const uint32_t rows = (4u * (uint32_t)functions) + 2u + (4u * parts);
+    const size_t triangles = parts_of_triangle(functions, FACTOR_PARTS) + parts_of_triangle(functions, WHITEN_PARTS);
+    const uint32_t along = (functions + (ALONG_A_STAGE - 1u)) / ALONG_A_STAGE;
+    const uint32_t removed = (functions + (REMOVED_A_STAGE - 1u)) / REMOVED_A_STAGE;
+    const uint32_t assembled = (functions + (ASSEMBLED_A_STAGE - 1u)) / ASSEMBLED_A_STAGE;
+    const uint32_t once = (2u * (uint32_t)functions) + assembled + (uint32_t)triangles;
+    const uint32_t rows = once + (2u * (2u + along + removed));
     const uint32_t first = pvid_estimator_stages_q31(estimator, true);
     const uint32_t more = pvid_estimator_stages_q31(estimator, false);
     return rows + first + ((iterations - 1u) * more);

@@ -97,6 +97,7 @@ typedef struct {
  * index 0. */
 typedef struct {
     uint8_t n;
+    bool positive;                           /* no pivot so far was rounding */
     int32_t u[PVID_MAX_P][PVID_MAX_P];       /* above the diagonal */
     pvid_reciprocal_q31 inverse[PVID_MAX_P]; /* 1 / U_jj in Q30 is m 2^(k - 31) */
     int32_t first_pivot;                     /* pivot of index 0 over its diagonal entry, Q30 */
@@ -108,24 +109,26 @@ typedef struct {
     uint8_t stage;
     uint8_t index; /* of the row within the stage */
     uint8_t start; /* of the column of C in work among its non-zeros */
-    uint8_t next;  /* non-zero to be multiplied next */
     bool ends_group;
     int32_t gain;
     int32_t m[PVID_MAX_MOMENTS_Q31];     /* M_ij = m_ij 2^(h_i + h_j) */
     int16_t h[PVID_MAX_THETA_Q31];
     int32_t c[PVID_MAX_C_Q31];           /* C_k = c_k 2^(f_column - h_row) */
     int16_t f[PVID_MAX_P];
-    int64_t column[PVID_MAX_THETA_Q31];  /* m times a column of c */
     int32_t force[PVID_MAX_THETA_Q31];   /* what drives the step, by rows: 2^(force_exponent + h_row) */
     int32_t force_exponent;
     int64_t s[PVID_MAX_P][PVID_MAX_P];   /* C^T M C + H0, in units of 2^(f_a + f_b + 32) */
-    int16_t g[PVID_MAX_P];               /* s_ab 2^-(g_a + g_b) is what is factored */
-    int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved */
+    int64_t first_prior;                 /* H0 of p[0], in the units of s */
+    int16_t g[PVID_MAX_P];
+    int32_t q[PVID_MAX_P][PVID_MAX_P];   /* s_ab 2^-(g_a + g_b), which is factored */
+    pvid_cholesky_q31 factor;
+    int64_t dp[PVID_MAX_P];
+    int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved, rr -= fall */
     int64_t theta[PVID_MAX_THETA_Q31];
     int32_t theta_step[PVID_MAX_THETA_Q31]; /* theta_step_j 2^(step_exponent - h_j) in units of Y per N */
     int32_t step_exponent;
     int64_t moved[PVID_MAX_THETA_Q31];
-    pvid_cholesky_q31 factor;
+    int64_t fall;
 } pvid_estimator_solve_q31;
 
 /* What is published. */

@@ -108,7 +108,8 @@ typedef struct {
     int16_t exponent[PVID_MAX_FUNCTIONS];           /* of the rows of the Gram matrix */
     pvid_reciprocal_q31 inverse[PVID_MAX_FUNCTIONS]; /* of the factor's diagonal */
     int32_t factor[PVID_WEAK_FACTOR_Q31];           /* R0, then its Cholesky factor, Q30 */
-    int32_t direction[PVID_MAX_FUNCTIONS];          /* that is being projected out, Q30; length 1 or 0 */
+    pvid_reciprocal_q31 length;                     /* of the column that is being projected out */
+    int32_t direction[PVID_MAX_FUNCTIONS];          /* of it, Q30; length 1 or 0 */
     int64_t along[PVID_WEAK_COLUMNS_Q31];           /* the columns' components along it, Q30 */
     pvid_estimator_solve_q31 solve;
 } pvid_weak_finish_q31;

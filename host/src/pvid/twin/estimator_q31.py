@@ -32,6 +32,7 @@ ROW_LIMIT = 2**28
 SUM_LIMIT = 2**60  # above it the sums are divided by 4
 SUM_LOW = 2**54  # below it, if they were divided, they are multiplied by 4 again
 STEP_MAX = 2**40  # of |dp|, far beyond the bounds of p
+SIZE_BITS = 22  # format of the size of a step
 TERM_MAX = 2**40  # of |N_i theta_i|, far beyond the limit of a row
 HELD_LIMIT = 2 * SUM_LIMIT  # of |b|, rr and what a step may add to them
 UNIT_BITS = cholesky.RHS_BITS - 1
@@ -72,7 +73,8 @@ class EstimatorQ31:
     """
 
     _ROWS_A_STAGE = 4
-    _COLUMNS_A_STAGE = 3
+    _ENTRIES_A_STAGE = 18
+    _END_PARTS = 2
 
     def __init__(self, configs: Sequence[EstimatorConfigQ31], model: ModelQ31) -> None:
         first = configs[0]
@@ -205,26 +207,42 @@ class EstimatorQ31:
             reason = self._commit(self.gain if ends_group else ONE)
             yield None if ends_group else reason
         if ends_group:
+            self._forget(slice(0, self.model.n_sums // 2))
+            yield None
+            self._forget(slice(self.model.n_sums // 2, None))
             self._end_group()
             yield reason
 
     def solve_stages(self, ends_group: bool) -> int:
         """Stages of a solve that is due."""
-        return self._stages_before_commit() + 1 + ends_group
+        return self._stages_before_commit() + 1 + (self._END_PARTS if ends_group else 0)
 
     def _stages_before_commit(self) -> int:
-        columns = self.model.c_column
-        projections = sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
-        return 3 + projections + -(-self.model.n_theta // self._ROWS_A_STAGE)
+        """Rows of M, C, force, rows of S, prior, pivots, solve, step, rows of M dtheta, fall."""
+        n_theta, n_p = self.model.n_theta, self.model.n_p
+        follow = -(-n_theta // self._ROWS_A_STAGE)
+        return self._matrix_stages() + 2 + n_p + 1 + n_p + 2 + follow + 1
+
+    def _matrix_stages(self) -> int:
+        """Stages that scale M, a few rows each."""
+        stages = row = 0
+        while row < self.model.n_theta:
+            entries = 0
+            while row < self.model.n_theta and entries < self._ENTRIES_A_STAGE:
+                entries += self.model.n_theta - row
+                row += 1
+            stages += 1
+        return stages
 
     # ---- information ----
 
+    def _forget(self, places: slice) -> None:
+        """Lets some of the sums fade if it is time to."""
+        if self.age + 1 >= self.block and self.retention < 2**31 - 1:
+            self.sums[places] = times_q31(self.sums[places], integers(self.retention))
+
     def _end_group(self) -> None:
-        self.age += 1
-        if self.age >= self.block:
-            self.age = 0
-            if self.retention < 2**31 - 1:
-                self.sums = times_q31(self.sums, integers(self.retention))
+        self.age = 0 if self.age + 1 >= self.block else self.age + 1
         largest = np.max(self._matrix(self.sums).diagonal(axis1=0, axis2=1), axis=1)
         largest = np.maximum(largest, self.sums[-2])
         high = largest > SUM_LIMIT
@@ -326,9 +344,10 @@ class EstimatorQ31:
         size = np.zeros(self.lanes, np.int64)
         for a in range(self.model.n_p):
             reference = self.p[a] if self.model.positive[a] else self.start_sd[a]
-            size = np.maximum(size, (np.abs(dp[a]) << 16) // reference)
-        limited = size > self.step_limit
-        factor = (self.step_limit << 31) // np.maximum(size, self.step_limit + 1)
+            size = np.maximum(size, (np.abs(dp[a]) << SIZE_BITS) // reference)
+        limit = self.step_limit << (SIZE_BITS - 16)
+        limited = size > limit
+        factor = (limit << 31) // np.maximum(size, limit + 1)
         x = self.p + np.where(limited, times_q31(dp, factor), dp)
         above, below = x > self.upper, x < self.lower
         x = np.where(above, self.upper, np.where(below, self.lower, x))

@@ -23,7 +23,10 @@ COLUMNS = 12
 COLUMN_LIMIT = 2**28
 DIRECTION_BITS = 27
 _Y, _A, _B = 8, 9, 10
-_FUNCTIONS_A_STAGE = 6
+_ASSEMBLED_A_STAGE = 2
+_ALONG_A_STAGE = 6
+_REMOVED_A_STAGE = 3
+_FACTOR_PARTS, _WHITEN_PARTS = 2, 3
 
 
 def assemble(sums: Int, design: WeakTablesQ31) -> Int:
@@ -131,7 +134,16 @@ def rows(sums: Int, design: WeakTablesQ31, estimator: EstimatorQ31) -> tuple[Int
 
 
 def _stages_before_add(design: WeakTablesQ31) -> int:
-    return 3 * design.functions + 2 + 4 * -(-design.functions // _FUNCTIONS_A_STAGE)
+    functions = design.functions
+    whole = functions // 3
+    triangles = 2 * whole + (_FACTOR_PARTS + _WHITEN_PARTS) * (functions - whole)
+    assembled = -(-functions // _ASSEMBLED_A_STAGE)
+    return (
+        functions
+        + assembled
+        + triangles
+        + 2 * (2 + -(-functions // _ALONG_A_STAGE) + -(-functions // _REMOVED_A_STAGE))
+    )
 
 
 def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> int:

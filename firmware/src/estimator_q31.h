@@ -1,0 +1,76 @@
+/* What the parts of the fixed-point estimator share: the system S dp = F, and the parameters' own. Private to the core.
+ */
+#ifndef PVID_PRIVATE_ESTIMATOR_Q31_H
+#define PVID_PRIVATE_ESTIMATOR_Q31_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "cholesky_q31.h"
+#include "information_q31.h"
+#include "integer_q31.h"
+#include "pvid/estimator_q31.h"
+
+#define PVID_HELD_LIMIT (2 * PVID_SUM_LIMIT) /* of |b|, rr and what a step may add to them */
+#define PVID_ROW_SD_BITS 8                   /* format of row_sd beyond Y's */
+#define PVID_S_BITS 32                       /* of the unit of s; see pvid_estimator_solve_q31 */
+#define PVID_NOTHING_Q31 (-200)              /* exponent of 0: never the largest */
+
+static inline bool pvid_is_positive_q31(const pvid_model_q31 *model, size_t i)
+{
+    return ((model->positive >> i) & 1u) != 0u;
+}
+
+/* Bits of |x|, or PVID_NOTHING_Q31. */
+static inline int32_t pvid_length_q31(int64_t x)
+{
+    return (x == 0) ? PVID_NOTHING_Q31 : (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(x));
+}
+
+/* One past the last non-zero of the column of C that starts at `start`. */
+static inline size_t pvid_column_end_q31(const pvid_model_q31 *model, size_t start)
+{
+    size_t k = start;
+    while ((k < model->n_c) && (model->c_column[k] == model->c_column[start])) {
+        k++;
+    }
+    return k;
+}
+
+static inline const int64_t *pvid_b_of_q31(const pvid_information_q31 *information)
+{
+    return &information->sums[((size_t)information->n_sums - 2u) - information->n_theta];
+}
+
+/* (sd 2^exponent / start_sd)^2 = prior 2^-(returned), prior of 31 bits; 0 < sd < 2^31. */
+int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior);
+
+/* Sets theta = f(p), and what rows are multiplied with. */
+void pvid_estimator_take_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
+
+/* ---- the system ---- */
+
+/* h: powers of two that bring M's diagonal into [2^28, 2^30). */
+void pvid_system_exponents_q31(const pvid_information_q31 *information, int16_t h[]);
+
+/* m: the packed M with these exponents, its rows from `row` on, a few; returns the next row. */
+size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const int16_t h[], size_t row, int32_t m[]);
+
+/* c and f: C at p, its rows scaled as M's, the largest entry of a column of 29 bits. */
+void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[], int32_t c[], int16_t f[]);
+
+/* Row a of s = C^T M C from its diagonal entry on, `start` the first non-zero of column a; returns that of the next. */
+size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], const int32_t c[], size_t start,
+                               int64_t s[]);
+
+/* H0 = prior 2^-prior_exponent in the unit of s. */
+int64_t pvid_system_prior_q31(int32_t prior, int32_t prior_exponent, int32_t f);
+
+/* q: s with the diagonal that Cholesky wants, q_ab = s_ab 2^-(g_a + g_b). */
+void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int16_t g[], int32_t q[][PVID_MAX_P]);
+
+/* Calls of pvid_system_scale_rows_q31 that scale all of M. */
+size_t pvid_system_row_stages_q31(size_t n_theta);
+
+#endif

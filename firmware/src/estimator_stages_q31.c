@@ -1,0 +1,357 @@
+/* The solve in stages. */
+#include <string.h>
+
+#include "count.h"
+#include "estimator_q31.h"
+
+enum {
+    STAGE_MATRIX,   /* a few rows of M at a time, scaled */
+    STAGE_JACOBIAN, /* C at p, scaled */
+    STAGE_FORCE,
+    STAGE_PROJECT, /* n_p times: a row of S */
+    STAGE_PRIOR,   /* S + H0, scaled */
+    STAGE_FACTOR,  /* n_p times: a pivot */
+    STAGE_SOLVE,   /* dp */
+    STAGE_STEP,    /* where p and theta go with it */
+    STAGE_FOLLOW,  /* a few rows of M dtheta at a time */
+    STAGE_FALL,    /* what rr loses */
+    STAGE_COMMIT,
+    STAGE_FOLD, /* in parts */
+    STAGE_DONE
+};
+
+#define ROWS_A_STAGE 4u
+#define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
+#define SIZE_BITS 22                /* format of the size of a step: |dp| in it still is an int64 */
+
+static void hold(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
+{
+    pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
+    solve->reason = reason;
+}
+
+/* Returns the next row. */
+static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t row)
+{
+    if (row == 0u) {
+        pvid_system_exponents_q31(&self->information, solve->h);
+    }
+    return pvid_system_scale_rows_q31(&self->information, solve->h, row, solve->m);
+}
+
+/* What drives the step, g b + (1 - g) sum N e since the last solve, scaled as the rows of C. */
+static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    const int64_t *b = pvid_b_of_q31(&self->information);
+    int64_t force[PVID_MAX_THETA_Q31];
+    for (size_t i = 0; i < n; i++) {
+        int64_t driving = b[i];
+        if (solve->gain == 0) {
+            driving = self->fresh[i];
+        } else if (solve->gain < PVID_ONE_Q30) {
+            driving = pvid_times_q31(b[i], (int32_t)(2 * (int64_t)solve->gain)) +
+                      pvid_times_q31(self->fresh[i], (int32_t)(2 * (int64_t)(PVID_ONE_Q30 - solve->gain)));
+        }
+        force[i] = pvid_scale_q31(driving, solve->h[i]);
+        self->fresh[i] = 0;
+    }
+    solve->force_exponent = pvid_to_block_q31((uint32_t)n, force, 30, solve->force);
+}
+
+static void project_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    int64_t *row = solve->s[solve->index];
+    solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->c, solve->start, row);
+}
+
+static void prior_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const uint8_t n_p = self->model->n_p;
+    for (size_t a = 0; a < n_p; a++) {
+        const int32_t exponent = (int32_t)self->prior_exponent[a] + (2 * (int32_t)self->information.exponent);
+        const int64_t prior = pvid_system_prior_q31(self->prior[a], exponent, solve->f[a]);
+        solve->s[a][a] += prior;
+        solve->first_prior = (a == 0u) ? prior : solve->first_prior;
+    }
+    pvid_system_equilibrate_q31(n_p, (const int64_t(*)[PVID_MAX_P])solve->s, solve->g, solve->q);
+    pvid_cholesky_begin_q31(&solve->factor, n_p);
+}
+
+/* Whether the data speak of p[0]: what of its information no other parameter can imitate is a part kappa of its
+ * diagonal entry, and more than the start brought along. */
+static bool is_excited(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    const int32_t kappa = solve->factor.first_pivot;
+    const int64_t prior = pvid_scale_q31(solve->first_prior, 2 * solve->g[0]);
+    const bool own = pvid_round_shift_q31((int64_t)kappa * solve->q[0][0], 31) >= prior;
+    return (kappa >= self->kappa_min) && (own || (self->kappa_min == 0));
+}
+
+/* Eliminates a parameter, the last one at index 0. */
+static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t index)
+{
+    const size_t left = self->model->n_p - (index + 1u);
+    pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q, left);
+    if (left > 0u) {
+        return;
+    }
+    solve->reason = PVID_UPDATED;
+    if (!solve->factor.positive) {
+        hold(self, solve, PVID_HELD_PIVOT);
+    } else if (!is_excited(self, solve)) {
+        hold(self, solve, PVID_HELD_NOT_EXCITED);
+    }
+}
+
+static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const pvid_model_q31 *model = self->model;
+    if (solve->reason != PVID_UPDATED) {
+        return;
+    }
+    int64_t rhs[PVID_MAX_P] = {0};
+    int32_t x[PVID_MAX_P];
+    for (size_t k = 0; k < model->n_c; k++) {
+        rhs[model->c_column[k]] += (int64_t)solve->c[k] * solve->force[model->c_row[k]];
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        rhs[a] = pvid_scale_q31(rhs[a], solve->g[a]);
+    }
+    const int32_t exponent = pvid_cholesky_solve_q31(&solve->factor, rhs, x) + solve->force_exponent;
+    for (size_t a = 0; a < model->n_p; a++) {
+        const int32_t shift = ((solve->f[a] + solve->g[a]) - exponent) + PVID_S_BITS + 30;
+        solve->dp[a] = pvid_clamp_q31(pvid_scale_q31(x[a], shift), STEP_MAX);
+    }
+}
+
+/* How far dp goes, as a part of what each parameter is measured by: its own value where it is positive, else the
+ * standard deviation of its start. */
+static int64_t size_of(const pvid_estimator_q31 *self, const int64_t dp[])
+{
+    int64_t size = 0;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        const int32_t reference = pvid_is_positive_q31(self->model, a) ? self->p[a] : self->start_sd[a];
+        const int64_t own = (int64_t)(pvid_magnitude_q31(dp[a]) << SIZE_BITS) / reference;
+        size = (own > size) ? own : size;
+    }
+    return size;
+}
+
+/* p[n_p] = where the step leads: shortened to the step limit, within the bounds. */
+static void take_step(pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int64_t size, int32_t p[])
+{
+    const int64_t limit = (int64_t)self->step_limit << (SIZE_BITS - 16);
+    const bool limited = size > limit;
+    const int32_t factor = limited ? (int32_t)((limit << 31) / size) : 0;
+    bool bounded = false;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        int64_t x = self->p[a] + (limited ? pvid_times_q31(solve->dp[a], factor) : solve->dp[a]);
+        if (x > self->upper[a]) {
+            x = self->upper[a];
+            bounded = true;
+        }
+        if (x < self->lower[a]) {
+            x = self->lower[a];
+            bounded = true;
+        }
+        p[a] = (int32_t)x;
+    }
+    if (limited) {
+        pvid_count_up(&self->counters.limited);
+    }
+    if (bounded) {
+        pvid_count_up(&self->counters.bounded);
+    }
+}
+
+/* theta_step and its exponent: dtheta scaled as the columns of m. */
+static void scale_theta_step(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    int64_t step[PVID_MAX_THETA_Q31];
+    int32_t largest = INT32_MIN;
+    for (size_t j = 0; j < n; j++) {
+        step[j] = solve->theta[j] - self->theta[j];
+        const int32_t length = (pvid_length_q31(step[j]) - self->align[j]) + solve->h[j];
+        largest = (length > largest) ? length : largest;
+    }
+    solve->step_exponent = largest - 29;
+    for (size_t j = 0; j < n; j++) {
+        solve->theta_step[j] =
+            (int32_t)pvid_scale_q31(step[j], (solve->step_exponent + self->align[j]) - solve->h[j]);
+    }
+}
+
+static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    memcpy(solve->p, self->p, sizeof solve->p);
+    if (solve->reason == PVID_UPDATED) {
+        take_step(self, solve, size_of(self, solve->dp), solve->p);
+    }
+    self->model->theta(solve->p, solve->theta);
+    scale_theta_step(self, solve);
+}
+
+/* Rows first.. of M dtheta; returns the next row. */
+static size_t follow_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t first)
+{
+    const size_t n = self->model->n_theta;
+    const size_t last = ((n - first) > ROWS_A_STAGE) ? (first + ROWS_A_STAGE) : n;
+    for (size_t i = first; i < last; i++) {
+        size_t at = i;
+        int64_t sum = 0;
+        for (size_t j = 0; j < i; j++) {
+            sum += (int64_t)solve->m[at] * solve->theta_step[j];
+            at += (n - 1u) - j;
+        }
+        for (size_t j = i; j < n; j++) {
+            sum += (int64_t)solve->m[at] * solve->theta_step[j];
+            at++;
+        }
+        solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_HELD_LIMIT);
+    }
+    return last;
+}
+
+/* dtheta^T (b_old + b_new), by which rr falls. */
+static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    int64_t both[PVID_MAX_THETA_Q31] = {0};
+    int32_t mantissa[PVID_MAX_THETA_Q31];
+    const int64_t *b = pvid_b_of_q31(&self->information);
+    for (size_t j = 0; j < n; j++) {
+        both[j] = pvid_scale_q31((2 * pvid_clamp_q31(b[j], PVID_HELD_LIMIT)) - solve->moved[j], solve->h[j]);
+    }
+    const int32_t exponent = pvid_to_block_q31((uint32_t)n, both, 30, mantissa);
+    int64_t fall = 0;
+    for (size_t j = 0; j < n; j++) {
+        fall += (int64_t)solve->theta_step[j] * mantissa[j];
+    }
+    return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->step_exponent + exponent)), PVID_HELD_LIMIT);
+}
+
+/* Moves p, theta, b and rr together: b -= M dtheta. */
+static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    if (solve->reason != PVID_UPDATED) {
+        return;
+    }
+    const size_t n = self->model->n_theta;
+    pvid_information_q31 *information = &self->information;
+    int64_t *sums = &information->sums[((size_t)information->n_sums - 2u) - n]; /* b, rr */
+    int64_t b[PVID_MAX_THETA_Q31];
+    bool fits = true;
+    for (size_t i = 0; i < n; i++) {
+        b[i] = pvid_clamp_q31(sums[i], PVID_HELD_LIMIT);
+        fits = fits && (pvid_magnitude_q31(b[i] - solve->moved[i]) <= (uint64_t)PVID_HELD_LIMIT);
+    }
+    const int64_t residual = sums[n] - solve->fall;
+    if (!fits || (residual > PVID_HELD_LIMIT)) {
+        hold(self, solve, PVID_HELD_PIVOT);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        sums[i] = b[i] - solve->moved[i];
+    }
+    sums[n] = (residual > 0) ? residual : 0;
+    pvid_estimator_take_theta_q31(self, solve->theta);
+    memcpy(self->p, solve->p, sizeof self->p);
+    pvid_count_up(&self->counters.updates);
+}
+
+/* Counts a group; whether a solve is due. */
+static bool is_due(pvid_estimator_q31 *self)
+{
+    self->phase++;
+    if (self->phase < self->divider) {
+        return false;
+    }
+    self->phase = 0;
+    return true;
+}
+
+void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group)
+{
+    solve->ends_group = ends_group;
+    solve->reason = PVID_ACCUMULATED;
+    solve->index = 0;
+    solve->start = 0;
+    solve->stage = STAGE_MATRIX;
+    solve->gain = PVID_ONE_Q30;
+    if (ends_group) {
+        solve->gain = self->gain;
+        solve->stage = (uint8_t)(is_due(self) ? STAGE_MATRIX : STAGE_FOLD);
+    } else if (self->gain < PVID_ONE_Q30) {
+        solve->stage = STAGE_DONE; /* the law of g < 1 is a rate, not an iteration */
+    }
+}
+
+bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t index = solve->index;
+    size_t next = index + 1u; /* index after this stage, */
+    size_t all = 1;           /* and where the stage is over */
+    switch (solve->stage) {
+    case STAGE_MATRIX:
+        next = matrix_stage(self, solve, index);
+        all = self->model->n_theta;
+        break;
+    case STAGE_JACOBIAN:
+        pvid_system_jacobian_q31(self, solve->h, solve->c, solve->f);
+        break;
+    case STAGE_FORCE:
+        scale_force(self, solve);
+        break;
+    case STAGE_PROJECT:
+        project_stage(self, solve);
+        all = self->model->n_p;
+        break;
+    case STAGE_PRIOR:
+        prior_stage(self, solve);
+        break;
+    case STAGE_FACTOR:
+        factor_stage(self, solve, index);
+        all = self->model->n_p;
+        break;
+    case STAGE_SOLVE:
+        solve_stage(self, solve);
+        break;
+    case STAGE_STEP:
+        step_stage(self, solve);
+        break;
+    case STAGE_FOLLOW:
+        next = follow_stage(self, solve, index);
+        all = self->model->n_theta;
+        break;
+    case STAGE_FALL:
+        solve->fall = fall_of(self, solve);
+        break;
+    case STAGE_COMMIT:
+        commit_stage(self, solve);
+        break;
+    case STAGE_FOLD:
+        pvid_information_end_group_q31(&self->information, index, self->fresh);
+        all = PVID_INFORMATION_END_PARTS;
+        break;
+    default:
+        return true;
+    }
+    solve->index = (uint8_t)next;
+    if (next >= all) {
+        const bool over = (solve->stage == STAGE_COMMIT) && !solve->ends_group;
+        solve->index = 0;
+        solve->stage = (uint8_t)(over ? STAGE_DONE : (solve->stage + 1));
+    }
+    return solve->stage == STAGE_DONE;
+}
+
+uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_group)
+{
+    const pvid_model_q31 *model = self->model;
+    const size_t follow = (model->n_theta + (ROWS_A_STAGE - 1u)) / ROWS_A_STAGE;
+    const size_t fold = ends_group ? PVID_INFORMATION_END_PARTS : 0u;
+    /* and seven that come once */
+    return (uint16_t)(pvid_system_row_stages_q31(model->n_theta) + (2u * model->n_p) + follow + fold + 7u);
+}
