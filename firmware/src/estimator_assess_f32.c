@@ -11,6 +11,9 @@
 /* Rounding floor of yy - 2 B^T theta + theta^T M theta, relative to yy: a few ulp of each term. */
 #define RESIDUAL_FLOOR 4.8e-7f
 
+/* Where p is absurd the sum overflows or is no number; so far up no standard error made of it does. */
+#define RESIDUAL_MAX 1.0e30f
+
 float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy)
 {
     const pvid_model_f32 *model = self->model;
@@ -21,7 +24,8 @@ float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float su
         return self->row_variance;
     }
     const float floor = pvid_relative_f32(model) ? 0.0f : (RESIDUAL_FLOOR * yy);
-    const float residual = yy + energy;
+    const float sum = yy + energy;
+    const float residual = (sum <= RESIDUAL_MAX) ? sum : RESIDUAL_MAX;
     return ((residual > floor) ? residual : floor) / freedom;
 }
 

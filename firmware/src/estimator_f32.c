@@ -288,8 +288,10 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
 void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
 {
     for (size_t a = 0; a < self->model->n_p; a++) {
-        const float x = (p[a] < self->lower[a]) ? self->lower[a] : p[a];
-        self->p[a] = (x > self->upper[a]) ? self->upper[a] : x;
+        if (pvid_finite_f32(p[a])) {
+            const float x = (p[a] < self->lower[a]) ? self->lower[a] : p[a];
+            self->p[a] = (x > self->upper[a]) ? self->upper[a] : x;
+        }
     }
     self->model->theta(self->p, self->theta);
 }

@@ -191,7 +191,7 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
 /* Number of stages of a solve that is due. */
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group);
 
-/* Sets p before the first row, within its bounds. */
+/* Sets p before the first row, within its bounds; what is no number leaves its entry as it was. */
 void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[]);
 
 /* Standard errors, kappa and residual of the present estimate, from (S / s^2 + 1 / start_sd^2)^-1

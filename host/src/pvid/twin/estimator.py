@@ -22,6 +22,7 @@ Float32 = npt.NDArray[np.float32]
 
 ROW_LIMIT = np.float32(1.0e14)
 RESIDUAL_FLOOR = np.float32(4.8e-7)
+RESIDUAL_MAX = np.float32(1e30)
 _COUNTERS = (
     "rows",
     "updates",
@@ -35,6 +36,11 @@ _COUNTERS = (
     "held_out_of_range",
     "misfits",
 )
+
+
+def _capped(residual: Float32) -> Float32:
+    """No more than RESIDUAL_MAX, which stands for what is no number as well."""
+    return np.where(residual <= RESIDUAL_MAX, residual, RESIDUAL_MAX)
 
 
 def _lanes(values: Sequence[float]) -> Float32:
@@ -182,7 +188,7 @@ class Estimator:
         """S [n_p, n_p, lanes] and the sum of squared residuals [lanes], not below its rounding."""
         s, _, energy = model.project(self.p, sums)
         floor = RESIDUAL_FLOOR * sums[-2]
-        residual = sums[-2] + energy
+        residual = _capped(sums[-2] + energy)
         return s, np.where(residual > floor, residual, floor)
 
     def assess(self) -> npt.NDArray[np.void]:
@@ -391,9 +397,9 @@ class RelativeEstimator(Estimator):
         return reason
 
     def place(self, p: Float32) -> None:
-        """Sets p [n_p, lanes] before the first row, within its bounds."""
+        """Sets p [n_p, lanes] before the first row, within its bounds; what is no number leaves its entry."""
         x = np.where(p < self.lower, self.lower, p)
-        self.p = np.where(x > self.upper, self.upper, x)
+        self.p = np.where(np.isfinite(p), np.where(x > self.upper, self.upper, x), self.p)
         with np.errstate(all="ignore"):
             self.theta = self.model.theta(self.p)
 
@@ -403,5 +409,5 @@ class RelativeEstimator(Estimator):
 
     def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
         s = self.model.project(self.model.jacobian(self.p), self.model.matrix(sums))
-        residual = sums[-2] + np.float32(0)
+        residual = _capped(sums[-2] + np.float32(0))
         return s, np.where(residual > 0, residual, np.float32(0))
