@@ -2,6 +2,7 @@
 
 #include <stddef.h>
 
+#include "differentiator_f32.h"
 #include "finite_f32.h"
 
 const float pvid_five_points_f32[PVID_ORDERS * 2] = {
@@ -58,48 +59,20 @@ void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 
 bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, float out[PVID_ORDERS])
 {
-    const uint16_t length = self->length;
-    const uint16_t half = self->bank.half;
-    const uint16_t stride = self->bank.stride;
-    self->history[self->head] = sample;
-    self->head = (uint16_t)((self->head + 1u == length) ? 0u : (self->head + 1u));
-    if (self->filled < length) {
-        self->filled++;
-        if (self->filled < length) {
-            return false;
-        }
+    if (!pvid_fir_push_f32(self, sample)) {
+        return false;
     }
-    /* head is now the oldest sample; the centre stands half * stride after it */
-    uint16_t centre = (uint16_t)(self->head + (half * stride));
-    centre = (uint16_t)((centre >= length) ? (centre - length) : centre);
-    uint16_t newer = centre;
-    uint16_t older = centre;
-    const float middle = self->history[centre];
+    const size_t half = self->bank.half;
     const float *weight = self->bank.weights;
-    float sum0 = 0.0f;
-    float sum1 = 0.0f;
-    float sum2 = 0.0f;
-    float sum3 = 0.0f;
-    float sum4 = 0.0f;
-    for (size_t i = 0; i < half; i++) {
-        newer = (uint16_t)(newer + stride);
-        newer = (uint16_t)((newer >= length) ? (newer - length) : newer);
-        older = (uint16_t)((older < stride) ? (older + length - stride) : (older - stride));
-        const float after = self->history[newer];
-        const float before = self->history[older];
-        const float even = (after - middle) + (before - middle);
-        const float odd = after - before;
-        sum0 += weight[0] * even;
-        sum1 += weight[half] * odd;
-        sum2 += weight[2 * half] * even;
-        sum3 += weight[3 * half] * odd;
-        sum4 += weight[4 * half] * even;
-        weight++;
+    pvid_fir_walk walk = pvid_fir_centre_f32(self);
+    const float middle = self->history[walk.newer];
+    pvid_fir_outwards(&walk);
+    pvid_fir_sums_f32 sums =
+        pvid_fir_begin_f32(weight, half, middle, self->history[walk.newer], self->history[walk.older]);
+    for (size_t i = 1; i < half; i++) {
+        pvid_fir_outwards(&walk);
+        pvid_fir_add_f32(&sums, &weight[i], half, self->history[walk.newer], self->history[walk.older]);
     }
-    out[0] = middle + sum0;
-    out[1] = sum1 * self->rate_power[1];
-    out[2] = sum2 * self->rate_power[2];
-    out[3] = sum3 * self->rate_power[3];
-    out[4] = sum4 * self->rate_power[4];
+    pvid_fir_end_f32(self, &sums, out);
     return true;
 }

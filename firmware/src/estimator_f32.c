@@ -8,6 +8,8 @@
 #include "estimator_f32.h"
 #include "finite_f32.h"
 #include "pattern_f32.h"
+#include "pvid/kapitza.h"
+#include "unroll.h"
 
 const pvid_estimator_config_f32 pvid_estimator_defaults_f32 = {
     .correlation = 1.0f,
@@ -30,6 +32,7 @@ static bool model_is_valid(const pvid_model_f32 *model)
            (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
            ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
+           ((model->absorb == NULL) || (model->project != NULL)) &&
            ((model->accumulate != NULL) ||
             (model->n_moments == ((uint16_t)model->n_theta * (model->n_theta + 1u)) / 2u));
 }
@@ -138,14 +141,33 @@ pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimat
 
 /* ---- rows ---- */
 
-/* The sum of squares of a row is within its limit only if every entry is a number of reasonable size:
- * one comparison for all of them. Which it was that broke the rule is asked only afterwards. */
-static pvid_reason row_is_usable(size_t n_theta, const float n[], float y)
+static inline float sum_of_squares(size_t n_theta, const float n[], float y)
 {
     float squares = y * y;
     for (size_t i = 0; i < n_theta; i++) {
         squares += n[i] * n[i];
     }
+    return squares;
+}
+
+/* The same for the strong form's 11 entries, at every tick. */
+static inline float sum_of_eleven_squares(const float n[], float y)
+{
+    float squares = y * y;
+    PVID_UNROLL
+    for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
+        squares += n[i] * n[i];
+    }
+    return squares;
+}
+
+/* Counts a row that is refused. The sum of squares of a row is within its limit only if every entry is a number of
+ * reasonable size: one comparison for all of them. Which it was that broke the rule is asked only afterwards. */
+static inline pvid_reason admit(pvid_estimator_f32 *self, const float n[], float y)
+{
+    const size_t n_theta = self->model->n_theta;
+    const float squares =
+        (n_theta == (size_t)PVID_KAPITZA_STRONG_THETA) ? sum_of_eleven_squares(n, y) : sum_of_squares(n_theta, n, y);
     if (squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {
         return PVID_ACCUMULATED;
     }
@@ -153,17 +175,14 @@ static pvid_reason row_is_usable(size_t n_theta, const float n[], float y)
     for (size_t i = 0; i < n_theta; i++) {
         finite = finite && pvid_finite_f32(n[i]);
     }
+    pvid_count_up(finite ? &self->counters.rejected_saturated : &self->counters.rejected_not_finite);
     return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
 }
 
-/* e = y - N^T theta and, while g < 1, gradient = C^T N: by the model's own function or by theta and
- * the pattern of C. */
-static float innovate(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
+/* e = y - N^T theta and, while g < 1, gradient = C^T N, by theta and the pattern of C. */
+static inline float innovate(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
 {
     const pvid_model_f32 *model = self->model;
-    if (model->innovate != NULL) {
-        return model->innovate(self->p, n, y, gradient);
-    }
     if (self->gain < 1.0f) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         model->jacobian(self->p, c);
@@ -176,38 +195,52 @@ static float innovate(const pvid_estimator_f32 *self, const float n[], float y, 
     return e;
 }
 
-/* Takes one row in and writes the sums with it; sums may be NULL where the model does not insist. */
-static inline pvid_reason add_row(pvid_estimator_f32 *self, const float n[], float y, float sums[])
+/* innovation += C^T N e */
+static inline void listen(pvid_estimator_f32 *self, const float gradient[], float e)
 {
-    const pvid_model_f32 *model = self->model;
-    const pvid_reason reason = row_is_usable(model->n_theta, n, y);
-    if (reason == PVID_REJECTED_NOT_FINITE) {
-        pvid_count_up(&self->counters.rejected_not_finite);
+    PVID_UNROLL
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        if (a >= self->model->n_p) {
+            break;
+        }
+        self->innovation[a] += gradient[a] * e;
+    }
+}
+
+/* Takes a row of a model without functions of its own in. */
+static inline pvid_reason add_relative_row(pvid_estimator_f32 *self, const float n[], float y)
+{
+    const pvid_reason reason = admit(self, n, y);
+    if (reason != PVID_ACCUMULATED) {
         return reason;
     }
-    if (reason == PVID_REJECTED_SATURATED) {
+    float gradient[PVID_MAX_P];
+    const float e = innovate(self, n, y, gradient);
+    if (!((e * e) <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT))) {
         pvid_count_up(&self->counters.rejected_saturated);
+        return PVID_REJECTED_SATURATED;
+    }
+    if (self->gain < 1.0f) {
+        listen(self, gradient, e);
+    }
+    self->energy += e * e;
+    pvid_information_add_f32(&self->information, self->model, n, e, NULL);
+    pvid_count_up(&self->counters.rows);
+    return PVID_ACCUMULATED;
+}
+
+/* What comes before a row of a model with functions of its own is added to the sums. */
+static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y)
+{
+    const pvid_reason reason = admit(self, n, y);
+    if (reason != PVID_ACCUMULATED) {
         return reason;
     }
-    const bool relative = pvid_relative_f32(model);
-    float e = y;
-    if (relative || (self->gain < 1.0f)) {
+    if (self->gain < 1.0f) {
         float gradient[PVID_MAX_P];
-        e = innovate(self, n, y, gradient);
-        if (relative && !((e * e) <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT))) {
-            pvid_count_up(&self->counters.rejected_saturated);
-            return PVID_REJECTED_SATURATED;
-        }
-        if (self->gain < 1.0f) {
-            for (size_t a = 0; a < model->n_p; a++) {
-                self->innovation[a] += gradient[a] * e;
-            }
-        }
+        const float e = self->model->innovate(self->p, n, y, gradient);
+        listen(self, gradient, e);
     }
-    if (relative) {
-        self->energy += e * e;
-    }
-    pvid_information_add_f32(&self->information, model, n, relative ? e : y, sums);
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;
 }
@@ -215,28 +248,37 @@ static inline pvid_reason add_row(pvid_estimator_f32 *self, const float n[], flo
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     if (pvid_relative_f32(self->model)) {
-        return add_row(self, n, y, NULL);
+        return add_relative_row(self, n, y);
     }
-    float sums[PVID_MAX_SUMS];
-    return add_row(self, n, y, sums);
+    const pvid_reason reason = begin_row(self, n, y);
+    if (reason == PVID_ACCUMULATED) {
+        float sums[PVID_MAX_SUMS];
+        pvid_information_add_f32(&self->information, self->model, n, y, sums);
+    }
+    return reason;
 }
 
 /* ---- the solve ---- */
 
-/* One step of p from the sums, for a model that projects them by itself; `gain` is g of estimator.h. */
-static inline pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, const float sums[])
+/* One step of p from S and F, for a model that projects its sums by itself; `gain` is g of estimator.h. */
+PVID_ALWAYS_INLINE pvid_reason step_from(pvid_estimator_f32 *self, bool three, float gain, float s[][PVID_MAX_P],
+                                         float rhs[])
 {
-    float s[PVID_MAX_P][PVID_MAX_P];
-    float rhs[PVID_MAX_P];
+    const size_t n_p = three ? 3u : self->model->n_p;
+    const float(*upper)[PVID_MAX_P] = (const float(*)[PVID_MAX_P])s;
     float dp[PVID_MAX_P];
     pvid_cholesky_f32 factor;
-    (void)self->model->project(self->p, sums, &sums[self->model->n_moments], s, rhs);
-    for (size_t a = 0; a < self->model->n_p; a++) {
+    PVID_UNROLL
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        if (a >= n_p) {
+            break;
+        }
         s[a][a] += self->prior[a];
         rhs[a] = (gain * rhs[a]) + ((1.0f - gain) * self->innovation[a]);
         self->innovation[a] = 0.0f;
     }
-    if (!pvid_cholesky_factor_f32(&factor, self->model->n_p, (const float(*)[PVID_MAX_P])s)) {
+    if (!(three ? pvid_cholesky_factor_three_f32(&factor, upper)
+                : pvid_cholesky_factor_f32(&factor, (uint8_t)n_p, upper))) {
         pvid_count_up(&self->counters.held_pivot);
         return PVID_HELD_PIVOT;
     }
@@ -244,45 +286,97 @@ static inline pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, co
         pvid_count_up(&self->counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
-    pvid_cholesky_solve_f32(&factor, rhs, dp);
-    const float size = pvid_estimator_size_f32(self, dp);
+    if (three) {
+        pvid_cholesky_solve_three_f32(&factor, rhs, dp);
+    } else {
+        pvid_cholesky_solve_f32(&factor, rhs, dp);
+    }
+    const float size = pvid_estimator_size_f32(self, n_p, dp);
     if (!pvid_finite_f32(size)) {
         pvid_count_up(&self->counters.held_pivot);
         return PVID_HELD_PIVOT;
     }
-    pvid_estimator_take_step_f32(self, dp, size, self->p);
+    pvid_estimator_take_step_f32(self, n_p, dp, size, self->p);
     pvid_count_up(&self->counters.updates);
     return PVID_UPDATED;
 }
 
-/* Ends a group whose sums are known and solves if it is time to. */
-static inline pvid_reason end_group(pvid_estimator_f32 *self, const float sums[])
+/* With n_p a constant 3, the paper's, S and its factor stay in registers. */
+static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
 {
-    const pvid_reason reason =
-        pvid_estimator_is_due_f32(self) ? solve_at_once(self, self->gain, sums) : PVID_ACCUMULATED;
-    pvid_information_end_group_f32(&self->information);
-    return reason;
+    return step_from(self, true, gain, s, rhs);
+}
+
+static pvid_reason step_of_any(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+{
+    return step_from(self, false, gain, s, rhs);
+}
+
+static inline pvid_reason step_of(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+{
+    return (self->model->n_p == 3u) ? step_of_three(self, gain, s, rhs) : step_of_any(self, gain, s, rhs);
+}
+
+static pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, const float sums[])
+{
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float rhs[PVID_MAX_P];
+    (void)self->model->project(self->p, sums, &sums[self->model->n_moments], s, rhs);
+    return step_of(self, gain, s, rhs);
 }
 
 pvid_reason pvid_estimator_solve_sums_f32(pvid_estimator_f32 *self, bool ends_group)
 {
     float sums[PVID_MAX_SUMS];
     pvid_information_read_f32(&self->information, sums);
-    if (ends_group) {
-        return end_group(self, sums);
+    if (!ends_group) {
+        return (self->gain < 1.0f) ? PVID_ACCUMULATED : solve_at_once(self, 1.0f, sums);
     }
-    return (self->gain < 1.0f) ? PVID_ACCUMULATED : solve_at_once(self, 1.0f, sums);
+    const pvid_reason reason =
+        pvid_estimator_is_due_f32(self) ? solve_at_once(self, self->gain, sums) : PVID_ACCUMULATED;
+    pvid_information_end_group_f32(&self->information);
+    return reason;
+}
+
+/* Adds a row to the sums and solves with them. */
+static inline pvid_reason add_and_solve(pvid_estimator_f32 *self, const float n[], float y)
+{
+    pvid_information_f32 *information = &self->information;
+    if (self->model->absorb == NULL) {
+        float sums[PVID_MAX_SUMS];
+        pvid_information_add_f32(information, self->model, n, y, sums);
+        return solve_at_once(self, self->gain, sums);
+    }
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float rhs[PVID_MAX_P];
+    self->model->absorb(self->p, n, y, information->high, information->low, s, rhs);
+    return step_of(self, self->gain, s, rhs);
+}
+
+/* As pvid_estimator_add_f32 and the end of a group, without reading the sums back in between. */
+static inline pvid_reason step_with_row(pvid_estimator_f32 *self, const float n[], float y)
+{
+    pvid_reason reason = begin_row(self, n, y);
+    if (reason != PVID_ACCUMULATED) {
+        return reason;
+    }
+    if (pvid_estimator_is_due_f32(self)) {
+        reason = add_and_solve(self, n, y);
+    } else {
+        float sums[PVID_MAX_SUMS];
+        pvid_information_add_f32(&self->information, self->model, n, y, sums);
+    }
+    pvid_information_end_group_f32(&self->information);
+    return reason;
 }
 
 pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
-    if (pvid_relative_f32(self->model)) {
-        const pvid_reason added = add_row(self, n, y, NULL);
-        return (added == PVID_ACCUMULATED) ? pvid_estimator_update_f32(self) : added;
+    if (!pvid_relative_f32(self->model)) {
+        return step_with_row(self, n, y);
     }
-    float sums[PVID_MAX_SUMS];
-    const pvid_reason added = add_row(self, n, y, sums);
-    return (added == PVID_ACCUMULATED) ? end_group(self, sums) : added;
+    const pvid_reason added = add_relative_row(self, n, y);
+    return (added == PVID_ACCUMULATED) ? pvid_estimator_update_f32(self) : added;
 }
 
 void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])

@@ -11,6 +11,7 @@
 #include "count.h"
 #include "finite_f32.h"
 #include "pvid/estimator.h"
+#include "unroll.h"
 
 static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
 {
@@ -32,10 +33,14 @@ static inline uint8_t pvid_gated_f32(const pvid_model_f32 *model)
 /* How far dp goes, as a part of what each parameter is measured by: its own value where it is
  * positive, else the standard deviation of its start. Not finite if dp is not: the bits of |x| order
  * as |x| does, infinity and NaN last. */
-static inline float pvid_estimator_size_f32(const pvid_estimator_f32 *self, const float dp[])
+static inline float pvid_estimator_size_f32(const pvid_estimator_f32 *self, size_t n_p, const float dp[])
 {
     uint32_t largest = 0;
-    for (size_t a = 0; a < self->model->n_p; a++) {
+    PVID_UNROLL
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        if (a >= n_p) {
+            break;
+        }
         const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
         const uint32_t bits = pvid_bits_f32(dp[a] / reference[a]) & 0x7FFFFFFFu;
         largest = (bits > largest) ? bits : largest;
@@ -44,7 +49,8 @@ static inline float pvid_estimator_size_f32(const pvid_estimator_f32 *self, cons
 }
 
 /* p[n_p] = where the step dp leads: shortened to the step limit, within the bounds. */
-static inline void pvid_estimator_take_step_f32(pvid_estimator_f32 *self, const float dp[], float size, float p[])
+static inline void pvid_estimator_take_step_f32(pvid_estimator_f32 *self, size_t n_p, const float dp[], float size,
+                                                float p[])
 {
     float factor = 1.0f;
     bool bounded = false;
@@ -52,7 +58,11 @@ static inline void pvid_estimator_take_step_f32(pvid_estimator_f32 *self, const 
         factor = self->step_limit / size;
         pvid_count_up(&self->counters.limited);
     }
-    for (size_t a = 0; a < self->model->n_p; a++) {
+    PVID_UNROLL
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        if (a >= n_p) {
+            break;
+        }
         float x = self->p[a] + (factor * dp[a]);
         if (x > self->upper[a]) {
             x = self->upper[a];

@@ -4,7 +4,9 @@
 #include <string.h>
 
 #include "count.h"
+#include "differentiator_f32.h"
 #include "finite_f32.h"
+#include "kapitza_row_f32.h"
 
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
 {
@@ -39,6 +41,35 @@ void pvid_strong_gap_f32(pvid_strong_f32 *self)
     pvid_differentiator_reset_f32(&self->y);
 }
 
+/* Takes a sample of each channel in and, once the windows are full, writes their derivatives. The windows have the
+ * same bank and always the same fill: one walk does for both. */
+static inline bool differentiate(pvid_strong_f32 *self, float phi, float y, float d_phi[PVID_ORDERS],
+                                 float d_y[PVID_ORDERS])
+{
+    const bool y_ready = pvid_fir_push_f32(&self->y, y);
+    if (!pvid_fir_push_f32(&self->phi, phi) || !y_ready) {
+        return false;
+    }
+    const size_t half = self->phi.bank.half;
+    const float *weight = self->phi.bank.weights;
+    const float *phis = self->phi.history;
+    const float *ys = self->y.history;
+    pvid_fir_walk at = pvid_fir_centre_f32(&self->phi);
+    const float phi_middle = phis[at.newer];
+    const float y_middle = ys[at.newer];
+    pvid_fir_outwards(&at);
+    pvid_fir_sums_f32 phi_sums = pvid_fir_begin_f32(weight, half, phi_middle, phis[at.newer], phis[at.older]);
+    pvid_fir_sums_f32 y_sums = pvid_fir_begin_f32(weight, half, y_middle, ys[at.newer], ys[at.older]);
+    for (size_t i = 1; i < half; i++) {
+        pvid_fir_outwards(&at);
+        pvid_fir_add_f32(&phi_sums, &weight[i], half, phis[at.newer], phis[at.older]);
+        pvid_fir_add_f32(&y_sums, &weight[i], half, ys[at.newer], ys[at.older]);
+    }
+    pvid_fir_end_f32(&self->phi, &phi_sums, d_phi);
+    pvid_fir_end_f32(&self->y, &y_sums, d_y);
+    return true;
+}
+
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
 {
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
@@ -48,9 +79,7 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
     }
     float d_phi[PVID_ORDERS];
     float d_y[PVID_ORDERS];
-    const bool phi_ready = pvid_differentiator_step_f32(&self->phi, phi, d_phi);
-    const bool y_ready = pvid_differentiator_step_f32(&self->y, y, d_y);
-    if (!phi_ready || !y_ready) {
+    if (!differentiate(self, phi, y, d_phi, d_y)) {
         return PVID_WARMING_UP;
     }
     const float u[3] = {d_y[2] * self->inverse_l1, d_y[3] * self->inverse_l1, d_y[4] * self->inverse_l1};
@@ -62,6 +91,6 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
     }
     float n[PVID_KAPITZA_STRONG_THETA];
     float row_y;
-    pvid_kapitza_strong_row_f32(d_phi, u, &row_y, n);
+    pvid_kapitza_row_f32(d_phi, u, &row_y, n);
     return pvid_estimator_step_f32(&self->estimator, n, row_y);
 }

@@ -270,6 +270,29 @@ static void outside_the_physical_region_nothing_is_written(void **state)
     }
 }
 
+static void absorbing_a_row_is_adding_it_and_projecting(void **state)
+{
+    (void)state;
+    float high[PVID_MAX_SUMS], low[PVID_MAX_SUMS], same_low[PVID_MAX_SUMS], sums[PVID_MAX_SUMS];
+    for (int k = 0; k < PVID_MAX_SUMS; k++) {
+        high[k] = 1.0e6f * noise();
+        low[k] = 10.0f * noise();
+        same_low[k] = low[k];
+    }
+    for (int i = 0; i < ROWS; i++) {
+        float s[PVID_MAX_P][PVID_MAX_P], expected_s[PVID_MAX_P][PVID_MAX_P];
+        float f[PVID_MAX_P], expected_f[PVID_MAX_P];
+        pvid_kapitza_strong_f32.accumulate(rows[i], values[i], high, low, sums);
+        (void)pvid_kapitza_strong_f32.project(p, sums, &sums[pvid_kapitza_strong_f32.n_moments], expected_s, expected_f);
+        pvid_kapitza_strong_f32.absorb(p, rows[i], values[i], high, same_low, s, f);
+        assert_memory_equal(same_low, low, (pvid_kapitza_strong_f32.n_moments + N + 2u) * sizeof low[0]);
+        assert_memory_equal(f, expected_f, 3 * sizeof f[0]);
+        for (int a = 0; a < 3; a++) {
+            assert_memory_equal(&s[a][a], &expected_s[a][a], (3 - (size_t)a) * sizeof s[0][0]);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -277,6 +300,7 @@ int main(void)
         cmocka_unit_test(jacobian_is_the_derivative_of_theta),
         cmocka_unit_test(projection_by_shifts_is_the_dense_product),
         cmocka_unit_test(innovation_is_the_residual_and_its_gradient),
+        cmocka_unit_test(absorbing_a_row_is_adding_it_and_projecting),
         cmocka_unit_test(physical_parameters_come_back),
         cmocka_unit_test(outside_the_physical_region_nothing_is_written),
     };

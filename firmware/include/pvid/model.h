@@ -55,6 +55,10 @@ struct pvid_model_f32 {
      * theta^T M theta - 2 theta^T b.
      * NULL: by the pattern of C, with b kept relative to theta(p); see estimator.h. */
     float (*project)(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[]);
+    /* accumulate and project in one, without the energy, with the same bits: saves writing the sums out and reading
+     * them again where a solve follows every row. NULL: one after the other. */
+    void (*absorb)(const float p[], const float n[], float y, const float high[], float low[], float s[][PVID_MAX_P],
+                   float f[]);
     /* Information that the sensor's noise alone makes at p, as if it were signal: what noise of unit variance
      * adds to C^T M C for each unit of weight, s[i][j] for i <= j < n_p, from the traces that the estimator
      * was given. NULL: not known; then nobody asks. */

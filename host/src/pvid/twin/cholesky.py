@@ -12,7 +12,6 @@ Mask = npt.NDArray[np.bool_]
 
 PIVOT_MIN = np.float32(1.0e-6)
 _SMALLEST_NORMAL = np.float32(1.17549435e-38)
-_LARGEST = np.float32(3.4e38)
 
 
 def _inverse_root_scale(x: Float32) -> Float32:
@@ -37,7 +36,7 @@ def factor(s: Float32) -> Factor:
     ok = np.ones(lanes, np.bool_)
     scale = np.empty((n, lanes), np.float32)
     for i in range(n):
-        ok &= (s[i, i] >= _SMALLEST_NORMAL) & (s[i, i] <= _LARGEST)
+        ok &= (s[i, i] >= _SMALLEST_NORMAL) & (s[i, i] < np.inf)
         scale[i] = _inverse_root_scale(s[i, i])
     u = np.zeros((n, n, lanes), np.float32)
     first_pivot = np.zeros(lanes, np.float32)

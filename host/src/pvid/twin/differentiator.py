@@ -51,7 +51,7 @@ def derivatives(
                 continue
             x = samples[first:last]
             middle = x[reach : reach + count]
-            sums = np.zeros((ORDERS, count), np.float32)
+            sums = np.empty((ORDERS, count), np.float32)
             for i in range(half):
                 away = (i + 1) * stride
                 after = x[reach + away : reach + away + count]
@@ -59,7 +59,8 @@ def derivatives(
                 even = (after - middle) + (before - middle)
                 odd = after - before
                 for k in range(ORDERS):
-                    sums[k] += weights[k, i] * (even if k % 2 == 0 else odd)
+                    term = weights[k, i] * (even if k % 2 == 0 else odd)
+                    sums[k] = term if i == 0 else sums[k] + term
             now = slice(first + 2 * reach, last)
             out[now, 0] = middle + sums[0]
             for k in range(1, ORDERS):
