@@ -6,7 +6,7 @@
 
 enum { PHI = 0, Y = 1 };
 
-const int32_t pvid_five_points_q31[PVID_ORDERS * 2] = {
+const PVID_TABLE int32_t pvid_five_points_q31[PVID_ORDERS * 2] = {
     0,   0,  /* order 0: the centre itself */
     8,   -1, /* order 1 */
     16,  -1, /* order 2 */
@@ -28,7 +28,7 @@ static uint64_t reach_of(size_t order, int32_t full_scale)
 /* Every product fits 32 bits. Sums of 8191 of them fit 64. */
 static bool products_fit(const pvid_fir_bank_q31 *bank, size_t order, int32_t full_scale)
 {
-    const int32_t *weight = &bank->weights[order * bank->half];
+    const PVID_TABLE int32_t *weight = &bank->weights[order * bank->half];
     const uint64_t reach = reach_of(order, full_scale);
     for (size_t i = 0; i < bank->half; i++) {
         if ((pvid_magnitude_q31(weight[i]) * reach) > (uint64_t)INT32_MAX) {
@@ -41,7 +41,7 @@ static bool products_fit(const pvid_fir_bank_q31 *bank, size_t order, int32_t fu
 /* The largest sum that counts within full scale can make, each with the sign of its weight, stays within the limit. */
 static bool sum_fits(const pvid_fir_bank_q31 *bank, size_t order, int32_t full_scale, uint8_t shift)
 {
-    const int32_t *weight = &bank->weights[order * bank->half];
+    const PVID_TABLE int32_t *weight = &bank->weights[order * bank->half];
     uint64_t away = 0;
     int64_t at_centre = (order == 0u) ? bank->centre : 0;
     for (size_t i = 0; i < bank->half; i++) {
@@ -124,7 +124,7 @@ bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, in
     size_t older = newer;
     const int32_t middle_phi = self->history[newer][PHI];
     const int32_t middle_y = self->history[newer][Y];
-    const int32_t *weight = self->bank.weights;
+    const PVID_TABLE int32_t *weight = self->bank.weights;
     int64_t phi0 = (int64_t)middle_phi * self->bank.centre;
     int64_t phi1 = 0;
     int64_t phi2 = 0;

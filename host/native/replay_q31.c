@@ -21,6 +21,10 @@ const uint32_t pvid_native_layout_q31[] = {
     (uint32_t)sizeof(pvid_fir_bank_q31),
     FIELD(pvid_fir_bank_q31, phi_shift),
     FIELD(pvid_fir_bank_q31, weights),
+    (uint32_t)sizeof(pvid_strong_config_q31),
+    FIELD(pvid_strong_config_q31, u_multiplier),
+    FIELD(pvid_strong_config_q31, drive_ticks),
+    FIELD(pvid_strong_config_q31, estimator),
     (uint32_t)sizeof(pvid_estimate_q31),
     FIELD(pvid_estimate_q31, kappa),
     (uint32_t)sizeof(pvid_estimator_q31),
@@ -28,6 +32,8 @@ const uint32_t pvid_native_layout_q31[] = {
     (uint32_t)sizeof(pvid_weak_q31),
     FIELD(pvid_weak_q31, estimator),
     (uint32_t)sizeof(pvid_differentiator_q31),
+    (uint32_t)sizeof(pvid_strong_q31),
+    FIELD(pvid_strong_q31, estimator),
     PVID_MAX_P,
     PVID_MAX_THETA_Q31,
 };
@@ -69,6 +75,15 @@ void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi
     }
 }
 
+void pvid_replay_strong_q31(pvid_strong_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
+                            const pvid_record_q31 *record)
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_strong_step_q31(self, phi[tick], y[tick]);
+        record_tick(record, tick, &self->estimator, reason);
+    }
+}
+
 void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_t n[], const int32_t y[],
                           const pvid_record_q31 *record)
 {
@@ -88,5 +103,16 @@ void pvid_replay_derivatives_q31(pvid_differentiator_q31 *self, uint32_t ticks, 
                                                    &d_y[tick * PVID_Y_ORDERS_Q31])
                           ? 1u
                           : 0u;
+    }
+}
+
+void pvid_replay_strong_rows_q31(const pvid_strong_row_q31 *shifts, uint32_t ticks, const int32_t phi[],
+                                 const int32_t u[], int32_t n[], int32_t y[], uint8_t fits[])
+{
+    for (size_t tick = 0; tick < ticks; tick++) {
+        fits[tick] = pvid_kapitza_strong_row_q31(shifts, &phi[tick * PVID_ORDERS], &u[tick * PVID_Y_ORDERS_Q31],
+                                                 &y[tick], &n[tick * PVID_KAPITZA_STRONG_THETA])
+                         ? 1u
+                         : 0u;
     }
 }

@@ -26,6 +26,9 @@ extern const uint32_t pvid_native_layout_q31_length;
 void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
                           const pvid_record_q31 *record);
 
+void pvid_replay_strong_q31(pvid_strong_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
+                            const pvid_record_q31 *record);
+
 /* Steps an initialised estimator through rows n[ticks][n_theta], y[ticks], a group each. */
 void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_t n[], const int32_t y[],
                           const pvid_record_q31 *record);
@@ -33,5 +36,9 @@ void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_
 /* Derivatives of counts within full scale after every tick: d_phi[ticks][5], d_y[ticks][3], ready[ticks]. */
 void pvid_replay_derivatives_q31(pvid_differentiator_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
                                  int32_t d_phi[], int32_t d_y[], uint8_t ready[]);
+
+/* Rows of the strong form from phi[ticks][5] and u[ticks][3], and whether they fit[ticks]. */
+void pvid_replay_strong_rows_q31(const pvid_strong_row_q31 *shifts, uint32_t ticks, const int32_t phi[],
+                                 const int32_t u[], int32_t n[], int32_t y[], uint8_t fits[]);
 
 #endif

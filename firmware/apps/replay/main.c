@@ -10,7 +10,13 @@
 #include "replay_run.h"
 #include "report.h"
 
-#if REPLAY_Q31
+#if REPLAY_Q31 && !REPLAY_WEAK
+typedef pvid_strong_q31 identifier_type;
+typedef int32_t sample_type;
+#define INIT pvid_strong_init_q31
+#define STEP pvid_strong_step_q31
+#define HASH pvid_fnv_estimator_q31
+#elif REPLAY_Q31
 typedef pvid_weak_q31 identifier_type;
 typedef int32_t sample_type;
 #define INIT pvid_weak_init_q31

@@ -47,11 +47,11 @@ typedef struct {
     int32_t centre;   /* 1..2^30 */
     uint8_t phi_shift[PVID_ORDERS];     /* 0..62 */
     uint8_t y_shift[PVID_Y_ORDERS_Q31]; /* of orders 2, 3, 4 */
-    const int32_t *weights; /* [PVID_ORDERS][half]; kept by reference */
+    const PVID_TABLE int32_t *weights; /* [PVID_ORDERS][half]; kept by reference */
 } pvid_fir_bank_q31;
 
 /* Central differences on five points in twelfths: centre 12, no shift, exact. */
-extern const int32_t pvid_five_points_q31[PVID_ORDERS * 2];
+extern const PVID_TABLE int32_t pvid_five_points_q31[PVID_ORDERS * 2];
 #define PVID_FIVE_POINTS_CENTRE_Q31 12
 
 /* Only the functions below write to it. */

@@ -45,7 +45,8 @@ from pvid.rig import (
 )
 from pvid.rigfile import RigFile, load
 from pvid.setup import config_of, weak_design_of
-from pvid.setup_q31 import config_for_run, counts_of, tables_of, weak_config_q31
+from pvid.setup_q31 import config_for_run, counts_of, strong_config_q31, tables_of, weak_config_q31
+from pvid.strong_header_q31 import strong_header_q31
 from pvid.weak_design import to_c_header
 from pvid.weak_header_q31 import to_c_header_q31
 
@@ -542,6 +543,26 @@ def weak_table(rig_path: Path, name: str, check: Path | None, core: str) -> int:
         f"{tables.update_rate_hz:.2f} answers a second"
     )
     return _print_header(to_c_header(tables, name, f"pvid weak-table --rig {rig_path.name} --name {name}"), check)
+
+
+@commands.command(name="strong-table")
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML).")
+@click.option("--name", default="strong_config", show_default=True, help="Name of the configuration in C.")
+@click.option("--check", type=click.Path(path_type=Path), help="Only tell whether this file is what would be printed.")
+def strong_table(rig_path: Path, name: str, check: Path | None) -> int:
+    """Prints the fixed-point strong form's weights, formats and settings for a rig as a C header.
+
+    On standard error by how many bits each derivative stays clear of overflow at full scale. The float core's weights
+    are printed by fir-table.
+    """
+    rig = load(rig_path)
+    if rig.sample_rate is None:
+        raise PvidError(f"{rig_path}: sample_rate is missing, and the formats hang on it")
+    config = strong_config_q31(rig, rig.sample_rate)
+    margins = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
+    messages.print(f"bits to spare at full scale: {margins}", highlight=False)
+    made_by = f"pvid strong-table --rig {rig_path.name} --name {name}"
+    return _print_header(strong_header_q31(config, rig.l1, name, made_by), check)
 
 
 @commands.command(name="design")

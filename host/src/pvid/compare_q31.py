@@ -9,8 +9,10 @@ import numpy.typing as npt
 
 from pvid.compare import P_NAMES, Comparison, Difference
 from pvid.native import Native
-from pvid.native_q31 import RecordQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.native_q31 import RecordQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.setup_q31 import ConfigQ31
 from pvid.twin import fnv
+from pvid.twin.strong_q31 import StrongTwinQ31
 from pvid.twin.weak_q31 import TwinRecordQ31, WeakTwinQ31
 
 
@@ -64,17 +66,29 @@ def twin_hashes(twin: TwinRecordQ31, lane: int = 0) -> npt.NDArray[np.uint32]:
     )
 
 
+def identifier_q31(native: Native, config: ConfigQ31) -> WeakIdentifierQ31 | StrongIdentifierQ31:
+    """The core's identifier of a configuration."""
+    if isinstance(config, WeakConfigQ31):
+        return WeakIdentifierQ31(native, config)
+    return StrongIdentifierQ31(native, config)
+
+
+def twin_q31(config: ConfigQ31) -> WeakTwinQ31 | StrongTwinQ31:
+    """The twin of a configuration."""
+    return WeakTwinQ31(config) if isinstance(config, WeakConfigQ31) else StrongTwinQ31(config)
+
+
 def compare_run_q31(
     native: Native,
-    config: WeakConfigQ31,
+    config: ConfigQ31,
     phi: npt.ArrayLike,
     y: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,
 ) -> Comparison:
     """Runs counts phi, y through the core and the twin and compares every tick."""
-    core = WeakIdentifierQ31(native, config)
+    core = identifier_q31(native, config)
     record = core.run(phi, y)
-    twin = WeakTwinQ31(config).run(np.asarray(phi, np.int64), np.asarray(y, np.int64), progress=progress)
+    twin = twin_q31(config).run(np.asarray(phi, np.int64), np.asarray(y, np.int64), progress=progress)
     hashes = twin_hashes(twin)
     twin_hash = int(hashes[-1]) if len(hashes) else fnv.START
     return Comparison(len(record.reason), core.running_hash, twin_hash, first_difference(record, twin))

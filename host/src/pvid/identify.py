@@ -12,7 +12,7 @@ from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.native import Law, Native, Reason, StrongConfig, TrustConfig, WeakConfig, WeakIdentifier
-from pvid.native_q31 import WeakIdentifierQ31
+from pvid.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, config_of, weak_design_of
 from pvid.setup_q31 import config_for_run, counts_of, covariance_of, p_of
@@ -166,7 +166,10 @@ def identify(
         if isinstance(config, StrongConfig):
             return _in_float64(run, rig, config, every)
         return _weak_in_float64(run, rig, config)
-    return _weak_in_q31(run, rig, native, start, every)
+    fixed = config_for_run(rig, run, start)
+    if isinstance(fixed, StrongConfigQ31):
+        return _strong_in_q31(run, rig, fixed, every, native)
+    return _weak_in_q31(run, rig, fixed, every, native)
 
 
 def _ticks_needed(config: StrongConfig | WeakConfig) -> int:
@@ -327,10 +330,36 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
     )
 
 
-def _weak_in_q31(run: Run, rig: RigFile, native: Native, start: npt.ArrayLike | None, every: int) -> Identification:
+def _strong_in_q31(run: Run, rig: RigFile, config: StrongConfigQ31, every: int, native: Native) -> Identification:
+    identifier = StrongIdentifierQ31(native, config)
+    record = identifier.run(*counts_of(rig, run), sums=False, estimate_every=every)
+    last = identifier.assess()
+    counters = identifier.counters
+    return _identification(
+        rig,
+        p=p_of(config, last["p"][:3]),
+        covariance=covariance_of(config, last),
+        kappa=float(last["kappa"]) / 2**30,
+        trusted_s=None,
+        misfit=None,
+        alarm=False,
+        status=_final_status(record.reason),
+        ticks=len(run.t),
+        updates=counters["updates"],
+        lost=counters["rejected_saturated"],
+        running_hash=identifier.running_hash,
+        trajectory=_trajectory(
+            run.t[::every],
+            p_of(config, record.estimate["p"][:, :3]),
+            covariance_of(config, record.estimate),
+            rig.l1,
+        ),
+    )
+
+
+def _weak_in_q31(run: Run, rig: RigFile, config: WeakConfigQ31, every: int, native: Native) -> Identification:
     """The fixed-point core has neither gate nor alarm yet: what it holds at the end is judged here, by the gate's
     limits of kappa and standard errors alone."""
-    config = config_for_run(rig, run, start)
     phi, y = counts_of(rig, run)
     identifier = WeakIdentifierQ31(native, config)
     record = identifier.run(phi, y, sums=False, estimate_every=every)

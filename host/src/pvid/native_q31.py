@@ -16,6 +16,7 @@ import numpy.typing as npt
 from pvid.differentiation_q31 import FirBankQ31
 from pvid.errors import PvidError
 from pvid.native import MAX_P, Native, Status, Stepper
+from pvid.strong_design_q31 import RowShiftsQ31, StrongDesignQ31
 from pvid.weak_design_q31 import TERMS, WeakTablesQ31
 
 Int32 = npt.NDArray[np.int32]
@@ -23,6 +24,9 @@ Int64 = npt.NDArray[np.int64]
 
 MAX_THETA = 11
 GRAMS = 6
+
+# Models of the core by the lengths of p and theta.
+_MODELS = {(4, 8): "pvid_kapitza_weak_q31", (3, 5): "pvid_kapitza_weak_zeroed_q31", (3, 11): "pvid_kapitza_strong_q31"}
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,18 @@ class WeakConfigQ31:
     def hop(self) -> int:
         """Decimated samples from the start of a window to the start of the next."""
         return (self.design.window - 1) // 2
+
+
+@dataclass(frozen=True)
+class StrongConfigQ31:
+    """Settings of the fixed-point strong-form identifier, as in strong_q31.h: counts, and drive_min in u's unit."""
+
+    design: StrongDesignQ31
+    estimator: EstimatorConfigQ31
+    drive_ticks: int
+    phi_offset: int = 0
+    y_offset: int = 0
+    drive_min: int = 0
 
 
 class EstimatorConfigStruct(ctypes.Structure):
@@ -149,6 +165,35 @@ class FirBankStruct(ctypes.Structure):
     ]
 
 
+class RowShiftsStruct(ctypes.Structure):
+    """pvid_strong_row_q31."""
+
+    _fields_ = [
+        ("n_a", ctypes.c_uint8),
+        ("n_e", ctypes.c_uint8),
+        ("n_phi2", ctypes.c_uint8 * 4),
+        ("n_phi0", ctypes.c_uint8 * 5),
+        ("part", ctypes.c_uint8),
+        ("y", ctypes.c_uint8),
+    ]
+
+
+class StrongConfigStruct(ctypes.Structure):
+    """pvid_strong_config_q31."""
+
+    _fields_ = [
+        ("bank", FirBankStruct),
+        ("row", RowShiftsStruct),
+        ("u_multiplier", ctypes.c_int32),
+        ("u_shift", ctypes.c_uint8),
+        ("phi_offset", ctypes.c_int32),
+        ("y_offset", ctypes.c_int32),
+        ("drive_min", ctypes.c_int32),
+        ("drive_ticks", ctypes.c_uint32),
+        ("estimator", EstimatorConfigStruct),
+    ]
+
+
 class RecordStruct(ctypes.Structure):
     """pvid_record_q31 of host/native/replay_q31.h."""
 
@@ -224,6 +269,8 @@ class _Layout(NamedTuple):
     weak_size: int
     weak_estimator_at: int
     differentiator_size: int
+    strong_size: int
+    strong_estimator_at: int
 
 
 def _checked_layout(native: Native) -> _Layout:
@@ -245,6 +292,10 @@ def _checked_layout(native: Native) -> _Layout:
         ctypes.sizeof(FirBankStruct),
         FirBankStruct.phi_shift.offset,
         FirBankStruct.weights.offset,
+        ctypes.sizeof(StrongConfigStruct),
+        StrongConfigStruct.u_multiplier.offset,
+        StrongConfigStruct.drive_ticks.offset,
+        StrongConfigStruct.estimator.offset,
         ESTIMATE_DTYPE.itemsize,
         int(ESTIMATE_DTYPE.fields["kappa"][1]) if ESTIMATE_DTYPE.fields else 0,
     ]
@@ -340,16 +391,58 @@ class WeakIdentifierQ31(_IntegerStepper):
         self.native.library.pvid_weak_gap_q31(self._state)
 
 
+def _bank_struct(bank: FirBankQ31) -> tuple[FirBankStruct, Int32]:
+    """The C struct of a bank and the weights it points to."""
+    weights = np.ascontiguousarray(bank.weights, np.int32)
+    struct = FirBankStruct(weights=weights.ctypes.data)
+    _fill(struct, bank, {"weights": weights})
+    return struct, weights
+
+
+def _row_struct(shifts: RowShiftsQ31) -> RowShiftsStruct:
+    struct = RowShiftsStruct()
+    _fill(struct, shifts, {})
+    return struct
+
+
+class StrongIdentifierQ31(_IntegerStepper):
+    """pvid_strong_q31: phi, y in counts."""
+
+    REPLAY = "pvid_replay_strong_q31"
+    n_p, n_theta = 3, 11
+
+    def __init__(self, native: Native, config: StrongConfigQ31) -> None:
+        layout = _checked_layout(native)
+        bank, self._weights = _bank_struct(config.design.bank)
+        struct = StrongConfigStruct(
+            bank=bank,
+            row=_row_struct(config.design.row),
+            u_multiplier=config.design.u_multiplier,
+            u_shift=config.design.u_shift,
+            phi_offset=config.phi_offset,
+            y_offset=config.y_offset,
+            drive_min=config.drive_min,
+            drive_ticks=config.drive_ticks,
+            estimator=estimator_struct(config.estimator),
+        )
+        size, at = layout.strong_size, layout.strong_estimator_at
+        super().__init__(native, "pvid_strong_init_q31", struct, size, at, layout.counters_at)
+
+    def gap(self) -> None:
+        """pvid_strong_gap_q31: samples are missing before the next call of `run`."""
+        self.native.library.pvid_strong_gap_q31(self._state)
+
+
 class RowEstimatorQ31(_IntegerStepper):
-    """pvid_estimator_q31 on the weak form's model with its zero unknown, fed rows, a group each."""
+    """pvid_estimator_q31 on one of the core's models, fed rows, a group each."""
 
     REPLAY = "pvid_replay_rows_q31"
-    n_p, n_theta = 4, 8
 
     def __init__(self, native: Native, config: EstimatorConfigQ31) -> None:
         layout = _checked_layout(native)
+        self.n_p, self.n_theta = len(config.p_bits), len(config.n_bits)
         struct = estimator_struct(config)
-        struct.model = ctypes.addressof(ctypes.c_char.in_dll(native.library, "pvid_kapitza_weak_q31"))
+        struct.model = ctypes.addressof(ctypes.c_char.in_dll(native.library, _MODELS[self.n_p, self.n_theta]))
         super().__init__(native, "pvid_estimator_init_q31", struct, layout.estimator_size, 0, layout.counters_at)
 
 
@@ -359,9 +452,7 @@ def derivatives_q31(
     """pvid_differentiator_q31 on counts within full scale: derivatives [ticks, 5] of phi and [ticks, 3] of y after
     every tick, and whether there were any."""
     layout = _checked_layout(native)
-    weights = np.ascontiguousarray(bank.weights, np.int32)
-    struct = FirBankStruct(weights=weights.ctypes.data)
-    _fill(struct, bank, {"weights": weights})
+    struct, _weights = _bank_struct(bank)
     state = ctypes.create_string_buffer(layout.differentiator_size)
     status = Status(native.library.pvid_differentiator_init_q31(state, ctypes.byref(struct)))
     if status is not Status.OK:
@@ -372,4 +463,18 @@ def derivatives_q31(
     addresses = [array.ctypes.data for array in counts] + [array.ctypes.data for array in out]
     places = [ctypes.c_void_p(place) for place in addresses]
     native.library.pvid_replay_derivatives_q31(state, ctypes.c_uint32(ticks), *places)
+    return out[0], out[1], out[2].astype(np.bool_)
+
+
+def strong_rows_q31(
+    native: Native, shifts: RowShiftsQ31, phi: npt.ArrayLike, u: npt.ArrayLike
+) -> tuple[Int32, Int32, npt.NDArray[np.bool_]]:
+    """pvid_kapitza_strong_row_q31: N [ticks, 11], Y [ticks] from phi [ticks, 5], u [ticks, 3], and whether they fit."""
+    struct = _row_struct(shifts)
+    given = [np.ascontiguousarray(x, np.int32) for x in (phi, u)]
+    ticks = len(given[0])
+    out = np.zeros((ticks, 11), np.int32), np.zeros(ticks, np.int32), np.zeros(ticks, np.uint8)
+    addresses = [array.ctypes.data for array in given] + [array.ctypes.data for array in out]
+    places = [ctypes.c_void_p(place) for place in addresses]
+    native.library.pvid_replay_strong_rows_q31(ctypes.byref(struct), ctypes.c_uint32(ticks), *places)
     return out[0], out[1], out[2].astype(np.bool_)

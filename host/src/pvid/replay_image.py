@@ -13,19 +13,20 @@ import numpy.typing as npt
 
 from pvid.boards import BUILD, Board, build, keep_header
 from pvid.boards import run as run_image
+from pvid.compare_q31 import identifier_q31, twin_q31
 from pvid.compare_q31 import twin_hashes as twin_hashes_q31
 from pvid.ctables import float_array, float_literal, struct_initializer
 from pvid.errors import PvidError
 from pvid.native import Native, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
-from pvid.native_q31 import WeakConfigQ31, WeakIdentifierQ31
+from pvid.native_q31 import StrongConfigQ31
 from pvid.rig import simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
 from pvid.setup import config_of
-from pvid.setup_q31 import weak_config_q31
+from pvid.setup_q31 import ConfigQ31, config_of_q31
+from pvid.strong_header_q31 import strong_header_q31
 from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
-from pvid.twin.weak_q31 import WeakTwinQ31
 from pvid.weak_header_q31 import to_c_header_q31
 
 REPORT_EVERY = 500  # ticks from one line with the running hash to the next
@@ -52,7 +53,7 @@ class ReplayRun:
     phi_lsb: np.float32
     y_lsb: np.float32
     measure_from: int
-    fixed: WeakConfigQ31 | None = None  # in place of config, where the fixed-point core plays the counts
+    fixed: ConfigQ31 | None = None  # in place of config, where the fixed-point core plays the counts
 
     @property
     def core(self) -> str:
@@ -97,7 +98,7 @@ def standard_run(form: str, ticks: int, core: str = "f32") -> ReplayRun:
         phi_lsb=np.float32(sensors.phi_lsb),
         y_lsb=np.float32(sensors.y_lsb),
         measure_from=_measure_from(config, ticks),
-        fixed=weak_config_q31(rig, run.sample_rate, start) if core == "q31" else None,
+        fixed=config_of_q31(rig, run.sample_rate, start) if core == "q31" else None,
     )
 
 
@@ -114,7 +115,7 @@ def header(run: ReplayRun) -> str:
     """replay_run.h of a run."""
     tables: dict[str, npt.NDArray[np.float32]] = {}
     if run.fixed is not None:
-        settings = [to_c_header_q31(run.fixed, RigFile.standard().l1, "replay_config", "pvid.replay_image")]
+        settings = [_header_q31(run.fixed)]
     elif isinstance(run.config, WeakConfig):
         weak, tables = weak_config_struct(run.config)
         design = struct_initializer(weak.design.contents, {name: f"replay_{name}" for name in tables})
@@ -174,6 +175,13 @@ def header(run: ReplayRun) -> str:
     )
 
 
+def _header_q31(config: ConfigQ31) -> str:
+    names = RigFile.standard().l1, "replay_config", "pvid.replay_image"
+    if isinstance(config, StrongConfigQ31):
+        return strong_header_q31(config, *names)
+    return to_c_header_q31(config, *names)
+
+
 def _resolutions(run: ReplayRun) -> list[str]:
     """What a count is worth to the core: itself in fixed point."""
     if run.core == "q31":
@@ -190,7 +198,7 @@ def _resolutions(run: ReplayRun) -> list[str]:
 def native_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
     if run.fixed is not None:
-        return WeakIdentifierQ31(native, run.fixed).run(run.counts[:, 0], run.counts[:, 1]).hash
+        return identifier_q31(native, run.fixed).run(run.counts[:, 0], run.counts[:, 1]).hash
     if isinstance(run.config, WeakConfig):
         return native.weak(run.config).run(run.phi, run.y).hash
     return native.strong(run.config).run(run.phi, run.y).hash
@@ -200,7 +208,7 @@ def twin_hashes(run: ReplayRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]. Cost: 0.5 ms a tick in the strong form."""
     if run.fixed is not None:
         phi, y = run.counts.astype(np.int64).T
-        return twin_hashes_q31(WeakTwinQ31(run.fixed).run(phi, y))
+        return twin_hashes_q31(twin_q31(run.fixed).run(phi, y))
     if isinstance(run.config, WeakConfig):
         states = WeakTwin(run.config).run(run.phi, run.y)
     else:

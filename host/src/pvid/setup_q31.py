@@ -10,13 +10,16 @@ import numpy.typing as npt
 
 from pvid.capture import Run
 from pvid.errors import PvidError
-from pvid.native import Law
-from pvid.native_q31 import EstimatorConfigQ31, ScaleQ31, WeakConfigQ31
-from pvid.rigfile import RigFile
-from pvid.setup import weak_config, weak_design_of
+from pvid.native import EstimatorConfig, Law
+from pvid.native_q31 import EstimatorConfigQ31, ScaleQ31, StrongConfigQ31, WeakConfigQ31
+from pvid.rigfile import RigFile, Sensor
+from pvid.setup import bank_of, nominal_start, strong_config, weak_config, weak_design_of
+from pvid.strong_design_q31 import StrongDesignQ31, strong_design_q31
 from pvid.weak_design_q31 import WeakTablesQ31, weak_tables_q31
 
+Float = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
+ConfigQ31 = WeakConfigQ31 | StrongConfigQ31
 
 
 def format_of(largest: float) -> int:
@@ -24,21 +27,51 @@ def format_of(largest: float) -> int:
     return math.floor(math.log2((2**31 - 2) / largest))
 
 
-def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
-    """The tables a rig file asks for."""
+def _counting(rig: RigFile) -> Sensor:
+    """The sensors of a rig, which must count in something."""
     sensor = rig.sensor
     for name, lsb in (("phi_lsb", sensor.phi_lsb), ("y_lsb", sensor.y_lsb)):
         if not lsb > 0:
             raise PvidError(
                 f"[sensor] {name} is 0, and the fixed-point core counts in it: say what the sensor resolves"
             )
+    return replace(
+        sensor,
+        y_range=sensor.y_range or rig.l1 / 10,
+        acceleration_range=sensor.acceleration_range or 4 * rig.nominal.g,
+    )
+
+
+def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
+    """The tables a rig file asks for."""
+    sensor = _counting(rig)
     return weak_tables_q31(
         weak_design_of(rig, sample_rate),
         sensor.phi_lsb,
         sensor.y_lsb,
         sensor.phi_range,
-        sensor.y_range or rig.l1 / 10,
-        sensor.acceleration_range or 4 * rig.nominal.g,
+        sensor.y_range,
+        sensor.acceleration_range,
+    )
+
+
+def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
+    """The strong form's formats that a rig file asks for."""
+    sensor = _counting(rig)
+    w, d1, d2 = nominal_start(rig)
+    mode = math.sqrt(w * (d1 + math.sqrt(max(d1**2 - 4 * d2, 0.0))) / 2)  # the faster one of the nominal mechanism
+    # the motion is as fast as twice that, or as a drive that uses both of its ranges
+    fastest = max(2 * mode, math.sqrt(sensor.acceleration_range / sensor.y_range))
+    return strong_design_q31(
+        bank_of(rig, sample_rate),
+        sample_rate,
+        rig.l1,
+        sensor.phi_lsb,
+        sensor.y_lsb,
+        sensor.phi_range,
+        sensor.y_range,
+        sensor.acceleration_range,
+        fastest,
     )
 
 
@@ -53,17 +86,78 @@ def _counts(values: npt.NDArray[np.float64], lsb: float) -> Int64:
     return np.clip(counts, -(2.0**31), 2.0**31 - 1).astype(np.int64)
 
 
-def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
-    """Settings for a run, its first sample taken for rest where that is nearer than 0."""
-    if rig.identifier.form != "weak":
-        raise PvidError("core q31 has the weak form only: use --form weak, or --core f32")
+def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> ConfigQ31:
+    """Settings of the form the rig file asks for.
+
+    In the weak form a run's first sample is taken for rest where that is nearer than 0; the strong form takes the
+    encoder's zero for the equilibrium, and of the pivot only what changes counts.
+    """
+    if rig.identifier.form == "strong":
+        strong = strong_config_q31(rig, run.sample_rate, start)
+        return replace(strong, y_offset=_first(counts_of(rig, run)[1], strong.design.bank.y_max // 2))
     if rig.identifier.full_angle or rig.identifier.damping:
         raise PvidError("core q31 has neither full_angle nor damping: use --core f32")
     config = weak_config_q31(rig, run.sample_rate, start)
     phi, y = counts_of(rig, run)
-    half = config.design.phi_max // 2, config.design.y_max // 2
-    first = [int(c[0]) if len(c) and abs(int(c[0])) > limit else 0 for c, limit in zip((phi, y), half, strict=True)]
-    return replace(config, phi_offset=first[0], y_offset=first[1])
+    design = config.design
+    return replace(config, phi_offset=_first(phi, design.phi_max // 2), y_offset=_first(y, design.y_max // 2))
+
+
+def _first(counts: Int64, limit: int) -> int:
+    """The first of the counts where it is beyond the limit, else 0."""
+    return int(counts[0]) if len(counts) and abs(int(counts[0])) > limit else 0
+
+
+def _estimator_q31(
+    settings: EstimatorConfig,
+    nominal: EstimatorConfig,
+    unit: Float,
+    n_bits: tuple[int, ...],
+    y_bits: int,
+    row_unit: float,
+    **own: int,
+) -> EstimatorConfigQ31:
+    """Settings of the estimator in integers.
+
+    Parameters
+    ----------
+    settings
+        Those of the float core; start, start_sd and row_sd among them.
+    nominal
+        Likewise for the nominal start, whose bounds, and with them formats, are those of every start: one program.
+    unit
+        Of p in SI [n_p].
+    n_bits, y_bits
+        Formats of a row.
+    row_unit
+        What Y is counted in, in SI.
+    own
+        Settings that the forms see differently.
+    """
+    n_p = len(unit)
+    lower, upper, start, sd = (
+        np.asarray(x, np.float64)[:n_p] / unit
+        for x in (nominal.lower, nominal.upper, settings.start, settings.start_sd)
+    )
+    bits = [format_of(x) for x in np.maximum(np.abs(lower), upper)]
+
+    def integers(x: Float) -> tuple[int, ...]:
+        return tuple(int(np.rint(v * 2.0**b)) for v, b in zip(x, bits, strict=True))
+
+    return EstimatorConfigQ31(
+        start=integers(start),
+        start_sd=integers(sd),
+        lower=tuple(max(1, x) if i < 3 else x for i, x in enumerate(integers(lower))),
+        upper=integers(upper),
+        p_bits=tuple(bits),
+        n_bits=n_bits,
+        y_bits=y_bits,
+        row_sd=min(max(1, round(settings.row_sd / row_unit * 2.0 ** (y_bits + 8))), 2**31 - 1),
+        step_limit=round(settings.step_limit * 2**16),
+        kappa_min=round(settings.kappa_min * 2**30),
+        divider=settings.divider,
+        **own,
+    )
 
 
 def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
@@ -72,36 +166,18 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
     float_config = weak_config(rig, sample_rate, start)
     e = float_config.estimator
     n_p = 4 if float_config.zero_unknown else 3
-    unit = np.array([1 / tables.dt**2, 1.0, 1.0, tables.f_unit])[:n_p]  # of p, in SI
-    # bounds, and with them formats, are the nominal start's: one program for every start
-    nominal = weak_config(rig, sample_rate).estimator
-    lower = np.asarray(nominal.lower, np.float64)[:n_p] / unit
-    upper = np.asarray(nominal.upper, np.float64)[:n_p] / unit
-    start_p = np.asarray(e.start, np.float64)[:n_p] / unit
-    sd = np.asarray(e.start_sd, np.float64)[:n_p] / unit
-    bits = [format_of(x) for x in np.maximum(np.abs(lower), upper)]
-
-    def integers(x: npt.NDArray[np.float64]) -> tuple[int, ...]:
-        return tuple(int(np.rint(v * 2.0**b)) for v, b in zip(x, bits, strict=True))
-
     functions = tables.functions
-    y_bits = tables.column_bits[8]
-    estimator = EstimatorConfigQ31(
-        start=integers(start_p),
-        start_sd=integers(sd),
-        lower=tuple(max(1, x) if i < 3 else x for i, x in enumerate(integers(lower))),
-        upper=integers(upper),
-        p_bits=tuple(bits),
-        n_bits=tables.column_bits[: 8 if n_p == 4 else 5],
-        y_bits=y_bits,
-        row_sd=max(1, round(e.row_sd / tables.f_unit * 2.0 ** (y_bits + 8))),
+    estimator = _estimator_q31(
+        e,
+        weak_config(rig, sample_rate).estimator,
+        _p_units(tables)[:n_p],
+        tables.column_bits[: 8 if n_p == 4 else 5],
+        tables.column_bits[8],
+        tables.f_unit,
         forgetting_groups=round(e.forgetting_s * sample_rate / (tables.decimation * float_config.hop)),
         gain=0 if e.law is Law.PSEUDOVELOCITY else 2**30,
         correlation=round(tables.overlap * 2**16),
         row_weight=round((functions - 2) / functions * 2**16),
-        step_limit=round(e.step_limit * 2**16),
-        kappa_min=round(e.kappa_min * 2**30),
-        divider=e.divider,
     )
     return WeakConfigQ31(
         design=tables,
@@ -112,28 +188,64 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
     )
 
 
-def units_of(config: WeakConfigQ31) -> npt.NDArray[np.float64]:
+def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfigQ31:
+    """Settings of the strong form at `sample_rate` [Hz]; `start` overrides the nominal p."""
+    design = strong_design_of(rig, sample_rate)
+    config = strong_config(rig, sample_rate, start)
+    e = config.estimator
+    gain = e.feedback_hz * e.divider / sample_rate if e.feedback_hz > 0 else 1.0
+    estimator = _estimator_q31(
+        e,
+        strong_config(rig, sample_rate).estimator,
+        _p_units(design),
+        design.n_bits,
+        design.y_bits,
+        design.angle_unit / design.dt**8,
+        forgetting_groups=round(e.forgetting_s * sample_rate),
+        gain=0 if e.law is Law.PSEUDOVELOCITY else round(min(gain, 1.0) * 2**30),
+        correlation=round(e.correlation * 2**16),
+    )
+    return StrongConfigQ31(
+        design=design,
+        estimator=estimator,
+        drive_ticks=min(max(round(sample_rate), 1), 2**30),
+        drive_min=min(round(config.drive_min * design.dt**2 * 2.0**design.u_bits), 2**30),
+    )
+
+
+def config_of_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> ConfigQ31:
+    """Settings of the form the rig file asks for."""
+    make = weak_config_q31 if rig.identifier.form == "weak" else strong_config_q31
+    return make(rig, sample_rate, start)
+
+
+def _p_units(design: WeakTablesQ31 | StrongDesignQ31) -> Float:
+    """What w, d1, d2 and, in the weak form, c are counted in, in SI."""
+    zero = [design.f_unit] if isinstance(design, WeakTablesQ31) else []
+    return np.array([1 / design.dt**2, 1.0, 1.0, *zero])
+
+
+def units_of(config: ConfigQ31) -> Float:
     """One unit of each of the core's integers p in SI [n_p]."""
     bits = np.array(config.estimator.p_bits, np.float64)
-    unit = np.array([1 / config.design.dt**2, 1.0, 1.0, config.design.f_unit])[: len(bits)]
-    return np.asarray(unit * 2.0**-bits)
+    return np.asarray(_p_units(config.design)[: len(bits)] * 2.0**-bits)
 
 
-def p_of(config: WeakConfigQ31, p: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def p_of(config: ConfigQ31, p: npt.ArrayLike) -> Float:
     """p = (w, d1, d2, c) in SI from the core's integers [..., n_p]; c is the encoder's reading at rest."""
     values = np.asarray(p, np.float64) * units_of(config)
-    if values.shape[-1] > 3:
+    if values.shape[-1] > 3 and isinstance(config, WeakConfigQ31):
         lsb = config.design.f_unit * 2.0 ** (config.design.smooth_bits - config.design.phi_shift)
         values[..., 3] += config.phi_offset * lsb
     return np.asarray(values)
 
 
-def se_of(config: WeakConfigQ31, se: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def se_of(config: ConfigQ31, se: npt.ArrayLike) -> Float:
     """Standard errors in SI from the core's integers [..., n_p]."""
     return np.asarray(np.asarray(se, np.float64) * units_of(config))
 
 
-def covariance_of(config: WeakConfigQ31, estimate: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
+def covariance_of(config: ConfigQ31, estimate: npt.NDArray[np.void]) -> Float:
     """Covariance of p in SI [..., n_p, n_p] from estimates of the core."""
     n_p = len(config.estimator.p_bits)
     se = se_of(config, estimate["se"][..., :n_p])
@@ -144,7 +256,7 @@ def covariance_of(config: WeakConfigQ31, estimate: npt.NDArray[np.void]) -> npt.
 LENGTH_BITS = 24  # of pvid_kapitza_q31
 
 
-def scale_of(config: WeakConfigQ31, l1: float) -> ScaleQ31:
+def scale_of(config: ConfigQ31, l1: float) -> ScaleQ31:
     """What turns the estimates of a configuration into metres for a rod of l1 [m]."""
     if not 2.0**-LENGTH_BITS <= l1 < 2.0 ** (31 - LENGTH_BITS):
         raise PvidError(f"l1 = {l1:g} m does not fit the fixed-point core's lengths, which end at 127 m")

@@ -18,18 +18,21 @@ def integers(values: npt.ArrayLike) -> Int:
 def round_shift(x: Int, s: npt.ArrayLike) -> Int:
     """x 2^-s rounded half up, s >= 0."""
     shift = integers(s)
-    whole = x >> np.minimum(shift, 63)
-    half = (x >> np.clip(shift - 1, 0, 63)) & 1
-    return np.where(shift > 63, 0, whole + np.where(shift > 0, half, 0))
+    twice = x >> np.minimum(np.maximum(shift - 1, 0), 63)  # of the result, but for a shift of 0
+    rounded = (twice >> 1) + (twice & 1)
+    return np.where(shift > 63, 0, np.where(shift > 0, rounded, x))
 
 
 def scale(x: Int, s: npt.ArrayLike) -> Int:
     """x 2^-s, rounded half up where s > 0, saturated at WIDE where s < 0."""
     shift = integers(s)
-    left = np.maximum(-shift, 0)
-    fits = (bit_length(np.abs(x)) + left) <= 62
-    shifted = np.where(x == 0, 0, np.where(fits, x << np.minimum(left, 62), np.sign(x) * WIDE))
-    return np.where(shift < 0, shifted, round_shift(x, np.maximum(shift, 0)))
+    right = round_shift(x, np.maximum(shift, 0))
+    if (shift >= 0).all():
+        return right
+    left = np.minimum(np.maximum(-shift, 0), 62)
+    fits = np.abs(x) <= (np.int64(WIDE - 1) >> left)  # of x, bits and shift are 62 at most
+    shifted = np.where(fits, x << left, np.sign(x) * WIDE)
+    return np.where(shift < 0, shifted, right)
 
 
 def clamp(x: Int, limit: int) -> Int:
@@ -39,26 +42,19 @@ def clamp(x: Int, limit: int) -> Int:
 
 def bit_length(x: Int) -> Int:
     """Bits of x >= 0; 0 for 0."""
-    rest = integers(x)
-    length = np.zeros_like(rest)
-    for step in (32, 16, 8, 4, 2, 1):
-        large = rest >= (1 << step)
-        length = length + np.where(large, step, 0)
-        rest = np.where(large, rest >> step, rest)
-    return length + (rest > 0)
+    values = integers(x)
+    exponent = np.frexp(values.astype(np.float64))[1].astype(
+        np.int64
+    )  # of the nearest float: 2^exponent may be above x
+    return exponent - ((values > 0) & (values < (np.int64(1) << np.maximum(exponent - 1, 0))))
 
 
 def square_root(x: Int) -> Int:
     """Largest r with r^2 <= x, 0 <= x <= WIDE."""
-    rest = integers(x)
-    root = np.zeros_like(rest)
-    for place in range(62, -1, -2):
-        bit = np.int64(1 << place)
-        trial = root + bit
-        taken = rest >= trial
-        rest = np.where(taken, rest - trial, rest)
-        root = (root >> 1) + np.where(taken, bit, 0)
-    return root
+    values = integers(x)
+    root = np.sqrt(values.astype(np.float64)).astype(np.int64)  # the nearest float's: one off at most
+    root = root - (root * root > values)
+    return root + ((root + 1) * (root + 1) <= values)
 
 
 def reciprocal(x: Int) -> tuple[Int, Int]:

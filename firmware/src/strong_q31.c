@@ -1,0 +1,113 @@
+#include "pvid/strong_q31.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "count.h"
+#include "integer_q31.h"
+
+#define SHIFT_MAX 62u
+#define DRIVE_TICKS_MAX ((uint32_t)1 << 30)
+
+static bool shifts_are_valid(const uint8_t shift[], size_t n)
+{
+    bool valid = true;
+    for (size_t i = 0; i < n; i++) {
+        valid = valid && (shift[i] <= SHIFT_MAX);
+    }
+    return valid;
+}
+
+static bool row_is_valid(const pvid_strong_row_q31 *row)
+{
+    return (row->n_a <= SHIFT_MAX) && (row->n_e <= SHIFT_MAX) && (row->part <= SHIFT_MAX) && (row->y <= SHIFT_MAX) &&
+           shifts_are_valid(row->n_phi2, 4) && shifts_are_valid(row->n_phi0, 5);
+}
+
+pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL));
+    if (!row_is_valid(&config->row) || (config->u_multiplier <= 0) || (config->u_shift > SHIFT_MAX)) {
+        return PVID_BAD_DESIGN;
+    }
+    if ((config->drive_min < 0) || (config->drive_min > PVID_DERIVATIVE_LIMIT_Q31) || (config->drive_ticks < 1u) ||
+        (config->drive_ticks > DRIVE_TICKS_MAX)) {
+        return PVID_BAD_DRIVE_MIN;
+    }
+    memset(self, 0, sizeof *self);
+    const pvid_status status = pvid_differentiator_init_q31(&self->differentiator, &config->bank);
+    if (status != PVID_OK) {
+        return status;
+    }
+    self->row = config->row;
+    self->u_multiplier = config->u_multiplier;
+    self->u_shift = config->u_shift;
+    self->phi_offset = config->phi_offset;
+    self->y_offset = config->y_offset;
+    self->drive_min = (int64_t)config->drive_min * config->drive_min;
+    self->drive_forgetting = (int32_t)(INT32_MAX / config->drive_ticks);
+    pvid_estimator_config_q31 estimator = config->estimator;
+    estimator.model = &pvid_kapitza_strong_q31;
+    return pvid_estimator_init_q31(&self->estimator, &estimator);
+}
+
+void pvid_strong_gap_q31(pvid_strong_q31 *self)
+{
+    pvid_differentiator_reset_q31(&self->differentiator);
+}
+
+static bool is_within(int64_t x, int32_t limit)
+{
+    return (x >= -(int64_t)limit) && (x <= limit);
+}
+
+static pvid_reason refuse(pvid_strong_q31 *self)
+{
+    pvid_count_up(&self->estimator.counters.rejected_saturated);
+    return PVID_REJECTED_SATURATED;
+}
+
+/* u[k] = y_A^(k+2)/l1; false where one is beyond the expected range. */
+static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int32_t u[])
+{
+    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
+        const int64_t exact = pvid_round_shift_q31((int64_t)d_y[k] * self->u_multiplier, self->u_shift);
+        if (!is_within(exact, PVID_DERIVATIVE_LIMIT_Q31)) {
+            return false;
+        }
+        u[k] = (int32_t)exact;
+    }
+    return true;
+}
+
+pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
+{
+    const int64_t angle = (int64_t)phi - self->phi_offset;
+    const int64_t height = (int64_t)y - self->y_offset;
+    if (!is_within(angle, self->differentiator.bank.phi_max) || !is_within(height, self->differentiator.bank.y_max)) {
+        pvid_strong_gap_q31(self);
+        return refuse(self);
+    }
+    int32_t d_phi[PVID_ORDERS];
+    int32_t d_y[PVID_Y_ORDERS_Q31];
+    if (!pvid_differentiator_step_q31(&self->differentiator, (int32_t)angle, (int32_t)height, d_phi, d_y)) {
+        return PVID_WARMING_UP;
+    }
+    int32_t u[PVID_Y_ORDERS_Q31];
+    if (!accelerations(self, d_y, u)) {
+        return refuse(self);
+    }
+    self->drive += pvid_times_q31(((int64_t)u[0] * u[0]) - self->drive, self->drive_forgetting);
+    if (self->drive < self->drive_min) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    int32_t n[PVID_KAPITZA_STRONG_THETA];
+    int32_t row_y;
+    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n)) {
+        return refuse(self);
+    }
+    const pvid_reason added = pvid_estimator_add_q31(&self->estimator, n, row_y);
+    return (added == PVID_ACCUMULATED) ? pvid_estimator_update_q31(&self->estimator) : added;
+}

@@ -1,0 +1,119 @@
+"""Twin of strong_q31.c: counts in, the state after every tick out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.errors import PvidError
+from pvid.native import Reason
+from pvid.native_q31 import EstimatorConfigQ31, StrongConfigQ31
+from pvid.twin import kapitza_strong_q31 as model
+from pvid.twin.differentiator_q31 import derivatives
+from pvid.twin.estimator_q31 import EstimatorQ31
+from pvid.twin.integer_q31 import Int, integers, times_q31
+from pvid.twin.weak_q31 import TwinRecordQ31
+
+Mask = npt.NDArray[np.bool_]
+Reasons = npt.NDArray[np.uint8]
+
+DERIVATIVE_LIMIT = 2**30
+
+
+class StrongTwinQ31:
+    """The strong-form identifier in several lanes that share samples and design."""
+
+    def __init__(self, config: StrongConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
+        self.config = config
+        self.estimator = EstimatorQ31(estimators or [config.estimator], model.STRONG)
+
+    def rows(self, phi: Int, y: Int) -> tuple[Int, Int, Reasons]:
+        """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
+        config, design = self.config, self.config.design
+        phi = phi - config.phi_offset
+        y = y - config.y_offset
+        within = (np.abs(phi) <= design.bank.phi_max) & (np.abs(y) <= design.bank.y_max)
+        d_phi, d_y, ready = derivatives(phi, y, within, design.bank)
+        u = model.accelerations(d_y, design.u_multiplier, design.u_shift)
+        usable = ready & (np.abs(u) <= DERIVATIVE_LIMIT).all(axis=1)
+        u[~usable] = 0
+        n, row_y, fits = model.rows(design.row, d_phi, u)
+        driven = self._driven(u[:, 0], usable)
+        fate = np.full(len(phi), Reason.ACCUMULATED, np.uint8)
+        fate[~fits] = Reason.REJECTED_SATURATED
+        fate[~driven] = Reason.HELD_NOT_EXCITED
+        fate[~usable] = Reason.REJECTED_SATURATED
+        fate[~ready] = Reason.WARMING_UP
+        fate[~within] = Reason.REJECTED_SATURATED
+        return n, row_y, fate
+
+    def _driven(self, u: Int, usable: Mask) -> Mask:
+        """Where the mean square of u [ticks] over about a second reaches its threshold."""
+        threshold = self.config.drive_min**2
+        forgetting = integers((2**31 - 1) // self.config.drive_ticks)
+        mean_square = integers(0)
+        driven = np.zeros(len(u), np.bool_)
+        for tick in np.flatnonzero(usable):
+            mean_square = mean_square + times_q31(u[tick] * u[tick] - mean_square, forgetting)
+            driven[tick] = mean_square >= threshold
+        return driven
+
+    def run(
+        self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
+    ) -> TwinRecordQ31:
+        """Steps all lanes through a run from its first sample: counts phi, y, both int64 [ticks]."""
+        return run_rows(self.estimator, *self.rows(phi, y), sums=sums, progress=progress)
+
+
+def run_rows(
+    estimator: EstimatorQ31,
+    n: Int,
+    y: Int,
+    fate: Reasons,
+    *,
+    sums: bool = True,
+    progress: Callable[[int], None] | None = None,
+) -> TwinRecordQ31:
+    """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share, each a group of its own.
+
+    `fate` [ticks] tells what became of a tick before it reached the estimator: ACCUMULATED where it has a row.
+    """
+    ticks = len(y)
+    n_p, lanes = estimator.p.shape
+    record = TwinRecordQ31(
+        p=np.empty((ticks, n_p, lanes), np.int32),
+        sums=np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64),
+        exponent=np.empty((ticks, lanes), np.uint8),
+        reason=np.empty((ticks, lanes), np.uint8),
+    )
+    wide_n = np.broadcast_to(n[:, :, None], (ticks, n.shape[1], lanes))
+    wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
+    for tick in range(ticks):
+        if fate[tick] == Reason.ACCUMULATED:
+            record.reason[tick] = _step(estimator, wide_n[tick], wide_y[tick])
+        else:
+            record.reason[tick] = fate[tick]
+            if fate[tick] != Reason.WARMING_UP:
+                estimator.counters[Reason(fate[tick]).name.lower()] += 1
+        record.p[tick] = estimator.p
+        record.exponent[tick] = estimator.exponent
+        if sums:
+            record.sums[tick] = estimator.sums
+        if progress is not None and tick % 512 == 0:
+            progress(tick)
+    return record
+
+
+def _step(estimator: EstimatorQ31, n: Int, y: Int) -> Reasons:
+    """A row and the solve it may lead to."""
+    reason = estimator.add(n, y)
+    taken = reason == Reason.ACCUMULATED
+    if not taken.any():
+        return reason
+    if not taken.all():
+        raise PvidError("lanes of one twin must take the same rows in: step those that do not apart")
+    for told in estimator.solve(ends_group=True):
+        reason = reason if told is None else told
+    return reason
