@@ -38,7 +38,7 @@ target_link_options(pvid_board INTERFACE ${PVID_BOARD_CPU} -Wl,--gc-sections)
 set(pvid_port_sources ${pvid_ports}/fault.c)
 if(PVID_BOARD_FAMILY STREQUAL "avr")
   list(APPEND pvid_port_sources ${pvid_ports}/avr/port.c)
-  set(PVID_C_EXTENSIONS ON)
+  set(PVID_C_EXTENSIONS ON CACHE INTERNAL "GNU extensions")
   target_compile_definitions(pvid_board INTERFACE PVID_TABLE=__flash)
 else()
   # No C library: the compiler's own headers, the two of freestanding/, and the compiler's arithmetic (libgcc).

@@ -5,7 +5,7 @@ set(PVID_CORE_OPTIONS -ffp-contract=off -fno-fast-math)
 
 # Strict C99 (or what CMAKE_C_STANDARD names), without GNU extensions (ISO mode itself forbids excess precision), but
 # for a board whose constants stay in flash only by one of them: PVID_C_EXTENSIONS.
-set(PVID_C_EXTENSIONS OFF)
+set(PVID_C_EXTENSIONS OFF CACHE INTERNAL "GNU extensions") # cache: images are made in the scope of who includes us
 function(pvid_compile_as_core target)
   target_compile_options(${target} PRIVATE ${PVID_CORE_OPTIONS})
   if(NOT CMAKE_C_STANDARD)

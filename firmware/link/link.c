@@ -36,7 +36,7 @@ static void stuff(stuffer *self, const uint8_t bytes[], size_t n)
 
 size_t pvid_link_encode(const pvid_link_frame *frame, uint8_t out[], size_t room)
 {
-    if ((frame->length > PVID_LINK_MAX_PAYLOAD) || (room < PVID_LINK_ENCODED_BYTES(frame->length))) {
+    if ((frame->length > PVID_LINK_MAX_SENT) || (room < PVID_LINK_ENCODED_BYTES(frame->length))) {
         return 0;
     }
     uint8_t header[PVID_LINK_HEADER_BYTES];

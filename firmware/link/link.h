@@ -24,12 +24,15 @@
 
 #include "schema.h"
 
-/* Longest payload [bytes]. RAM: as much in a decoder. The PC's side takes up to 1024. */
+/* Longest payload of any frame [bytes]. */
+#define PVID_LINK_MAX_SENT 2048u
+
+/* Longest payload that a decoder takes [bytes]. RAM: as much in a decoder. The PC's side takes all. */
 #ifndef PVID_LINK_MAX_PAYLOAD
-#define PVID_LINK_MAX_PAYLOAD 1024
+#define PVID_LINK_MAX_PAYLOAD 2048
 #endif
-#if PVID_LINK_MAX_PAYLOAD < 256 || PVID_LINK_MAX_PAYLOAD > 1024
-#error "PVID_LINK_MAX_PAYLOAD must lie in 256..1024"
+#if PVID_LINK_MAX_PAYLOAD < 256 || PVID_LINK_MAX_PAYLOAD > 2048
+#error "PVID_LINK_MAX_PAYLOAD must lie in 256..2048"
 #endif
 
 #define PVID_LINK_HEADER_BYTES 12u
@@ -70,7 +73,7 @@ typedef struct {
 } pvid_link_decoder;
 
 /* Writes the encoded frame with its final 0; returns its length, or 0 and nothing written iff the payload is
- * longer than PVID_LINK_MAX_PAYLOAD or room < PVID_LINK_ENCODED_BYTES(length). */
+ * longer than PVID_LINK_MAX_SENT or room < PVID_LINK_ENCODED_BYTES(length). */
 size_t pvid_link_encode(const pvid_link_frame *frame, uint8_t out[], size_t room);
 
 /* An empty decoder that takes the first frame it meets as the start of the sequence. */

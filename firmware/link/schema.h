@@ -5,30 +5,39 @@
 #define PVID_LINK_VERSION 1u
 
 /* CRC-32 of the text. */
-#define PVID_LINK_SCHEMA 0xC04A322Cu
+#define PVID_LINK_SCHEMA 0xA1646BC5u
 
 #define PVID_LINK_SCHEMA_TEXT \
     "pvid 1\n" \
-    "1 hello form:u8 n_p:u8 window:u16 settings:u32 session:u32 board:char[16]\n" \
+    "1 hello form:u8 core:u8 n_p:u8 window:u16 settings:u32 session:u32 sample_rate:f32 phi_lsb:f32 y_lsb:f32 p_unit:f32[6] board:char[16]\n" \
     "2 schema text:char[]\n" \
-    "3 configure session:u32 settings:u32 form:u8 law:u8 divider:u16 hash_every:u16 estimate_every:u16 start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32\n" \
+    "3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32\n" \
     "4 sample phi_y:f32[]\n" \
     "5 raw phi_y:f32[]\n" \
     "6 estimate session:u32 updates:u32 p:f32[6] covariance:f32[21] kappa:f32 residual_sd:f32 weight:f32 reason:u8\n" \
     "7 status session:u32 code:u8 core:u8 updates:u32 rejected:u32 repeated:u32 skipped:u32 missing:u32 malformed:u32 bad_crc:u32 foreign:u32\n" \
     "8 hash session:u32 hash:u32\n" \
-    "9 credit session:u32 room:u32 hash:u32 reason:u8"
+    "9 credit session:u32 room:u32 hash:u32 reason:u8\n" \
+    "10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 start:i32[6] start_sd:i32[6] lower:i32[6] upper:i32[6] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 y_offset:i32\n" \
+    "11 count phi_y:i32[]\n" \
+    "12 raw_count phi_y:i32[]\n" \
+    "13 estimate_q31 session:u32 updates:u32 p:i32[6] se:i32[6] correlation:i32[21] kappa:i32 residual_sd:i32 weight:u32 reason:u8"
 
 /* Frame types; offsets of their fields and the bytes before an open end. */
 
 #define PVID_HELLO 1u
 #define PVID_HELLO_FORM 0u /* u8 */
-#define PVID_HELLO_N_P 1u /* u8 */
-#define PVID_HELLO_WINDOW 2u /* u16 */
-#define PVID_HELLO_SETTINGS 4u /* u32 */
-#define PVID_HELLO_SESSION 8u /* u32 */
-#define PVID_HELLO_BOARD 12u /* char[16] */
-#define PVID_HELLO_BYTES 28u
+#define PVID_HELLO_CORE 1u /* u8 */
+#define PVID_HELLO_N_P 2u /* u8 */
+#define PVID_HELLO_WINDOW 3u /* u16 */
+#define PVID_HELLO_SETTINGS 5u /* u32 */
+#define PVID_HELLO_SESSION 9u /* u32 */
+#define PVID_HELLO_SAMPLE_RATE 13u /* f32 */
+#define PVID_HELLO_PHI_LSB 17u /* f32 */
+#define PVID_HELLO_Y_LSB 21u /* f32 */
+#define PVID_HELLO_P_UNIT 25u /* f32[6] */
+#define PVID_HELLO_BOARD 49u /* char[16] */
+#define PVID_HELLO_BYTES 65u
 
 #define PVID_SCHEMA 2u
 #define PVID_SCHEMA_TEXT 0u /* char[] */
@@ -38,18 +47,19 @@
 #define PVID_CONFIGURE_SESSION 0u /* u32 */
 #define PVID_CONFIGURE_SETTINGS 4u /* u32 */
 #define PVID_CONFIGURE_FORM 8u /* u8 */
-#define PVID_CONFIGURE_LAW 9u /* u8 */
-#define PVID_CONFIGURE_DIVIDER 10u /* u16 */
-#define PVID_CONFIGURE_HASH_EVERY 12u /* u16 */
-#define PVID_CONFIGURE_ESTIMATE_EVERY 14u /* u16 */
-#define PVID_CONFIGURE_START 16u /* f32[6] */
-#define PVID_CONFIGURE_START_SD 40u /* f32[6] */
-#define PVID_CONFIGURE_LOWER 64u /* f32[6] */
-#define PVID_CONFIGURE_UPPER 88u /* f32[6] */
-#define PVID_CONFIGURE_ROW_SD 112u /* f32 */
-#define PVID_CONFIGURE_FORGETTING_S 116u /* f32 */
-#define PVID_CONFIGURE_FEEDBACK_HZ 120u /* f32 */
-#define PVID_CONFIGURE_BYTES 124u
+#define PVID_CONFIGURE_SOURCE 9u /* u8 */
+#define PVID_CONFIGURE_HASH_EVERY 10u /* u16 */
+#define PVID_CONFIGURE_ESTIMATE_EVERY 12u /* u16 */
+#define PVID_CONFIGURE_DIVIDER 14u /* u16 */
+#define PVID_CONFIGURE_LAW 16u /* u8 */
+#define PVID_CONFIGURE_START 17u /* f32[6] */
+#define PVID_CONFIGURE_START_SD 41u /* f32[6] */
+#define PVID_CONFIGURE_LOWER 65u /* f32[6] */
+#define PVID_CONFIGURE_UPPER 89u /* f32[6] */
+#define PVID_CONFIGURE_ROW_SD 113u /* f32 */
+#define PVID_CONFIGURE_FORGETTING_S 117u /* f32 */
+#define PVID_CONFIGURE_FEEDBACK_HZ 121u /* f32 */
+#define PVID_CONFIGURE_BYTES 125u
 
 #define PVID_SAMPLE 4u
 #define PVID_SAMPLE_PHI_Y 0u /* f32[] */
@@ -96,6 +106,45 @@
 #define PVID_CREDIT_REASON 12u /* u8 */
 #define PVID_CREDIT_BYTES 13u
 
+#define PVID_CONFIGURE_Q31 10u
+#define PVID_CONFIGURE_Q31_SESSION 0u /* u32 */
+#define PVID_CONFIGURE_Q31_SETTINGS 4u /* u32 */
+#define PVID_CONFIGURE_Q31_FORM 8u /* u8 */
+#define PVID_CONFIGURE_Q31_SOURCE 9u /* u8 */
+#define PVID_CONFIGURE_Q31_HASH_EVERY 10u /* u16 */
+#define PVID_CONFIGURE_Q31_ESTIMATE_EVERY 12u /* u16 */
+#define PVID_CONFIGURE_Q31_DIVIDER 14u /* u16 */
+#define PVID_CONFIGURE_Q31_START 16u /* i32[6] */
+#define PVID_CONFIGURE_Q31_START_SD 40u /* i32[6] */
+#define PVID_CONFIGURE_Q31_LOWER 64u /* i32[6] */
+#define PVID_CONFIGURE_Q31_UPPER 88u /* i32[6] */
+#define PVID_CONFIGURE_Q31_ROW_SD 112u /* i32 */
+#define PVID_CONFIGURE_Q31_FORGETTING_GROUPS 116u /* u32 */
+#define PVID_CONFIGURE_Q31_GAIN 120u /* i32 */
+#define PVID_CONFIGURE_Q31_PHI_OFFSET 124u /* i32 */
+#define PVID_CONFIGURE_Q31_Y_OFFSET 128u /* i32 */
+#define PVID_CONFIGURE_Q31_BYTES 132u
+
+#define PVID_COUNT 11u
+#define PVID_COUNT_PHI_Y 0u /* i32[] */
+#define PVID_COUNT_BYTES 0u
+
+#define PVID_RAW_COUNT 12u
+#define PVID_RAW_COUNT_PHI_Y 0u /* i32[] */
+#define PVID_RAW_COUNT_BYTES 0u
+
+#define PVID_ESTIMATE_Q31 13u
+#define PVID_ESTIMATE_Q31_SESSION 0u /* u32 */
+#define PVID_ESTIMATE_Q31_UPDATES 4u /* u32 */
+#define PVID_ESTIMATE_Q31_P 8u /* i32[6] */
+#define PVID_ESTIMATE_Q31_SE 32u /* i32[6] */
+#define PVID_ESTIMATE_Q31_CORRELATION 56u /* i32[21] */
+#define PVID_ESTIMATE_Q31_KAPPA 140u /* i32 */
+#define PVID_ESTIMATE_Q31_RESIDUAL_SD 144u /* i32 */
+#define PVID_ESTIMATE_Q31_WEIGHT 148u /* u32 */
+#define PVID_ESTIMATE_Q31_REASON 152u /* u8 */
+#define PVID_ESTIMATE_Q31_BYTES 153u
+
 /* Status.code */
 #define PVID_CODE_WAITING 0u
 #define PVID_CODE_RUNNING 1u
@@ -103,9 +152,19 @@
 #define PVID_CODE_REFUSED_SETTINGS 3u
 #define PVID_CODE_REFUSED_FORM 4u
 #define PVID_CODE_ARITHMETIC 5u
+#define PVID_CODE_REFUSED_SOURCE 6u
 
 /* Hello.form */
 #define PVID_FORM_STRONG 0u
 #define PVID_FORM_WEAK 1u
+
+/* Hello.core */
+#define PVID_CORE_F32 0u
+#define PVID_CORE_Q31 1u
+
+/* Configure.source */
+#define PVID_SOURCE_PC 0u
+#define PVID_SOURCE_SENSOR 1u
+#define PVID_SOURCE_SENSOR_PACED 2u
 
 #endif

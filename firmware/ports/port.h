@@ -46,6 +46,10 @@ uint32_t pvid_port_instructions(void);
 /* Counts for 1024 instructions (AVR: cycles). */
 uint32_t pvid_port_counts_per_1024(void);
 
+/* Time since some moment [us], modulo 2^32. Call it at least every 90 ms (a 24-bit counter at 168 MHz), else time is
+ * lost. Under -icount it is the emulator's time. */
+uint32_t pvid_port_microseconds(void);
+
 /* Ends the program: an emulator exits with `code` (0..255), a board stops. Does not return. Bytes that
  * were taken by pvid_port_send have left. */
 #if defined(__GNUC__)

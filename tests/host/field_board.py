@@ -22,8 +22,8 @@ from pvid.capture import Run
 from pvid.native import Native, WeakConfig
 from pvid.rig import simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
-from pvid.setup import config_of
-from pvid.target import configure_of
+from pvid.stream_image import settings_number
+from pvid.stream_rig import stream_rig
 
 SAMPLES_A_FRAME = 16
 
@@ -59,15 +59,30 @@ def rig() -> RigFile:
 def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[int, link.Message]]:
     """(tick, message) in the order in which a board sends them."""
     run = field.run
-    config = config_of(rig(), run.sample_rate, standard_start(field.seed))
-    assert isinstance(config, WeakConfig)
-    configure = replace(configure_of(config, field.hash_every, field.estimate_every), session=session)
-    identifier = native.weak(config)
+    image = stream_rig(rig(), run.sample_rate, start=standard_start(field.seed))
+    assert isinstance(image.config, WeakConfig)
+    settings = settings_number(image)
+    sent = image.configure(settings, field.hash_every, field.estimate_every, link.Source.SENSOR)
+    configure = replace(sent, session=session)
+    hello = link.Hello(
+        form=link.Form.WEAK,
+        core=link.Core.F32,
+        n_p=image.n_p,
+        window=256,
+        settings=settings,
+        session=session,
+        sample_rate=image.sample_rate,
+        phi_lsb=image.phi_lsb,
+        y_lsb=image.y_lsb,
+        p_unit=image.p_unit,
+        board="field",
+    )
+    identifier = native.weak(image.config)
     phi, y = run.phi.astype(np.float32)[: field.ticks], run.y.astype(np.float32)[: field.ticks]
     reason = 0
     for first in range(0, field.ticks, SAMPLES_A_FRAME):
         if first % field.hello_every < SAMPLES_A_FRAME:
-            yield first, link.Hello(1, len(config.estimator.start), 256, configure.settings, session, "field")
+            yield first, hello
             yield first, link.Schema(link.SCHEMA_TEXT.encode())
             yield first, configure
             yield first, link.Status(session, link.Code.RUNNING, 0, identifier.counters["updates"], *[0] * 7)

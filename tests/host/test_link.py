@@ -22,7 +22,9 @@ C = ctypes.CDLL(str(default_library()))
 HEAD = struct.Struct("<BHIH")
 
 payloads = st.integers(0, link.MAX_PAYLOAD).flatmap(lambda n: st.binary(min_size=n, max_size=n))
-repetitive = st.builds(lambda piece, n: (piece * 1024)[:n], st.binary(min_size=1, max_size=300), st.integers(0, 1024))
+repetitive = st.builds(
+    lambda piece, n: (piece * 2048)[:n], st.binary(min_size=1, max_size=300), st.integers(0, link.MAX_PAYLOAD)
+)
 frames = st.tuples(
     st.integers(0, 255), st.integers(0, 0xFFFF), st.integers(0, 0xFFFFFFFF), st.one_of(payloads, repetitive)
 )
@@ -31,7 +33,7 @@ FUZZ_RUNS = 100_000
 
 
 def c_encode(number: int, sequence: int, tick: int, payload: bytes) -> bytes:
-    out = ctypes.create_string_buffer(1100)
+    out = ctypes.create_string_buffer(2 * link.MAX_PAYLOAD)
     n = C.pvid_native_link_encode(
         number, sequence, ctypes.c_uint32(tick), payload, len(payload), out, ctypes.c_uint32(len(out))
     )
@@ -83,7 +85,7 @@ def test_c_and_python_encode_the_same_bytes(frame: tuple[int, int, int, bytes]) 
 @pytest.mark.parametrize("fill", [b"\0", b"\1", b"\xff", b"\1" * 253 + b"\0", b"\1" * 254 + b"\0"])
 def test_every_length_encodes_alike_and_decodes(fill: bytes) -> None:
     for n in range(link.MAX_PAYLOAD + 1):
-        frame = (4, n, 7, (fill * 1025)[:n])
+        frame = (4, n, 7, (fill * 2048)[:n])
         encoded = link.encode_raw(*frame)
         assert c_encode(*frame) == encoded
         assert c_decode(encoded)[0] == [frame]
@@ -156,10 +158,16 @@ def test_messages_survive_the_way() -> None:
     values = np.array([[1.5, -2.0], [np.float32(1e-45), 3e38]], np.float32)
     sample = link.Sample.of_values(values[:, 0], values[:, 1])
     estimate = link.Estimate(9, 4, (1.0, 2.0, 3.0, 4.0, 0.0, 0.0), tuple(map(float, range(21))), 0.5, 0.25, 8.0, 2)
-    hello = link.Hello(form=1, n_p=4, window=256, settings=5, session=0, board="mps2-an386")
-    data = b"".join(link.encode(m, i, i) for i, m in enumerate([sample, estimate, hello]))
+    unit = (0.5, 1.0, 1.0, 2.0**-40, 0.0, 0.0)
+    hello = link.Hello(1, 1, 4, 256, 5, 0, 1000.0, 2.0**-11, 2.0**-17, unit, "mps2-an386")
+    extremes = (-(2**31), 2**31 - 1, -1, 0, 1, 2)
+    fixed = link.ConfigureQ31(7, 5, 1, 2, 500, 0, 1, extremes, extremes, extremes, extremes, 3, 2**32 - 1, 2**30, -5, 6)
+    counts = link.RawCount.of_values(extremes[:3], extremes[3:])
+    sent = [sample, estimate, hello, fixed, counts]
+    data = b"".join(link.encode(m, i, i) for i, m in enumerate(sent))
     got = [item for item in link.Decoder().feed(data) if isinstance(item, link.Frame)]
-    assert [frame.message for frame in got] == [sample, estimate, hello]
+    assert [frame.message for frame in got] == sent
+    assert counts.values.tolist() == [[-(2**31), 0], [2**31 - 1, 1], [-1, 2]]
     assert isinstance(got[0].message, link.Sample)
     assert np.array_equal(got[0].message.values, values)
 

@@ -83,6 +83,14 @@ def test_the_counter_counts_instructions(board: Board) -> None:
 
 
 @boards
+def test_the_clock_goes_with_the_instructions(board: Board) -> None:
+    ns_an_instruction = {"cortex-m": 256.0, "riscv": 1.0, "avr": 62.5}[board.toolchain]  # -icount; cycles of 16 MHz
+    shortest = 50_000 * ns_an_instruction / 1000
+    around = 0.3 if board.toolchain == "avr" else 0.1  # the loop and the call; divisions take an AVR 600 cycles
+    assert shortest - 1 <= numbers(ask(board, b"tx\0"))["microseconds"] <= (1 + around) * shortest + 1
+
+
+@boards
 def test_a_deep_call_is_seen_in_the_paint(board: Board) -> None:
     found = numbers(ask(board, b"sx\0"))
     assert found["last"] == 255

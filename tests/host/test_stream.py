@@ -16,8 +16,11 @@ import numpy.typing as npt
 import pytest
 
 from pvid.errors import PvidError
-from pvid.native import Native, StrongConfig, WeakConfig
-from pvid.replay_image import ReplayRun, native_hashes, standard_run
+from pvid.link import Estimate
+from pvid.native import Native, WeakConfig
+from pvid.replay_image import SAMPLE_RATE, ReplayRun, native_hashes, standard_run
+from pvid.rig import STANDARD_PENDULUM
+from pvid.stream_rig import StreamRig
 from pvid.target import HOST_TARGET, Playback, Port, Target, judge, open_target, play
 
 TICKS = 5000
@@ -38,28 +41,42 @@ def form(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-def config_for(run: ReplayRun) -> StrongConfig | WeakConfig:
-    """Its configuration; the link carries float32 alone."""
-    assert isinstance(run.config, StrongConfig | WeakConfig)
-    return run.config
+def rig_of(run: ReplayRun) -> StreamRig:
+    """What an image is made for that plays it."""
+    return StreamRig(
+        config=run.config if run.fixed is None else run.fixed,
+        sample_rate=SAMPLE_RATE[run.form],
+        l1=STANDARD_PENDULUM.l1,
+        phi_lsb=float(run.phi_lsb),
+        y_lsb=float(run.y_lsb),
+    )
 
 
-def expected(form: str, native: Native) -> npt.NDArray[np.uint32]:
-    return native_hashes(standard_run(form, TICKS), native)
+def standard_rig(form: str, core: str = "f32") -> StreamRig:
+    return rig_of(standard_run(form, TICKS, core))
+
+
+def expected(form: str, native: Native, core: str = "f32") -> npt.NDArray[np.uint32]:
+    return native_hashes(standard_run(form, TICKS, core), native)
 
 
 def play_standard(
-    target: Target, form: str, reopen: Callable[[], Target] | None = None, patience_s: float = 30.0
+    target: Target,
+    form: str,
+    core: str = "f32",
+    reopen: Callable[[], Target] | None = None,
+    patience_s: float = 30.0,
 ) -> Playback:
-    run = standard_run(form, TICKS)
-    return play(target, config_for(run), run.phi, run.y, reopen=reopen, patience_s=patience_s, resend_s=0.5)
+    run = standard_run(form, TICKS, core)
+    phi, y = (run.phi, run.y) if core == "f32" else (run.counts[:, 0], run.counts[:, 1])
+    return play(target, rig_of(run), phi, y, reopen=reopen, patience_s=patience_s, resend_s=0.5)
 
 
+@pytest.mark.parametrize(("form", "core"), [("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31")])
 @pytest.mark.parametrize("name", [HOST_TARGET, *EMULATED])
-def test_every_target_computes_the_bits_of_the_host(name: str, form: str, native: Native) -> None:
-    run = standard_run(form, TICKS)
-    playback = play_standard(open_target(name, config_for(run)), form)
-    verdict = judge(playback, expected(form, native))
+def test_every_target_computes_the_bits_of_the_host(name: str, form: str, core: str, native: Native) -> None:
+    playback = play_standard(open_target(name, standard_rig(form, core)), form, core)
+    verdict = judge(playback, expected(form, native, core))
     assert verdict.equal, verdict.text
     assert playback.missing_hashes == []
     assert (playback.done, playback.restarts) == (TICKS, 0)
@@ -68,12 +85,12 @@ def test_every_target_computes_the_bits_of_the_host(name: str, form: str, native
 
 def test_the_last_estimate_is_that_of_the_core(native: Native) -> None:
     run = standard_run("weak", TICKS)
-    config = config_for(run)
-    assert isinstance(config, WeakConfig)
-    identifier = native.weak(config)
+    assert isinstance(run.config, WeakConfig)
+    identifier = native.weak(run.config)
     identifier.run(run.phi, run.y)
     last = identifier.assess()
-    estimate = play_standard(open_target(HOST_TARGET, config_for(run)), "weak").estimates[TICKS]
+    estimate = play_standard(open_target(HOST_TARGET, rig_of(run)), "weak").estimates[TICKS]
+    assert isinstance(estimate, Estimate)
     assert np.array_equal(np.array(estimate.p, np.float32), last["p"])
     upper = last["covariance"][np.triu_indices(6)]
     assert np.array_equal(np.array(estimate.covariance, np.float32), upper)
@@ -111,9 +128,8 @@ class Faulty:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_line_that_spoils_bytes_changes_no_bit(form: str, seed: int, native: Native) -> None:
-    run = standard_run(form, TICKS)
     random = np.random.default_rng(seed)
-    target = open_target(HOST_TARGET, config_for(run), lambda port: Faulty(port, 1e-4, random))
+    target = open_target(HOST_TARGET, standard_rig(form), lambda port: Faulty(port, 1e-4, random))
     playback = play_standard(target, form)
     verdict = judge(playback, expected(form, native))
     assert verdict.equal, verdict.text
@@ -143,7 +159,7 @@ class KilledMidway:
 
 
 def start_to_be_killed(name: str, form: str, after: int) -> Target:
-    target = open_target(name, config_for(standard_run(form, TICKS)))
+    target = open_target(name, standard_rig(form))
 
     def kill() -> None:
         assert target.process is not None
@@ -156,9 +172,9 @@ def start_to_be_killed(name: str, form: str, after: int) -> Target:
 
 @pytest.mark.parametrize("name", [HOST_TARGET, "mps2-an386"])
 def test_a_killed_emulator_is_started_again_and_the_run_over(name: str, form: str, native: Native) -> None:
-    config = config_for(standard_run(form, TICKS))
+    rig = standard_rig(form)
     playback = play_standard(
-        start_to_be_killed(name, form, 20_000), form, lambda: open_target(name, config), patience_s=10
+        start_to_be_killed(name, form, 20_000), form, reopen=lambda: open_target(name, rig), patience_s=10
     )
     verdict = judge(playback, expected(form, native))
     assert verdict.equal, verdict.text
@@ -186,24 +202,29 @@ def silent_port() -> Iterator[str]:
 
 
 def test_a_silent_port_ends_in_bounded_time(silent_port: str, native: Native) -> None:
-    config = config_for(standard_run("weak", TICKS))
     began = time.monotonic()
-    playback = play_standard(open_target(silent_port, config), "weak", patience_s=2)
+    playback = play_standard(open_target(silent_port, standard_rig("weak")), "weak", patience_s=2)
     assert time.monotonic() - began < 10
     assert not judge(playback, expected("weak", native)).equal
     assert "no answer for 2 s" in playback.account
 
 
 def test_an_image_for_other_settings_is_refused() -> None:
-    run = standard_run("weak", TICKS)
-    other = replace(config_for(run), l1=0.31)
+    run, rig = standard_run("weak", TICKS), standard_rig("weak")
     with pytest.raises(PvidError, match="made for other settings"):
-        play(open_target(HOST_TARGET, config_for(run)), other, run.phi, run.y)
+        play(open_target(HOST_TARGET, rig), replace(rig, l1=0.31), run.phi, run.y)
+
+
+def test_an_image_with_the_other_core_is_refused() -> None:
+    run = standard_run("weak", TICKS)
+    with pytest.raises(PvidError, match="the other form or the other core"):
+        play(open_target(HOST_TARGET, standard_rig("weak", "q31")), standard_rig("weak"), run.phi, run.y)
 
 
 def test_what_the_core_refuses_is_named() -> None:
-    run = standard_run("weak", TICKS)
-    bad = replace(config_for(run), estimator=replace(config_for(run).estimator, row_sd=-1.0))
+    run, rig = standard_run("weak", TICKS), standard_rig("weak")
+    assert isinstance(rig.config, WeakConfig)
+    bad = replace(rig, config=replace(rig.config, estimator=replace(rig.config.estimator, row_sd=-1.0)))
     with pytest.raises(PvidError, match="bad row sd"):
         play(open_target(HOST_TARGET, bad), bad, run.phi, run.y)
 
@@ -212,7 +233,7 @@ def test_a_wrong_bit_is_not_called_equal(native: Native) -> None:
     run = standard_run("weak", TICKS)
     phi = run.phi.copy()
     phi[2600] += run.phi_lsb  # one step of the encoder, once
-    playback = play(open_target(HOST_TARGET, config_for(run)), config_for(run), phi, run.y)
+    playback = play(open_target(HOST_TARGET, rig_of(run)), rig_of(run), phi, run.y)
     verdict = judge(playback, expected("weak", native))
     assert not verdict.equal
     assert verdict.first is not None and 2500 <= verdict.first[0] < verdict.first[1]
@@ -220,9 +241,9 @@ def test_a_wrong_bit_is_not_called_equal(native: Native) -> None:
 
 def test_an_unknown_target_is_named() -> None:
     with pytest.raises(PvidError, match="there is no target mps2; there are stream-host, microbit"):
-        open_target("mps2", config_for(standard_run("weak", TICKS)))
+        open_target("mps2", standard_rig("weak"))
     with pytest.raises(PvidError, match="cannot open the port /dev/nowhere"):
-        open_target("/dev/nowhere", config_for(standard_run("weak", TICKS)))
+        open_target("/dev/nowhere", standard_rig("weak"))
 
 
 def test_identify_and_compare_on_targets(tmp_path: Path) -> None:
@@ -234,7 +255,12 @@ def test_identify_and_compare_on_targets(tmp_path: Path) -> None:
     done = pvid("identify", "run.csv", "--rig", "run.toml", "--on", "mps2-an386", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["on"] == "mps2-an386"
-    both = pvid("compare", "run.csv", "--rig", "run.toml", "--on", HOST_TARGET, "--on", "virt-rv32imac")
+    fixed = pvid("identify", "run.csv", "--rig", "run.toml", "--core", "q31", "--on", "virt-rv32imac", "--json")
+    assert fixed.returncode == 0, fixed.stderr
+    assert json.loads(fixed.stdout)["core"] == "q31"
+    both = pvid(
+        "compare", "run.csv", "--rig", "run.toml", "--core", "all", "--on", HOST_TARGET, "--on", "virt-rv32imac"
+    )
     assert both.returncode == 0, both.stderr
-    assert both.stdout.count("equal") == 6 and "DIFFERENT" not in both.stdout
+    assert both.stdout.count("equal") == 12 and "DIFFERENT" not in both.stdout
     assert pvid("identify", "run.csv", "--rig", "run.toml", "--on", "nowhere").returncode == 2

@@ -40,6 +40,18 @@ static void count_instructions(void)
     report_number("counts_per_1024", pvid_port_counts_per_1024());
 }
 
+/* 't': what the clock makes of 50 000 instructions and those of the loop around them. */
+static void time_instructions(void)
+{
+    const uint32_t from = pvid_port_microseconds();
+    uint32_t to = from;
+    for (volatile uint8_t round = 0; round < 50u; round++) {
+        __asm__ volatile(TEN(TEN(TEN("nop\n\t"))));
+        to = pvid_port_microseconds();
+    }
+    report_number("microseconds", to - from);
+}
+
 /* 's': how deep the stack has been, before and after a call that is n bytes deep. */
 static __attribute__((noinline)) uint8_t deep(size_t n)
 {
@@ -106,6 +118,9 @@ int main(void)
         case 'm':
             report_hex("initialised", initialised);
             report_hex("cleared", cleared);
+            break;
+        case 't':
+            time_instructions();
             break;
         case 's':
             measure_stack();

@@ -1,9 +1,14 @@
-/* The identifier behind a serial link: the PC configures it and sends samples, the board steps and answers with
- * credits, running hashes, estimates and its status. Frames: link.h and schema.h.
+/* The identifier behind a serial link: the PC configures it; samples come from the PC, or the board samples by
+ * itself (field mode); the board steps and answers with running hashes, estimates and its status. Frames: link.h and
+ * schema.h; what they mean: host/src/pvid/link.py.
  *
- * No sample is lost: samples are numbered, only the next one is taken, and each credit says which that is and how
- * many may be under way. What a line swallows or spoils is sent again; what comes twice is counted and left out.
- * Every answer carries the session number of the configuration, so that a board that has restarted is noticed.
+ * From the PC no sample is lost: samples are numbered, only the next one is taken, and each credit says which that is
+ * and how many may be under way. What a line swallows or spoils is sent again; what comes twice is counted and left
+ * out. Every answer carries the session number of the configuration, so that a board that has restarted is noticed.
+ *
+ * In field mode each sample goes to the PC exactly as the identifier gets it, before the hash or the estimate that it
+ * is part of. In time (PVID_SOURCE_SENSOR) nothing waits for the line: a frame that does not fit is dropped, and the
+ * PC counts it. What a PC that joins late has to know is said again every ANNOUNCE_S seconds.
  *
  * stream_rig.h (pvid.stream_image makes it) holds the settings and tables; Configure brings the start and the law.
  * The PC's Configure is refused when it was made for other settings. The host runs the same program on a
@@ -12,48 +17,54 @@
 #include <string.h>
 
 #include "answers.h"
+#include "identifier.h"
 #include "link.h"
-#include "pvid/little_endian.h"
 #include "port.h"
-#include "pvid/pvid.h"
-#include "stream_rig.h"
+#include "pvid/little_endian.h"
+#include "sensor.h"
 
-#if STREAM_WEAK
-typedef pvid_weak_f32 identifier_f32;
-typedef pvid_weak_config_f32 config_f32;
-#define INIT pvid_weak_init_f32
-#define STEP pvid_weak_step_f32
-#define FORM PVID_FORM_WEAK
-#else
-typedef pvid_strong_f32 identifier_f32;
-typedef pvid_strong_config_f32 config_f32;
-#define INIT pvid_strong_init_f32
-#define STEP pvid_strong_step_f32
-#define FORM PVID_FORM_STRONG
-#endif
-
-#define WINDOW 256u       /* samples that may be under way */
-#define SAMPLE_PAIR 8u    /* bytes of phi and y */
-#define LINK_MAX_P 6u     /* places for parameters in a frame */
-#define ANSWER_ROOM 1280u /* all that one sample or one question may be answered with */
+#define WINDOW 256u      /* samples that may be under way */
+#define RAW_SAMPLES 32u  /* that go to the PC in a frame */
+#define ANSWER_ROOM 640u /* all that one sample or one question may be answered with, but for announcements */
 #define CHUNK 64u
+#define ANNOUNCE_S 4u
 
-#if PVID_MAX_P > 6
-#error "the frames hold six parameters"
-#endif
+#define PERIOD_NS ((uint32_t)(1.0e9f / STREAM_SAMPLE_RATE))
+#define BACKLOG_NS 1000000000u /* of samples that are due: what is more is not taken any more */
+#define ANNOUNCE_TICKS ((uint32_t)((float)ANNOUNCE_S * STREAM_SAMPLE_RATE))
+
+/* Both cores' Configure begin alike. */
+typedef char configurations_begin_alike[((PVID_CONFIGURE_SESSION == PVID_CONFIGURE_Q31_SESSION) &&
+                                         (PVID_CONFIGURE_SETTINGS == PVID_CONFIGURE_Q31_SETTINGS) &&
+                                         (PVID_CONFIGURE_FORM == PVID_CONFIGURE_Q31_FORM) &&
+                                         (PVID_CONFIGURE_SOURCE == PVID_CONFIGURE_Q31_SOURCE) &&
+                                         (PVID_CONFIGURE_HASH_EVERY == PVID_CONFIGURE_Q31_HASH_EVERY) &&
+                                         (PVID_CONFIGURE_ESTIMATE_EVERY == PVID_CONFIGURE_Q31_ESTIMATE_EVERY))
+                                            ? 1
+                                            : -1];
+
+/* What is still to be announced, in this order. */
+#define DUE_HELLO 1u
+#define DUE_SCHEMA 2u
+#define DUE_CONFIGURATION 4u
+#define DUE_STATUS 8u
+#define DUE_ALL 15u
 
 static struct {
     answers out;
     pvid_link_decoder decoder;
-    identifier_f32 identifier;
+    uint8_t due;
+    uint8_t configuration[IDENTIFIER_CONFIGURE_BYTES]; /* in force */
     uint32_t session;
     uint8_t code;
+    uint8_t source;
     pvid_status core;
     uint16_t hash_every;
     uint16_t estimate_every;
     uint32_t ticks; /* samples worked off: the number of the next one */
     uint32_t hash;
-    pvid_reason reason;
+    pvid_reason reason;  /* of the last tick */
+    pvid_reason verdict; /* of the last one that was more than a row accumulated */
     uint32_t repeated;
     uint32_t skipped;
     pvid_link_frame samples; /* the frame in work */
@@ -61,29 +72,47 @@ static struct {
     uint32_t count;          /* of its samples; 0: none is in work */
 } stream;
 
+static struct {
+    uint32_t clock_us; /* at the last look */
+    uint32_t due_ns;   /* time that has passed and is not sampled yet */
+    uint32_t count;    /* samples in raw, the last ones before stream.ticks */
+    uint8_t raw[SAMPLE_BYTES * RAW_SAMPLES];
+} field;
+
 /* ---- answers */
+
+static void answer(uint8_t type, const uint8_t payload[], size_t length)
+{
+    answers_put(&stream.out, type, stream.ticks, payload, length);
+}
 
 static void answer_hello(void)
 {
     static const char board[] = PVID_BOARD_NAME;
-    static const char schema[] = PVID_LINK_SCHEMA_TEXT;
+    static const float p_unit[LINK_MAX_P] = STREAM_P_UNIT;
     uint8_t payload[PVID_HELLO_BYTES];
     memset(payload, 0, sizeof payload);
-    payload[PVID_HELLO_FORM] = FORM;
+    payload[PVID_HELLO_FORM] = STREAM_FORM;
+    payload[PVID_HELLO_CORE] = STREAM_CORE;
     payload[PVID_HELLO_N_P] = STREAM_N_P;
     pvid_put_u16(&payload[PVID_HELLO_WINDOW], WINDOW);
     pvid_put_u32(&payload[PVID_HELLO_SETTINGS], STREAM_SETTINGS);
     pvid_put_u32(&payload[PVID_HELLO_SESSION], stream.session);
+    pvid_put_f32(&payload[PVID_HELLO_SAMPLE_RATE], STREAM_SAMPLE_RATE);
+    pvid_put_f32(&payload[PVID_HELLO_PHI_LSB], STREAM_PHI_LSB);
+    pvid_put_f32(&payload[PVID_HELLO_Y_LSB], STREAM_Y_LSB);
+    for (size_t i = 0; i < LINK_MAX_P; i++) {
+        pvid_put_f32(&payload[PVID_HELLO_P_UNIT + (4u * i)], p_unit[i]);
+    }
     for (size_t i = 0; (i < (sizeof board - 1u)) && (i < (PVID_HELLO_BYTES - PVID_HELLO_BOARD)); i++) {
         payload[PVID_HELLO_BOARD + i] = (uint8_t)board[i];
     }
-    answers_put(&stream.out, PVID_HELLO, stream.ticks, payload, sizeof payload);
-    answers_put(&stream.out, PVID_SCHEMA, stream.ticks, (const uint8_t *)schema, sizeof schema - 1u);
+    answer(PVID_HELLO, payload, sizeof payload);
 }
 
 static void answer_status(void)
 {
-    const pvid_counters *counters = &stream.identifier.estimator.counters;
+    const pvid_counters *counters = identifier_counters();
     const pvid_link_counters *received = &stream.decoder.counters;
     uint8_t payload[PVID_STATUS_BYTES];
     pvid_put_u32(&payload[PVID_STATUS_SESSION], stream.session);
@@ -97,7 +126,7 @@ static void answer_status(void)
     pvid_put_u32(&payload[PVID_STATUS_MALFORMED], received->malformed);
     pvid_put_u32(&payload[PVID_STATUS_BAD_CRC], received->bad_crc);
     pvid_put_u32(&payload[PVID_STATUS_FOREIGN], received->foreign);
-    answers_put(&stream.out, PVID_STATUS, stream.ticks, payload, sizeof payload);
+    answer(PVID_STATUS, payload, sizeof payload);
 }
 
 static void answer_credit(void)
@@ -107,7 +136,7 @@ static void answer_credit(void)
     pvid_put_u32(&payload[PVID_CREDIT_ROOM], WINDOW);
     pvid_put_u32(&payload[PVID_CREDIT_HASH], stream.hash);
     payload[PVID_CREDIT_REASON] = (uint8_t)stream.reason;
-    answers_put(&stream.out, PVID_CREDIT, stream.ticks, payload, sizeof payload);
+    answer(PVID_CREDIT, payload, sizeof payload);
 }
 
 static void answer_hash(void)
@@ -115,94 +144,181 @@ static void answer_hash(void)
     uint8_t payload[PVID_HASH_BYTES];
     pvid_put_u32(&payload[PVID_HASH_SESSION], stream.session);
     pvid_put_u32(&payload[PVID_HASH_HASH], stream.hash);
-    answers_put(&stream.out, PVID_HASH, stream.ticks, payload, sizeof payload);
+    answer(PVID_HASH, payload, sizeof payload);
 }
 
 static void answer_estimate(void)
 {
-    pvid_estimate_f32 estimate;
-    uint8_t payload[PVID_ESTIMATE_BYTES];
-    memset(payload, 0, sizeof payload);
-    pvid_estimator_assess_f32(&stream.identifier.estimator, &estimate);
-    pvid_put_u32(&payload[PVID_ESTIMATE_SESSION], stream.session);
-    pvid_put_u32(&payload[PVID_ESTIMATE_UPDATES], stream.identifier.estimator.counters.updates);
-    size_t at = PVID_ESTIMATE_COVARIANCE;
-    for (size_t i = 0; i < LINK_MAX_P; i++) {
-        for (size_t j = i; j < LINK_MAX_P; j++) {
-            if (j < STREAM_N_P) {
-                pvid_put_f32(&payload[at], estimate.covariance[i][j]);
-            }
-            at += 4u;
-        }
-        if (i < STREAM_N_P) {
-            pvid_put_f32(&payload[PVID_ESTIMATE_P + (4u * i)], estimate.p[i]);
-        }
+    uint8_t payload[IDENTIFIER_ESTIMATE_BYTES];
+    identifier_estimate(payload, stream.session, stream.verdict);
+    answer(IDENTIFIER_ESTIMATE, payload, sizeof payload);
+}
+
+static void answer_raw(void)
+{
+    if (field.count > 0u) {
+        answers_put(&stream.out, IDENTIFIER_RAW, stream.ticks - field.count, field.raw, SAMPLE_BYTES * field.count);
+        field.count = 0;
     }
-    pvid_put_f32(&payload[PVID_ESTIMATE_KAPPA], estimate.kappa);
-    pvid_put_f32(&payload[PVID_ESTIMATE_RESIDUAL_SD], estimate.residual_sd);
-    pvid_put_f32(&payload[PVID_ESTIMATE_WEIGHT], estimate.weight);
-    payload[PVID_ESTIMATE_REASON] = (uint8_t)stream.reason;
-    answers_put(&stream.out, PVID_ESTIMATE, stream.ticks, payload, sizeof payload);
+}
+
+static bool running(void)
+{
+    return stream.code == PVID_CODE_RUNNING;
+}
+
+static bool sampling(void)
+{
+    return running() && (stream.source != PVID_SOURCE_PC);
+}
+
+/* Says one of the things that are due, as soon as there is room for it. */
+static void announce(void)
+{
+    static const char schema[] = PVID_LINK_SCHEMA_TEXT;
+    const uint8_t first = (uint8_t)(stream.due & (0u - stream.due));
+    const size_t longest = (first == DUE_SCHEMA) ? (sizeof schema - 1u) : (size_t)IDENTIFIER_CONFIGURE_BYTES;
+    if ((first == 0u) || !answers_fit(&stream.out, PVID_LINK_ENCODED_BYTES(longest))) {
+        return;
+    }
+    stream.due = (uint8_t)(stream.due - first);
+    if (first == DUE_HELLO) {
+        answer_hello();
+    } else if (first == DUE_SCHEMA) {
+        answer(PVID_SCHEMA, (const uint8_t *)schema, sizeof schema - 1u);
+    } else if (first == DUE_STATUS) {
+        answer_status();
+    } else if (sampling()) {
+        answer(IDENTIFIER_CONFIGURE, stream.configuration, sizeof stream.configuration);
+    } else {
+        /* the PC knows what it configured */
+    }
+}
+
+/* ---- steps */
+
+static void step(const uint8_t sample[SAMPLE_BYTES])
+{
+    stream.reason = identifier_step(sample);
+    if (stream.reason != PVID_ACCUMULATED) {
+        stream.verdict = stream.reason;
+    }
+    stream.hash = identifier_hash(stream.hash, stream.reason);
+    stream.ticks++;
+    const bool hash_due = (stream.hash_every != 0u) && ((stream.ticks % stream.hash_every) == 0u);
+    const bool estimate_due = (stream.estimate_every != 0u) && ((stream.ticks % stream.estimate_every) == 0u);
+    if (hash_due || estimate_due || (field.count == RAW_SAMPLES)) {
+        answer_raw();
+    }
+    if (hash_due) {
+        answer_hash();
+    }
+    if (estimate_due) {
+        answer_estimate();
+    }
+}
+
+/* The next sample of the frame in work. */
+static void step_sent(void)
+{
+    step(&stream.samples.payload[SAMPLE_BYTES * stream.taken]);
+    stream.taken++;
+    if (stream.taken == stream.count) {
+        stream.count = 0;
+        answer_credit();
+    }
+}
+
+/* The next sample of the board's own sensor. */
+static void step_field(void)
+{
+    int32_t counts[2];
+    uint8_t *sample = &field.raw[SAMPLE_BYTES * field.count];
+    sensor_read(counts);
+    identifier_sample(counts, sample);
+    field.count++;
+    step(sample);
+    if ((stream.ticks % ANNOUNCE_TICKS) == 0u) {
+        stream.due = DUE_ALL;
+    }
+}
+
+/* Whether it is time for a sample of the board's own: in time, or as soon as all that it may be answered with fits. */
+static bool sample_due(bool room)
+{
+    if (stream.source == PVID_SOURCE_SENSOR_PACED) {
+        return room && (stream.due == 0u);
+    }
+    const uint32_t now = pvid_port_microseconds();
+    const uint32_t passed_us = now - field.clock_us;
+    field.clock_us = now;
+    const uint32_t room_us = (BACKLOG_NS - field.due_ns) / 1000u;
+    field.due_ns += 1000u * ((passed_us < room_us) ? passed_us : room_us);
+    if (field.due_ns < PERIOD_NS) {
+        return false;
+    }
+    field.due_ns -= PERIOD_NS;
+    return true;
 }
 
 /* ---- what comes from the PC */
 
-static void get_floats(float to[], const uint8_t from[])
+static void start_over(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES])
 {
-    for (size_t i = 0; i < STREAM_N_P; i++) {
-        to[i] = pvid_get_f32(&from[4u * i]);
+    stream.core = identifier_start(payload);
+    stream.code = (stream.core == PVID_OK) ? PVID_CODE_RUNNING : PVID_CODE_REFUSED_BY_CORE;
+    if (sampling()) {
+        memcpy(stream.configuration, payload, sizeof stream.configuration);
+        stream.due = DUE_ALL;
+        sensor_start();
+        field.clock_us = pvid_port_microseconds();
+        field.due_ns = 0;
     }
 }
 
-static void start_over(const uint8_t payload[PVID_CONFIGURE_BYTES])
-{
-    config_f32 config = stream_config;
-    pvid_estimator_config_f32 *estimator = &config.estimator;
-    get_floats(estimator->start, &payload[PVID_CONFIGURE_START]);
-    get_floats(estimator->start_sd, &payload[PVID_CONFIGURE_START_SD]);
-    get_floats(estimator->lower, &payload[PVID_CONFIGURE_LOWER]);
-    get_floats(estimator->upper, &payload[PVID_CONFIGURE_UPPER]);
-    estimator->row_sd = pvid_get_f32(&payload[PVID_CONFIGURE_ROW_SD]);
-    estimator->forgetting_s = pvid_get_f32(&payload[PVID_CONFIGURE_FORGETTING_S]);
-    estimator->feedback_hz = pvid_get_f32(&payload[PVID_CONFIGURE_FEEDBACK_HZ]);
-    estimator->law =
-        (payload[PVID_CONFIGURE_LAW] == (uint8_t)PVID_LAW_STATIONARY) ? PVID_LAW_STATIONARY : PVID_LAW_PSEUDOVELOCITY;
-    estimator->divider = pvid_get_u16(&payload[PVID_CONFIGURE_DIVIDER]);
-    stream.core = INIT(&stream.identifier, &config);
-    stream.code = (stream.core == PVID_OK) ? PVID_CODE_RUNNING : PVID_CODE_REFUSED_BY_CORE;
-}
-
-static void configure(const uint8_t payload[PVID_CONFIGURE_BYTES])
+static void configure(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES])
 {
     const uint32_t session = pvid_get_u32(&payload[PVID_CONFIGURE_SESSION]);
-    if ((session == stream.session) && (stream.code == PVID_CODE_RUNNING)) {
+    if ((session == stream.session) && running()) {
         return; /* sent again because the answer was lost */
     }
+    answer_raw();
     stream.session = session;
+    stream.source = payload[PVID_CONFIGURE_SOURCE];
     stream.hash_every = pvid_get_u16(&payload[PVID_CONFIGURE_HASH_EVERY]);
     stream.estimate_every = pvid_get_u16(&payload[PVID_CONFIGURE_ESTIMATE_EVERY]);
     stream.ticks = 0;
     stream.hash = PVID_FNV_START;
     stream.reason = PVID_WARMING_UP;
+    stream.verdict = PVID_WARMING_UP;
     stream.repeated = 0;
     stream.skipped = 0;
-    if (pvid_arithmetic_faults_f32() != 0u) {
+    if (identifier_arithmetic_faults() != 0u) {
         stream.code = PVID_CODE_ARITHMETIC;
-    } else if (payload[PVID_CONFIGURE_FORM] != FORM) {
+    } else if (payload[PVID_CONFIGURE_FORM] != STREAM_FORM) {
         stream.code = PVID_CODE_REFUSED_FORM;
     } else if (pvid_get_u32(&payload[PVID_CONFIGURE_SETTINGS]) != STREAM_SETTINGS) {
         stream.code = PVID_CODE_REFUSED_SETTINGS;
+    } else if (stream.source > PVID_SOURCE_SENSOR_PACED) {
+        stream.code = PVID_CODE_REFUSED_SOURCE;
     } else {
         start_over(payload);
     }
 }
 
+/* The other core's Configure. */
+static void refuse(const uint8_t payload[])
+{
+    stream.session = pvid_get_u32(&payload[PVID_CONFIGURE_SESSION]);
+    stream.code = PVID_CODE_REFUSED_FORM;
+}
+
 /* Takes a frame of samples into work if it holds the next one. */
 static void take(const pvid_link_frame *frame)
 {
-    const uint32_t n = (uint32_t)(frame->length / SAMPLE_PAIR);
+    const uint32_t n = (uint32_t)(frame->length / SAMPLE_BYTES);
     const uint32_t known = stream.ticks - frame->tick;
-    if (stream.code != PVID_CODE_RUNNING) {
+    if (!running() || sampling()) {
         answer_status();
     } else if (frame->tick > stream.ticks) {
         stream.skipped++;
@@ -220,16 +336,20 @@ static void take(const pvid_link_frame *frame)
 
 static void obey(const pvid_link_frame *frame)
 {
-    if ((frame->type == PVID_CONFIGURE) && (frame->length == PVID_CONFIGURE_BYTES)) {
+    if ((frame->type == IDENTIFIER_CONFIGURE) && (frame->length == IDENTIFIER_CONFIGURE_BYTES)) {
         configure(frame->payload);
         answer_status();
         answer_credit();
-    } else if ((frame->type == PVID_SAMPLE) && ((frame->length % SAMPLE_PAIR) == 0u)) {
+    } else if (((frame->type == PVID_CONFIGURE) || (frame->type == PVID_CONFIGURE_Q31)) &&
+               (frame->length >= PVID_CONFIGURE_DIVIDER)) {
+        refuse(frame->payload);
+        answer_status();
+    } else if ((frame->type == IDENTIFIER_SAMPLE) && ((frame->length % SAMPLE_BYTES) == 0u)) {
         take(frame);
     } else if (frame->type == PVID_CREDIT) {
-        answer_hello();
-        answer_status();
-        if (stream.code == PVID_CODE_RUNNING) {
+        stream.due = DUE_ALL;
+        answer_raw();
+        if (running()) {
             answer_estimate();
         }
         answer_credit();
@@ -238,46 +358,45 @@ static void obey(const pvid_link_frame *frame)
     }
 }
 
-static void step(void)
+/* Takes bytes in up to the end of a frame. */
+static void listen(void)
 {
-    const uint8_t *pair = &stream.samples.payload[SAMPLE_PAIR * stream.taken];
-    stream.reason = STEP(&stream.identifier, pvid_get_f32(pair), pvid_get_f32(&pair[4]));
-    stream.hash = pvid_fnv_estimator_f32(stream.hash, &stream.identifier.estimator, stream.reason);
-    stream.ticks++;
-    if ((stream.hash_every != 0u) && ((stream.ticks % stream.hash_every) == 0u)) {
-        answer_hash();
+    static uint8_t bytes[CHUNK];
+    static size_t at;
+    static size_t n;
+    pvid_link_frame frame;
+    if (at == n) {
+        at = 0;
+        n = pvid_port_receive(bytes, sizeof bytes);
     }
-    if ((stream.estimate_every != 0u) && ((stream.ticks % stream.estimate_every) == 0u)) {
-        answer_estimate();
-    }
-    stream.taken++;
-    if (stream.taken == stream.count) {
-        stream.count = 0;
-        answer_credit();
+    while (at < n) {
+        if (pvid_link_decode(&stream.decoder, bytes[at++], &frame)) {
+            obey(&frame);
+            break;
+        }
     }
 }
 
 int main(void)
 {
-    uint8_t bytes[CHUNK];
-    size_t at = 0;
-    size_t n = 0;
-    pvid_link_frame frame;
     pvid_port_init();
     pvid_link_decoder_init(&stream.decoder);
-    answer_hello();
+    stream.due = DUE_HELLO | DUE_SCHEMA;
     for (;;) {
         answers_pump(&stream.out);
-        if (!answers_fit(&stream.out, ANSWER_ROOM)) {
-            continue; /* the PC does not read: neither do we */
-        }
+        announce();
+        const bool room = answers_fit(&stream.out, ANSWER_ROOM); /* else the PC does not read: neither do we */
         if (stream.count > 0u) {
-            step();
-        } else if (at == n) {
-            at = 0;
-            n = pvid_port_receive(bytes, sizeof bytes);
-        } else if (pvid_link_decode(&stream.decoder, bytes[at++], &frame)) {
-            obey(&frame);
+            if (room) {
+                step_sent();
+            }
+            continue;
+        }
+        if (room) {
+            listen();
+        }
+        if (sampling() && sample_due(room)) {
+            step_field();
         }
     }
 }

@@ -27,6 +27,20 @@ static inline uint32_t pvid_get_u32(const uint8_t in[4])
     return pvid_get_u16(in) | ((uint32_t)pvid_get_u16(&in[2]) << 16);
 }
 
+static inline void pvid_put_i32(uint8_t out[4], int32_t value)
+{
+    pvid_put_u32(out, (uint32_t)value);
+}
+
+/* A copy, for C99 leaves the conversion of large words to the compiler. */
+static inline int32_t pvid_get_i32(const uint8_t in[4])
+{
+    const uint32_t word = pvid_get_u32(in);
+    int32_t value;
+    memcpy(&value, &word, sizeof value);
+    return value;
+}
+
 /* The copy between a float and the word of its bits is the one that C99 defines. */
 static inline void pvid_put_f32(uint8_t out[4], float value)
 {

@@ -99,6 +99,19 @@ uint32_t pvid_port_counts_per_1024(void)
     return 1024u;
 }
 
+uint32_t pvid_port_microseconds(void)
+{
+    static uint32_t value;
+    static uint32_t rest;
+    static uint32_t time;
+    const uint32_t now = pvid_port_instructions();
+    rest += now - value;
+    value = now;
+    time += rest / (F_CPU / 1000000u);
+    rest %= F_CPU / 1000000u;
+    return time;
+}
+
 /* Asleep without interrupts, with the code in GPIOR0: the emulator ends. */
 void pvid_port_exit(int code)
 {

@@ -34,6 +34,24 @@ uint32_t pvid_port_counts_per_1024(void)
     return (uint32_t)(((uint64_t)PVID_CLOCK_HZ * 67108864u + 500000000u) / 1000000000u);
 }
 
+#define COUNTS_A_MICROSECOND (PVID_CLOCK_HZ / 1000000u)
+#if (PVID_CLOCK_HZ % 1000000u) != 0u
+#error "the clock must be whole MHz"
+#endif
+
+uint32_t pvid_port_microseconds(void)
+{
+    static uint32_t value = LARGEST; /* at the last call; SysTick counts down */
+    static uint32_t rest;            /* counts that are no whole microsecond yet */
+    static uint32_t time;
+    const uint32_t now = VALUE;
+    rest += (value - now) & LARGEST;
+    value = now;
+    time += rest / COUNTS_A_MICROSECOND;
+    rest %= COUNTS_A_MICROSECOND;
+    return time;
+}
+
 #if !defined(PVID_PORT_NO_SEMIHOSTING)
 #define SYS_EXIT_EXTENDED 0x20u
 #define APPLICATION_EXIT 0x20026u

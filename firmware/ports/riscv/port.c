@@ -24,6 +24,23 @@ uint32_t pvid_port_counts_per_1024(void)
     return 1024u;
 }
 
+/* The machine timer of `virt`, 10 MHz. */
+#define MTIME_LOW (*(volatile uint32_t *)(uintptr_t)0x0200BFF8u)
+#define COUNTS_A_MICROSECOND 10u
+
+uint32_t pvid_port_microseconds(void)
+{
+    static uint32_t value;
+    static uint32_t rest;
+    static uint32_t time;
+    const uint32_t now = MTIME_LOW;
+    rest += now - value;
+    value = now;
+    time += rest / COUNTS_A_MICROSECOND;
+    rest %= COUNTS_A_MICROSECOND;
+    return time;
+}
+
 void pvid_port_exit(int code)
 {
     pvid_uart_drain();

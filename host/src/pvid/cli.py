@@ -325,12 +325,12 @@ def identify_command(
     native = Native()
     result = identify(run, rig, native)
     if target is not None:
+        from pvid.stream_rig import played_samples, stream_rig
         from pvid.target import verify
 
-        if rig.identifier.core != "f32":
-            raise PvidError(f"targets hold the core f32, and core {rig.identifier.core} was asked for")
+        image = stream_rig(rig, run.sample_rate, run)
         with progress_bar(f"streaming to {target}", len(run.t)) as advance:
-            verdict = verify(target, config_of(rig, run.sample_rate), native, run.phi, run.y, advance)
+            verdict = verify(target, image, native, *played_samples(rig, run), progress=advance)
         messages.print(f"{target}: {verdict.playback.account}")
         if not verdict.equal:
             click.echo(f"pvid: {target}: {verdict.text}", err=True)
@@ -359,41 +359,29 @@ def compare_command(
 ) -> int:
     """Compares the C core with its numpy twin on RUN, after every tick, in every bit.
 
-    With --on the run is streamed to targets, too (core f32), and their running hashes are held against the host's.
+    With --on the run is streamed to targets, too, and their running hashes are held against the host's.
     """
-    from pvid.target import targets_of, verify
+    from pvid.compare_on import Outcome, compare_here, compare_there
+    from pvid.target import targets_of
 
     rig = _load_rig(rig_path, form=form)
     run = read_run(run_path, rig.sample_rate)
     native = Native()
-    if targets and core == "q31":
-        raise PvidError("targets hold the core f32, and core q31 was asked for")
-    table = Table("target", "core", "form", "law", "ticks", "hash", "verdict")
-    failed = False
     own = "q31" if rig.identifier.core == "q31" else "f32"
-    cores = ["f32", "q31"] if core == "all" else [core or own]
-    for one in [law] if law else ["stationary", "pseudovelocity"]:
-        chosen = replace(rig, identifier=replace(rig.identifier, law=one))  # type: ignore[arg-type]
-        for arithmetic in cores:
+    outcomes: list[Outcome] = []
+    for arithmetic in ["f32", "q31"] if core == "all" else [core or own]:
+        for one in [law] if law else ["stationary", "pseudovelocity"]:
+            chosen = replace(rig, identifier=replace(rig.identifier, law=one, core=arithmetic))  # type: ignore[arg-type]
             with progress_bar(f"{one} law, {arithmetic}", len(run.t)) as advance:
-                if arithmetic == "q31":
-                    outcome = compare_run_q31(
-                        native, config_for_run(chosen, run), *counts_of(chosen, run), progress=advance
-                    )
-                else:
-                    outcome = compare_run(native, config_of(chosen, run.sample_rate), run.phi, run.y, advance)
-            verdict = "equal" if outcome.equal else f"DIFFERENT: {outcome.difference}"
-            hashed = f"{outcome.core_hash:08x}"
-            table.add_row("host", arithmetic, chosen.identifier.form, one, str(outcome.ticks), hashed, verdict)
-            failed |= not outcome.equal
-        for target in targets_of(targets) if "f32" in cores else []:
-            with progress_bar(f"{one} law on {target}", len(run.t)) as advance:
-                there = verify(target, config_of(chosen, run.sample_rate), native, run.phi, run.y, advance)
-            done, hashed = str(there.playback.done), f"{there.playback.hash or 0:08x}"
-            table.add_row(target, "f32", chosen.identifier.form, one, done, hashed, there.text)
-            failed |= not there.equal
+                outcomes.append(compare_here(chosen, run, native, advance))
+            for target in targets_of(targets):
+                with progress_bar(f"{one} law, {arithmetic} on {target}", len(run.t)) as advance:
+                    outcomes.append(compare_there(target, chosen, run, native, advance))
+    table = Table("target", "core", "form", "law", "ticks", "hash", "verdict")
+    for outcome in outcomes:
+        table.add_row(*outcome.cells)
     Console(width=None if sys.stdout.isatty() else 140).print(table)
-    return DIFFERENT if failed else DONE
+    return DONE if all(outcome.equal for outcome in outcomes) else DIFFERENT
 
 
 # ---- log

@@ -31,13 +31,21 @@ from cobs import cobs
 from pvid.errors import PvidError
 
 VERSION = 1
-MAX_PAYLOAD = 1024
+MAX_PAYLOAD = 2048
 MAX_P = 6  # places for parameters; those that a model lacks are 0
 _HEADER = struct.Struct("<BBIHI")
 _CRC = struct.Struct("<I")
 _LONGEST = _HEADER.size + MAX_PAYLOAD + _CRC.size
 
-_WIRE = {"u8": ("B", 1), "u16": ("H", 2), "u32": ("I", 4), "u64": ("Q", 8), "f32": ("f", 4), "char": ("s", 1)}
+_WIRE = {
+    "u8": ("B", 1),
+    "u16": ("H", 2),
+    "u32": ("I", 4),
+    "u64": ("Q", 8),
+    "i32": ("i", 4),
+    "f32": ("f", 4),
+    "char": ("s", 1),
+}
 
 
 def _wire(kind: str, count: int | None = 1) -> Any:
@@ -129,7 +137,8 @@ class Message:
     def layout(cls) -> Layout:
         """Its wire format."""
         described = tuple((f.name, f.metadata["kind"], f.metadata["count"]) for f in fields(cls))
-        return Layout(cls.TYPE, cls.__name__.lower(), described)
+        name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
+        return Layout(cls.TYPE, name, described)
 
     @property
     def payload(self) -> bytes:
@@ -149,6 +158,21 @@ class Form(IntEnum):
     WEAK = 1
 
 
+class Core(IntEnum):
+    """Which arithmetic an image holds."""
+
+    F32 = 0
+    Q31 = 1
+
+
+class Source(IntEnum):
+    """Where the samples come from."""
+
+    PC = 0
+    SENSOR = 1  # the board's own, in time: what the line does not take is dropped, and its sequence number with it
+    SENSOR_PACED = 2  # the board's own, as fast as the line takes the answers: nothing is dropped
+
+
 class Code(IntEnum):
     """What a board says of itself (Status.code)."""
 
@@ -156,20 +180,31 @@ class Code(IntEnum):
     RUNNING = 1
     REFUSED_BY_CORE = 2  # Status.core names the field
     REFUSED_SETTINGS = 3  # made for other tables or settings than those in the image
-    REFUSED_FORM = 4  # the image holds the other form
+    REFUSED_FORM = 4  # the image holds the other form, or the other core
     ARITHMETIC = 5  # float arithmetic is not what the bits need
+    REFUSED_SOURCE = 6  # none of Source
 
 
 @dataclass(frozen=True)
 class Hello(Message):
-    """Board to PC when it starts, and when the PC sends a Credit: who it is."""
+    """Board to PC: who it is. Sent when it starts, when the PC sends a Credit, and, while the board samples by
+    itself, every few seconds of its time, with Schema, the configuration in force and Status behind it.
+
+    What the integers of the fixed-point core are worth stands here, so that a log can be read without its rig file:
+    a count of a sensor in rad and m, one unit of each p in SI. In float32 p is in SI, and its units are 1.
+    """
 
     TYPE = 1
     form: int = _wire("u8")
+    core: int = _wire("u8")
     n_p: int = _wire("u8")
     window: int = _wire("u16")  # samples that may be under way without an answer
     settings: int = _wire("u32")  # CRC-32 of the settings and tables in the image
     session: int = _wire("u32")  # of the configuration it works with; 0: none since it started
+    sample_rate: float = _wire("f32")  # ticks a second
+    phi_lsb: float = _wire("f32")
+    y_lsb: float = _wire("f32")
+    p_unit: tuple[float, ...] = _wire("f32", MAX_P)
     board: str = _wire("char", 16)
 
 
@@ -182,17 +217,29 @@ class Schema(Message):
 
 
 @dataclass(frozen=True)
-class Configure(Message):
-    """PC to board: starts over with these settings (estimator.h); the others are in the image, with its tables."""
+class Configuration(Message):
+    """What both cores are configured with.
 
-    TYPE = 3
+    PC to board: starts over with these settings; the others are in the image, with its tables. Board to PC, while it
+    samples by itself: the configuration in force, bit by bit as it came, beside every Hello. Whoever has it, the
+    image's settings (Hello.settings names them) and every sample from tick 0 on has all that the bits depend on.
+    """
+
     session: int = _wire("u32")  # any number but 0; comes back in every answer
     settings: int = _wire("u32")  # CRC-32 of the settings and tables that the image must hold
     form: int = _wire("u8")
-    law: int = _wire("u8")
-    divider: int = _wire("u16")
+    source: int = _wire("u8")
     hash_every: int = _wire("u16")  # ticks; 0: only in the credits
     estimate_every: int = _wire("u16")  # ticks; 0: never
+    divider: int = _wire("u16")
+
+
+@dataclass(frozen=True)
+class Configure(Configuration):
+    """Float32 (estimator.h)."""
+
+    TYPE = 3
+    law: int = _wire("u8")
     start: tuple[float, ...] = _wire("f32", MAX_P)
     start_sd: tuple[float, ...] = _wire("f32", MAX_P)
     lower: tuple[float, ...] = _wire("f32", MAX_P)
@@ -203,8 +250,25 @@ class Configure(Message):
 
 
 @dataclass(frozen=True)
-class _Samples(Message):
-    """phi [rad], y [m] of consecutive ticks, the first of them in the frame's header."""
+class ConfigureQ31(Configuration):
+    """Fixed point (estimator_q31.h); the formats are the image's."""
+
+    TYPE = 10
+    start: tuple[int, ...] = _wire("i32", MAX_P)
+    start_sd: tuple[int, ...] = _wire("i32", MAX_P)
+    lower: tuple[int, ...] = _wire("i32", MAX_P)
+    upper: tuple[int, ...] = _wire("i32", MAX_P)
+    row_sd: int = _wire("i32")
+    forgetting_groups: int = _wire("u32")
+    gain: int = _wire("i32")
+    phi_offset: int = _wire("i32")
+    y_offset: int = _wire("i32")
+
+
+@dataclass(frozen=True)
+class Samples(Message):
+    """phi [rad], y [m] of consecutive ticks for the float32 core, exactly as it gets them; the first of them is the
+    header's tick."""
 
     phi_y: bytes = _wire("f32", None)
 
@@ -221,22 +285,58 @@ class _Samples(Message):
 
 
 @dataclass(frozen=True)
-class Sample(_Samples):
+class Sample(Samples):
     """PC to board, to be identified with."""
 
     TYPE = 4
 
 
 @dataclass(frozen=True)
-class Raw(_Samples):
-    """Board to PC: what its own sensors read."""
+class Raw(Samples):
+    """Board to PC: what its own sensor gave the identifier. Every sample up to the tick of an Estimate or a Hash has
+    been sent before it."""
 
     TYPE = 5
 
 
 @dataclass(frozen=True)
+class Counts(Message):
+    """phi, y [counts] of consecutive ticks for the fixed-point core; the first of them is the header's tick."""
+
+    phi_y: bytes = _wire("i32", None)
+
+    @property
+    def values(self) -> npt.NDArray[np.int32]:
+        """int32 [n, 2]: phi, y."""
+        whole = len(self.phi_y) // 8
+        return np.frombuffer(self.phi_y[: 8 * whole], "<i4").astype(np.int32).reshape(whole, 2)
+
+    @classmethod
+    def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:
+        """From counts phi [n] and y [n]."""
+        return cls(np.stack([np.asarray(phi, "<i4"), np.asarray(y, "<i4")], axis=1).tobytes())
+
+
+@dataclass(frozen=True)
+class Count(Counts):
+    """PC to board, to be identified with."""
+
+    TYPE = 11
+
+
+@dataclass(frozen=True)
+class RawCount(Counts):
+    """Board to PC: what its own sensor counted, as Raw."""
+
+    TYPE = 12
+
+
+@dataclass(frozen=True)
 class Estimate(Message):
-    """Board to PC: the estimate after the header's tick (pvid_estimate_f32)."""
+    """Board to PC: the estimate after the header's tick (pvid_estimate_f32).
+
+    `reason` is what became of the last group of rows: of the last tick that was more than one row accumulated.
+    """
 
     TYPE = 6
     session: int = _wire("u32")
@@ -246,6 +346,22 @@ class Estimate(Message):
     kappa: float = _wire("f32")
     residual_sd: float = _wire("f32")
     weight: float = _wire("f32")
+    reason: int = _wire("u8")
+
+
+@dataclass(frozen=True)
+class EstimateQ31(Message):
+    """Board to PC: the same of the fixed-point core (pvid_estimate_q31)."""
+
+    TYPE = 13
+    session: int = _wire("u32")
+    updates: int = _wire("u32")
+    p: tuple[int, ...] = _wire("i32", MAX_P)
+    se: tuple[int, ...] = _wire("i32", MAX_P)
+    correlation: tuple[int, ...] = _wire("i32", MAX_P * (MAX_P + 1) // 2)  # Q30, upper triangle by rows
+    kappa: int = _wire("i32")
+    residual_sd: int = _wire("i32")
+    weight: int = _wire("u32")
     reason: int = _wire("u8")
 
 
@@ -535,7 +651,12 @@ def c_header() -> str:
             lines.append(f"#define {stem}_{name.upper()} {at}u /* {kind}{extent} */")
             at += _WIRE[kind][1] * (count or 0)
         lines.append(f"#define {stem}_BYTES {layout.size}u")
-    for title, enum in (("Status.code", Code), ("Hello.form", Form)):
+    for title, enum in (
+        ("Status.code", Code),
+        ("Hello.form", Form),
+        ("Hello.core", Core),
+        ("Configure.source", Source),
+    ):
         lines += ["", f"/* {title} */"]
         lines += [f"#define PVID_{enum.__name__.upper()}_{member.name} {member.value}u" for member in enum]
     return "\n".join([*lines, "", "#endif", ""])

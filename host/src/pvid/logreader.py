@@ -23,7 +23,20 @@ from pathlib import Path
 from typing import Protocol
 
 from pvid.errors import PvidError
-from pvid.link import MESSAGES, SCHEMA, Decoder, Described, Frame, Hello, Loss, Message, Raw, described_readers, readers
+from pvid.link import (
+    MESSAGES,
+    SCHEMA,
+    Decoder,
+    Described,
+    Frame,
+    Hello,
+    Loss,
+    Message,
+    Raw,
+    RawCount,
+    described_readers,
+    readers,
+)
 from pvid.logfile import LOG_MESSAGES, LOG_SCHEMA, Close, LinkSchema, Mark, Rig, Segment
 
 _CHUNK = 1 << 16
@@ -226,7 +239,7 @@ class LogStream:
             account.segments[-1].frames += 1
         if began:
             yield from self._restart(frame.tick)
-        if isinstance(message, Raw):
+        if isinstance(message, Raw | RawCount):
             yield from self._follow(frame.tick, len(message.values))
         yield self._record(frame.tick, message)
 

@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import re
-import secrets
 import select
 import subprocess
 import time
@@ -24,28 +23,26 @@ from pvid.boards import BOARDS, Board
 from pvid.errors import PvidError
 from pvid.link import (
     Code,
-    Configure,
     Counters,
     Credit,
     Decoder,
     Estimate,
-    Form,
+    EstimateQ31,
     Frame,
     Hash,
     Hello,
     Message,
-    Sample,
     encode,
 )
 from pvid.link import Status as BoardStatus
-from pvid.native import Native, Status, StrongConfig, WeakConfig
+from pvid.native import Native, Status
 from pvid.stream_image import build_image, settings_number
+from pvid.stream_rig import StreamRig
 
 SAMPLES_A_FRAME = 64
 HOST_TARGET = "stream-host"
 EMULATORS = tuple(name for name, board in BOARDS.items() if board.toolchain != "avr")
 COMING_UP_S = 2.0  # longest wait for an emulator's first word
-_PLACES = 6
 
 
 class Port(Protocol):
@@ -100,10 +97,8 @@ def open_port(name: str) -> Port:
     return port
 
 
-def open_target(
-    name: str, config: StrongConfig | WeakConfig, wrap: Callable[[Port], Port] = lambda port: port
-) -> Target:
-    """Starts the emulator of that name with the image for `config`, or opens a port.
+def open_target(name: str, rig: StreamRig, wrap: Callable[[Port], Port] = lambda port: port) -> Target:
+    """Starts the emulator of that name with the image for `rig`, or opens a port.
 
     Parameters
     ----------
@@ -116,12 +111,12 @@ def open_target(
         When there is no such target, or something that it needs is missing.
     """
     if name == HOST_TARGET:
-        return _start([str(build_image(config, None))], name, "this machine", wrap)
+        return _start([str(build_image(rig, None))], name, "this machine", wrap)
     if name in EMULATORS:
         board = BOARDS[name]
         if board.missing:
             raise PvidError(f"{name} needs {' and '.join(board.missing)}: ./tools/test installs them")
-        return _start(_emulator(board, str(build_image(config, board))), name, board.core, wrap)
+        return _start(_emulator(board, str(build_image(rig, board))), name, board.core, wrap)
     if "/" not in name and not name.upper().startswith("COM"):
         raise PvidError(f"there is no target {name}; there are {', '.join((HOST_TARGET, *EMULATORS))} and ports")
     return Target(name, "unknown", wrap(open_port(name)))
@@ -178,7 +173,7 @@ class Playback:
     received: Counters = field(default_factory=Counters)
     board: BoardStatus | None = None
     hello: Hello | None = None
-    estimates: dict[int, Estimate] = field(default_factory=dict)
+    estimates: dict[int, Estimate | EstimateQ31] = field(default_factory=dict)
     ended: str = ""
 
     @property
@@ -205,38 +200,13 @@ class Playback:
         return text if self.complete else f"{text}; {self.ended}"
 
 
-def configure_of(config: StrongConfig | WeakConfig, hash_every: int, estimate_every: int) -> Configure:
-    """The Configure frame of a configuration, with a new session number."""
-    settings = config.estimator
-
-    def places(values: npt.NDArray[np.float32]) -> tuple[float, ...]:
-        return tuple([*map(float, values), *[0.0] * (_PLACES - len(values))])
-
-    return Configure(
-        session=secrets.randbelow(2**32 - 1) + 1,
-        settings=settings_number(config),
-        form=Form.WEAK if isinstance(config, WeakConfig) else Form.STRONG,
-        law=int(settings.law),
-        divider=settings.divider,
-        hash_every=hash_every,
-        estimate_every=estimate_every,
-        start=places(settings.start),
-        start_sd=places(settings.start_sd),
-        lower=places(settings.lower),
-        upper=places(settings.upper),
-        row_sd=settings.row_sd,
-        forgetting_s=settings.forgetting_s,
-        feedback_hz=settings.feedback_hz,
-    )
-
-
 class Player:
     """One play of a run; see `play`."""
 
     def __init__(
         self,
         target: Target,
-        config: StrongConfig | WeakConfig,
+        rig: StreamRig,
         phi: npt.ArrayLike,
         y: npt.ArrayLike,
         hash_every: int,
@@ -245,9 +215,9 @@ class Player:
         progress: Callable[[int], None] | None,
     ) -> None:
         self.target = target
-        self.config = config
-        self.phi = np.asarray(phi, np.float32)
-        self.y = np.asarray(y, np.float32)
+        self.rig = rig
+        self.settings = settings_number(rig)
+        self.phi, self.y = rig.samples(phi, y)
         self.estimate_every = estimate_every
         self.reopen = reopen
         self.progress = progress
@@ -260,7 +230,7 @@ class Player:
         self.skipped = 0
         self.running = False
         self.closing = False
-        self._configure = configure_of(config, hash_every, estimate_every)
+        self._configure = rig.configure(self.settings, hash_every, estimate_every)
 
     # ---- out
 
@@ -275,14 +245,14 @@ class Player:
         limit = min(self.account.ticks, self.account.done + self.room)
         while self.running and self.next < limit:
             end = min(self.next + SAMPLES_A_FRAME, limit)
-            self._send(Sample.of_values(self.phi[self.next : end], self.y[self.next : end]), self.next)
+            self._send(self.rig.sample(self.phi[self.next : end], self.y[self.next : end]), self.next)
             self.account.sent += end - self.next
             self.account.repeated += max(0, min(self.furthest, end) - self.next)
             self.furthest = max(self.furthest, end)
             self.next = end
 
     def _start_session(self) -> None:
-        self._configure = configure_of(self.config, self.account.hash_every, self.estimate_every)
+        self._configure = self.rig.configure(self.settings, self.account.hash_every, self.estimate_every)
         account = self.account
         account.done, account.hash, account.board = 0, None, None
         account.hashes.clear()
@@ -327,7 +297,7 @@ class Player:
                 self.next = max(self.next, tick)
         elif isinstance(message, Hash) and self._ours(message.session):
             self.account.hashes[tick] = message.hash
-        elif isinstance(message, Estimate) and self._ours(message.session):
+        elif isinstance(message, Estimate | EstimateQ31) and self._ours(message.session):
             self.account.estimates[tick] = message
 
     def _ours(self, session: int) -> bool:
@@ -349,7 +319,7 @@ class Player:
                 self.next = self.account.done
             self.skipped = status.skipped
         elif status.code != Code.WAITING:
-            raise PvidError(f"{self.target.name} refused: {_refusal(status)}")
+            raise PvidError(f"{self.target.name} refused: {refusal(status)}")
 
     # ---- the whole
 
@@ -417,13 +387,15 @@ class Player:
         return self.account
 
 
-def _refusal(status: BoardStatus) -> str:
+def refusal(status: BoardStatus) -> str:
+    """Why a board does not run, in words."""
     if status.code == Code.REFUSED_BY_CORE:
         names = {one.value: one.name.lower().replace("_", " ") for one in Status}
         return f"the core refused the configuration: {names.get(status.core, status.core)}"
     words = {
         Code.REFUSED_SETTINGS: "its image was made for other settings or tables; build it for this rig file",
-        Code.REFUSED_FORM: "its image holds the other form",
+        Code.REFUSED_FORM: "its image holds the other form or the other core",
+        Code.REFUSED_SOURCE: "it knows no such source of samples",
         Code.ARITHMETIC: "its float arithmetic is not what the bits need",
     }
     return words.get(Code(status.code), f"code {status.code}") if status.code in list(Code) else f"code {status.code}"
@@ -431,7 +403,7 @@ def _refusal(status: BoardStatus) -> str:
 
 def play(
     target: Target,
-    config: StrongConfig | WeakConfig,
+    rig: StreamRig,
     phi: npt.ArrayLike,
     y: npt.ArrayLike,
     *,
@@ -443,10 +415,12 @@ def play(
     reconnects: int = 3,
     progress: Callable[[int], None] | None = None,
 ) -> Playback:
-    """Plays phi [rad], y [m] through a target and returns the account; it ends in bounded time, complete or not.
+    """Plays a run through a target and returns the account; it ends in bounded time, complete or not.
 
     Parameters
     ----------
+    phi, y
+        [ticks], in rad and m; in counts for the fixed-point core.
     hash_every, estimate_every
         Ticks between checkpoints of the running hash and between estimates; 0: the last only.
     patience_s
@@ -463,7 +437,7 @@ def play(
     PvidError
         When the target refuses the configuration.
     """
-    player = Player(target, config, phi, y, hash_every, estimate_every, reopen, progress)
+    player = Player(target, rig, phi, y, hash_every, estimate_every, reopen, progress)
     try:
         return player.run(patience_s, resend_s, reconnects if reopen is not None else 0)
     finally:
@@ -525,7 +499,7 @@ def targets_of(names: tuple[str, ...]) -> list[str]:
 
 def verify(
     name: str,
-    config: StrongConfig | WeakConfig,
+    rig: StreamRig,
     native: Native,
     phi: npt.ArrayLike,
     y: npt.ArrayLike,
@@ -538,7 +512,6 @@ def verify(
     PvidError
         When the target cannot be started or refuses the configuration.
     """
-    identifier = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
-    expected = identifier.run(phi, y, sums=False).hash
-    reopen = (lambda: open_target(name, config)) if name in (HOST_TARGET, *EMULATORS) else None
-    return judge(play(open_target(name, config), config, phi, y, reopen=reopen, progress=progress), expected)
+    expected = rig.hashes(native, phi, y)
+    reopen = (lambda: open_target(name, rig)) if name in (HOST_TARGET, *EMULATORS) else None
+    return judge(play(open_target(name, rig), rig, phi, y, reopen=reopen, progress=progress), expected)

@@ -1,0 +1,55 @@
+/* The identifier behind the link: the core and the form of stream_rig.h, one source a core.
+ *
+ * Settings, samples and estimates go in and out as they stand in the frames of that core (link/schema.h). */
+#ifndef IDENTIFIER_H
+#define IDENTIFIER_H
+
+#include <stdint.h>
+
+#include "link.h"
+#include "pvid/pvid.h"
+#include "stream_rig.h"
+
+#if STREAM_CORE == 1 /* PVID_CORE_Q31 */
+#define IDENTIFIER_CONFIGURE PVID_CONFIGURE_Q31
+#define IDENTIFIER_CONFIGURE_BYTES PVID_CONFIGURE_Q31_BYTES
+#define IDENTIFIER_SAMPLE PVID_COUNT
+#define IDENTIFIER_RAW PVID_RAW_COUNT
+#define IDENTIFIER_ESTIMATE PVID_ESTIMATE_Q31
+#define IDENTIFIER_ESTIMATE_BYTES PVID_ESTIMATE_Q31_BYTES
+#else
+#define IDENTIFIER_CONFIGURE PVID_CONFIGURE
+#define IDENTIFIER_CONFIGURE_BYTES PVID_CONFIGURE_BYTES
+#define IDENTIFIER_SAMPLE PVID_SAMPLE
+#define IDENTIFIER_RAW PVID_RAW
+#define IDENTIFIER_ESTIMATE PVID_ESTIMATE
+#define IDENTIFIER_ESTIMATE_BYTES PVID_ESTIMATE_BYTES
+#endif
+
+#define SAMPLE_BYTES 8u /* phi and y in a frame */
+#define LINK_MAX_P 6u   /* places for parameters in a frame */
+
+#if PVID_MAX_P > 6
+#error "the frames hold six parameters"
+#endif
+
+/* Faults of the arithmetic that the bits hang on; 0 where there are none. */
+uint32_t identifier_arithmetic_faults(void);
+
+/* Starts over with the settings of a Configure frame. */
+pvid_status identifier_start(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES]);
+
+/* What a sample of the board's own sensor is to the identifier, as in a frame. */
+void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES]);
+
+pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES]);
+
+/* The running hash (fnv.h) with the present state and `reason`. */
+uint32_t identifier_hash(uint32_t hash, pvid_reason reason);
+
+/* The payload of an Estimate frame. */
+void identifier_estimate(uint8_t payload[IDENTIFIER_ESTIMATE_BYTES], uint32_t session, pvid_reason reason);
+
+const pvid_counters *identifier_counters(void);
+
+#endif

@@ -1,0 +1,94 @@
+#include <string.h>
+
+#include "identifier.h"
+#include "pvid/little_endian.h"
+#include "stream_tables.h"
+
+#if STREAM_FORM == 1 /* PVID_FORM_WEAK */
+typedef pvid_weak_f32 identifier_type;
+typedef pvid_weak_config_f32 config_type;
+#define INIT pvid_weak_init_f32
+#define STEP pvid_weak_step_f32
+#else
+typedef pvid_strong_f32 identifier_type;
+typedef pvid_strong_config_f32 config_type;
+#define INIT pvid_strong_init_f32
+#define STEP pvid_strong_step_f32
+#endif
+
+static identifier_type identifier;
+
+static void get_floats(float to[], const uint8_t from[])
+{
+    for (size_t i = 0; i < STREAM_N_P; i++) {
+        to[i] = pvid_get_f32(&from[4u * i]);
+    }
+}
+
+uint32_t identifier_arithmetic_faults(void)
+{
+    return pvid_arithmetic_faults_f32();
+}
+
+pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
+{
+    config_type config = stream_config;
+    pvid_estimator_config_f32 *estimator = &config.estimator;
+    get_floats(estimator->start, &payload[PVID_CONFIGURE_START]);
+    get_floats(estimator->start_sd, &payload[PVID_CONFIGURE_START_SD]);
+    get_floats(estimator->lower, &payload[PVID_CONFIGURE_LOWER]);
+    get_floats(estimator->upper, &payload[PVID_CONFIGURE_UPPER]);
+    estimator->row_sd = pvid_get_f32(&payload[PVID_CONFIGURE_ROW_SD]);
+    estimator->forgetting_s = pvid_get_f32(&payload[PVID_CONFIGURE_FORGETTING_S]);
+    estimator->feedback_hz = pvid_get_f32(&payload[PVID_CONFIGURE_FEEDBACK_HZ]);
+    estimator->law =
+        (payload[PVID_CONFIGURE_LAW] == (uint8_t)PVID_LAW_STATIONARY) ? PVID_LAW_STATIONARY : PVID_LAW_PSEUDOVELOCITY;
+    estimator->divider = pvid_get_u16(&payload[PVID_CONFIGURE_DIVIDER]);
+    return INIT(&identifier, &config);
+}
+
+void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES])
+{
+    pvid_put_f32(sample, (float)counts[0] * STREAM_PHI_LSB);
+    pvid_put_f32(&sample[4], (float)counts[1] * STREAM_Y_LSB);
+}
+
+pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
+{
+    return STEP(&identifier, pvid_get_f32(sample), pvid_get_f32(&sample[4]));
+}
+
+uint32_t identifier_hash(uint32_t hash, pvid_reason reason)
+{
+    return pvid_fnv_estimator_f32(hash, &identifier.estimator, reason);
+}
+
+void identifier_estimate(uint8_t payload[PVID_ESTIMATE_BYTES], uint32_t session, pvid_reason reason)
+{
+    pvid_estimate_f32 estimate;
+    memset(payload, 0, PVID_ESTIMATE_BYTES);
+    pvid_estimator_assess_f32(&identifier.estimator, &estimate);
+    pvid_put_u32(&payload[PVID_ESTIMATE_SESSION], session);
+    pvid_put_u32(&payload[PVID_ESTIMATE_UPDATES], identifier.estimator.counters.updates);
+    size_t at = PVID_ESTIMATE_COVARIANCE;
+    for (size_t i = 0; i < LINK_MAX_P; i++) {
+        for (size_t j = i; j < LINK_MAX_P; j++) {
+            if (j < STREAM_N_P) {
+                pvid_put_f32(&payload[at], estimate.covariance[i][j]);
+            }
+            at += 4u;
+        }
+        if (i < STREAM_N_P) {
+            pvid_put_f32(&payload[PVID_ESTIMATE_P + (4u * i)], estimate.p[i]);
+        }
+    }
+    pvid_put_f32(&payload[PVID_ESTIMATE_KAPPA], estimate.kappa);
+    pvid_put_f32(&payload[PVID_ESTIMATE_RESIDUAL_SD], estimate.residual_sd);
+    pvid_put_f32(&payload[PVID_ESTIMATE_WEIGHT], estimate.weight);
+    payload[PVID_ESTIMATE_REASON] = (uint8_t)reason;
+}
+
+const pvid_counters *identifier_counters(void)
+{
+    return &identifier.estimator.counters;
+}
