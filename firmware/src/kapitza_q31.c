@@ -13,14 +13,14 @@ static bool scale_is_valid(const pvid_kapitza_scale_q31 *scale)
            (scale->d1_bits >= 0) && (scale->d1_bits <= 31) && (scale->d2_bits >= 0) && (scale->d2_bits <= 31);
 }
 
-/* a b / c, rounded down; 0 <= a < 2^62, 0 <= b < 2^31, c > 0. Saturates at PVID_WIDE. */
+/* a b / c, rounded down; 0 <= a < 2^62, 0 <= b < 2^31, c > 0. Saturates at half of PVID_WIDE, so that two add up. */
 static int64_t times_over(int64_t a, int32_t b, int64_t c)
 {
     const int32_t up = (int32_t)pvid_bit_length_q31((uint64_t)PVID_WIDE) - 1 - (int32_t)pvid_bit_length_q31((uint64_t)a);
     const int64_t quotient = pvid_scale_q31(a, -up) / c; /* a 2^up / c */
     const int32_t down = (int32_t)pvid_bit_length_q31((uint64_t)quotient) - 31;
     const int64_t mantissa = pvid_scale_q31(quotient, down); /* 31 bits */
-    return pvid_scale_q31(mantissa * b, up - down);
+    return pvid_clamp_q31(pvid_scale_q31(mantissa * b, up - down), PVID_WIDE / 2);
 }
 
 /* sqrt(x^2 + y^2 + 2 r x y), r in Q30. */

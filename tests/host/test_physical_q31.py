@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from pvid import oracle
 from pvid.native import Native
-from pvid.native_q31 import ESTIMATE_DTYPE, physical_q31
+from pvid.native_q31 import ESTIMATE_DTYPE, ScaleQ31, physical_q31
 from pvid.rigfile import RigFile
-from pvid.setup_q31 import covariance_of, p_of, scale_of, weak_config_q31
+from pvid.setup_q31 import ConfigQ31, covariance_of, p_of, scale_of, strong_config_q31, units_of, weak_config_q31
+from pvid.twin import kapitza_q31
 
 RIG = RigFile.standard()
+STRONG = replace(RIG, identifier=replace(RIG.identifier, form="strong"))
 CONFIG = weak_config_q31(RIG, 1000.0)
 SCALE = scale_of(CONFIG, RIG.l1)
 
@@ -53,3 +57,32 @@ def test_outside_the_physical_region_there_are_none(native: Native, p: tuple[flo
 def test_a_length_that_does_not_fit_is_refused(native: Native) -> None:
     """l2 = l1 L2/d2 beyond 127 m."""
     assert physical_q31(native, estimate_of((30.0, 60.0, 0.1), 0.01, 0.0), SCALE) is None
+
+
+@pytest.mark.parametrize("config", [CONFIG, strong_config_q31(STRONG, 1000.0)])
+def test_core_and_twin_agree_on_any_estimate(native: Native, config: ConfigQ31) -> None:
+    """Estimates of every size and sign, and scales of every shift: the same integers, or none in both."""
+    random = np.random.default_rng(9)
+    count = 3000
+    estimates = np.zeros(count, ESTIMATE_DTYPE)
+    sizes = random.integers(0, 31, (2, count, 3))
+    estimates["p"][:, :3] = random.integers(0, 2**31, (count, 3)) >> sizes[0]
+    estimates["p"][::50, 0] *= -1
+    # half of them near the mechanism, where there is an answer
+    near = np.rint(np.array([31.7, 8.9, 5.6]) / units_of(config)[:3] * random.uniform(0.5, 2, (count // 2, 3)))
+    estimates["p"][: count // 2, :3] = np.minimum(near, 2**31 - 1)
+    estimates["se"][:, :3] = random.integers(0, 2**31, (count, 3)) >> sizes[1]
+    estimates["correlation"][:, 1, 2] = random.integers(-(2**30), 2**30 + 1, count)
+    estimates["correlation"][::7, 1, 2] = 2**30
+    for unit in (
+        scale_of(config, RIG.l1),
+        ScaleQ31(l1=1, g_multiplier=1, g_shift=62, d1_bits=0, d2_bits=31),
+        ScaleQ31(l1=2**31 - 1, g_multiplier=2**31 - 1, g_shift=-31, d1_bits=31, d2_bits=0),
+    ):
+        values, errors, inside = kapitza_q31.physical(estimates, unit)
+        for i in range(count):
+            answer = physical_q31(native, estimates[i : i + 1], unit)
+            assert (answer is not None) == inside[i], i
+            if answer is not None:
+                assert np.array_equal(answer[0], values[i]) and np.array_equal(answer[1], errors[i]), i
+    assert 200 < kapitza_q31.physical(estimates, scale_of(config, RIG.l1))[2].sum() < count
