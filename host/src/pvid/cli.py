@@ -739,6 +739,32 @@ def bench_hard(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="longevity")
+@click.option("--ticks", default=10_000_000, show_default=True, type=click.IntRange(50_000), help="Of each run.")
+@click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@_UPDATE
+def bench_longevity(ticks: int, chosen: tuple[str, ...], update: Path | None) -> int:
+    """Millions of ticks of every disturbance, beside textbook and UD recursive least squares (needs gcc).
+
+    What is done is kept in build/longevity.json, for the present core: the next call goes on from there.
+    """
+    from pvid.bench import longevity
+    from pvid.bench.longevity_signals import SCENARIOS
+
+    unknown = set(chosen) - set(SCENARIOS)
+    if unknown:
+        raise PvidError(f"no such scenario: {', '.join(sorted(unknown))}; there are {', '.join(SCENARIOS)}")
+    scenarios = chosen or tuple(SCENARIOS)
+    with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", 2 * ticks * len(scenarios)) as advance:
+        place = {name: 2 * ticks * i for i, name in enumerate(scenarios)}
+        results = longevity.run_missing(
+            Native(), ticks, scenarios, Path(folder), lambda name, done: advance(place[name] + done)
+        )
+    for marker, header, rows in longevity.tables(results):
+        _update_readme(update, marker, _markdown(header, rows))
+    return DONE
+
+
 @bench.command(name="noise")
 @_UPDATE
 def bench_noise(update: Path | None) -> int:

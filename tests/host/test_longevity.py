@@ -1,0 +1,151 @@
+"""The longevity bench in its short form: every disturbance, every forgetting. The long one: `pvid bench longevity`."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pvid.bench import longevity
+from pvid.bench.longevity import ENCODER, LANES, STRONG_FORGETTING_S, WEAK_FORGETTING_S, Lane, Outcome
+from pvid.bench.longevity_signals import RATE_HZ, SCENARIOS, Signals
+from pvid.compare import first_difference
+from pvid.native import Native, Reason
+from pvid.rig import Sensors, simulate
+from pvid.rigfile import RigFile
+from pvid.setup import strong_config, weak_config
+from pvid.twin.strong import StrongTwin
+from pvid.twin.weak import WeakTwin
+
+TICKS = 100_000
+TWIN_TICKS = {"weak": 25_000, "strong": 6_000}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    return longevity.build_library(tmp_path_factory.mktemp("longevity"))
+
+
+@pytest.fixture(scope="module")
+def outcomes(native: Native, library: ctypes.CDLL) -> dict[str, dict[str, Outcome]]:
+    return {name: longevity.measure(native, library, name, LANES, TICKS) for name in SCENARIOS}
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_nothing_of_ours_is_ever_not_finite(scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
+    for lane in LANES:
+        outcome = outcomes[scenario][lane.label]
+        if lane.kind in ("weak", "strong"):
+            assert (outcome.ticks, outcome.not_finite, outcome.singular) == (TICKS, 0, 0), lane.label
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_weak_form_is_never_silently_wrong(scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
+    for tau in WEAK_FORGETTING_S:
+        assert not outcomes[scenario][Lane("weak", tau).label].silent, tau
+
+
+@pytest.mark.parametrize("scenario", ["perfect", "one tone", "switching", "dropped samples", "outliers"])
+def test_what_leaves_the_equations_true_leaves_the_weak_form_right(
+    scenario: str, outcomes: dict[str, dict[str, Outcome]]
+) -> None:
+    for tau in WEAK_FORGETTING_S:
+        outcome = outcomes[scenario][Lane("weak", tau).label]
+        assert outcome.told in (Reason.UPDATED.text, Reason.MISFIT.text)
+        assert outcome.errors <= longevity.BACK
+        assert abs(outcome.error_after) < 0.2
+
+
+@pytest.mark.parametrize("scenario", ["step", "drift"])
+def test_forgetting_follows_a_parameter(scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
+    # 40 s after the change: four time constants
+    outcome = outcomes[scenario]["weak, 10 s"]
+    assert outcome.errors <= longevity.BACK
+    assert abs(outcome.error_after) < 1.0
+
+
+def test_the_baselines_die_where_ours_lives(outcomes: dict[str, dict[str, Outcome]]) -> None:
+    # without excitation their covariance grows by 1 / lambda a tick until float32 ends
+    for kind in longevity.PEERS:
+        for scenario in ("absent", "constant", "stuck sensor"):
+            assert outcomes[scenario][f"{kind}, 0.1 s"].ticks < TICKS // 2, (kind, scenario)
+        assert abs(outcomes["perfect"][f"{kind}, none"].error_after) < 1.0, "the baseline itself is sound"
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: ctypes.CDLL) -> None:
+    phi, y = samples(library, scenario, "weak")
+    config = weak_config(RigFile.standard(), RATE_HZ)
+    lanes = [replace(config.estimator, forgetting_s=tau) for tau in WEAK_FORGETTING_S]
+    expected = WeakTwin(config, lanes).run(phi, y)
+    for lane, estimator in enumerate(lanes):
+        record = native.weak(replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
+        assert first_difference(record, *theirs, expected.published[:, :, lane]) is None
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_strong_form_equals_its_twin(scenario: str, native: Native, library: ctypes.CDLL) -> None:
+    phi, y = samples(library, scenario, "strong")
+    rig = RigFile.standard()
+    settings = replace(rig.identifier, form="strong", stride=longevity.STRIDE)
+    config = strong_config(replace(rig, identifier=settings), RATE_HZ)
+    lanes = [replace(config.estimator, forgetting_s=tau) for tau in STRONG_FORGETTING_S]
+    expected = StrongTwin(config, lanes).run(phi, y)
+    for lane, estimator in enumerate(lanes):
+        record = native.strong(replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
+        assert first_difference(record, *theirs) is None
+
+
+def samples(library: ctypes.CDLL, scenario: str, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    chunks = list(Signals(library, scenario, TWIN_TICKS[kind], ENCODER).chunks())
+    return np.concatenate([phi for phi, _ in chunks]), np.concatenate([y for _, y in chunks])
+
+
+# ---- the bench itself ----
+
+
+def test_the_motion_is_that_of_the_rig(library: ctypes.CDLL) -> None:
+    # the simulator integrates the same equations with error control
+    sensing = replace(ENCODER, phi_lsb=0.0, y_lsb=0.0, zero=0.0)
+    phi, y = next(iter(Signals(library, "perfect", 50_000, sensing).chunks()))
+    run = simulate(sensors=Sensors(), truth="linear", duration=len(phi) / RATE_HZ, seed=1).run
+    n = min(len(phi), len(run.phi))
+    assert np.abs(phi[:n] - run.phi[:n]).max() < 1e-7
+    assert np.abs(y[:n] - run.y[:n]).max() < 1e-12
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_disturbance_begins_and_ends(scenario: str, library: ctypes.CDLL) -> None:
+    whole = [Signals(library, name, 50_000, replace(ENCODER, phi_lsb=0.0, y_lsb=0.0)) for name in ("perfect", scenario)]
+    same = []
+    for signals in whole:
+        chunks = list(signals.chunks())
+        same.append([np.concatenate([chunk[i] for chunk in chunks]) for i in (0, 1)])
+    differs = np.zeros(50_000, bool)
+    for one, other in zip(*same, strict=True):
+        differs |= ~((one == other) | (np.isnan(one) & np.isnan(other)))
+    assert not differs[: whole[0].first].any()
+    assert (scenario == "perfect") == (not differs.any())
+
+
+def test_results_are_kept_for_the_same_core_alone(tmp_path: Path) -> None:
+    place = tmp_path / "longevity.json"
+    assert longevity.load(place) == {}
+    longevity.save({"perfect": {"ticks": 7, "lanes": {}}}, place)
+    assert longevity.load(place) == {"perfect": {"ticks": 7, "lanes": {}}}
+    stored = json.loads(place.read_text())
+    place.write_text(json.dumps(stored | {"core": "another"}))
+    assert longevity.load(place) == {}
+
+
+def test_wrong_answers_without_a_word_are_called_silent() -> None:
+    assert Outcome(told="updated", errors=4.0).silent
+    assert Outcome(told="updated", errors=float("nan")).silent
+    assert not Outcome(told="updated", errors=2.0).silent
+    assert not Outcome(told="misfit", errors=40.0).silent
