@@ -82,6 +82,8 @@ missing_packages() {
     if [[ $1 == test ]]; then
         need binutils command -v readelf
         need clang command -v clang
+        need clang-tidy command -v clang-tidy
+        need cppcheck command -v cppcheck
         need g++ command -v g++
         need libclang-rt-dev links_with clang -fsanitize=address,undefined
         need libcmocka-dev test -e /usr/include/cmocka.h

@@ -70,7 +70,7 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     self->phi_offset = config->phi_offset;
     self->y_offset = config->y_offset;
     self->zero_unknown = config->zero_unknown;
-    self->zero_bits = config->zero_unknown ? config->estimator.p_bits[PVID_KAPITZA_C] : 0;
+    self->zero_bits = (int8_t)(config->zero_unknown ? config->estimator.p_bits[PVID_KAPITZA_C] : 0);
     pvid_weak_front_init_q31(&self->front, design);
     const int64_t drive_min = (int64_t)config->drive_min * (design->window - 1);
     self->drive_min = drive_min * drive_min;

@@ -1,0 +1,249 @@
+#!/usr/bin/env python3
+"""Static analysis of the C core and the link: gcc -fanalyzer, clang-tidy, cppcheck with its MISRA C:2012 add-on.
+
+    tools/analyse.py            every finding, but for those that firmware/analysis.toml deviates from; exits 1 on one
+    tools/analyse.py --update   writes firmware/MISRA.md too: the deviations, their reasons and how often each is used
+
+A deviation names a tool, a rule, a reason, and what it covers: files and a regular expression that the line of the
+finding has to match. One that covers nothing any more is an error; so is a required rule that is deviated from more
+often than MISRA.md says, until a person has looked and written it anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+DEVIATIONS = ROOT / "firmware" / "analysis.toml"
+PAGE = ROOT / "firmware" / "MISRA.md"
+FOLDERS = [ROOT / "firmware" / "src", ROOT / "firmware" / "link"]
+INCLUDES = [f"-I{ROOT / 'firmware' / name}" for name in ("include", "src", "link")]
+ASSERT = ["-include", "assert.h", "-DPVID_ASSERT(condition)=assert(condition)"]  # tells a tool what a caller owes
+BUILD = ROOT / "build" / "analysis"
+PACKAGES = {"gcc": "gcc", "clang-tidy": "clang-tidy", "cppcheck": "cppcheck"}
+
+
+@dataclass(frozen=True, order=True)
+class Finding:
+    """What a tool says of one line."""
+
+    tool: str
+    rule: str
+    file: str  # from the top of the repository
+    line: int
+    text: str
+
+    def source(self) -> str:
+        lines = (ROOT / self.file).read_text(encoding="utf-8").splitlines()
+        return lines[self.line - 1] if 0 < self.line <= len(lines) else ""
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}: {self.tool} {self.rule}: {self.text}\n    {self.source().strip()}"
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Findings that stay, and why; the fields of analysis.toml."""
+
+    tool: str
+    rule: str
+    reason: str
+    category: str = "required"  # MISRA's: an advisory rule's findings are counted but not limited
+    files: tuple[str, ...] = ("firmware/*",)
+    line: str = ""  # a regular expression, searched in the finding's line
+
+    def covers(self, finding: Finding) -> bool:
+        return (
+            (self.tool, self.rule) == (finding.tool, finding.rule)
+            and any(fnmatch.fnmatch(finding.file, pattern) for pattern in self.files)
+            and re.search(self.line, finding.source()) is not None
+        )
+
+    def key(self) -> str:
+        return " ".join(filter(None, (self.tool, self.rule, ", ".join(self.files), self.line and f"`{self.line}`")))
+
+
+def sources() -> list[Path]:
+    return sorted(path for folder in FOLDERS for path in folder.glob("*.c"))
+
+
+def run(command: list[str]) -> str:
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.stdout + done.stderr
+
+
+def located(tool: str, output: str, pattern: str) -> set[Finding]:
+    """Finds with the groups file, line, rule and text of pattern; lines elsewhere (notes, system headers) are not."""
+    found = set()
+    for match in re.finditer(pattern, output, re.MULTILINE):
+        path = (ROOT / match["file"]).resolve()
+        if path.is_relative_to(ROOT):
+            at = str(path.relative_to(ROOT))
+            found.add(Finding(tool, match["rule"], at, int(match["line"]), match["text"]))
+    return found
+
+
+def gcc(path: Path) -> set[Finding]:
+    options = ["-std=c99", "-O2", "-ffp-contract=off", "-fanalyzer", "-Wall", "-Wextra", *ASSERT, *INCLUDES]
+    output = run(["gcc", *options, "-c", str(path), "-o", "/dev/null"])
+    if re.search(r"(?<!\w)error:", output):
+        raise SystemExit(f"gcc does not compile {path.name}:\n{output}")
+    return located(
+        "gcc", output, r"^(?P<file>[^\s:]+):(?P<line>\d+):\d+: warning: (?P<text>.*) \[(?P<rule>-W[^\]]+)\]$"
+    )
+
+
+def clang_tidy(path: Path) -> set[Finding]:
+    options = ["-std=c99", "-ffp-contract=off", *ASSERT, *INCLUDES]
+    output = run(["clang-tidy", "--quiet", str(path), "--", *options])
+    if re.search(r"(?<!\w)error:", output):
+        raise SystemExit(f"clang-tidy does not read {path.name}:\n{output}")
+    return located(
+        "clang-tidy", output, r"^(?P<file>/[^:]+):(?P<line>\d+):\d+: warning: (?P<text>.*) \[(?P<rule>[^\]]+)\]$"
+    )
+
+
+def cppcheck(folders: list[Path]) -> set[Finding]:
+    """MISRA's rules have the tool's name "misra": their texts are not free, so that a number is all there is."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    checks = [
+        "--std=c99",
+        "--enable=warning,style,performance,portability",
+        "--inline-suppr",
+        "--addon=misra",
+        "--quiet",
+    ]
+    # A macro that a user may define as the name of a header; cppcheck would invent a value for it.
+    checks += ["-UPVID_CONFIG_HEADER", f"--cppcheck-build-dir={BUILD}", "-j2"]
+    template = "--template={file}:{line}:{id}:{message}"
+    output = run(["cppcheck", *checks, template, *INCLUDES, *map(str, folders)])
+    found = located("cppcheck", output, r"^(?P<file>/[^:]+):(?P<line>\d+):(?P<rule>[\w.-]+):(?P<text>.*)$")
+    prefix = "misra-c2012-"
+    return {
+        Finding("misra", f.rule.removeprefix(prefix), f.file, f.line, "see the rule")
+        if f.rule.startswith(prefix)
+        else f
+        for f in found
+    }
+
+
+def all_findings() -> list[Finding]:
+    with ThreadPoolExecutor(2) as pool:
+        jobs = [pool.submit(cppcheck, FOLDERS)]
+        jobs += [pool.submit(tool, path) for tool in (clang_tidy, gcc) for path in sources()]
+        return sorted(set().union(*(job.result() for job in jobs)))
+
+
+def deviations() -> list[Deviation]:
+    with DEVIATIONS.open("rb") as file:
+        entries = tomllib.load(file)["deviation"]
+    return [Deviation(**{**entry, "files": tuple(entry.get("files", ["firmware/*"]))}) for entry in entries]
+
+
+def row_of(deviation: Deviation, count: int) -> str:
+    where = (
+        ""
+        if deviation.files == ("firmware/*",)
+        else ", ".join(name.removeprefix("firmware/") for name in deviation.files)
+    )
+    line = f"`{deviation.line}`".replace("|", "\\|") if deviation.line else ""
+    scope = " ".join(filter(None, (where, line))) or "everywhere"
+    reason = " ".join(deviation.reason.split())
+    kind = f" ({deviation.category})" if deviation.tool == "misra" else ""
+    return f"| {deviation.tool} {deviation.rule}{kind} | {count} | {scope} | {reason} |"
+
+
+def limits() -> dict[str, int]:
+    """How often each deviation is used according to MISRA.md, by the row without its count and reason."""
+    if not PAGE.exists():
+        return {}
+    rows = re.findall(
+        r"^\| (\S+ \S+(?: \(\w+\))?) \| (\d+) \| (.+?(?<!\\)) \| .*\|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    return {f"{rule} | {scope}": int(count) for rule, count, scope in rows}
+
+
+def limit_key(row: str) -> str:
+    match = re.match(r"\| (\S+ \S+(?: \(\w+\))?) \| \d+ \| (.+?(?<!\\)) \| ", row)
+    assert match is not None
+    return f"{match[1]} | {match[2]}"
+
+
+def page_of(used: list[tuple[Deviation, int]]) -> str:
+    order = sorted(used, key=lambda pair: (pair[0].tool != "misra", pair[0].tool, natural(pair[0].rule)))
+    in_place = run(["grep", "-rnE", "MISRA deviation|cppcheck-suppress|NOLINT", *map(str, FOLDERS)]).splitlines()
+    in_place = [line.replace(f"{ROOT}/", "") for line in in_place]
+    places = "".join(
+        f"- `{where.rsplit(':', 1)[0]}`\n" for where in (":".join(line.split(":", 2)[:2]) + ":" for line in in_place)
+    )
+    required = sum(count for entry, count in used if entry.tool == "misra" and entry.category == "required")
+    advisory = sum(count for entry, count in used if entry.tool == "misra" and entry.category == "advisory")
+    head = f"""<!-- Written by tools/analyse.py --update; the reasons are those of firmware/analysis.toml. -->
+# Static analysis: what is deviated from, and why
+
+`tools/analyse.py`, a layer of `./tools/test`, runs gcc's -fanalyzer, clang-tidy (the checks of `.clang-tidy`) and
+cppcheck with its MISRA C:2012 add-on over `firmware/src`, `firmware/link` and the headers they include. Whatever is
+found fails the test, but for the deviations below. A number in the second column cannot grow unnoticed where
+the rule is required. cppcheck's add-on checks most of the decidable rules; this is no claim of compliance.
+
+{required} findings of MISRA's required rules and {advisory} of its advisory ones stay:
+
+| rule | findings | where | why it stays |
+|---|---:|---|---|
+"""
+    rows = "\n".join(row_of(deviation, count) for deviation, count in order)
+    return f"{head}{rows}\n\nMarked in place:\n\n{places}"
+
+
+def natural(rule: str) -> tuple[float, float, str]:
+    match = re.fullmatch(r"(\d+)\.(\d+)", rule)
+    return (float(match[1]), float(match[2]), "") if match else (0.0, 0.0, rule)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--update", action="store_true", help="write firmware/MISRA.md")
+    update = parser.parse_args().update
+    missing = [package for tool, package in PACKAGES.items() if shutil.which(tool) is None]
+    if missing:
+        raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")
+
+    findings = all_findings()
+    known = deviations()
+    faults = [str(finding) for finding in findings if not any(entry.covers(finding) for entry in known)]
+    counted = [(entry, sum(entry.covers(finding) for finding in findings)) for entry in known]
+    faults += [
+        f"{DEVIATIONS.name}: {entry.key()} covers nothing; take it out" for entry, count in counted if count == 0
+    ]
+    if update:
+        PAGE.write_text(page_of(counted), encoding="utf-8")
+    else:
+        written = limits()
+        for entry, count in counted:
+            limit = written.get(limit_key(row_of(entry, count)), 0)
+            if entry.category != "advisory" and count > limit:
+                found = "\n".join(f"  {finding}" for finding in findings if entry.covers(finding))
+                faults.append(
+                    f"{entry.key()}: {count} findings, {PAGE.name} says {limit}; mend it, or look and --update\n{found}"
+                )
+    print("\n".join(faults))
+    covered = sum(count for _, count in counted)
+    print(
+        f"Found {len(faults)} faults"
+        if faults
+        else f"All checks passed! {covered} findings deviated from, see {PAGE.name}"
+    )
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
