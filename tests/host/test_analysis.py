@@ -70,7 +70,8 @@ def test_planted_faults_are_found(copy: Path) -> None:
         "planted.c:21: misra 21.3",  # free
     ):
         assert expected in done.stdout
-    assert "analysis.toml: misra 8.14 firmware/* `restrict` covers nothing" in done.stdout  # nor may a deviation outlive its cause
+    # Nor may a deviation outlive its cause.
+    assert "analysis.toml: misra 8.14 firmware/* `restrict` covers nothing" in done.stdout
 
 
 def test_required_rule_is_not_deviated_from_more_often_than_written(copy: Path) -> None:
