@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pvid import link
 from pvid.capture import Run
-from pvid.native import Native, WeakConfig
+from pvid.native import Native, Reason, WeakConfig
 from pvid.rig import simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
 from pvid.stream_image import settings_number
@@ -34,8 +34,8 @@ class Field:
 
     ticks: int
     seed: int = 1
-    estimate_every: int = 500
-    hash_every: int = 500
+    estimate_every: int = 160  # multiples of SAMPLES_A_FRAME
+    hash_every: int = 160
     hello_every: int = 2000
 
     @property
@@ -59,27 +59,26 @@ def rig() -> RigFile:
 def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[int, link.Message]]:
     """(tick, message) in the order in which a board sends them."""
     run = field.run
-    image = stream_rig(rig(), run.sample_rate, start=standard_start(field.seed))
-    assert isinstance(image.config, WeakConfig)
-    settings = settings_number(image)
-    sent = image.configure(settings, field.hash_every, field.estimate_every, link.Source.SENSOR)
-    configure = replace(sent, session=session)
+    board = stream_rig(rig(), run.sample_rate, start=standard_start(field.seed))
+    assert isinstance(board.config, WeakConfig)
+    settings = settings_number(board)
+    configure = replace(board.configure(settings, field.hash_every, field.estimate_every), session=session)
     hello = link.Hello(
-        form=link.Form.WEAK,
-        core=link.Core.F32,
-        n_p=image.n_p,
+        form=int(board.form),
+        core=int(board.core),
+        n_p=board.n_p,
         window=256,
         settings=settings,
         session=session,
-        sample_rate=image.sample_rate,
-        phi_lsb=image.phi_lsb,
-        y_lsb=image.y_lsb,
-        p_unit=image.p_unit,
+        sample_rate=board.sample_rate,
+        phi_lsb=board.phi_lsb,
+        y_lsb=board.y_lsb,
+        p_unit=board.p_unit,
         board="field",
     )
-    identifier = native.weak(image.config)
+    identifier = native.weak(board.config)
     phi, y = run.phi.astype(np.float32)[: field.ticks], run.y.astype(np.float32)[: field.ticks]
-    reason = 0
+    verdict = int(Reason.WARMING_UP)
     for first in range(0, field.ticks, SAMPLES_A_FRAME):
         if first % field.hello_every < SAMPLES_A_FRAME:
             yield first, hello
@@ -90,8 +89,9 @@ def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[i
         yield first, link.Raw.of_values(phi[first:last], y[first:last])
         for tick in range(first, last):
             reason = int(identifier.run(phi[tick : tick + 1], y[tick : tick + 1], sums=False).reason[0])
+            verdict = verdict if reason == Reason.ACCUMULATED else reason
             if field.estimate_every and (tick + 1) % field.estimate_every == 0:
-                yield tick + 1, _estimate(session, identifier.counters["updates"], identifier.assess(), reason)
+                yield tick + 1, _estimate(session, identifier.counters["updates"], identifier.assess(), verdict)
             if field.hash_every and (tick + 1) % field.hash_every == 0:
                 yield tick + 1, link.Hash(session, identifier.running_hash)
 

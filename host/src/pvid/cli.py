@@ -8,8 +8,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,18 +18,19 @@ import numpy as np
 import numpy.typing as npt
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from pvid import __version__
 from pvid.capture import Run, read_run, write_run
+from pvid.cli_log import COMMANDS as LOG_COMMANDS
 from pvid.compare import Comparison, compare_run
 from pvid.compare_q31 import compare_run_q31
+from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
 from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
 from pvid.identify import LINEAR, PHYSICAL, UNITS, ZERO, Identification, identify
-from pvid.logreader import Account
+from pvid.logrig import LOG_SUFFIX, rig_of_log, run_of_log
 from pvid.native import Native
 from pvid.rig import (
     STANDARD_DRIVE,
@@ -49,10 +49,6 @@ from pvid.setup_q31 import config_for_run, counts_of, strong_config_q31, tables_
 from pvid.strong_header_q31 import strong_header_q31
 from pvid.weak_design import to_c_header
 from pvid.weak_header_q31 import to_c_header_q31
-
-DONE, DIFFERENT, BAD_INPUT, NOTHING_IDENTIFIED = 0, 1, 2, 3
-
-messages = Console(stderr=True)
 
 
 def main() -> None:
@@ -73,19 +69,14 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else DONE)
 
 
-@contextmanager
-def progress_bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A bar on a terminal, nothing elsewhere; yields the function to call with the work done so far."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=messages, transient=True, disable=not messages.is_terminal) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda done: bar.update(task, completed=done)
-
-
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="pvid", message="%(prog)s %(version)s")
 def commands() -> None:
     """Identifies the parameters of a mechanism, and proves the C core bit for bit."""
+
+
+for _command in LOG_COMMANDS:
+    commands.add_command(_command)
 
 
 # ---- demo
@@ -281,7 +272,9 @@ def _rig_path(out: Path) -> Path:
 
 def _rig_options(function: Callable[..., int]) -> Callable[..., int]:
     options = [
-        click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML)."),
+        click.option(
+            "--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file (TOML).  [default: a log's own]"
+        ),
         click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."),
         click.option("--form", type=click.Choice(["weak", "strong"]), help="Overrides the rig file."),
     ]
@@ -290,8 +283,19 @@ def _rig_options(function: Callable[..., int]) -> Callable[..., int]:
     return function
 
 
-def _load_rig(path: Path, **overrides: str | None) -> RigFile:
-    rig = load(path)
+def _is_log(path: Path) -> bool:
+    return path.suffix == LOG_SUFFIX
+
+
+def _read(path: Path, rig: RigFile) -> Run:
+    return run_of_log(path) if _is_log(path) else read_run(path, rig.sample_rate)
+
+
+def _load_rig(path: Path | None, run_path: Path, **overrides: str | None) -> RigFile:
+    """The rig file of that name, or the one in a log."""
+    rig = load(path) if path is not None else rig_of_log(run_path) if _is_log(run_path) else None
+    if rig is None:
+        raise PvidError("no rig file: name it with --rig")
     given = {name: value for name, value in overrides.items() if value is not None}
     return replace(rig, identifier=replace(rig.identifier, **given)) if given else rig  # type: ignore[arg-type]
 
@@ -307,7 +311,7 @@ def _load_rig(path: Path, **overrides: str | None) -> RigFile:
 @click.option("--figure", type=click.Path(path_type=Path), help="Writes the convergence (png, svg, pdf).")
 def identify_command(
     run_path: Path,
-    rig_path: Path,
+    rig_path: Path | None,
     law: str | None,
     form: str | None,
     core: str | None,
@@ -320,8 +324,8 @@ def identify_command(
     With --on the run is streamed to a target as well, and the answer is given only if the target reached the same
     bits at every tick that it reported and at the end.
     """
-    rig = _load_rig(rig_path, law=law, form=form, core=core)
-    run = read_run(run_path, rig.sample_rate)
+    rig = _load_rig(rig_path, run_path, law=law, form=form, core=core)
+    run = _read(run_path, rig)
     native = Native()
     result = identify(run, rig, native)
     if target is not None:
@@ -355,7 +359,7 @@ def identify_command(
 @click.option("--core", type=click.Choice(["f32", "q31", "all"]), help="Which arithmetic.  [default: the rig file's]")
 @click.option("--on", "targets", metavar="TARGET", multiple=True, help="Also there: emulator, serial port, all.")
 def compare_command(
-    run_path: Path, rig_path: Path, law: str | None, form: str | None, core: str | None, targets: tuple[str, ...]
+    run_path: Path, rig_path: Path | None, law: str | None, form: str | None, core: str | None, targets: tuple[str, ...]
 ) -> int:
     """Compares the C core with its numpy twin on RUN, after every tick, in every bit.
 
@@ -364,8 +368,8 @@ def compare_command(
     from pvid.compare_on import Outcome, compare_here, compare_there
     from pvid.target import targets_of
 
-    rig = _load_rig(rig_path, form=form)
-    run = read_run(run_path, rig.sample_rate)
+    rig = _load_rig(rig_path, run_path, form=form)
+    run = _read(run_path, rig)
     native = Native()
     own = "q31" if rig.identifier.core == "q31" else "f32"
     outcomes: list[Outcome] = []
@@ -382,58 +386,6 @@ def compare_command(
         table.add_row(*outcome.cells)
     Console(width=None if sys.stdout.isatty() else 140).print(table)
     return DONE if all(outcome.equal for outcome in outcomes) else DIFFERENT
-
-
-# ---- log
-
-
-@commands.command(name="log")
-@click.argument("port")
-@click.argument("out", type=click.Path(path_type=Path))
-@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file: goes into the log, for verify.")
-@click.option("--append", is_flag=True, help="OUT may exist: the new segments go behind its old ones.")
-@click.option("--duration", type=click.FloatRange(min=0), help="Ends after so many seconds.  [default: at Ctrl-C]")
-@click.option(
-    "--allow-loss",
-    default=0.001,
-    show_default=True,
-    type=click.FloatRange(0, 1),
-    help="Share of frames or samples that may be lost without exit code 1.",
-)
-def log_command(
-    port: str, out: Path, rig_path: Path | None, append: bool, duration: float | None, allow_loss: float
-) -> int:
-    """Records what a board sends on PORT into the log OUT, until Ctrl-C.
-
-    PORT is a serial device or a URL of pyserial. A link that breaks off is taken up again when the board is back, in
-    a new segment of the same log. The file holds every byte that came, and opens even if this program is killed.
-    """
-    from pvid.logger import Logger, PortSource
-    from pvid.logstatus import StatusLine
-
-    rig = None
-    if rig_path is not None:
-        load(rig_path)
-        rig = rig_path.read_text(encoding="utf-8")
-    messages.print(f"{port} -> {out}; Ctrl-C ends the recording", highlight=False)
-    logger = Logger(PortSource(port), out, [StatusLine(sys.stderr)], rig, append, duration)
-    return _print_account(logger.run(), allow_loss)
-
-
-def _print_account(account: Account, allow_loss: float) -> int:
-    """The summary of a log; the exit code."""
-    for one in account.segments:
-        lasted = (one.ended_ns - one.began_ns) / 1e9 if one.why is not None else None
-        missing = f", {one.missing_samples} missing" if one.missing_samples else ""
-        click.echo(
-            f"segment {one.number}, {one.port}: {one.samples} samples{missing}, "
-            + (f"{lasted:.1f} s, {one.why}" if lasted is not None else "not closed")
-        )
-    click.echo(account.text)
-    if account.lost_share > allow_loss:
-        click.echo(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed", err=True)
-        return DIFFERENT
-    return DONE
 
 
 # ---- tune

@@ -49,9 +49,10 @@ class Difference:
     variable: str
     core_word: int
     twin_word: int
+    core: str = "core"  # what is compared with the twin
 
     def __str__(self) -> str:
-        return f"tick {self.tick}, {self.variable}: core {self.core_word:08x}, twin {self.twin_word:08x}"
+        return f"tick {self.tick}, {self.variable}: {self.core} {self.core_word:08x}, twin {self.twin_word:08x}"
 
 
 @dataclass(frozen=True)

@@ -14,21 +14,22 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 import serial
 from serial.tools import list_ports
 
 from pvid.errors import PvidError
-from pvid.link import Credit, encode
-from pvid.logfile import LogWriter
-from pvid.logreader import Account, LogStream, Observer
-from pvid.target import Port, Target, open_port
+from pvid.link import Code, Configuration, Credit, Hello, Message, Status, encode
+from pvid.logfile import LogWriter, Segment
+from pvid.logreader import Account, LogStream, Observer, Record
+from pvid.target import COMING_UP_S, Port, Target, open_port, refusal
 
 _CHUNK = 1 << 14
 _RETRY_S = 0.25
 _DRAIN_S = 1.0
 _LOOK_S = 0.05
+_RESEND_S = 1.0
 
 
 class Source(Protocol):
@@ -99,19 +100,20 @@ class EmulatorSource:
 class Recorder(threading.Thread):
     """Reads a source into a log until `stop` is set; then it takes in what is still under way and ends.
 
-    `error` is what ended it before that, if anything did; `greeting` is sent whenever the link has come up.
+    `error` is what ended it before that, if anything did. Whenever the link has come up the board is asked who it is;
+    an emulator only after its first word or COMING_UP_S, for it may block for good when it is written to before.
     """
 
-    def __init__(self, source: Source, writer: LogWriter, greeting: bytes) -> None:
+    def __init__(self, source: Source, writer: LogWriter) -> None:
         super().__init__(name="recorder", daemon=True)
         self.source = source
         self.writer = writer
-        self.greeting = greeting
         self.stop = threading.Event()
         self.why = "ended"
         self.connected = False
         self.error: PvidError | None = None
         self._target: Target | None = None
+        self._sent = 0
 
     def run(self) -> None:
         """See the class."""
@@ -130,30 +132,35 @@ class Recorder(threading.Thread):
             with contextlib.suppress(OSError):
                 self.writer.close()
 
-    def send(self, data: bytes) -> None:
+    def send(self, message: Message) -> None:
         """To the board, if it is there; whether it arrived shows in what it answers."""
         target = self._target
         if target is not None:
+            self._sent += 1
             with contextlib.suppress(serial.SerialException, OSError):
-                target.port.write(data)
+                target.port.write(encode(message, self._sent - 1))
 
     def _segment(self, target: Target) -> None:
         self.writer.begin(self.source.name, self.source.usb)
         self._target, self.connected = target, True
         try:
-            why = self._read(target.port)
+            why = self._read(target.port, 0.0 if target.process is None else COMING_UP_S)
         finally:
             self._target, self.connected = None, False
             with contextlib.suppress(serial.SerialException, OSError):
                 target.close()
         self.writer.end(why)
 
-    def _read(self, port: Port) -> str:
+    def _read(self, port: Port, silent_s: float) -> str:
         """Until the port is gone or the end is asked for; returns which."""
-        self.send(self.greeting)
+        ask_at: float | None = time.monotonic() + silent_s
         try:
             while not self.stop.is_set():
-                self.writer.take(port.read(_CHUNK))
+                data = port.read(_CHUNK)
+                self.writer.take(data)
+                if ask_at is not None and (data or time.monotonic() >= ask_at):
+                    ask_at = None
+                    self.send(Credit(0, 0, 0, 0))
             limit = time.monotonic() + _DRAIN_S
             while time.monotonic() < limit and (data := port.read(_CHUNK)):
                 self.writer.take(data)
@@ -166,6 +173,58 @@ class Recorder(threading.Thread):
             with contextlib.suppress(PvidError):
                 return self.source.open()
         return None
+
+
+class Starter:
+    """An observer that configures a board which is not, so that it samples by itself.
+
+    Parameters
+    ----------
+    send
+        To the board.
+    begin
+        Makes a configuration, with a new session.
+    anew
+        Also a board that is configured already: once, when the recording begins.
+    """
+
+    def __init__(self, send: Callable[[Message], None], begin: Callable[[], Configuration], anew: bool) -> None:
+        self._send = send
+        self._begin = begin
+        self._anew = anew
+        self._wanted: Configuration | None = None
+        self._sent = 0.0
+
+    def take(self, record: Record, account: Account) -> None:
+        """See logreader.Observer.
+
+        Raises
+        ------
+        PvidError
+            When the board refuses.
+        """
+        match record.item:
+            case Segment():
+                self._wanted = None
+            case Hello() as hello if self._wanted is None and (hello.session == 0 or self._anew):
+                self._wanted = self._begin()
+                self._anew = False
+            case Status() as status if self._wanted is not None and status.session == self._wanted.session:
+                if status.code != Code.RUNNING:
+                    raise PvidError(f"the board refused: {refusal(status)}")
+                self._wanted = None
+            case _:
+                pass
+
+    def idle(self, account: Account) -> None:
+        """See logreader.Observer."""
+        now = time.monotonic()
+        if self._wanted is not None and now - self._sent >= _RESEND_S:
+            self._sent = now
+            self._send(self._wanted)
+
+    def close(self, account: Account) -> None:
+        """See logreader.Observer."""
 
 
 @contextlib.contextmanager
@@ -198,7 +257,11 @@ class Logger:
     append
         Whether `out` may exist.
     duration_s
-        Ends by itself after this time; None: when it is asked to.
+        Ends by itself so long after the link first came up; None: when it is asked to.
+    samples
+        Ends by itself when so many have come; None: likewise.
+    begin, anew
+        See Starter; without `begin` nothing is configured.
     """
 
     source: Source
@@ -207,7 +270,11 @@ class Logger:
     rig: str | None = None
     append: bool = False
     duration_s: float | None = None
+    samples: int | None = None
+    begin: Callable[[], Configuration] | None = None
+    anew: bool = False
     stream: LogStream = field(default_factory=LogStream)
+    _observers: list[Observer] = field(default_factory=list)
 
     def run(self) -> Account:
         """Until SIGINT, SIGTERM or the duration; in the main thread.
@@ -215,27 +282,25 @@ class Logger:
         Raises
         ------
         PvidError
-            When the source is not there at the start, or the log cannot be written; what came is in the log.
+            When the source is not there at the start, the board refuses its configuration, or the log cannot be
+            written; what came is in the log.
         """
         writer = LogWriter(self.out, rig=self.rig, append=self.append)
-        recorder = Recorder(self.source, writer, encode(Credit(0, 0, 0, 0), 0))
+        recorder = Recorder(self.source, writer)
+        starter = None if self.begin is None else Starter(recorder.send, self.begin, self.anew)
+        self._observers = [*self.observers, *([] if starter is None else [starter])]
         with _asked_to_end(recorder), self.out.open("rb") as file:
             file.seek(writer.start)
             recorder.start()
-            limit = None if self.duration_s is None else time.monotonic() + self.duration_s
-            while True:
-                ended = not recorder.is_alive()
-                if not self._catch_up(file.read(1 << 16)):
-                    if ended:
-                        break
-                    recorder.stop.wait(_LOOK_S) if not recorder.stop.is_set() else time.sleep(_LOOK_S)
-                if limit is not None and time.monotonic() >= limit and not recorder.stop.is_set():
-                    recorder.why = f"{self.duration_s:g} s are over"
-                    recorder.stop.set()
+            try:
+                self._follow(file, recorder)
+            finally:
+                recorder.stop.set()
+                recorder.join()
         for record in self.stream.end():
-            for one in self.observers:
+            for one in self._observers:
                 one.take(record, self.stream.account)
-        for one in self.observers:
+        for one in self._observers:
             one.close(self.stream.account)
         if recorder.error is not None:
             if not self.stream.account.segments and writer.start == 0:
@@ -243,10 +308,30 @@ class Logger:
             raise recorder.error
         return self.stream.account
 
+    def _follow(self, file: BinaryIO, recorder: Recorder) -> None:
+        """Reads behind the recorder until both have come to the end."""
+        limit = float("inf")
+        while True:
+            ended = not recorder.is_alive()
+            if self.duration_s is not None and limit == float("inf") and self.stream.account.segments:
+                limit = time.monotonic() + self.duration_s
+            if not self._catch_up(file.read(1 << 16)):
+                if ended:
+                    return
+                time.sleep(_LOOK_S)
+            if recorder.stop.is_set():
+                continue
+            if time.monotonic() >= limit:
+                recorder.why = f"{self.duration_s:g} s are over"
+                recorder.stop.set()
+            elif self.samples is not None and self.stream.account.samples >= self.samples:
+                recorder.why = f"{self.samples} samples have come"
+                recorder.stop.set()
+
     def _catch_up(self, data: bytes) -> bool:
         for record in self.stream.feed(data):
-            for one in self.observers:
+            for one in self._observers:
                 one.take(record, self.stream.account)
-        for one in self.observers:
+        for one in self._observers:
             one.idle(self.stream.account)
         return bool(data)

@@ -60,6 +60,13 @@ class StrongTwinQ31:
             driven[tick] = mean_square >= threshold
         return driven
 
+    def follow(self, phi: Int, y: Int, after: Callable[[int, Reasons], None]) -> Reasons:
+        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+
+        Returns what every tick told, [ticks, lanes].
+        """
+        return follow_rows(self.estimator, *self.rows(phi, y), after)
+
     def run(
         self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
     ) -> TwinRecordQ31:
@@ -82,28 +89,43 @@ def run_rows(
     """
     ticks = len(y)
     n_p, lanes = estimator.p.shape
-    record = TwinRecordQ31(
-        p=np.empty((ticks, n_p, lanes), np.int32),
-        sums=np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64),
-        exponent=np.empty((ticks, lanes), np.uint8),
-        reason=np.empty((ticks, lanes), np.uint8),
-    )
+    p = np.empty((ticks, n_p, lanes), np.int32)
+    state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64)
+    exponent = np.empty((ticks, lanes), np.uint8)
+
+    def record(tick: int, _: Reasons) -> None:
+        p[tick] = estimator.p
+        exponent[tick] = estimator.exponent
+        if sums:
+            state[tick] = estimator.sums
+        if progress is not None and tick % 512 == 0:
+            progress(tick)
+
+    reason = follow_rows(estimator, n, y, fate, record)
+    return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)
+
+
+def follow_rows(
+    estimator: EstimatorQ31, n: Int, y: Int, fate: Reasons, after: Callable[[int, Reasons], None]
+) -> Reasons:
+    """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+
+    Returns what every tick told, [ticks, lanes].
+    """
+    ticks = len(y)
+    lanes = estimator.p.shape[1]
+    reason = np.empty((ticks, lanes), np.uint8)
     wide_n = np.broadcast_to(n[:, :, None], (ticks, n.shape[1], lanes))
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
         if fate[tick] == Reason.ACCUMULATED:
-            record.reason[tick] = _step(estimator, wide_n[tick], wide_y[tick])
+            reason[tick] = _step(estimator, wide_n[tick], wide_y[tick])
         else:
-            record.reason[tick] = fate[tick]
+            reason[tick] = fate[tick]
             if fate[tick] != Reason.WARMING_UP:
                 estimator.counters[Reason(fate[tick]).name.lower()] += 1
-        record.p[tick] = estimator.p
-        record.exponent[tick] = estimator.exponent
-        if sums:
-            record.sums[tick] = estimator.sums
-        if progress is not None and tick % 512 == 0:
-            progress(tick)
-    return record
+        after(tick, reason[tick])
+    return reason
 
 
 def _step(estimator: EstimatorQ31, n: Int, y: Int) -> Reasons:

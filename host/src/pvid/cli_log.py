@@ -1,0 +1,160 @@
+"""The commands for boards in the field: log, verify, export."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from pvid.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
+from pvid.errors import PvidError
+from pvid.link import Configuration, Source
+from pvid.logger import EmulatorSource, Logger, PortSource
+from pvid.logreader import Account, LogReader, Observer
+from pvid.logrig import rig_of_log
+from pvid.logstatus import StatusLine
+from pvid.rigfile import RigFile, load
+from pvid.stream_image import settings_number
+from pvid.stream_rig import StreamRig, stream_rig
+from pvid.target import EMULATORS, HOST_TARGET, open_target
+from pvid.tee import Tee
+
+
+@click.command(name="log")
+@click.argument("port")
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file: goes into the log, for verify.")
+@click.option("--append", is_flag=True, help="OUT may exist: the new segments go behind its old ones.")
+@click.option("--anew", is_flag=True, help="The board starts over, even if it is identifying already (needs --rig).")
+@click.option("--paced", is_flag=True, help="A board that is started samples as fast as the line goes, not in time.")
+@click.option("--duration", type=click.FloatRange(min=0), help="Ends after so many seconds.  [default: at Ctrl-C]")
+@click.option("--samples", type=click.IntRange(min=1), help="Ends when so many have come.")
+@click.option("--tee", "tees", metavar="URL", multiple=True, help="Also to udp://host:port (JSON) or teleplot://...")
+@click.option(
+    "--allow-loss",
+    default=0.001,
+    show_default=True,
+    type=click.FloatRange(0, 1),
+    help="Share of frames or samples that may be lost without exit code 1.",
+)
+def log_command(
+    port: str,
+    out: Path,
+    rig_path: Path | None,
+    append: bool,
+    anew: bool,
+    paced: bool,
+    duration: float | None,
+    samples: int | None,
+    tees: tuple[str, ...],
+    allow_loss: float,
+) -> int:
+    """Records what a board sends on PORT into the log OUT, until Ctrl-C.
+
+    PORT is a serial device, a URL of pyserial or the name of an emulator. A link that breaks off is taken up again
+    when the board is back, in a new segment of the same log. The file holds every byte that came, and opens even if
+    this program is killed. With a rig file a board that waits for its settings is started.
+    """
+    emulated = port in (HOST_TARGET, *EMULATORS)
+    rig = None if rig_path is None else load(rig_path)
+    if emulated and rig is None:
+        rig = RigFile.standard()
+    if anew and rig is None:
+        raise PvidError("--anew needs --rig: the board starts over with its settings")
+    board = None if rig is None else _board(rig)
+    source = Source.SENSOR_PACED if paced else Source.SENSOR
+    begin = None if board is None else _configurations(board, source)
+    observers: list[Observer] = [StatusLine(sys.stderr), *(Tee(one, None if rig is None else rig.l1) for one in tees)]
+    messages.print(f"{port} -> {out}; Ctrl-C ends the recording", highlight=False)
+    logger = Logger(
+        source=EmulatorSource(port, lambda: open_target(port, board)) if emulated and board else PortSource(port),
+        out=out,
+        observers=observers,
+        rig=None if rig is None else rig.text(),
+        append=append,
+        duration_s=duration,
+        samples=samples,
+        begin=begin,
+        anew=anew,
+    )
+    return print_account(logger.run(), allow_loss)
+
+
+def _board(rig: RigFile) -> StreamRig:
+    if rig.sample_rate is None:
+        raise PvidError("the rig file has no sample_rate, and a board that samples by itself needs one")
+    return stream_rig(rig, rig.sample_rate)
+
+
+def _configurations(board: StreamRig, source: Source) -> Callable[[], Configuration]:
+    """Makes configurations with an estimate and a hash ten times a second."""
+    settings = settings_number(board)
+    every = max(1, min(65535, round(board.sample_rate / 10)))
+    return lambda: board.configure(settings, every, every, source)
+
+
+def print_account(account: Account, allow_loss: float) -> int:
+    """The summary of a recording; returns the exit code."""
+    for one in account.segments:
+        lasted = f"{(one.ended_ns - one.began_ns) / 1e9:.1f} s, {one.why}" if one.why is not None else "not closed"
+        missing = f", {one.missing_samples} missing" if one.missing_samples else ""
+        click.echo(f"segment {one.number}, {one.port}: {one.samples} samples{missing}, {lasted}")
+    click.echo(account.text)
+    if account.lost_share > allow_loss:
+        click.echo(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed", err=True)
+        return DIFFERENT
+    return DONE
+
+
+_LOG = click.argument("log", type=click.Path(path_type=Path))
+_RIG = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
+
+
+@click.command(name="verify")
+@_LOG
+@_RIG
+def verify_command(log: Path, rig_path: Path | None) -> int:
+    """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
+
+    The first difference is named. What follows a lost sample cannot be verified until the board counts from 0 again;
+    it is listed. Exit code 1 at a difference, 3 when nothing could be verified.
+    """
+    from pvid.logverify import Verifier  # the twins, which other commands need not wait for
+
+    rig = load(rig_path) if rig_path is not None else rig_of_log(log)
+    reader = LogReader(log)
+    different = verified = 0
+    with progress_bar("verifying", None) as advance:
+        for stretch in Verifier(rig, advance).stretches(reader):
+            click.echo(stretch.text)
+            different += stretch.difference is not None
+            verified += stretch.verified
+    click.echo(reader.account.text)
+    if different:
+        return DIFFERENT
+    return DONE if verified else NOTHING_IDENTIFIED
+
+
+@click.command(name="export")
+@_LOG
+@_RIG
+@click.option("--to", "form", type=click.Choice(["csv", "parquet", "mcap", "npz"]), required=True, help="Format.")
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Where, without ending.  [default: beside LOG]")
+def export_command(log: Path, rig_path: Path | None, form: str, out: Path | None) -> int:
+    """Writes samples, estimates, status and events of a LOG in SI units, for other programs.
+
+    csv and parquet make a file of each table; units are in LOG-metadata.json (CSV on the Web) or in the columns'
+    metadata. npz is one file, whose arrays t, phi and y are a run for `pvid identify` if nothing is missing; its units
+    stand in the array "units". mcap is one file of JSON messages for PlotJuggler and Foxglove.
+    """
+    from pvid.export import export_log
+
+    rig = load(rig_path) if rig_path is not None else rig_of_log(log)
+    for path in export_log(log, form, out or log.with_suffix(""), None if rig is None else rig.l1):
+        click.echo(path)
+    return DONE
+
+
+COMMANDS = (log_command, verify_command, export_command)

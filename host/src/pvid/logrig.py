@@ -1,0 +1,76 @@
+"""What a log tells of the rig it was recorded on, and the run in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.capture import MIN_ROWS, Run
+from pvid.errors import PvidError
+from pvid.link import Hello
+from pvid.logreader import LogReader
+from pvid.logvalues import Values
+from pvid.rigfile import RigFile
+
+LOG_SUFFIX = ".pvlog"
+
+
+def rig_of_log(path: Path) -> RigFile | None:
+    """The rig file in a log; None when the logger was given none.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, or the rig file in it is none.
+    """
+    reader = LogReader(path)
+    for _ in reader:
+        if reader.rig is not None:
+            return RigFile.parse(reader.rig)
+        if reader.account.frames:
+            break  # it stands in front of all that the board said
+    return None
+
+
+def hello_of_log(path: Path) -> Hello | None:
+    """Who the board is, by its first word on it; None when it never said."""
+    for record in LogReader(path):
+        if isinstance(record.item, Hello):
+            return record.item
+    return None
+
+
+def run_of_log(path: Path) -> Run:
+    """The longest stretch of samples in a log without a gap.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, the board has not told its sample rate, or there are too few samples.
+    """
+    hello = hello_of_log(path)
+    if hello is None:
+        raise PvidError(f"{path}: the board never said who it is, and its sample rate is not known")
+    values = Values(hello=hello)
+    best: list[npt.NDArray[np.float64]] = []
+    parts: list[npt.NDArray[np.float64]] = []
+    longest = length = 0
+    expected = None
+    for record in LogReader(path):
+        for rows in values.rows(record):
+            if rows.table != "samples":
+                continue
+            columns = np.stack([rows.columns[name] for name in ("t", "phi", "y")])
+            if record.tick != expected:
+                parts, length = [], 0
+            parts.append(columns)
+            length += columns.shape[1]
+            expected = record.tick + columns.shape[1]
+            if length > longest:
+                best, longest = parts, length
+    if longest < MIN_ROWS:
+        raise PvidError(f"{path} holds {longest} samples in a row; a run needs at least {MIN_ROWS}")
+    t, phi, y = np.concatenate(best, axis=1)
+    return Run(t=t, phi=phi, y=y, sample_rate=float(hello.sample_rate))

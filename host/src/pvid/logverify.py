@@ -1,0 +1,324 @@
+"""A log computed again: every estimate and every hash in it against the numpy twin, bit for bit.
+
+What the bits depend on is all in the log: the samples from tick 0 on, the configuration and, by the rig file, the
+settings and tables of the board's image. After a sample is lost the identifier's state is unknown, and what follows
+cannot be verified until the board counts from 0 again. A link that broke without costing a sample breaks nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.compare import P_NAMES, Difference
+from pvid.errors import PvidError
+from pvid.link import (
+    MAX_P,
+    Configuration,
+    Configure,
+    ConfigureQ31,
+    Credit,
+    Estimate,
+    EstimateQ31,
+    Hash,
+    Hello,
+    Raw,
+    RawCount,
+)
+from pvid.logreader import Record
+from pvid.native import Law, Reason, StrongConfig, WeakConfig
+from pvid.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.rigfile import RigFile
+from pvid.stream_image import settings_number
+from pvid.stream_rig import FixedConfig, FloatConfig, stream_rig
+from pvid.twin import fnv
+from pvid.twin.estimator_q31 import EstimatorQ31
+from pvid.twin.strong import StrongTwin
+from pvid.twin.strong_q31 import StrongTwinQ31
+from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
+
+Check = Estimate | EstimateQ31 | Hash | Credit
+Twin = WeakTwin | StrongTwin | WeakTwinQ31 | StrongTwinQ31
+
+_CONFIGURATIONS = 8  # of the last sessions that are remembered
+_UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
+
+
+@dataclass
+class Stretch:
+    """Consecutive ticks of one session and what came of them.
+
+    `ticks` from `first` on; `checked` estimates and hashes were equal up to the `difference`, if there is one;
+    `why_not` says why nothing could be verified, or nothing behind the last tick.
+    """
+
+    segment: int
+    first: int
+    ticks: int
+    session: int | None = None
+    checked: int = 0
+    difference: Difference | None = None
+    why_not: str | None = None
+    verified: bool = False
+
+    @property
+    def text(self) -> str:
+        """In one sentence."""
+        where = f"segment {self.segment}, ticks {self.first} to {self.first + self.ticks - 1}"
+        if self.difference is not None:
+            return f"{where}: DIFFERENT at {self.difference}"
+        if not self.verified:
+            return f"{where}: not verified, {self.why_not}"
+        return f"{where}: {self.checked} estimates and hashes equal in every bit"
+
+
+@dataclass
+class _Open:
+    """A stretch that grows."""
+
+    stretch: Stretch
+    parts: list[npt.NDArray[Any]] = field(default_factory=list)
+    checks: list[tuple[int, Check]] = field(default_factory=list)
+
+    @property
+    def next(self) -> int:
+        return self.stretch.first + self.stretch.ticks
+
+
+class Verifier:
+    """Takes the records of a log in and hands out each stretch when it has come to its end.
+
+    Parameters
+    ----------
+    rig
+        Of the board; None: nothing can be verified.
+    progress
+        Called with the ticks computed so far.
+
+    Memory: the samples of the longest stretch.
+    """
+
+    def __init__(self, rig: RigFile | None, progress: Callable[[int], None] | None = None) -> None:
+        self.rig = rig
+        self._progress = progress
+        self._done = 0
+        self._hello: Hello | None = None
+        self._configurations: dict[int, Configuration] = {}
+        self._open: _Open | None = None
+        self._settings: dict[float, tuple[FloatConfig | FixedConfig, int]] = {}
+
+    def stretches(self, records: Iterable[Record]) -> Iterator[Stretch]:
+        """Of all records, in order."""
+        for record in records:
+            yield from self._take(record)
+        yield from self._close()
+
+    def _take(self, record: Record) -> Iterator[Stretch]:
+        match record.item:
+            case Hello() as hello:
+                self._hello = hello
+            case Configuration() as configuration:
+                self._configurations.pop(configuration.session, None)
+                self._configurations[configuration.session] = configuration
+                if len(self._configurations) > _CONFIGURATIONS:
+                    del self._configurations[next(iter(self._configurations))]
+            case Raw() | RawCount() as raw:
+                if self._open is None or record.tick != self._open.next:
+                    yield from self._close()
+                    self._open = _Open(Stretch(record.segment, record.tick, 0))
+                values = raw.values
+                self._open.stretch.ticks += len(values)
+                if self._open.stretch.first == 0:  # else it will not be computed
+                    self._open.parts.append(values)
+            case Estimate() | EstimateQ31() | Hash() | Credit() as check:
+                # ticks that are not this stretch's belong to samples that were lost
+                if self._open is not None and self._open.stretch.first == 0 and 0 < record.tick <= self._open.next:
+                    self._open.checks.append((record.tick, check))
+            case _:
+                pass
+
+    def _close(self) -> Iterator[Stretch]:
+        opened, self._open = self._open, None
+        if opened is None:
+            return
+        try:
+            self._verify(opened)
+        except PvidError as error:
+            opened.stretch.why_not = str(error)
+        yield opened.stretch
+
+    def _verify(self, opened: _Open) -> None:
+        stretch = opened.stretch
+        if stretch.first != 0:
+            raise PvidError("what was before is not in the log, and the state hangs on it")
+        if not opened.checks:
+            raise PvidError("no estimate and no hash came with them")
+        stretch.session = opened.checks[-1][1].session
+        configuration = self._configurations.get(stretch.session)
+        if configuration is None:
+            raise PvidError("the board's configuration did not come with them")
+        config = self._config(configuration)
+        samples = np.concatenate(opened.parts)
+        checks: dict[int, list[Check]] = {}
+        for tick, check in opened.checks:
+            if check.session == stretch.session:
+                checks.setdefault(tick, []).append(check)
+        _Recomputation(config, checks, stretch, self._count).run(samples)
+        stretch.verified = True
+
+    def _count(self) -> None:
+        self._done += 1
+        if self._progress is not None and self._done % 512 == 0:
+            self._progress(self._done)
+
+    def _config(self, configuration: Configuration) -> FloatConfig | FixedConfig:
+        """The identifier's settings: the rig file's, with what the configuration brings."""
+        if self.rig is None:
+            raise PvidError("the log holds no rig file: name it with --rig")
+        if self._hello is None:
+            raise PvidError("the board has not said who it is")
+        rate = float(self._hello.sample_rate)
+        if rate not in self._settings:
+            board = stream_rig(self.rig, self.rig.sample_rate or rate)
+            self._settings[rate] = (board.config, settings_number(board))
+        config, number = self._settings[rate]
+        if configuration.settings != number:
+            raise PvidError("the board's image was made for other settings than the rig file's")
+        n_p = len(config.estimator.start)
+        names = ("start", "start_sd", "lower", "upper")
+        match config, configuration:
+            case WeakConfigQ31() | StrongConfigQ31(), ConfigureQ31() as given:
+                integers: dict[str, Any] = {name: tuple(getattr(given, name)[:n_p]) for name in names}
+                estimator = replace(
+                    config.estimator,
+                    **integers,
+                    row_sd=given.row_sd,
+                    forgetting_groups=given.forgetting_groups,
+                    gain=given.gain,
+                    divider=given.divider,
+                )
+                return replace(config, estimator=estimator, phi_offset=given.phi_offset, y_offset=given.y_offset)
+            case WeakConfig() | StrongConfig(), Configure() as given:
+                floats: dict[str, Any] = {name: np.array(getattr(given, name)[:n_p], np.float32) for name in names}
+                settings = replace(
+                    config.estimator,
+                    **floats,
+                    row_sd=given.row_sd,
+                    forgetting_s=given.forgetting_s,
+                    feedback_hz=given.feedback_hz,
+                    law=Law(given.law),
+                    divider=given.divider,
+                )
+                return replace(config, estimator=settings)
+            case _:
+                raise PvidError("the board's image holds another core than the rig file asks for")
+
+
+def _twin_of(config: FloatConfig | FixedConfig) -> Twin:
+    match config:
+        case WeakConfig():
+            return WeakTwin(config)
+        case StrongConfig():
+            return StrongTwin(config)
+        case WeakConfigQ31():
+            return WeakTwinQ31(config)
+        case StrongConfigQ31():
+            return StrongTwinQ31(config)
+
+
+class _DifferentError(Exception):
+    """Ends a recomputation."""
+
+
+class _Recomputation:
+    """One run of the twin over a stretch."""
+
+    def __init__(
+        self,
+        config: FloatConfig | FixedConfig,
+        checks: dict[int, list[Check]],
+        stretch: Stretch,
+        count: Callable[[], None],
+    ) -> None:
+        self.twin = _twin_of(config)
+        self._fixed = isinstance(config, FixedConfig)
+        self._checks = checks
+        self._stretch = stretch
+        self._count = count
+        self._hash = fnv.START
+        self._verdict = int(Reason.WARMING_UP)
+
+    def run(self, samples: npt.NDArray[Any]) -> None:
+        """Over samples [ticks, 2] from tick 0; the outcome is left in the stretch."""
+        try:
+            wide = samples.astype(np.int64) if self._fixed else samples
+            self.twin.follow(wide[:, 0], wide[:, 1], self._after)
+        except _DifferentError:
+            pass
+
+    def _after(self, tick: int, reasons: npt.NDArray[np.uint8]) -> None:
+        reason = int(reasons[0])
+        self._hash = fnv.fold_bytes(self._hash, self._state(reason))
+        if reason != Reason.ACCUMULATED:
+            self._verdict = reason
+        self._count()
+        for check in self._checks.get(tick + 1, ()):
+            for variable, logged, own in self._compared(check, reason):
+                if logged != own:
+                    self._stretch.difference = Difference(tick + 1, variable, logged, own, "log")
+                    raise _DifferentError
+            self._stretch.checked += 1
+
+    def _state(self, reason: int) -> bytes:
+        """What the hash covers, as in fnv.h."""
+        estimator = self.twin.estimator
+        word = reason.to_bytes(4, "little")
+        if isinstance(estimator, EstimatorQ31):
+            exponent = int(estimator.exponent[0]).to_bytes(4, "little")
+            p, sums = estimator.p[:, 0].astype("<i4"), estimator.sums[:, 0].astype("<i8")
+            return p.tobytes() + sums.tobytes() + exponent + word
+        return estimator.p[:, 0].astype("<f4").tobytes() + estimator.sums[:, 0].astype("<f4").tobytes() + word
+
+    def _compared(self, check: Check, reason: int) -> Iterator[tuple[str, int, int]]:
+        """Variable, the log's word, the twin's."""
+        match check:
+            case Hash():
+                yield "hash", check.hash, self._hash
+            case Credit():
+                yield "hash", check.hash, self._hash
+                yield "status", check.reason, reason
+            case Estimate() | EstimateQ31():
+                yield from self._compared_estimate(check)
+
+    def _compared_estimate(self, check: Estimate | EstimateQ31) -> Iterator[tuple[str, int, int]]:
+        if isinstance(check, EstimateQ31) != self._fixed:
+            raise PvidError("the estimates are of another core than the rig file asks for")
+        own = self.twin.estimator.assess()[0]
+        n_p = len(self.twin.estimator.p)
+        upper = tuple((a, b) for a, b in _UPPER if b < n_p)
+        for i in range(n_p):
+            yield P_NAMES[i], _word(check.p[i]), _word(own["p"][i])
+        matrix = "correlation" if isinstance(check, EstimateQ31) else "covariance"
+        logged = dict(zip(_UPPER, getattr(check, matrix), strict=True))
+        if isinstance(check, EstimateQ31):
+            for i in range(n_p):
+                yield f"standard error of {P_NAMES[i]}", _word(check.se[i]), _word(own["se"][i])
+        for a, b in upper:
+            yield f"{matrix} of {P_NAMES[a]} and {P_NAMES[b]}", _word(logged[a, b]), _word(own[matrix][a, b])
+        for name in ("kappa", "residual_sd", "weight"):
+            yield name.replace("_", " "), _word(getattr(check, name)), _word(own[name])
+        yield "updates", check.updates, int(self.twin.estimator.counters["updates"][0])
+        yield "status", check.reason, self._verdict
+
+
+def _word(value: Any) -> int:
+    """The 32 bits of a number; one NaN is like another."""
+    if isinstance(value, float | np.floating):
+        word = np.float32(value)
+        return 0x7FC00000 if np.isnan(word) else int(word.view(np.uint32))
+    return int(value) & 0xFFFFFFFF

@@ -1,0 +1,205 @@
+"""A log computed again by the twin: equal where the board was right, and the first wrong bit named."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import field_board
+import numpy as np
+import pytest
+
+from pvid import link
+from pvid.logfile import LogWriter
+from pvid.logreader import LogReader
+from pvid.logverify import Stretch, Verifier
+from pvid.native import Native
+from pvid.rigfile import RigFile
+from pvid.target import HOST_TARGET
+
+TICKS = 4000
+Sent = list[tuple[int, link.Message]]
+
+
+@pytest.fixture(scope="module")
+def sent(native: Native) -> Sent:
+    """(tick, message) of a run of TICKS."""
+    return list(field_board.messages(field_board.Field(TICKS), native))
+
+
+def verified(path: Path, *segments: Sequence[bytes], rig: RigFile | None = None) -> list[Stretch]:
+    """The stretches of a log of these segments."""
+    rig = field_board.rig() if rig is None else rig
+    writer = LogWriter(path, rig=rig.text())
+    for frames in segments:
+        writer.begin("a port", None)
+        writer.take(b"".join(frames))
+        writer.end("the end")
+    writer.close()
+    return list(Verifier(rig).stretches(LogReader(path)))
+
+
+def checks(sent: Sent) -> int:
+    return sum(isinstance(message, link.Estimate | link.Hash) for _, message in sent)
+
+
+def test_a_right_board_is_equal_in_every_bit(tmp_path: Path, sent: Sent) -> None:
+    (stretch,) = verified(tmp_path / "a.pvlog", list(field_board.frames(sent)))
+    assert (stretch.first, stretch.ticks, stretch.checked) == (0, TICKS, checks(sent))
+    assert stretch.verified and stretch.difference is None
+    assert stretch.checked > 40
+    reasons = {message.reason for _, message in sent if isinstance(message, link.Estimate)}
+    assert len(reasons) > 2  # warming up, held, updated: the test would see a verdict that is forgotten
+
+
+def _flipped(value: float) -> float:
+    return float((np.float32(value).view(np.uint32) ^ np.uint32(1)).view(np.float32))
+
+
+def _wrong_in(name: str, place: int) -> Callable[[link.Estimate], link.Estimate]:
+    def change(message: link.Estimate) -> link.Estimate:
+        values = list(getattr(message, name))
+        values[place] = _flipped(values[place])
+        changed: dict[str, Any] = {name: tuple(values)}
+        return replace(message, **changed)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "variable"),
+    [
+        (_wrong_in("p", 1), "d1"),
+        (_wrong_in("covariance", 1), "covariance of w and d1"),
+        (_wrong_in("covariance", 12), "covariance of d2 and c"),
+        (lambda message: replace(message, kappa=_flipped(message.kappa)), "kappa"),
+        (lambda message: replace(message, residual_sd=_flipped(message.residual_sd)), "residual sd"),
+        (lambda message: replace(message, weight=_flipped(message.weight)), "weight"),
+        (lambda message: replace(message, updates=message.updates + 1), "updates"),
+        (lambda message: replace(message, reason=message.reason ^ 1), "status"),
+    ],
+)
+def test_one_wrong_bit_is_named(
+    tmp_path: Path, sent: Sent, change: Callable[[link.Estimate], link.Estimate], variable: str
+) -> None:
+    place, (tick, message) = next(
+        (i, one) for i, one in enumerate(sent) if isinstance(one[1], link.Estimate) and one[0] > 3000
+    )
+    assert isinstance(message, link.Estimate)
+    wrong = [*sent[:place], (tick, change(message)), *sent[place + 1 :]]
+    (stretch,) = verified(tmp_path / "a.pvlog", list(field_board.frames(wrong)))
+    found = stretch.difference
+    assert found is not None
+    assert (found.tick, found.variable) == (tick, variable)
+    assert found.core_word != found.twin_word
+    if variable not in ("updates", "status"):
+        assert found.core_word ^ found.twin_word == 1
+    assert f"DIFFERENT at tick {tick}, {variable}: log {found.core_word:08x}, twin" in stretch.text
+
+
+def test_one_wrong_sample_is_found_by_the_hash(tmp_path: Path, sent: Sent) -> None:
+    place, (tick, message) = next(
+        (i, one) for i, one in enumerate(sent) if isinstance(one[1], link.Raw) and one[0] > 2000
+    )
+    assert isinstance(message, link.Raw)
+    values = message.values.copy()
+    values[3, 0] += np.float32(field_board.rig().sensor.phi_lsb)  # one step of the encoder, once
+    wrong = [*sent[:place], (tick, link.Raw.of_values(values[:, 0], values[:, 1])), *sent[place + 1 :]]
+    (stretch,) = verified(tmp_path / "a.pvlog", list(field_board.frames(wrong)))
+    assert stretch.difference is not None
+    # a sample moves the state when its window is taken in, and a window is a second long
+    assert tick < stretch.difference.tick <= tick + 1500
+
+
+def test_what_follows_a_lost_sample_is_not_verified_until_the_board_starts_over(tmp_path: Path, sent: Sent) -> None:
+    frames = list(field_board.frames(sent))
+    lost = next(i for i, (tick, message) in enumerate(sent) if isinstance(message, link.Raw) and tick > 2000)
+    again = list(field_board.frames(sent[:300]))
+    first, behind, anew = verified(tmp_path / "a.pvlog", [*frames[:lost], *frames[lost + 1 :], *again])
+    n = field_board.SAMPLES_A_FRAME
+    gap = sent[lost][0]
+    assert (first.first, first.ticks, first.verified) == (0, gap, True)
+    assert (behind.first, behind.ticks, behind.verified) == (gap + n, TICKS - gap - n, False)
+    assert "what was before is not in the log" in behind.text
+    assert (anew.first, anew.verified, anew.difference) == (0, True, None)
+    assert 0 < first.checked < checks(sent) and anew.checked > 0
+
+
+def test_a_link_that_broke_without_costing_a_sample_breaks_nothing(tmp_path: Path, sent: Sent) -> None:
+    frames = list(field_board.frames(sent))
+    (stretch,) = verified(tmp_path / "a.pvlog", frames[:150], frames[150:])
+    assert (stretch.ticks, stretch.checked, stretch.difference) == (TICKS, checks(sent), None)
+
+
+def test_what_cannot_be_verified_says_why(tmp_path: Path, sent: Sent) -> None:
+    def reason(name: str, frames: list[tuple[int, link.Message]], rig: RigFile | None = None) -> str | None:
+        (stretch,) = verified(tmp_path / name, list(field_board.frames(frames)), rig=rig)
+        assert not stretch.verified
+        return stretch.why_not
+
+    without = [one for one in sent if not isinstance(one[1], link.Configuration)]
+    silent = [one for one in sent if not isinstance(one[1], link.Estimate | link.Hash)]
+    assert reason("a", without) == "the board's configuration did not come with them"
+    assert reason("b", silent) == "no estimate and no hash came with them"
+    assert reason("c", [one for one in sent if one[0] >= 160]) == (
+        "what was before is not in the log, and the state hangs on it"
+    )
+    other = replace(field_board.rig(), l1=0.31)
+    assert reason("d", sent, other) == "the board's image was made for other settings than the rig file's"
+    fixed = replace(field_board.rig(), identifier=replace(field_board.rig().identifier, core="q31"))
+    assert reason("e", sent, fixed) == "the board's image was made for other settings than the rig file's"
+    (stretch,) = Verifier(None).stretches(LogReader(tmp_path / "d"))
+    assert stretch.why_not == "the log holds no rig file: name it with --rig"
+
+
+# ---- the program
+
+
+def pvid(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pvid", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+
+
+@pytest.mark.parametrize(
+    ("target", "form", "core", "samples"),
+    [
+        (HOST_TARGET, "weak", "f32", 4000),
+        (HOST_TARGET, "weak", "q31", 4000),
+        (HOST_TARGET, "strong", "f32", 800),
+        ("mps2-an386", "weak", "f32", 8000),
+        ("mps2-an386", "weak", "q31", 4000),
+    ],
+)
+def test_a_field_log_of_the_firmware_verifies(tmp_path: Path, target: str, form: str, core: str, samples: int) -> None:
+    rig = RigFile.standard()
+    identifier = replace(rig.identifier, form=form, core=core)  # type: ignore[arg-type]
+    replace(rig, identifier=identifier).write(tmp_path / "rig.toml")
+    pace = [] if target == HOST_TARGET else ["--paced"]
+    done = pvid(tmp_path, "log", target, "a.pvlog", "--rig", "rig.toml", "--samples", str(samples), *pace)
+    assert done.returncode == 0, done.stderr
+    checked = pvid(tmp_path, "verify", "a.pvlog")
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    assert "estimates and hashes equal in every bit" in checked.stdout
+    assert "lost 0 frames, 0 samples" in checked.stdout
+
+
+def test_verify_tells_by_its_exit_code(tmp_path: Path, sent: Sent) -> None:
+    frames = list(field_board.frames(sent[:200]))
+    verified(tmp_path / "right.pvlog", frames)
+    wrong = [
+        (tick, replace(message, hash=message.hash ^ 1) if isinstance(message, link.Hash) else message)
+        for tick, message in sent[:200]
+    ]
+    verified(tmp_path / "wrong.pvlog", list(field_board.frames(wrong)))
+    verified(tmp_path / "none.pvlog", frames[30:])
+    (tmp_path / "noise").write_bytes(b"noise")
+    assert pvid(tmp_path, "verify", "right.pvlog").returncode == 0
+    different = pvid(tmp_path, "verify", "wrong.pvlog")
+    assert different.returncode == 1 and "DIFFERENT at tick 160, hash: log" in different.stdout
+    assert pvid(tmp_path, "verify", "none.pvlog").returncode == 3
+    noise = pvid(tmp_path, "verify", "noise")
+    assert (noise.returncode, noise.stderr) == (2, "pvid: noise is no log of pvid: not one frame in 5 bytes\n")
