@@ -1,4 +1,4 @@
-"""The commands for boards in the field: log, verify, export."""
+"""The commands for boards in the field: log, verify, export, plot."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
+from rich.console import Console
 
 from pvid.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
 from pvid.errors import PvidError
@@ -15,6 +16,7 @@ from pvid.logger import EmulatorSource, Logger, PortSource
 from pvid.logreader import Account, LogReader, Observer
 from pvid.logrig import rig_of_log
 from pvid.logstatus import StatusLine
+from pvid.logview import LiveView
 from pvid.rigfile import RigFile, load
 from pvid.stream_image import settings_number
 from pvid.stream_rig import StreamRig, stream_rig
@@ -39,6 +41,7 @@ from pvid.tee import Tee
     type=click.FloatRange(0, 1),
     help="Share of frames or samples that may be lost without exit code 1.",
 )
+@click.option("-q", "--quiet", is_flag=True, help="Nothing but the summary at the end.")
 def log_command(
     port: str,
     out: Path,
@@ -50,12 +53,15 @@ def log_command(
     samples: int | None,
     tees: tuple[str, ...],
     allow_loss: float,
+    quiet: bool,
 ) -> int:
     """Records what a board sends on PORT into the log OUT, until Ctrl-C.
 
     PORT is a serial device, a URL of pyserial or the name of an emulator. A link that breaks off is taken up again
     when the board is back, in a new segment of the same log. The file holds every byte that came, and opens even if
     this program is killed. With a rig file a board that waits for its settings is started.
+
+    On a terminal the estimates are shown as they come, elsewhere there is a line every ten seconds.
     """
     emulated = port in (HOST_TARGET, *EMULATORS)
     rig = None if rig_path is None else load(rig_path)
@@ -66,8 +72,10 @@ def log_command(
     board = None if rig is None else _board(rig)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)
-    observers: list[Observer] = [StatusLine(sys.stderr), *(Tee(one, None if rig is None else rig.l1) for one in tees)]
-    messages.print(f"{port} -> {out}; Ctrl-C ends the recording", highlight=False)
+    l1 = None if rig is None else rig.l1
+    observers: list[Observer] = [Tee(one, l1) for one in tees]
+    if not quiet:
+        observers.append(_view(f"{port} -> {out}", l1))
     logger = Logger(
         source=EmulatorSource(port, lambda: open_target(port, board)) if emulated and board else PortSource(port),
         out=out,
@@ -80,6 +88,15 @@ def log_command(
         anew=anew,
     )
     return print_account(logger.run(), allow_loss)
+
+
+def _view(title: str, l1: float | None) -> Observer:
+    """The live view on a terminal that can draw it, else a line every ten seconds."""
+    console = Console()
+    if sys.stdout.isatty() and not console.is_dumb_terminal:
+        return LiveView(console, title, l1)
+    messages.print(f"{title}; Ctrl-C ends the recording", highlight=False)
+    return StatusLine(sys.stderr)
 
 
 def _board(rig: RigFile) -> StreamRig:
@@ -157,4 +174,22 @@ def export_command(log: Path, rig_path: Path | None, form: str, out: Path | None
     return DONE
 
 
-COMMANDS = (log_command, verify_command, export_command)
+@click.command(name="plot")
+@click.argument("log", metavar="LOG|RUN", type=click.Path(path_type=Path))
+@_RIG
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="png, svg or pdf.  [default: LOG with .png]")
+def plot_command(log: Path, rig_path: Path | None, out: Path | None) -> int:
+    """Draws a report of a LOG: convergence, residuals and their autocorrelation, spectra, phase plot.
+
+    A run (.csv, .csv.gz, .npz, .parquet), or a log without estimates, is identified on this machine first.
+    """
+    from pvid.report import recording_of, write_report  # matplotlib and scipy, which others need not wait for
+
+    recording = recording_of(log, None if rig_path is None else load(rig_path))
+    out = out or log.with_suffix(".png")
+    write_report(recording, out)
+    click.echo(out)
+    return DONE
+
+
+COMMANDS = (log_command, verify_command, export_command, plot_command)

@@ -18,14 +18,14 @@ from pvid.identify import PHYSICAL, UNITS, Identification
 
 Float = npt.NDArray[np.float64]
 
-_LABELS = {
+LABELS = {
     "g": "gravity in the plane g*",
     "l2": "joint to centre of mass l2",
     "rho2": "radius of gyration rho2",
 }
 
 
-def _interesting(value: Float, band: Float) -> tuple[float, float]:
+def interesting(value: Float, band: Float) -> tuple[float, float]:
     """Limits that show where the estimate ends and how it got there: twice the last band, and the last 3/4."""
     known = np.flatnonzero(np.isfinite(value) & np.isfinite(band))
     if not len(known):
@@ -50,13 +50,13 @@ def convergence(result: Identification, path: Path, *, truth: dict[str, float] |
         band = 2 * trajectory.physical_se[:, column]
         axis.fill_between(trajectory.t, value - band, value + band, alpha=0.25, color="C0", label="±2 s.e.")
         axis.plot(trajectory.t, value, color="C0", linewidth=1.2, label="estimate")
-        low, high = _interesting(value, band)
+        low, high = interesting(value, band)
         if truth is not None:
             axis.axhline(truth[name], color="C3", linestyle="--", linewidth=1.2, label="truth")
             low, high = min(low, truth[name]), max(high, truth[name])
         if math.isfinite(low) and low < high:
             axis.set_ylim(low, high)
-        axis.set_ylabel(f"{_LABELS[name]} [{UNITS[name]}]")
+        axis.set_ylabel(f"{LABELS[name]} [{UNITS[name]}]")
         axis.grid(alpha=0.3)
     axes[0].legend(loc="upper right", ncols=3)
     axes[-1].set_xlabel("time [s]")

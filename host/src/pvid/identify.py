@@ -39,13 +39,14 @@ UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", 
 @dataclass(frozen=True)
 class Trajectory:
     """Estimates over time, for a figure: t [n] in s, p and se [n, 3]; physical and its errors [n, 3], NaN outside
-    the physical region."""
+    the physical region; kappa [n]."""
 
     t: Float
     p: Float
     se: Float
     physical: Float
     physical_se: Float
+    kappa: Float
 
 
 @dataclass(frozen=True)
@@ -194,6 +195,7 @@ def _in_float32(
         estimates["p"][:, :3].astype(np.float64),
         estimates["covariance"][:, :3, :3].astype(np.float64),
         rig.l1,
+        estimates["kappa"].astype(np.float64),
     )
     n_p = min(record.p.shape[1], NAMED)
     return _identification(
@@ -263,6 +265,7 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
             np.array([estimate.p for _, estimate in result.estimates]),
             np.array([estimate.covariance for _, estimate in result.estimates]),
             rig.l1,
+            np.array([estimate.kappa for _, estimate in result.estimates]),
         ),
     )
 
@@ -326,7 +329,9 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
         updates=config.iterations * int(result.updated.sum()),
         lost=0,
         running_hash=None,
-        trajectory=_trajectory(run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig.l1),
+        trajectory=_trajectory(
+            run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig.l1, result.kappa
+        ),
     )
 
 
@@ -353,6 +358,7 @@ def _strong_in_q31(run: Run, rig: RigFile, config: StrongConfigQ31, every: int, 
             p_of(config, record.estimate["p"][:, :3]),
             covariance_of(config, record.estimate),
             rig.l1,
+            record.estimate["kappa"] / 2**30,
         ),
     )
 
@@ -392,6 +398,7 @@ def _weak_in_q31(run: Run, rig: RigFile, config: WeakConfigQ31, every: int, nati
             p_of(config, record.estimate["p"][:, :n_p])[:, :3],
             covariance_of(config, record.estimate)[:, :3, :3],
             rig.l1,
+            record.estimate["kappa"] / 2**30,
         ),
     )
 
@@ -413,17 +420,20 @@ def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
         updates=0,
         lost=0,
         running_hash=None,
-        trajectory=_trajectory(run.t[[0, -1]], np.stack([p, p]), np.stack([covariance, covariance]), rig.l1),
+        trajectory=_trajectory(
+            run.t[[0, -1]], np.stack([p, p]), np.stack([covariance, covariance]), rig.l1, np.zeros(2)
+        ),
     )
 
 
-def _trajectory(t: Float, p: Float, covariance: Float, l1: float) -> Trajectory:
+def _trajectory(t: Float, p: Float, covariance: Float, l1: float, kappa: Float) -> Trajectory:
     return Trajectory(
         t=t,
         p=p,
         se=np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)),
         physical=oracle.physical(p, l1),
         physical_se=oracle.physical_errors(p, covariance, l1),
+        kappa=kappa,
     )
 
 

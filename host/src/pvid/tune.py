@@ -36,8 +36,9 @@ from pvid.rig import is_physical
 from pvid.rigfile import RigFile
 from pvid.setup import nominal_start, weak_config, weak_design_of, weak_drive_threshold
 from pvid.weak_cost import Schedule, instructions
-from pvid.weak_design import Bounds, WeakDesign
-from pvid.weak_oracle import WeakOracle, WeakSettings, columns, frames, front_end
+from pvid.weak_design import Bounds
+from pvid.weak_oracle import WeakOracle, WeakSettings
+from pvid.weak_windows import Windows
 
 Float = npt.NDArray[np.float64]
 
@@ -242,48 +243,6 @@ def _reason(kept: bool, ranked: tuple[Judged, ...], keep: Forgetting) -> str:
     )
 
 
-@dataclass(frozen=True)
-class _Windows:
-    """A run as a design sees it: windows of columns [windows, 11, K], angle and u [windows, W]."""
-
-    design: WeakDesign
-    columns: Float
-    phi: Float
-    u: Float
-
-    @classmethod
-    def of(cls, run: Run, design: WeakDesign) -> _Windows:
-        smooth, u = front_end(run.phi, run.y, design)
-        phi_frames, u_frames = frames(smooth, design), frames(u, design)
-        return cls(design, columns(phi_frames, u_frames, design), phi_frames, u_frames)
-
-    def estimated(self, settings: WeakSettings, part: slice = slice(None)) -> WeakOracle:
-        """The estimator after the windows of a part of the run."""
-        oracle = WeakOracle(self.design, settings)
-        for one, phi, u in zip(self.columns[part], self.phi[part], self.u[part], strict=True):
-            oracle.window(one, phi, u)
-        return oracle
-
-    def residuals(self, oracle: WeakOracle) -> Float:
-        """Residuals of all rows at the estimator's p [windows, K]."""
-        rows = []
-        for one, phi, u in zip(self.columns, self.phi, self.u, strict=True):
-            x, _ = oracle.rows(one, phi, u)
-            rows.append(x[0] - oracle.theta() @ x[1:])
-        return np.array(rows)
-
-    def innovations(self, settings: WeakSettings) -> Float:
-        """Energy of each window's residuals at the estimate from those before it [windows]."""
-        oracle = WeakOracle(self.design, settings)
-        energies = []
-        for one, phi, u in zip(self.columns, self.phi, self.u, strict=True):
-            x, _ = oracle.rows(one, phi, u)
-            e = x[0] - oracle.theta() @ x[1:]
-            energies.append(float(e @ e))
-            oracle.window(one, phi, u)
-        return np.array(energies)
-
-
 class _Bench:
     """Judges candidates on one run, each once."""
 
@@ -448,14 +407,14 @@ class _Bench:
             self.start = whole.p[: len(estimator.start)]
         return judged
 
-    def _prepared(self, settings: Settings) -> tuple[_Windows, WeakSettings]:
+    def _prepared(self, settings: Settings) -> tuple[Windows, WeakSettings]:
         """The run's windows and the estimator's settings."""
         rig = settings.applied(self.rig)
         config = weak_config(rig, self.run.sample_rate)
         estimator = config.estimator
         n_core = 3 + rig.identifier.zero  # the oracle adds friction by itself
         # From an estimate of an earlier candidate one step a window is enough: the sums are the same.
-        return _Windows.of(self.run, weak_design_of(rig, self.run.sample_rate)), WeakSettings(
+        return Windows.of(self.run, weak_design_of(rig, self.run.sample_rate)), WeakSettings(
             start=estimator.start[:n_core].astype(np.float64) if self.start is None else self.start,
             row_sd=estimator.row_sd,
             start_sd=estimator.start_sd[:n_core].astype(np.float64),

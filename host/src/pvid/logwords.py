@@ -1,0 +1,74 @@
+"""What a person is told of a recording: names of the parameters, reasons, kappa and residual in words."""
+
+from __future__ import annotations
+
+import math
+
+from pvid.native import Reason
+
+# Values.TABLES["estimates"] has the same names.
+PARAMETERS = {
+    "g": ("g*", "gravity in the plane", "m/s²"),
+    "l2": ("l2", "joint to centre of mass", "m"),
+    "rho2": ("rho2", "radius of gyration", "m"),
+    "w": ("w", "g*/l1", "1/s²"),
+    "d1": ("d1", "1 + L2 (1 + L1)", ""),
+    "d2": ("d2", "L1 L2", ""),
+    "c": ("c", "the encoder's zero", "rad"),
+}
+
+_REASONS = {
+    Reason.UPDATED: "the estimate took a step and is trusted",
+    Reason.WARMING_UP: "the first window of samples is not full yet",
+    Reason.ACCUMULATED: "samples taken in, the next step comes with the next window",
+    Reason.HELD_NOT_EXCITED: "drive or motion say too little of the parameters; the last estimate stays",
+    Reason.HELD_PIVOT: "the equations could not be solved; the last estimate stays",
+    Reason.REJECTED_NOT_FINITE: "a sample was not a number and was left out",
+    Reason.REJECTED_OUTLIER: "a sample lay far from all others and was left out",
+    Reason.REJECTED_SATURATED: "a sample was absurdly large and was left out",
+    Reason.HELD_UNCERTAIN: "standard errors too wide, or still on the way; the last trusted estimate stays",
+    Reason.HELD_OUT_OF_RANGE: "the angle went beyond what the equations are good for; that window was dropped",
+    Reason.MISFIT: "the estimate took a step, but residuals exceed the sensors' noise: friction, large angles or "
+    "another mechanism",
+}
+
+# What the core publishes (trust.h), and what a good drive reaches (MATH.md 4).
+KAPPA_MIN, KAPPA_WEAK, KAPPA_GOOD = 3e-5, 1e-3, 5e-3
+_KAPPA_SHOWN = (1e-6, 1.0)
+
+
+def reason_words(reason: str) -> str:
+    """What a reason (Reason.text) means, in a sentence; empty for one of another version."""
+    return next((words for one, words in _REASONS.items() if one.text == reason), "")
+
+
+def kappa_words(kappa: float) -> str:
+    """How well the data tell w from d1 and d2."""
+    if not kappa >= KAPPA_MIN:
+        return "parameters cannot be told apart"
+    if kappa < KAPPA_WEAK:
+        return "weak: parameters barely told apart"
+    return ("fair" if kappa < KAPPA_GOOD else "good") + ": parameters told apart"
+
+
+def kappa_share(kappa: float) -> float:
+    """Length of kappa's bar, 0 to 1, over the decades from 1e-6 to 1."""
+    low, high = (math.log10(one) for one in _KAPPA_SHOWN)
+    if not kappa > 0:
+        return 0.0
+    return min(1.0, max(0.0, (math.log10(kappa) - low) / (high - low)))
+
+
+def residual_words(weak: bool) -> str:
+    """What the residuals are so many times of."""
+    return "times the encoder's noise" if weak else "times the row_sd that was configured"
+
+
+def with_error(value: float, error: float) -> tuple[str, str]:
+    """Value and standard error to the error's second digit: 9.50069, 0.0011 is ("9.5007", "0.0011")."""
+    if not (math.isfinite(error) and error > 0):
+        return f"{value:.6g}", f"{error:.2g}"
+    decimals = 1 - math.floor(math.log10(error))
+    if not 0 <= decimals <= 6:
+        return f"{value:.3g}", f"{error:.2g}"
+    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"

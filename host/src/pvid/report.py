@@ -1,0 +1,308 @@
+"""A recording on one page: how the estimate converged, what it leaves unexplained, what excited it, how it moved."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from scipy.signal import savgol_filter, welch
+
+from pvid.capture import Run, read_run
+from pvid.errors import PvidError
+from pvid.figures import LABELS, interesting
+from pvid.identify import LINEAR, PHYSICAL, ZERO, identify
+from pvid.link import Estimate, Form, Hello
+from pvid.logreader import LogReader
+from pvid.logrig import rig_of_log, run_of_log
+from pvid.logvalues import Values
+from pvid.logwords import KAPPA_MIN, with_error
+from pvid.native import Native
+from pvid.residuals import Residuals, residuals_of
+from pvid.rigfile import RigFile
+
+Float = npt.NDArray[np.float64]
+
+_UNITS = {"g": "m/s²", "l2": "m", "rho2": "m"}
+_RUNS = (".csv", ".csv.gz", ".npz", ".parquet")
+_LAGS = 24
+_RESOLUTION_HZ = 0.05  # of the spectra, where the run is long enough
+_SMOOTHING_S = 0.071  # of the angle's rate, as in the weak form's front end
+_MOST_DOTS = 20_000
+_LAST_S = 5.0  # of the motion, drawn dark
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is drawn.
+
+    t : of the estimates, `clock` says since when [n, s];  physical, physical_se : g, l2, rho2 [n, 3];  kappa [n]
+    p : the last estimate, as residuals_of takes it;  reasons : how many estimates came with which
+    breaks : when the board began anew or the link came up again [s];  account : what was recorded and lost
+    run : the longest stretch of samples without a gap
+    """
+
+    title: str
+    clock: str
+    rig: RigFile
+    run: Run
+    t: Float
+    physical: Float
+    physical_se: Float
+    kappa: Float
+    p: Float
+    reasons: dict[str, int]
+    breaks: tuple[float, ...]
+    account: str
+
+
+def recording_of(path: Path, rig: RigFile | None) -> Recording:
+    """What a log holds, or what a run or a log without estimates gives when it is identified here.
+
+    Parameters
+    ----------
+    rig
+        None: the one in the log.
+
+    Raises
+    ------
+    PvidError
+        When the file cannot be read, has too few samples, or there is no rig file.
+    """
+    is_run = path.name.endswith(_RUNS)
+    if rig is None and not is_run:
+        rig = rig_of_log(path)
+    if rig is None:
+        raise PvidError("no rig file: name it with --rig")
+    if is_run:
+        return _of_run(path, read_run(path, rig.sample_rate), rig)
+    return _of_log(path, rig) or _of_run(path, run_of_log(path), rig)
+
+
+def _of_log(path: Path, rig: RigFile) -> Recording | None:
+    """What the board said; None when that was no estimate."""
+    reader, values = LogReader(path), Values(rig.l1)
+    columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason", *LINEAR, ZERO)}
+    columns |= {name: [] for one in PHYSICAL for name in (one, f"{one}_se")}
+    hello, began = None, None
+    friction: tuple[float, ...] = ()
+    for record in reader:
+        if isinstance(record.item, Hello):
+            hello = record.item
+        if isinstance(record.item, Estimate):
+            friction = record.item.p[4:6]
+        for rows in values.rows(record):
+            if rows.table == "samples" and began is None:
+                began = int(rows.columns["log_time"][0])
+            if rows.table == "estimates":
+                for name, column in columns.items():
+                    column.append(rows.columns[name][0])
+    if not columns["run"]:
+        return None
+    told = {name: np.array(column) for name, column in columns.items()}
+    t = (told["log_time"] - (told["log_time"][0] if began is None else began)) / 1e9
+    n_core = 4 if rig.identifier.zero and rig.identifier.form == "weak" else 3
+    counts = zip(*np.unique(told["reason"], return_counts=True), strict=True)
+    if hello is None:
+        title = path.name
+    else:
+        form = "weak" if hello.form == Form.WEAK else "strong"
+        rig = replace(rig, identifier=replace(rig.identifier, form=form))  # type: ignore[arg-type]
+        title = f"{path.name}: board {hello.board}, {form} form, {hello.sample_rate:g} samples per second"
+    return Recording(
+        title=title,
+        clock="since the first sample",
+        rig=rig,
+        run=run_of_log(path),
+        t=t,
+        physical=np.stack([told[name] for name in PHYSICAL], axis=1),
+        physical_se=np.stack([told[f"{name}_se"] for name in PHYSICAL], axis=1),
+        kappa=told["kappa"],
+        p=np.array([*(told[name][-1] for name in (*LINEAR, ZERO)[:n_core]), *friction]),
+        reasons={str(reason): int(count) for reason, count in counts},
+        breaks=tuple(t[1:][np.diff(told["run"]) > 0]),
+        account=reader.account.text,
+    )
+
+
+def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
+    result = identify(run, rig, Native())
+    names = [name for name in (*LINEAR, ZERO) if name in result.value]
+    identifier = rig.identifier
+    return Recording(
+        title=f"{path.name}: {result.form} form, {result.law} law, core {result.core}, {run.sample_rate:g} samples per "
+        "second",
+        clock="of the run",
+        rig=rig,
+        run=run,
+        t=result.trajectory.t,
+        physical=result.trajectory.physical,
+        physical_se=result.trajectory.physical_se,
+        kappa=result.trajectory.kappa,
+        p=np.array([result.value[name] for name in names]),
+        reasons={},
+        breaks=(),
+        account=f"{result.ticks} samples, {result.updates} updates, {result.lost} samples rejected; {result.status}"
+        + ("; residuals without the friction that was estimated" if identifier.damping else ""),
+    )
+
+
+def modes(p: Float) -> tuple[float, float]:
+    """Frequencies at rest [Hz], the slow one first, of s^4 + d1 w s^2 + d2 w^2."""
+    w, d1, d2 = p[:3]
+    root = math.sqrt(max(d1**2 - 4 * d2, 0.0))
+    slow, fast = (math.sqrt(max(w * (d1 + sign * root) / 2, 0.0)) / (2 * math.pi) for sign in (-1, 1))
+    return slow, fast
+
+
+def write_report(recording: Recording, path: Path) -> None:
+    """Draws it; the format follows the suffix of `path` (png, svg, pdf).
+
+    Raises
+    ------
+    PvidError
+        When the run is too short for the residuals, or the file cannot be written.
+    """
+    residuals = residuals_of(recording.run, recording.rig, recording.p)
+    figure, axes = plt.subplots(4, 2, figsize=(15, 13), layout="constrained")
+    try:
+        _converge(recording, axes[:, 0])
+        _residuals(residuals, recording.run, axes[0, 1])
+        _autocorrelation(residuals, axes[1, 1])
+        _spectra(recording, axes[2, 1])
+        _phase(recording.run, axes[3, 1])
+        figure.align_ylabels(axes[:, 0])
+        figure.align_ylabels(axes[:, 1])
+        figure.suptitle("\n".join([recording.title, _last(recording), recording.account]), fontsize=12)
+        figure.savefig(path, dpi=110)
+    except (OSError, ValueError) as error:
+        raise PvidError(f"cannot write the report {path}: {error}") from error
+    finally:
+        plt.close(figure)
+
+
+def _last(recording: Recording) -> str:
+    """The last estimate in words."""
+    parts = []
+    for name, value, error in zip(PHYSICAL, recording.physical[-1], recording.physical_se[-1], strict=True):
+        told, spread = with_error(float(value), float(error))
+        parts.append(f"{name} = {told} ± {spread} {_UNITS[name]}")
+    reasons = ", ".join(f"{count} {reason}" for reason, count in recording.reasons.items())
+    told = f"last estimate: {', '.join(parts)} (± standard error)"
+    return f"{told}\nestimates: {reasons}" if reasons else told
+
+
+def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
+    t = recording.t
+    for column, (name, axis) in enumerate(zip(PHYSICAL, axes, strict=False)):
+        value, band = recording.physical[:, column], 2 * recording.physical_se[:, column]
+        axis.fill_between(t, value - band, value + band, alpha=0.25, color="C0", label="±2 standard errors")
+        axis.plot(t, value, color="C0", linewidth=1.2, label="estimate")
+        low, high = interesting(value, band)
+        if math.isfinite(low) and low < high:
+            axis.set_ylim(low, high)
+        axis.set_ylabel(f"{LABELS[name]} [{_UNITS[name]}]")
+    axes[0].set_title("Convergence")
+    kappa = axes[3]
+    kappa.semilogy(t, np.where(recording.kappa > 0, recording.kappa, np.nan), color="C2", label="kappa")
+    kappa.axhline(KAPPA_MIN, color="C3", linestyle="--", label="nothing is published below")
+    kappa.set_ylabel("kappa: how far apart\nthe data tell the parameters [1]")
+    kappa.set_xlabel(f"time {recording.clock} [s]")
+    for axis in axes:
+        for i, one in enumerate(recording.breaks):
+            axis.axvline(one, color="0.5", linestyle=":", label="the board began anew" if i == 0 else None)
+        axis.set_xlim(min(0.0, float(t[0])), max(float(t[-1]), 1e-9))
+        axis.grid(alpha=0.3)
+        axis.legend(loc="best", fontsize=9)
+
+
+def _residuals(residuals: Residuals, run: Run, axis: Axes) -> None:
+    t, e = np.repeat(residuals.t, residuals.e.shape[1]), residuals.e.ravel()
+    every = max(1, len(e) // _MOST_DOTS)
+    axis.plot(t[::every], e[::every], ".", markersize=3, color="0.6", label="one row")
+    if residuals.expected:
+        axis.plot(residuals.t, residuals.rms, color="C1", linewidth=1.2, label="rms of a window")
+        axis.axhline(1.0, color="C3", linestyle="--", label="rms of the encoder's noise")
+        unit = "the encoder's noise"
+    else:
+        unit = "its standard deviation"
+    reach = 1.15 * max(float(np.quantile(np.abs(e), 0.999)), 1.0)
+    axis.set_ylim(-reach, 1.45 * reach)  # room for the legend
+    axis.set_title("Residuals of the rows at the last estimate")
+    axis.set_ylabel(f"residual [1 = {unit}]")
+    axis.set_xlabel("time on the board [s]")
+    axis.set_xlim(run.t[0], run.t[-1])
+    axis.grid(alpha=0.3)
+    axis.legend(loc="upper right", fontsize=9, ncols=3)
+
+
+def _autocorrelation(residuals: Residuals, axis: Axes) -> None:
+    """Of the windows' rows; in the strong form of the samples' over twice the differentiator's reach."""
+    every = max(1, 2 * residuals.shared // _LAGS)
+    found = residuals.autocorrelation(_LAGS * every)[::every]
+    lag = every * residuals.step_s * np.arange(len(found))
+    axis.bar(lag[1:], found[1:], width=0.6 * every * residuals.step_s, color="C0", label="autocorrelation")
+    axis.axhspan(-residuals.chance, residuals.chance, color="C3", alpha=0.2, label="chance (±2 s.d.)")
+    shared = residuals.shared * residuals.step_s
+    axis.axvspan(0, shared * 1.2, color="0.85", zorder=0, label="share samples")
+    reach = max(0.3, 1.3 * float(np.abs(found[1:]).max(initial=0.0)))
+    axis.set_ylim(-reach, 1.6 * reach)
+    axis.set_xlim(0, max(float(lag[-1]), residuals.step_s) * 1.02)
+    axis.set_title("Autocorrelation of the residuals")
+    axis.set_ylabel("correlation [1]")
+    axis.set_xlabel("lag [s]")
+    axis.grid(alpha=0.3)
+    axis.legend(loc="upper right", fontsize=9, ncols=3)
+
+
+def _spectra(recording: Recording, axis: Axes) -> None:
+    """Amplitude spectral densities of the pivot's acceleration and of the angle, beside the modes."""
+    run = recording.run
+    length = min(len(run.t), round(run.sample_rate / _RESOLUTION_HZ))
+    frequency, height = welch(run.y - run.y.mean(), run.sample_rate, "hann", length)
+    _, angle = welch(run.phi - run.phi.mean(), run.sample_rate, "hann", length)
+    both = modes(recording.p)
+    shown = (frequency > 0) & (frequency <= min(4 * both[1], run.sample_rate / 2))
+    acceleration = np.sqrt(height) * (2 * np.pi * frequency) ** 2
+    drive = axis.semilogy(frequency[shown], acceleration[shown], color="C0", label="pivot's acceleration")
+    axis.set_ylabel("acceleration [m/s²/√Hz]", color="C0")
+    other = axis.twinx()
+    motion = other.semilogy(frequency[shown], np.sqrt(angle)[shown], color="C1", label="angle phi")
+    other.set_ylabel("angle [rad/√Hz]", color="C1")
+    lines = [*drive, *motion]
+    for one in both:
+        lines += [axis.axvline(one, color="C3", linestyle="--", label=f"mode at {one:.3g} Hz")]
+    for scale in (axis, other):  # room for the legend
+        low, high = scale.get_ylim()
+        scale.set_ylim(low, high * (high / low) ** 0.35)
+    axis.set_xlim(0, float(frequency[shown][-1]))
+    axis.set_title("Excitation and answer against the modes of the estimate")
+    axis.set_xlabel("frequency [Hz]")
+    axis.grid(alpha=0.3)
+    axis.legend(handles=lines, loc="upper right", fontsize=9, ncols=2)
+
+
+def _phase(run: Run, axis: Axes) -> None:
+    points = max(7, round(_SMOOTHING_S * run.sample_rate)) | 1
+    angle = savgol_filter(run.phi, points, 4)
+    rate = savgol_filter(run.phi, points, 4, deriv=1, delta=1 / run.sample_rate)
+    every = max(1, len(angle) // _MOST_DOTS)
+    last = run.t > run.t[-1] - _LAST_S
+    axis.plot(angle[::every], rate[::every], color="C0", linewidth=0.6, alpha=0.3, label="whole run")
+    axis.plot(
+        angle[last], rate[last], color="C0", linewidth=1.2, label=f"last {min(_LAST_S, run.t[-1] - run.t[0]):g} s"
+    )
+    axis.set_title("Phase plot")
+    axis.set_xlabel("angle phi [rad]")
+    axis.set_ylabel("rate of phi [rad/s]")
+    axis.grid(alpha=0.3)
+    axis.legend(loc="upper right", fontsize=9)
