@@ -84,7 +84,9 @@ missing_packages() {
         need clang command -v clang
         need clang-tidy command -v clang-tidy
         need cppcheck command -v cppcheck
+        need frama-c-base command -v frama-c
         need g++ command -v g++
+        need gcovr command -v gcovr
         need libclang-rt-dev links_with clang -fsanitize=address,undefined
         need libcmocka-dev test -e /usr/include/cmocka.h
         need pkg-config command -v pkg-config

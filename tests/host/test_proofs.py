@@ -1,0 +1,32 @@
+"""tools/prove.py says so when a module is not safe: a decoder that writes one byte too far is not proved."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def prove(top: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(top / "tools" / "prove.py"), "link"]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
+    for name in ("firmware/include", "firmware/link", "tests/proofs"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    for name in ("tools/prove.py", "firmware/src/crc32.c"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    assert prove(tmp_path).returncode == 0
+    link = tmp_path / "firmware" / "link" / "link.c"
+    text = link.read_text(encoding="utf-8")
+    assert "if (self->filled == sizeof self->raw) {" in text
+    text = text.replace("if (self->filled == sizeof self->raw) {", "if (self->filled > sizeof self->raw) {")
+    link.write_text(text, encoding="utf-8")
+    done = prove(tmp_path)
+    assert done.returncode == 1
+    assert "link.c" in done.stdout and "out of bounds index" in done.stdout

@@ -1,0 +1,54 @@
+/* information_q31: any model size, any forgetting, any row within its limit, any number of groups.
+ *
+ * The sums are arbitrary within what the end of a group leaves; a group adds as many rows as a window has functions.
+ * Eva then shows that no sum overflows within the group and that its end brings them back within their bound, which
+ * together is the induction over a run of any length. */
+#include "prove.h"
+
+#include "information_q31.h"
+#include "integer_q31.h"
+
+#define SUM_BOUND ((int64_t)1 << 60)
+
+static pvid_information_q31 sums;
+static int64_t fresh[PVID_MAX_THETA_Q31];
+
+static void any_group(void)
+{
+    for (size_t i = 0; i < PVID_MAX_SUMS_Q31; i++) {
+        sums.sums[i] = any_i64(-SUM_BOUND, SUM_BOUND);
+    }
+    for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
+        fresh[i] = any_i64(-SUM_BOUND, SUM_BOUND);
+    }
+    sums.exponent = (uint8_t)any_u32(0, 40);
+    sums.age = (uint16_t)any_u32(0, sums.block - 1u);
+    for (size_t row = 0; row < PVID_MAX_FUNCTIONS; row++) {
+        int32_t n[PVID_MAX_THETA_Q31];
+        for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
+            n[i] = any_i32(-PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31);
+        }
+        pvid_information_add_q31(&sums, n, any_i32(-PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31), any_bool() ? fresh : NULL);
+    }
+    for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
+        pvid_information_end_group_q31(&sums, part, fresh);
+    }
+    for (size_t i = 0; i < sums.n_sums; i++) {
+        /*@ assert -0x4000000000000000 <= sums.sums[i] <= 0x4000000000000000; */
+    }
+}
+
+void main(void)
+{
+    for (uint32_t groups = 4; groups < 1024u; groups++) { /* where the block depends on them */
+        pvid_information_init_q31(&sums, PVID_MAX_THETA_Q31, groups, 65536);
+        /*@ assert 0 < sums.retention; */
+    }
+    pvid_information_init_q31(&sums, PVID_MAX_THETA_Q31, any_u32(1024, (uint32_t)1 << 24), 65536);
+    for (uint8_t n_theta = 1; n_theta <= PVID_MAX_THETA_Q31; n_theta++) {
+        pvid_information_init_q31(&sums, n_theta, 0, any_u32(1, 65536));
+        sums.block = (uint16_t)any_u32(1, 64);
+        sums.retention = any_i32(1, INT32_MAX);
+        any_group();
+    }
+}

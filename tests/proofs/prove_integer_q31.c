@@ -1,0 +1,44 @@
+/* integer_q31: every argument that integer_q31.h allows, magnitudes an octave at a time, both signs, all shifts. */
+#include "prove.h"
+
+#include "integer_q31.h"
+
+/* The octave of numbers of `bits` bits: 0, or 2^(bits-1)..2^bits - 1. */
+static int64_t of_bits(uint32_t bits, bool negative)
+{
+    if (bits == 0u) {
+        return 0;
+    }
+    const int64_t low = (int64_t)1 << (bits - 1u);
+    const int64_t high = low + (low - 1);
+    const int64_t x = any_i64(low, high);
+    return negative ? -x : x;
+}
+
+static void any_length(uint32_t bits, bool negative)
+{
+    const int64_t x = of_bits(bits, negative);
+    const uint32_t length = pvid_bit_length_q31(pvid_magnitude_q31(x));
+    /*@ assert length == bits; */
+    for (int32_t s = -64; s <= 64; s++) {
+        const int64_t y = pvid_scale_q31(x, s);
+        /*@ assert -0x4000000000000000 <= y <= 0x4000000000000000; */
+    }
+    const int64_t product = pvid_times_q31(x, any_i32(-INT32_MAX, INT32_MAX));
+    /*@ assert -0x4000000000000000 <= product <= 0x4000000000000000; */
+}
+
+void main(void)
+{
+    for (uint32_t bits = 0; bits <= 62u; bits++) {
+        any_length(bits, false);
+        any_length(bits, true);
+        const int64_t m = of_bits(bits, false);
+        (void)pvid_root_of_q31(m, any_i32(-1000, 1000));
+        (void)pvid_square_root_q31((uint64_t)m);
+    }
+    (void)pvid_scale_q31(any_i64(-((int64_t)1 << 62), (int64_t)1 << 62), any_i32(0, INT32_MAX));
+    for (uint32_t bits = 1; bits <= 31u; bits++) {
+        (void)pvid_reciprocal_of_q31((uint32_t)of_bits(bits, false));
+    }
+}
