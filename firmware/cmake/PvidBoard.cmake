@@ -74,6 +74,16 @@ target_link_libraries(pvid_port PUBLIC pvid_board)
 set_target_properties(pvid_port PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
 pvid_developer_warnings(pvid_port)
 
+# Reception by interrupt (ports/receiver.h), for images that link it.
+if(NOT PVID_BOARD_FAMILY STREQUAL "avr")
+  add_library(pvid_receiver OBJECT ${pvid_ports}/uart/receiver.c ${pvid_ports}/${PVID_BOARD_FAMILY}/interrupts.c)
+  target_include_directories(pvid_receiver PUBLIC ${pvid_ports})
+  target_compile_definitions(pvid_receiver PRIVATE ${PVID_BOARD_DEFINITIONS})
+  target_link_libraries(pvid_receiver PUBLIC pvid_board)
+  set_target_properties(pvid_receiver PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+  pvid_developer_warnings(pvid_receiver)
+endif()
+
 function(pvid_add_image name)
   add_executable(${name} ${ARGN})
   pvid_compile_as_core(${name})

@@ -9,8 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
 from pvid.capture import write_run
+from pvid.demo import stage
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
 
@@ -114,8 +116,12 @@ def test_compare_finds_both_laws_equal(place: Path) -> None:
 
 
 def test_demo_prints_its_table_and_draws_its_figure(tmp_path: Path) -> None:
-    done = pvid("demo", "--figure", "demo.png", cwd=tmp_path)
+    done = pvid("demo", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("streamed to mps2-an386, Cortex-M4F in QEMU: 40000 ticks, equal to here, hash ") == 2
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = readme.split("<!-- demo -->")[1].split("<!-- /demo -->")[0].strip().strip("`").strip("\n")
+    assert shown == done.stdout.rstrip(), "./tools/pvid bench demo --update README.md"
     for word in (
         "g [m/s^2]",
         "l2 [m]",
@@ -126,7 +132,14 @@ def test_demo_prints_its_table_and_draws_its_figure(tmp_path: Path) -> None:
         "equal in every bit",
     ):
         assert word in done.stdout
-    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "pvid-demo.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_an_emulator_the_demo_says_where_it_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert stage().where == "mps2-an386, Cortex-M4F in QEMU"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert stage().where == "this machine, over a pseudo-terminal"
+    assert stage().lacking == "mps2-an386 needs arm-none-eabi-gcc and qemu-system-arm"
 
 
 def test_a_run_without_motion_is_not_identified(tmp_path: Path) -> None:

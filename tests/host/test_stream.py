@@ -25,6 +25,7 @@ from pvid.target import HOST_TARGET, Playback, Port, Target, judge, open_target,
 
 TICKS = 5000
 EMULATED = (
+    "microbit",
     "mps2-an385",
     "mps2-an386",
     "netduinoplus2",

@@ -20,6 +20,7 @@
 #include "identifier.h"
 #include "link.h"
 #include "port.h"
+#include "receiver.h"
 #include "pvid/little_endian.h"
 #include "sensor.h"
 
@@ -358,8 +359,8 @@ static void obey(const pvid_link_frame *frame)
     }
 }
 
-/* Takes bytes in up to the end of a frame. */
-static void listen(void)
+/* Takes bytes in up to the end of a frame; returns whether there was one. */
+static bool listen(void)
 {
     static uint8_t bytes[CHUNK];
     static size_t at;
@@ -367,19 +368,22 @@ static void listen(void)
     pvid_link_frame frame;
     if (at == n) {
         at = 0;
-        n = pvid_port_receive(bytes, sizeof bytes);
+        n = pvid_receiver_take(bytes, sizeof bytes);
     }
+    const bool any = at < n;
     while (at < n) {
         if (pvid_link_decode(&stream.decoder, bytes[at++], &frame)) {
             obey(&frame);
             break;
         }
     }
+    return any;
 }
 
 int main(void)
 {
     pvid_port_init();
+    pvid_receiver_init();
     pvid_link_decoder_init(&stream.decoder);
     stream.due = DUE_HELLO | DUE_SCHEMA;
     for (;;) {
@@ -392,11 +396,15 @@ int main(void)
             }
             continue;
         }
-        if (room) {
-            listen();
-        }
-        if (sampling() && sample_due(room)) {
-            step_field();
+        const bool heard = room && listen();
+        if (sampling()) {
+            if (sample_due(room)) {
+                step_field();
+            }
+        } else if (!heard && answers_fit(&stream.out, ANSWERS_BYTES)) {
+            pvid_receiver_rest(); /* nothing is to be done or said */
+        } else {
+            /* on with it */
         }
     }
 }

@@ -19,18 +19,21 @@ static uint64_t report_stack[64];
 
 typedef void (*vector)(void);
 
-/* Entry 0 is the initial stack pointer, 1 the reset, 2 to 15 the core's own exceptions. A board that uses
- * interrupts adds theirs. */
+/* Entry 0 is the initial stack pointer, 1 the reset, 2 to 15 the core's own exceptions, from 16 on the board's
+ * interrupts up to the UART's. In an image without a receiver that one has no handler, and is never let through. */
+void pvid_uart_interrupt(void) __attribute__((weak));
 __attribute__((section(".vectors"), used)) static const struct {
     uint32_t *stack;
     vector reset;
     vector exceptions[14];
+    vector interrupts[PVID_UART_IRQ + 1u];
 } vectors = {
     .stack = pvid_stack_top,
     .reset = pvid_reset,
     .exceptions = {pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception,
                    pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception,
                    pvid_exception, pvid_exception},
+    .interrupts = {[PVID_UART_IRQ] = pvid_uart_interrupt},
 };
 
 #define SYSTEM_REGISTER(address) (*(volatile uint32_t *)(uintptr_t)(address))

@@ -17,6 +17,15 @@ bool pvid_uart_get(uint8_t *byte);
 /* Whether there was room for `byte`; if so it is on its way. */
 bool pvid_uart_put(uint8_t byte);
 
+/* Has the UART interrupt when a byte arrives, which pvid_uart_interrupt then serves. */
+void pvid_uart_listen(void);
+
+/* Takes the interrupt back, before the bytes are taken. */
+void pvid_uart_acknowledge(void);
+
+/* ports/uart/receiver.c; weak in the start-up, which calls it. */
+void pvid_uart_interrupt(void);
+
 /* Waits until what was put has left. */
 void pvid_uart_drain(void);
 

@@ -5,6 +5,7 @@
 #define START_TX PVID_UART_REGISTER(0x008u)
 #define RX_READY PVID_UART_REGISTER(0x108u)
 #define TX_READY PVID_UART_REGISTER(0x11Cu)
+#define INTERRUPT_SET PVID_UART_REGISTER(0x304u)
 #define ENABLE PVID_UART_REGISTER(0x500u)
 #define PIN_TX PVID_UART_REGISTER(0x50Cu)
 #define PIN_RX PVID_UART_REGISTER(0x514u)
@@ -13,6 +14,7 @@
 #define BAUDRATE PVID_UART_REGISTER(0x524u)
 
 #define ENABLE_UART 4u
+#define INTERRUPT_RX_READY 0x4u
 #define BAUD_115200 0x01D7E000u
 
 static bool sending; /* a byte was put whose TX_READY has not come yet */
@@ -51,6 +53,16 @@ bool pvid_uart_put(uint8_t byte)
     TXD = byte;
     sending = true;
     return true;
+}
+
+void pvid_uart_listen(void)
+{
+    INTERRUPT_SET = INTERRUPT_RX_READY;
+}
+
+/* Taking the event back, which comes before each byte's read, does it. */
+void pvid_uart_acknowledge(void)
+{
 }
 
 void pvid_uart_drain(void)

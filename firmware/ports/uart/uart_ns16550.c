@@ -3,11 +3,13 @@
 
 #define REGISTER(offset) (*(volatile uint8_t *)(uintptr_t)(PVID_UART_BASE + (offset)))
 #define DATA REGISTER(0u)
+#define INTERRUPT_ENABLE REGISTER(1u)
 #define FIFO_CONTROL REGISTER(2u)
 #define LINE_CONTROL REGISTER(3u)
 #define LINE_STATUS REGISTER(5u)
 
 #define FIFO_ENABLE_AND_CLEAR 0x07u
+#define INTERRUPT_RX 0x01u
 #define LINE_8N1 0x03u
 #define STATUS_RX_READY 0x01u
 #define STATUS_TX_EMPTY 0x20u
@@ -35,6 +37,16 @@ bool pvid_uart_put(uint8_t byte)
     }
     DATA = byte;
     return true;
+}
+
+void pvid_uart_listen(void)
+{
+    INTERRUPT_ENABLE = INTERRUPT_RX;
+}
+
+/* Reading the bytes does it. */
+void pvid_uart_acknowledge(void)
+{
 }
 
 void pvid_uart_drain(void)

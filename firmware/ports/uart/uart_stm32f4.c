@@ -11,6 +11,7 @@
 #define SR_TX_COMPLETE 0x40u
 #define SR_TX_EMPTY 0x80u
 #define CR1_RX_ENABLE 0x0004u
+#define CR1_RX_INTERRUPT 0x0020u
 #define CR1_TX_ENABLE 0x0008u
 #define CR1_USART_ENABLE 0x2000u
 
@@ -36,6 +37,16 @@ bool pvid_uart_put(uint8_t byte)
     }
     DR = byte;
     return true;
+}
+
+void pvid_uart_listen(void)
+{
+    CR1 = CR1_USART_ENABLE | CR1_TX_ENABLE | CR1_RX_ENABLE | CR1_RX_INTERRUPT;
+}
+
+/* Reading the byte does it. */
+void pvid_uart_acknowledge(void)
+{
 }
 
 void pvid_uart_drain(void)

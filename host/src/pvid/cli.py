@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage (one sentence), 
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -15,7 +16,6 @@ from typing import Any
 
 import click
 import numpy as np
-import numpy.typing as npt
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -23,8 +23,7 @@ from rich.table import Table
 from pvid import __version__
 from pvid.capture import Run, read_run, write_run
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
-from pvid.compare import Comparison, compare_run
-from pvid.compare_q31 import compare_run_q31
+from pvid.compare import Comparison
 from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
 from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
@@ -44,8 +43,8 @@ from pvid.rig import (
     standard_start,
 )
 from pvid.rigfile import RigFile, load
-from pvid.setup import config_of, weak_design_of
-from pvid.setup_q31 import config_for_run, counts_of, strong_config_q31, tables_of, weak_config_q31
+from pvid.setup import weak_design_of
+from pvid.setup_q31 import strong_config_q31, tables_of, weak_config_q31
 from pvid.strong_header_q31 import strong_header_q31
 from pvid.weak_design import to_c_header
 from pvid.weak_header_q31 import to_c_header_q31
@@ -89,43 +88,39 @@ for _command in LOG_COMMANDS:
 @click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
 def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
-    """Simulates the standard rig, identifies it in the C core, compares every bit with numpy."""
-    native = Native()
+    """Simulates the standard rig and streams it into the firmware on an emulated board; compares every bit."""
+    from pvid.demo import play_demo, stage
+
+    on = stage()
+    if on.lacking is not None:
+        messages.print(f"{on.lacking}: the firmware runs on {on.where}")
     simulation = simulate(sensors=standard_sensors(bits), truth=truth, seed=seed)  # type: ignore[arg-type]
     run = simulation.run
-    rig = RigFile.standard()
-    rig = replace(rig, identifier=replace(rig.identifier, form=form))  # type: ignore[arg-type]
+    standard = RigFile.standard()
+    rig = replace(
+        standard,
+        identifier=replace(standard.identifier, form=form),  # type: ignore[arg-type]
+        sensor=replace(standard.sensor, phi_lsb=2 * np.pi / 2**bits),
+    )
+    cores = ("f32", "q31") if form == "weak" else ("f32",)  # the strong form's twins take a solve a tick
+    rigs = [replace(rig, identifier=replace(rig.identifier, core=core)) for core in cores]  # type: ignore[arg-type]
     start = standard_start(seed)
     messages.print(
         f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
         f"start {', '.join(f'{100 * (s / p - 1):+.0f} %' for s, p in zip(start, simulation.p, strict=True))} off"
     )
-    result = identify(run, rig, native, start=start)
     truths = _truths(simulation.pendulum)
-    _print_result(result, truths)
-    _print_warning(result)
-    with progress_bar("comparing with the twin", len(run.t)) as advance:
-        comparison = compare_run(native, config_of(rig, run.sample_rate, start), run.phi, run.y, advance)
-    _print_comparison(comparison)
-    equal = comparison.equal and (form != "weak" or _demo_q31(run, rig, bits, native, start, truths))
-    _write_figure(result, figure, truths)
-    return DONE if equal else DIFFERENT
-
-
-def _demo_q31(
-    run: Run, rig: RigFile, bits: int, native: Native, start: npt.NDArray[np.float64], truths: dict[str, float]
-) -> bool:
-    """The same run in the fixed-point core; whether it equals its twin."""
-    rig = replace(
-        rig,
-        identifier=replace(rig.identifier, core="q31"),
-        sensor=replace(rig.sensor, phi_lsb=2 * np.pi / 2**bits),
-    )
-    _print_result(identify(run, rig, native, start=start), truths)
-    with progress_bar("comparing the fixed-point core with its twin", len(run.t)) as advance:
-        comparison = compare_run_q31(native, config_for_run(rig, run, start), *counts_of(rig, run), progress=advance)
-    _print_comparison(comparison, "fixed-point core against its numpy twin")
-    return comparison.equal
+    with progress_bar(f"streaming to {on.target}, comparing with the twins", len(rigs) * len(run.t)) as advance:
+        parts = play_demo(on, rigs, run, Native(), start, advance)
+    for played in parts:
+        _print_result(played.result, truths)
+        _print_warning(played.result)
+        _print_comparison(played.comparison, f"core {played.result.core} here against its numpy twin")
+        playback = played.verdict.playback
+        hashed = f", hash {playback.hash:08x}" if played.verdict.equal else ""
+        click.echo(f"streamed to {on.where}: {playback.done} ticks, {played.verdict.text} to here{hashed}")
+    _write_figure(parts[0].result, figure, truths)
+    return DONE if all(played.equal for played in parts) else DIFFERENT
 
 
 def _write_figure(result: Identification, path: Path, truths: dict[str, float] | None) -> None:
@@ -599,6 +594,19 @@ _UPDATE = click.option(
     type=click.Path(path_type=Path, exists=True),
     help="Write the table into this file's place for it.",
 )
+
+
+@bench.command(name="demo")
+@_UPDATE
+def bench_demo(update: Path | None) -> int:
+    """What the demo prints, as the README shows it."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-P", "-m", "pvid", "demo"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != DONE:
+        raise PvidError(f"the demo failed: {(done.stderr or done.stdout).strip()[-300:]}")
+    _update_readme(update, "demo", f"```\n{done.stdout.rstrip()}\n```")
+    return DONE
 
 
 @bench.command(name="laws")

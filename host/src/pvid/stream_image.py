@@ -155,6 +155,7 @@ def _build_for_host(folder: Path, tree: Path, core: Core) -> Path:
         *sorted((firmware / "src").glob("*.c")),
         firmware / "link" / "link.c",
         firmware / "ports" / "host" / "port.c",
+        firmware / "ports" / "host" / "receiver.c",
         *(application / file for file in ("main.c", "answers.c", "sensor.c", f"identifier_{core.name.lower()}.c")),
     ]
     image = tree / "stream"
