@@ -36,6 +36,11 @@ static uint32_t estimator_of(uint32_t hash, const pvid_estimator_config_f32 *con
     return pvid_fnv_word(running, config->divider);
 }
 
+static uint32_t gate_of(uint32_t hash, const pvid_gate_config_f32 *config)
+{
+    return one(one(hash, config->sigmas), config->patience_s);
+}
+
 uint32_t pvid_fingerprint_strong_f32(const pvid_strong_config_f32 *config)
 {
     uint32_t hash = one(PVID_FNV_START, config->sample_rate_hz);
@@ -44,6 +49,7 @@ uint32_t pvid_fingerprint_strong_f32(const pvid_strong_config_f32 *config)
     hash = pvid_fnv_word(hash, config->bank.half);
     hash = pvid_fnv_word(hash, config->bank.stride);
     hash = floats(hash, config->bank.weights, (size_t)PVID_ORDERS * config->bank.half);
+    hash = gate_of(hash, &config->gate);
     hash = one(hash, config->estimator.correlation);
     hash = one(hash, config->estimator.row_weight);
     return estimator_of(hash, &config->estimator, PVID_KAPITZA_P);
@@ -89,5 +95,6 @@ uint32_t pvid_fingerprint_weak_f32(const pvid_weak_config_f32 *config)
     hash = pvid_fnv_word(hash, config->zero_unknown ? 1u : 0u);
     hash = pvid_fnv_word(hash, config->iterations);
     hash = estimator_of(hash, &config->estimator, n_p);
+    hash = gate_of(hash, &config->gate);
     return trust_of(hash, &config->trust);
 }

@@ -8,6 +8,10 @@
 #include "finite_f32.h"
 #include "kapitza_row_f32.h"
 
+/* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
+#define GATE_MEMORY_S 0.25f
+#define GATE_FLOOR 1.0e-6f
+
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
@@ -32,7 +36,12 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
     pvid_estimator_config_f32 estimator = config->estimator;
     estimator.model = &pvid_kapitza_strong_f32;
     estimator.update_rate_hz = config->sample_rate_hz;
-    return pvid_estimator_init_f32(&self->estimator, &estimator);
+    status = pvid_estimator_init_f32(&self->estimator, &estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    return pvid_gate_init_f32(&self->gate, &config->gate, config->sample_rate_hz,
+                              GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
 }
 
 void pvid_strong_gap_f32(pvid_strong_f32 *self)
@@ -70,6 +79,15 @@ static inline bool differentiate(pvid_strong_f32 *self, float phi, float y, floa
     return true;
 }
 
+/* Whether the row fits the estimate as well as rows usually do. */
+static bool passes(pvid_strong_f32 *self, const float n[PVID_KAPITZA_STRONG_THETA], float y)
+{
+    pvid_estimator_f32 *estimator = &self->estimator;
+    float gradient[PVID_MAX_P];
+    const float e = estimator->model->innovate(estimator->p, n, y, gradient);
+    return pvid_gate_passes_f32(&self->gate, e * e);
+}
+
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
 {
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
@@ -92,5 +110,9 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
     float n[PVID_KAPITZA_STRONG_THETA];
     float row_y;
     pvid_kapitza_row_f32(d_phi, u, &row_y, n);
+    if ((self->gate.limit > 0.0f) && !passes(self, n, row_y)) {
+        pvid_count_up(&self->estimator.counters.rejected_outlier);
+        return PVID_REJECTED_OUTLIER;
+    }
     return pvid_estimator_step_f32(&self->estimator, n, row_y);
 }

@@ -62,6 +62,9 @@ static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f3
     return pvid_estimator_init_f32(&self->estimator, &estimator);
 }
 
+/* Windows that the gate's scale remembers; it stands relative to what noise explains, below which it never falls. */
+#define GATE_MEMORY 4.0f
+
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
@@ -93,6 +96,11 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
         return status;
     }
     status = pvid_trust_init_f32(&self->trust, &config->trust, &self->estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    const float windows_hz = config->sample_rate_hz / ((float)design->decimation * (float)pvid_weak_hop(design->window));
+    status = pvid_gate_init_f32(&self->finish.gate, &config->gate, windows_hz, GATE_MEMORY, 1.0f);
     if (status != PVID_OK) {
         return status;
     }

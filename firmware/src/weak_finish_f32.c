@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cholesky_f32.h"
+#include "count.h"
 #include "finite_f32.h"
 #include "unroll.h"
 #include "weak_angle_f32.h"
@@ -129,6 +130,24 @@ void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator
     self->stage = STAGE_COMBINE;
 }
 
+/* What a window's rows leave unexplained, a few functions at a time. */
+static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator, size_t first, size_t last,
+                          const float columns[][PVID_WEAK_TERMS])
+{
+    if (first == 0u) {
+        self->energy = 0.0f;
+    }
+    for (size_t k = first; k < last; k++) {
+        float e = columns[k][PVID_WEAK_COLUMN_Y];
+        for (size_t i = 0; i < estimator->model->n_theta; i++) {
+            const size_t linear = PVID_KAPITZA_WEAK_THETA;
+            const size_t column = (i < linear) ? i : ((PVID_WEAK_COLUMN_C1 + i) - linear);
+            e -= columns[k][column] * estimator->theta[i];
+        }
+        self->energy += e * e;
+    }
+}
+
 /* Before the rows: what noise there is (where the window keeps the whitening of its design, the last known), and
  * the past fades if it was made without the correction. */
 static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator)
@@ -250,6 +269,9 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
     case STAGE_REMOVE_A:
     case STAGE_REMOVE_B:
         remove_components(self, row, few, sums);
+        if ((self->stage == STAGE_REMOVE_B) && (self->gate.limit > 0.0f)) {
+            add_residuals(self, estimator, row, few, fixed);
+        }
         done = few;
         break;
     case STAGE_ADD:
@@ -276,7 +298,14 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         self->index = 0;
         self->stage++;
         if (self->stage == STAGE_ADD) {
-            begin_rows(self, estimator);
+            const float freedom = (float)functions - 2.0f;
+            if (pvid_gate_passes_f32(&self->gate, self->energy / (freedom * self->expected))) {
+                begin_rows(self, estimator);
+            } else {
+                pvid_count_up(&estimator->counters.rejected_outlier);
+                *reason = PVID_REJECTED_OUTLIER;
+                self->stage = STAGE_IDLE;
+            }
         } else if (self->stage == STAGE_SOLVE) {
             begin_solves(self, estimator, trust);
         } else if (self->stage == STAGE_ASSESS) {

@@ -152,6 +152,8 @@ RIG_FIELDS = {
     "sample_rate_hz": Range(1e-3, 1e6, Status.BAD_SAMPLE_RATE, (Status.BAD_FORGETTING, Status.BAD_UPDATE_RATE)),
     "l1": Range(1e-6, 1e6, Status.BAD_LENGTH),
     "drive_min": Range(0.0, 1e9, Status.BAD_DRIVE_MIN),
+    "gate.sigmas": Range(2.0, 1e3, Status.BAD_GATE_SIGMAS, besides=(0.0,)),
+    "gate.patience_s": Range(0.0, 1e12, Status.BAD_GATE_PATIENCE),
 }
 STRONG = {
     **RIG_FIELDS,
@@ -359,6 +361,8 @@ ODD_FLOATS: dict[str, st.SearchStrategy[float]] = {
     "pivot_noise": st.just(0.0) | magnitudes(-12, 9),
     "trust.kappa_min": st.just(0.0) | magnitudes(-9, -0.001),
     "trust.se_max": magnitudes(-9, 9),
+    "gate.sigmas": st.just(0.0) | magnitudes(0.31, 3),
+    "gate.patience_s": st.just(0.0) | magnitudes(-12, 12),
 }
 
 

@@ -119,6 +119,8 @@ def test_settings_changed_in_code_are_checked_too() -> None:
         full_angle=st.booleans(),
         zero=st.booleans(),
         kappa_min=st.floats(0, 0.999),
+        outlier_gate=st.floats(0, 1e3),
+        outlier_patience_s=st.floats(0, 1e12),
     ),
 )
 def test_text_gives_the_same_rig_back(
@@ -212,6 +214,8 @@ def test_the_published_defaults() -> None:
         damping=False,
         zero=True,
         kappa_min=1e-5,
+        outlier_gate=0.0,
+        outlier_patience_s=0.0,
     )
     assert Identifier(form="strong").window == 0.241
     assert Identifier(form="weak").window == 1.25

@@ -13,6 +13,7 @@
 #include "pvid/estimator_q31.h"
 #include "pvid/fnv.h"
 #include "pvid/fnv_q31.h"
+#include "pvid/gate.h"
 #include "pvid/information.h"
 #include "pvid/kapitza.h"
 #include "pvid/kapitza_q31.h"

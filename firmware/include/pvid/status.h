@@ -32,8 +32,10 @@ typedef enum {
     PVID_BAD_MISFIT_MAX,      /* not finite, or neither 0 nor at least 1 */
     PVID_BAD_PIVOT_NOISE,     /* not finite or negative */
     PVID_BAD_ANGLE_LIMIT,     /* not finite or negative */
-    PVID_BAD_ANGLE            /* full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or
+    PVID_BAD_ANGLE,           /* full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or
                                  friction with a known zero or with bounds too small for it */
+    PVID_BAD_GATE_SIGMAS,     /* not finite, or neither 0 nor 2..1e3 */
+    PVID_BAD_GATE_PATIENCE    /* not finite or outside 0..1e12 s */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */
@@ -45,7 +47,7 @@ typedef enum {
                                     information than noise makes */
     PVID_HELD_PIVOT,             /* the system could not be solved, or its solution was not finite */
     PVID_REJECTED_NOT_FINITE,    /* NaN or infinity in the sample or in its row */
-    PVID_REJECTED_OUTLIER,       /* reserved for the outlier gate */
+    PVID_REJECTED_OUTLIER,       /* a residual far beyond the usual: see gate.h */
     PVID_REJECTED_SATURATED,     /* a row beyond PVID_ROW_LIMIT */
     PVID_HELD_UNCERTAIN,         /* not published: standard errors too wide, or p still on its way */
     PVID_HELD_OUT_OF_RANGE,      /* window dropped: the angle went beyond what the equations are good for */

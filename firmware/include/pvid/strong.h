@@ -16,6 +16,7 @@
 
 #include "pvid/differentiator.h"
 #include "pvid/estimator.h"
+#include "pvid/gate.h"
 #include "pvid/kapitza.h"
 
 #ifdef __cplusplus
@@ -29,6 +30,7 @@ typedef struct {
                                  counts as still and no row is taken in; some ten times the noise of u.
                                  0: every row is taken in */
     pvid_fir_bank_f32 bank;   /* for both channels; the weights must outlive the identifier */
+    pvid_gate_config_f32 gate; /* on the innovation of a row */
     pvid_estimator_config_f32 estimator; /* model and update_rate_hz are filled in by init */
 } pvid_strong_config_f32;
 
@@ -39,6 +41,7 @@ typedef struct {
     float drive;            /* mean square of u over about a second [1/s^4] */
     float drive_forgetting; /* part of it that a tick replaces */
     float drive_min;        /* mean square below which no row is taken in */
+    pvid_gate_f32 gate;
     pvid_estimator_f32 estimator;
 } pvid_strong_f32;
 
@@ -46,7 +49,7 @@ typedef struct {
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m] sampled together. Answers as the estimator does, PVID_WARMING_UP
- * until the windows are full, and PVID_HELD_NOT_EXCITED while the pivot is still: without a drive the
+ * until the windows are full, PVID_REJECTED_OUTLIER for a row that the gate kept out, and PVID_HELD_NOT_EXCITED while the pivot is still: without a drive the
  * noise of a still sensor, differentiated four times, would pass for one. A sample that is not finite is rejected and
  * empties the windows (its neighbours are no longer equidistant); the sums keep what they know. */
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y);

@@ -37,6 +37,7 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
+#include "pvid/gate.h"
 #include "pvid/kapitza_weak.h"
 #include "pvid/trust.h"
 #include "pvid/weak_job.h"
@@ -92,6 +93,7 @@ typedef struct {
                                             in by init. A group of rows is a window; row_sd [rad] is
                                             the noise of a decimated sample */
     pvid_trust_config_f32 trust;         /* which estimates are published */
+    pvid_gate_config_f32 gate;           /* on the residuals of a window */
 } pvid_weak_config_f32;
 
 /* The front end: a ring of samples, and the FIR job of the last complete block in slices. */
@@ -208,6 +210,8 @@ typedef struct {
     pvid_reason reason; /* of the last solve, then of the window */
     float size;         /* of the last step, relative */
     float expected;     /* variance of a row's noise */
+    float energy;       /* of the window's rows at the p that they meet, where the gate looks at it */
+    pvid_gate_f32 gate;
     pvid_weak_angle_f32 *angle; /* NULL: linear rows */
     float direction[PVID_MAX_FUNCTIONS]; /* the one that is being projected out, of length 1 or 0 */
     float along[PVID_WEAK_COLUMNS];      /* the columns' components along it */
@@ -252,7 +256,8 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
 
 /* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is
  * complete; at the tick that ends the work on a window what trust.h says of it; PVID_HELD_NOT_EXCITED or
- * PVID_HELD_OUT_OF_RANGE at once where a window was dropped for want of drive or for its angle;
+ * PVID_HELD_OUT_OF_RANGE at once where a window was dropped for want of drive or for its angle, and
+ * PVID_REJECTED_OUTLIER where the gate kept it out;
  * PVID_REJECTED_.. when the sample or a window's row was not usable; else PVID_ACCUMULATED. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
 

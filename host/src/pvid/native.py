@@ -82,6 +82,8 @@ class Status(IntEnum):
     BAD_PIVOT_NOISE = 25
     BAD_ANGLE_LIMIT = 26
     BAD_ANGLE = 27
+    BAD_GATE_SIGMAS = 28
+    BAD_GATE_PATIENCE = 29
 
 
 class Law(IntEnum):
@@ -136,6 +138,12 @@ class TrustConfigStruct(ctypes.Structure):
     ]
 
 
+class GateConfigStruct(ctypes.Structure):
+    """pvid_gate_config_f32."""
+
+    _fields_ = [("sigmas", ctypes.c_float), ("patience_s", ctypes.c_float)]
+
+
 class StrongConfigStruct(ctypes.Structure):
     """pvid_strong_config_f32."""
 
@@ -144,6 +152,7 @@ class StrongConfigStruct(ctypes.Structure):
         ("l1", ctypes.c_float),
         ("drive_min", ctypes.c_float),
         ("bank", FirBankStruct),
+        ("gate", GateConfigStruct),
         ("estimator", EstimatorConfigStruct),
     ]
 
@@ -183,6 +192,7 @@ class WeakConfigStruct(ctypes.Structure):
         ("iterations", ctypes.c_uint8),
         ("estimator", EstimatorConfigStruct),
         ("trust", TrustConfigStruct),
+        ("gate", GateConfigStruct),
     ]
 
 
@@ -203,6 +213,7 @@ class CountersStruct(ctypes.Structure):
             "held_uncertain",
             "held_out_of_range",
             "misfits",
+            "rejected_outlier",
         )
     ]
 
@@ -270,6 +281,14 @@ class EstimatorConfig:
 
 
 @dataclass(frozen=True)
+class GateConfig:
+    """Which rows or windows are kept out, as in gate.h; sigmas 0: none."""
+
+    sigmas: float = 0.0
+    patience_s: float = 0.0
+
+
+@dataclass(frozen=True)
 class StrongConfig:
     """Settings of the strong-form identifier, as in strong.h.
 
@@ -282,6 +301,7 @@ class StrongConfig:
     stride: int
     estimator: EstimatorConfig
     drive_min: float = 0.0
+    gate: GateConfig = field(default_factory=GateConfig)
 
     @property
     def half(self) -> int:
@@ -356,6 +376,7 @@ class WeakConfig:
     pivot_noise: float = 0.0
     angle_limit: float = 0.0
     trust: TrustConfig = field(default_factory=TrustConfig)
+    gate: GateConfig = field(default_factory=GateConfig)
 
     @property
     def hop(self) -> int:
@@ -404,6 +425,7 @@ def _struct_layout() -> list[int]:
         ctypes.sizeof(StrongConfigStruct),
         at(StrongConfigStruct, "drive_min"),
         at(StrongConfigStruct, "bank"),
+        at(StrongConfigStruct, "gate"),
         at(StrongConfigStruct, "estimator"),
         ctypes.sizeof(WeakDesignStruct),
         at(WeakDesignStruct, "smooth"),
@@ -419,6 +441,7 @@ def _struct_layout() -> list[int]:
         at(WeakConfigStruct, "iterations"),
         at(WeakConfigStruct, "estimator"),
         at(WeakConfigStruct, "trust"),
+        at(WeakConfigStruct, "gate"),
         ctypes.sizeof(TrustConfigStruct),
         at(TrustConfigStruct, "groups_min"),
         ctypes.sizeof(CountersStruct),
@@ -547,6 +570,7 @@ def strong_config_struct(config: StrongConfig) -> tuple[StrongConfigStruct, Tabl
         l1=config.l1,
         drive_min=config.drive_min,
         bank=FirBankStruct(half=config.half, stride=config.stride, **_table_pointers(tables)),
+        gate=GateConfigStruct(**asdict(config.gate)),
         estimator=_estimator_struct(config.estimator),
     )
     return struct, tables
@@ -580,6 +604,7 @@ def weak_config_struct(config: WeakConfig) -> tuple[WeakConfigStruct, Tables]:
         iterations=config.iterations,
         estimator=_estimator_struct(config.estimator),
         trust=TrustConfigStruct(**asdict(config.trust)),
+        gate=GateConfigStruct(**asdict(config.gate)),
     )
     return struct, tables
 

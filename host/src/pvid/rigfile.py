@@ -109,6 +109,8 @@ class Identifier:
     damping : two regressors more, for viscous friction
     zero : the encoder's zero is unknown, a fourth parameter of the weak form
     kappa_min : hold the estimate while less than this part of w's information is its own
+    outlier_gate : keep out rows or windows whose residuals are larger than so many times the usual; 0: none
+    outlier_patience_s : until the gate believes that the mechanism has changed [s]; 0: never
     """
 
     form: Form = _choice("weak", Form)
@@ -128,6 +130,8 @@ class Identifier:
     damping: bool = False
     zero: bool = True
     kappa_min: float = _number(1e-5, "", 0.0, 0.999)
+    outlier_gate: float = _number(0.0, "", 0.0, 1e3)
+    outlier_patience_s: float = _number(0.0, "s", 0.0, 1e12)
 
     def __post_init__(self) -> None:
         _check_fields(self, "[identifier] ")

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.differentiation import FirBank, finite_difference, savitzky_golay
 from pvid.errors import PvidError
-from pvid.native import MAX_WINDOW, EstimatorConfig, Law, StrongConfig, TrustConfig, WeakConfig
+from pvid.native import MAX_WINDOW, EstimatorConfig, GateConfig, Law, StrongConfig, TrustConfig, WeakConfig
 from pvid.rigfile import RigFile
 from pvid.weak_design import WeakDesign, design
 from pvid.weak_oracle import VALID_ANGLE
@@ -76,6 +76,11 @@ def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
     return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
 
 
+def gate_config(rig: RigFile) -> GateConfig:
+    """What the rig file says of outliers."""
+    return GateConfig(rig.identifier.outlier_gate, rig.identifier.outlier_patience_s)
+
+
 def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig:
     """Settings of the strong-form identifier for samples at `sample_rate` [Hz]."""
     bank = bank_of(rig, sample_rate)
@@ -85,6 +90,7 @@ def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
         drive_min=drive_threshold(rig, bank, sample_rate),
         weights=bank.weights32,
         stride=bank.stride,
+        gate=gate_config(rig),
         estimator=estimator_config(rig, bank, start),
     )
 
@@ -159,6 +165,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
         drive_min=weak_drive_threshold(rig, tables.second, sample_rate),
         pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
         trust=TrustConfig(misfit_max=CORRECTED_MISFIT) if corrected else TrustConfig(),
+        gate=gate_config(rig),
         estimator=EstimatorConfig(
             start=np.concatenate([p, none]).astype(np.float32),
             start_sd=np.concatenate([START_RELATIVE_SD * p, extra_sd]).astype(np.float32),

@@ -92,6 +92,8 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
     In the weak form a run's first sample is taken for rest where that is nearer than 0; the strong form takes the
     encoder's zero for the equilibrium, and of the pivot only what changes counts.
     """
+    if rig.identifier.outlier_gate > 0.0:
+        raise PvidError("core q31 has no outlier_gate: use --core f32")
     if rig.identifier.form == "strong":
         strong = strong_config_q31(rig, run.sample_rate, start)
         return replace(strong, y_offset=_first(counts_of(rig, run)[1], strong.design.bank.y_max // 2))

@@ -24,6 +24,7 @@ from pvid.bench.longevity_signals import BEFORE, L1, RATE_HZ, SCENARIOS, Sensing
 from pvid.boards import ROOT
 from pvid.errors import PvidError
 from pvid.native import (
+    GateConfig,
     Native,
     Reason,
     StrongConfig,
@@ -44,6 +45,8 @@ STRIDE = 8  # ticks between the points of the strong form's Savitzky-Golay filte
 STRONG_FORGETTING_S = (0.1, 1.0, 10.0, 100.0, 0.0)
 WEAK_FORGETTING_S = (10.0, 100.0, 0.0)  # a group is a window of 0.62 s: below four of them init refuses
 PEERS = ("RLS", "UD RLS")
+GATE_SIGMAS = {"weak": 4.0, "strong": 6.0}
+GATE_PATIENCE = 6.0  # times the time constant of forgetting; without one the gate never gives way
 ENCODER = Sensing()
 EXACT = Sensing(phi_lsb=0.0, y_lsb=0.0, zero=0.0)
 JUDGED = (
@@ -53,6 +56,7 @@ JUDGED = (
     Reason.HELD_PIVOT,
     Reason.HELD_UNCERTAIN,
     Reason.HELD_OUT_OF_RANGE,
+    Reason.REJECTED_OUTLIER,
 )
 BACK = 3.0  # standard errors
 
@@ -63,11 +67,13 @@ class Lane:
 
     kind: str
     forgetting_s: float
+    gated: bool = False
 
     @property
     def label(self) -> str:
         """As the tables name it."""
-        return f"{self.kind}, {self.forgetting_s:g} s" if self.forgetting_s else f"{self.kind}, none"
+        time = f"{self.forgetting_s:g} s" if self.forgetting_s else "none"
+        return f"{self.kind}, {time}" + (", gate" if self.gated else "")
 
     @property
     def sensing(self) -> Sensing:
@@ -75,8 +81,11 @@ class Lane:
         return ENCODER if self.kind == "weak" else EXACT
 
 
-WEAK_LANES = tuple(Lane("weak", tau) for tau in WEAK_FORGETTING_S)
-STRONG_LANES = tuple(Lane("strong", tau) for tau in STRONG_FORGETTING_S)
+WEAK_LANES = tuple(Lane("weak", tau, gated) for gated in (False, True) for tau in WEAK_FORGETTING_S)
+STRONG_LANES = (
+    *(Lane("strong", tau) for tau in STRONG_FORGETTING_S),
+    *(Lane("strong", tau, gated=True) for tau in STRONG_FORGETTING_S[-3:]),
+)
 PEER_LANES = tuple(Lane(kind, tau) for kind in PEERS for tau in STRONG_FORGETTING_S)
 LANES = (*WEAK_LANES, *STRONG_LANES, *PEER_LANES)
 
@@ -123,12 +132,19 @@ class _Core:
 
     def __init__(self, native: Native, lane: Lane) -> None:
         rig = RigFile.standard()
-        settings = replace(rig.identifier, forgetting_s=lane.forgetting_s)
+        sigmas, patience = (GATE_SIGMAS[lane.kind], GATE_PATIENCE * lane.forgetting_s) if lane.gated else (0.0, 0.0)
+        settings = replace(
+            rig.identifier,
+            forgetting_s=lane.forgetting_s,
+            outlier_gate=sigmas,
+            outlier_patience_s=patience,
+        )
         self.identifier: WeakIdentifier | StrongIdentifier
         if lane.kind == "weak":
             self.identifier = native.weak(weak_config(replace(rig, identifier=settings), RATE_HZ))
         else:
-            self.identifier = native.strong(_strong(lane.forgetting_s))
+            config = replace(_strong(lane.forgetting_s), gate=GateConfig(sigmas, patience))
+            self.identifier = native.strong(config)
         self.outcome = Outcome()
         self._lately: list[int] = []
 

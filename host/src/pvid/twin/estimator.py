@@ -15,6 +15,7 @@ from pvid.errors import PvidError
 from pvid.native import ESTIMATE_DTYPE, EstimatorConfig, Law, Reason
 from pvid.twin import cholesky
 from pvid.twin import kapitza_strong as model
+from pvid.twin.gate import Gate
 from pvid.twin.information import Information
 from pvid.twin.pattern import PatternModel
 
@@ -35,6 +36,7 @@ _COUNTERS = (
     "held_uncertain",
     "held_out_of_range",
     "misfits",
+    "rejected_outlier",
 )
 
 
@@ -92,22 +94,28 @@ class Estimator:
         gain = (np.float32(config.feedback_hz) * np.float32(config.divider)) / rate
         return np.float32(gain if config.feedback_hz > 0 and gain < 1 else 1)
 
-    def step(self, n: Float32, y: Float32) -> npt.NDArray[np.uint8]:
+    def step(self, n: Float32, y: Float32, gate: Gate | None = None) -> npt.NDArray[np.uint8]:
         """One row a lane: N [11, lanes], Y [lanes]. Returns the reasons [lanes]; `sums` is up to date after it."""
         with np.errstate(all="ignore"):
-            return self._step(n, y)
+            passed = np.ones(len(y), np.bool_)
+            if gate is not None and gate.is_on:
+                e, _ = model.innovate(self.p, n, y)
+                passed = gate.passes(e * e)
+            return self._step(n, y, passed)
 
-    def _step(self, n: Float32, y: Float32) -> npt.NDArray[np.uint8]:
+    def _step(self, n: Float32, y: Float32, passed: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
         squares = y * y
         for entry in n:
             squares = squares + entry * entry
         usable = squares <= ROW_LIMIT * ROW_LIMIT
-        not_finite = ~usable & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
-        saturated = ~usable & ~not_finite
-        taken = ~not_finite & ~saturated
+        not_finite = passed & ~usable & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
+        saturated = passed & ~usable & ~not_finite
+        taken = passed & usable
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
         reason[not_finite] = Reason.REJECTED_NOT_FINITE
         reason[saturated] = Reason.REJECTED_SATURATED
+        reason[~passed] = Reason.REJECTED_OUTLIER
+        self.counters["rejected_outlier"] += ~passed
         self.counters["rejected_not_finite"] += not_finite
         self.counters["rejected_saturated"] += saturated
         if not taken.any():

@@ -12,6 +12,7 @@ from pvid.native import EstimatorConfig, Reason, StrongConfig
 from pvid.twin import kapitza_strong as model
 from pvid.twin.differentiator import derivatives
 from pvid.twin.estimator import Estimator
+from pvid.twin.gate import Gate
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
@@ -43,6 +44,9 @@ class StrongTwin:
     def __init__(self, config: StrongConfig, estimators: Sequence[EstimatorConfig] | None = None) -> None:
         self.config = config
         self.estimator = Estimator(estimators or [config.estimator], config.sample_rate)
+        rate = np.float32(config.sample_rate)
+        floor = np.float32(1e-6) * self.estimator.row_variance
+        self.gate = Gate(config.gate, rate, np.float32(0.25) * rate, floor)
 
     def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, Reasons]:
         """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
@@ -81,7 +85,7 @@ class StrongTwin:
         Returns what every tick told, [ticks, lanes].
         """
         n, row_y, fate = self.rows(phi, y)
-        return follow_rows(self.estimator, n, row_y, fate, after)
+        return follow_rows(self.estimator, n, row_y, fate, after, self.gate)
 
     def run(
         self,
@@ -93,7 +97,7 @@ class StrongTwin:
     ) -> TwinRecord:
         """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
         n, row_y, fate = self.rows(phi, y)
-        return run_rows(self.estimator, n, row_y, fate=fate, sums=sums, progress=progress)
+        return run_rows(self.estimator, n, row_y, fate=fate, sums=sums, progress=progress, gate=self.gate)
 
 
 def run_rows(
@@ -104,6 +108,7 @@ def run_rows(
     fate: Reasons | None = None,
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
+    gate: Gate | None = None,
 ) -> TwinRecord:
     """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share.
 
@@ -121,12 +126,17 @@ def run_rows(
         if progress is not None and tick % 512 == 0:
             progress(tick)
 
-    reason = follow_rows(estimator, n, y, fate, record)
+    reason = follow_rows(estimator, n, y, fate, record, gate)
     return TwinRecord(p=p, sums=state, reason=reason, published=np.empty((0, model.N_P, lanes), np.float32))
 
 
 def follow_rows(
-    estimator: Estimator, n: Float32, y: Float32, fate: Reasons | None, after: Callable[[int, Reasons], None]
+    estimator: Estimator,
+    n: Float32,
+    y: Float32,
+    fate: Reasons | None,
+    after: Callable[[int, Reasons], None],
+    gate: Gate | None = None,
 ) -> Reasons:
     """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
 
@@ -139,7 +149,7 @@ def follow_rows(
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
         if fate is None or fate[tick] == Reason.ACCUMULATED:
-            reason[tick] = estimator.step(wide_n[tick], wide_y[tick])
+            reason[tick] = estimator.step(wide_n[tick], wide_y[tick], gate)
         else:
             reason[tick] = fate[tick]
             if fate[tick] != Reason.WARMING_UP:

@@ -13,6 +13,7 @@ from pvid.native import EstimatorConfig, Reason, WeakConfig
 from pvid.twin import kapitza_weak, weak_finish, weak_front, weak_window
 from pvid.twin.differentiator import segments
 from pvid.twin.estimator import RelativeEstimator
+from pvid.twin.gate import Gate
 from pvid.twin.strong import TwinRecord
 from pvid.twin.trust import Trust
 from pvid.twin.weak_angle import Angle
@@ -55,6 +56,7 @@ class WeakTwin:
         row_sd = np.array([e.row_sd for e in lanes], np.float32)
         self.row_variance = row_sd * row_sd
         lag = (np.float32(design.decimation) / np.float32(config.sample_rate)) * np.float32(design.lag)
+        self.gate = Gate(config.gate, rate, np.float32(4), np.ones(len(lanes), np.float32))
         self.pivot_noise = np.float32(config.pivot_noise) / ((lag * lag) * (lag * lag))
 
     def _driven(self, variance: Float32) -> Mask:
@@ -123,7 +125,7 @@ class WeakTwin:
         with np.errstate(all="ignore"):
             expected = self.row_variance + self.pivot_noise * window.bend
         return weak_finish.stages(
-            window, self.config.design, self.iterations, self.estimator, self.trust, self.angle, expected
+            window, self.config.design, self.iterations, self.estimator, self.trust, self.angle, expected, self.gate
         )
 
     def _reject(self) -> Reason:

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from pvid.errors import PvidError
 from pvid.native import Reason, WeakTables
 from pvid.twin import weak_whiten
 from pvid.twin.estimator import RelativeEstimator
+from pvid.twin.gate import Gate
 from pvid.twin.trust import Trust
 from pvid.twin.weak_angle import Angle
 from pvid.twin.weak_window import Window
@@ -20,6 +22,7 @@ Reasons = npt.NDArray[np.uint8]
 COLUMNS = 13
 _Y, _A, _B = 8, 9, 10
 _FUNCTIONS_A_STAGE = 6
+_PLACES = [*range(8), 11, 12]  # of the entries of N
 
 
 def assemble(sums: Float32) -> Float32:
@@ -74,6 +77,21 @@ def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEst
     return rows_and_adds + solves + estimator.assessment_stages
 
 
+def _passes(gate: Gate, x: Float32, design: WeakTables, estimator: RelativeEstimator, expected: Float32) -> bool:
+    """Whether the gate lets the rows in; all lanes must agree."""
+    with np.errstate(all="ignore"):
+        energy = np.zeros(x.shape[2], np.float32)
+        for k in range(design.functions):
+            e = x[_Y, k]
+            for i, place in enumerate(_PLACES[: estimator.model.n_theta]):
+                e = e - x[place, k] * estimator.theta[i]
+            energy = energy + e * e
+        passes = gate.passes(energy / ((np.float32(design.functions) - np.float32(2)) * expected))
+    if passes.any() != passes.all():
+        raise PvidError("lanes of one twin must let the same windows in: their estimates differ too much")
+    return bool(passes.all())
+
+
 def stages(
     window: Window,
     design: WeakTables,
@@ -82,19 +100,24 @@ def stages(
     trust: Trust,
     angle: Angle | None,
     expected: Float32,
+    gate: Gate,
 ) -> Iterator[Reasons | None]:
     """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
     x, noise, whitened = rows(window, design, estimator, angle)
     for _ in range(_stages_of_rows(design) + (1 if angle is None else angle.stages) - 1):
         yield None
-    # the last of these stages makes the sums ready for the rows
+    # the last of these stages asks the gate, and makes the sums ready for the rows
+    if gate.is_on and not _passes(gate, x, design, estimator, expected):
+        estimator.counters["rejected_outlier"] += 1
+        yield np.full(estimator.p.shape[1], Reason.REJECTED_OUTLIER, np.uint8)
+        return
     estimator.noise = np.where(whitened, noise, estimator.noise)
     if angle is not None:
         with np.errstate(all="ignore"):
             estimator.information.fade(angle.age())
         estimator.sums = estimator.information.read()
     yield None
-    places = [*range(8), 11, 12][: estimator.model.n_theta]
+    places = _PLACES[: estimator.model.n_theta]
     for k in range(design.functions):
         added = estimator.add(x[places, k], x[_Y, k])
         yield None if (added == Reason.ACCUMULATED).all() else added
