@@ -748,6 +748,53 @@ def bench_fuzz_link(runs: int) -> int:
     return DONE
 
 
+@bench.command(name="codec")
+@click.option("--frames", default=1_000_000, show_default=True)
+def bench_codec(frames: int) -> int:
+    """Corrupted frames of every length against both decoders of the serial link."""
+    from pvid.bench.codec import corrupt
+
+    with progress_bar("corrupted frames", frames) as advance:
+        tally = corrupt(frames, Native(), progress=advance)
+    click.echo(
+        f"{tally.frames} corrupted frames, C and Python alike: {tally.wrong} let through wrong; of the good frames "
+        f"behind them the first was lost {tally.lost_first} times, the second {tally.lost_second} times"
+    )
+    return DIFFERENT if tally.wrong or tally.lost_second else DONE
+
+
+@bench.command(name="log")
+@click.option("--frames", default=200_000, show_default=True)
+def bench_log(frames: int) -> int:
+    """Frames a minute of processor time through `pvid log`, losses, memory."""
+    from pvid.bench.field import throughput
+
+    seen = throughput(frames)
+    click.echo(
+        f"{seen.frames} of {frames} frames, {seen.lost} lost; {seen.cpu_s:.1f} s of processor time, "
+        f"{60 * seen.frames / seen.cpu_s:.0f} frames a minute of it; resident memory {seen.early_kb} kB after a "
+        f"quarter, {seen.late_kb} kB at the end"
+    )
+    return DONE if seen.frames == frames and not seen.lost else DIFFERENT
+
+
+@bench.command(name="field-log")
+@click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
+@click.option("--samples", default=3_600_000, show_default=True, help="An hour at 1 kHz.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("field-log.pvlog"), show_default=True)
+def bench_field_log(target: str, samples: int, out: Path) -> int:
+    """An hour in the field, shortened in time: the board killed twice, its line closed once, every segment verified."""
+    from pvid.bench.field import field_log
+
+    with progress_bar("verifying", samples) as advance:
+        account, stretches = field_log(target, samples, out, advance)
+    for stretch in stretches:
+        click.echo(stretch.text)
+    click.echo(account.text)
+    good = sum(stretch.verified and stretch.difference is None for stretch in stretches)
+    return DONE if good == len(account.segments) and not account.missing_samples else DIFFERENT
+
+
 @bench.command(name="side-by-side")
 @_UPDATE
 def bench_side_by_side(update: Path | None) -> int:

@@ -29,7 +29,7 @@ from pvid.tee import Tee
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file: goes into the log, for verify.")
 @click.option("--append", is_flag=True, help="OUT may exist: the new segments go behind its old ones.")
-@click.option("--anew", is_flag=True, help="The board starts over, even if it is identifying already (needs --rig).")
+@click.option("--anew", is_flag=True, help="The board starts over whenever the link comes up (needs --rig).")
 @click.option("--paced", is_flag=True, help="A board that is started samples as fast as the line goes, not in time.")
 @click.option("--duration", type=click.FloatRange(min=0), help="Ends after so many seconds.  [default: at Ctrl-C]")
 @click.option("--samples", type=click.IntRange(min=1), help="Ends when so many have come.")

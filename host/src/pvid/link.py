@@ -48,7 +48,7 @@ _WIRE = {
 }
 
 
-def _wire(kind: str, count: int | None = 1) -> Any:
+def wire(kind: str, count: int | None = 1) -> Any:
     """A field of `count` numbers of a kind; None: all that is left of the payload, as bytes."""
     return field(metadata={"kind": kind, "count": count})
 
@@ -195,17 +195,17 @@ class Hello(Message):
     """
 
     TYPE = 1
-    form: int = _wire("u8")
-    core: int = _wire("u8")
-    n_p: int = _wire("u8")
-    window: int = _wire("u16")  # samples that may be under way without an answer
-    settings: int = _wire("u32")  # CRC-32 of the settings and tables in the image
-    session: int = _wire("u32")  # of the configuration it works with; 0: none since it started
-    sample_rate: float = _wire("f32")  # ticks a second
-    phi_lsb: float = _wire("f32")
-    y_lsb: float = _wire("f32")
-    p_unit: tuple[float, ...] = _wire("f32", MAX_P)
-    board: str = _wire("char", 16)
+    form: int = wire("u8")
+    core: int = wire("u8")
+    n_p: int = wire("u8")
+    window: int = wire("u16")  # samples that may be under way without an answer
+    settings: int = wire("u32")  # CRC-32 of the settings and tables in the image
+    session: int = wire("u32")  # of the configuration it works with; 0: none since it started
+    sample_rate: float = wire("f32")  # ticks a second
+    phi_lsb: float = wire("f32")
+    y_lsb: float = wire("f32")
+    p_unit: tuple[float, ...] = wire("f32", MAX_P)
+    board: str = wire("char", 16)
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ class Schema(Message):
     """Board to PC beside Hello: the schema text."""
 
     TYPE = 2
-    text: bytes = _wire("char", None)
+    text: bytes = wire("char", None)
 
 
 @dataclass(frozen=True)
@@ -225,13 +225,13 @@ class Configuration(Message):
     image's settings (Hello.settings names them) and every sample from tick 0 on has all that the bits depend on.
     """
 
-    session: int = _wire("u32")  # any number but 0; comes back in every answer
-    settings: int = _wire("u32")  # CRC-32 of the settings and tables that the image must hold
-    form: int = _wire("u8")
-    source: int = _wire("u8")
-    hash_every: int = _wire("u16")  # ticks; 0: only in the credits
-    estimate_every: int = _wire("u16")  # ticks; 0: never
-    divider: int = _wire("u16")
+    session: int = wire("u32")  # any number but 0; comes back in every answer
+    settings: int = wire("u32")  # CRC-32 of the settings and tables that the image must hold
+    form: int = wire("u8")
+    source: int = wire("u8")
+    hash_every: int = wire("u16")  # ticks; 0: only in the credits
+    estimate_every: int = wire("u16")  # ticks; 0: never
+    divider: int = wire("u16")
 
 
 @dataclass(frozen=True)
@@ -239,14 +239,14 @@ class Configure(Configuration):
     """Float32 (estimator.h)."""
 
     TYPE = 3
-    law: int = _wire("u8")
-    start: tuple[float, ...] = _wire("f32", MAX_P)
-    start_sd: tuple[float, ...] = _wire("f32", MAX_P)
-    lower: tuple[float, ...] = _wire("f32", MAX_P)
-    upper: tuple[float, ...] = _wire("f32", MAX_P)
-    row_sd: float = _wire("f32")
-    forgetting_s: float = _wire("f32")
-    feedback_hz: float = _wire("f32")
+    law: int = wire("u8")
+    start: tuple[float, ...] = wire("f32", MAX_P)
+    start_sd: tuple[float, ...] = wire("f32", MAX_P)
+    lower: tuple[float, ...] = wire("f32", MAX_P)
+    upper: tuple[float, ...] = wire("f32", MAX_P)
+    row_sd: float = wire("f32")
+    forgetting_s: float = wire("f32")
+    feedback_hz: float = wire("f32")
 
 
 @dataclass(frozen=True)
@@ -254,15 +254,15 @@ class ConfigureQ31(Configuration):
     """Fixed point (estimator_q31.h); the formats are the image's."""
 
     TYPE = 10
-    start: tuple[int, ...] = _wire("i32", MAX_P)
-    start_sd: tuple[int, ...] = _wire("i32", MAX_P)
-    lower: tuple[int, ...] = _wire("i32", MAX_P)
-    upper: tuple[int, ...] = _wire("i32", MAX_P)
-    row_sd: int = _wire("i32")
-    forgetting_groups: int = _wire("u32")
-    gain: int = _wire("i32")
-    phi_offset: int = _wire("i32")
-    y_offset: int = _wire("i32")
+    start: tuple[int, ...] = wire("i32", MAX_P)
+    start_sd: tuple[int, ...] = wire("i32", MAX_P)
+    lower: tuple[int, ...] = wire("i32", MAX_P)
+    upper: tuple[int, ...] = wire("i32", MAX_P)
+    row_sd: int = wire("i32")
+    forgetting_groups: int = wire("u32")
+    gain: int = wire("i32")
+    phi_offset: int = wire("i32")
+    y_offset: int = wire("i32")
 
 
 @dataclass(frozen=True)
@@ -270,7 +270,7 @@ class Samples(Message):
     """phi [rad], y [m] of consecutive ticks for the float32 core, exactly as it gets them; the first of them is the
     header's tick."""
 
-    phi_y: bytes = _wire("f32", None)
+    phi_y: bytes = wire("f32", None)
 
     @property
     def values(self) -> npt.NDArray[np.float32]:
@@ -303,7 +303,7 @@ class Raw(Samples):
 class Counts(Message):
     """phi, y [counts] of consecutive ticks for the fixed-point core; the first of them is the header's tick."""
 
-    phi_y: bytes = _wire("i32", None)
+    phi_y: bytes = wire("i32", None)
 
     @property
     def values(self) -> npt.NDArray[np.int32]:
@@ -339,14 +339,14 @@ class Estimate(Message):
     """
 
     TYPE = 6
-    session: int = _wire("u32")
-    updates: int = _wire("u32")
-    p: tuple[float, ...] = _wire("f32", MAX_P)
-    covariance: tuple[float, ...] = _wire("f32", MAX_P * (MAX_P + 1) // 2)  # upper triangle by rows, of all MAX_P
-    kappa: float = _wire("f32")
-    residual_sd: float = _wire("f32")
-    weight: float = _wire("f32")
-    reason: int = _wire("u8")
+    session: int = wire("u32")
+    updates: int = wire("u32")
+    p: tuple[float, ...] = wire("f32", MAX_P)
+    covariance: tuple[float, ...] = wire("f32", MAX_P * (MAX_P + 1) // 2)  # upper triangle by rows, of all MAX_P
+    kappa: float = wire("f32")
+    residual_sd: float = wire("f32")
+    weight: float = wire("f32")
+    reason: int = wire("u8")
 
 
 @dataclass(frozen=True)
@@ -354,15 +354,15 @@ class EstimateQ31(Message):
     """Board to PC: the same of the fixed-point core (pvid_estimate_q31)."""
 
     TYPE = 13
-    session: int = _wire("u32")
-    updates: int = _wire("u32")
-    p: tuple[int, ...] = _wire("i32", MAX_P)
-    se: tuple[int, ...] = _wire("i32", MAX_P)
-    correlation: tuple[int, ...] = _wire("i32", MAX_P * (MAX_P + 1) // 2)  # Q30, upper triangle by rows
-    kappa: int = _wire("i32")
-    residual_sd: int = _wire("i32")
-    weight: int = _wire("u32")
-    reason: int = _wire("u8")
+    session: int = wire("u32")
+    updates: int = wire("u32")
+    p: tuple[int, ...] = wire("i32", MAX_P)
+    se: tuple[int, ...] = wire("i32", MAX_P)
+    correlation: tuple[int, ...] = wire("i32", MAX_P * (MAX_P + 1) // 2)  # Q30, upper triangle by rows
+    kappa: int = wire("i32")
+    residual_sd: int = wire("i32")
+    weight: int = wire("u32")
+    reason: int = wire("u8")
 
 
 @dataclass(frozen=True)
@@ -370,17 +370,17 @@ class Status(Message):
     """Board to PC: what it does, and what its receiver lost."""
 
     TYPE = 7
-    session: int = _wire("u32")
-    code: int = _wire("u8")
-    core: int = _wire("u8")  # pvid_status of the init
-    updates: int = _wire("u32")
-    rejected: int = _wire("u32")  # samples that were not finite or absurd
-    repeated: int = _wire("u32")  # samples that had come before
-    skipped: int = _wire("u32")  # sample frames that were not the next ones
-    missing: int = _wire("u32")  # pvid_link_counters of the board's decoder
-    malformed: int = _wire("u32")
-    bad_crc: int = _wire("u32")
-    foreign: int = _wire("u32")
+    session: int = wire("u32")
+    code: int = wire("u8")
+    core: int = wire("u8")  # pvid_status of the init
+    updates: int = wire("u32")
+    rejected: int = wire("u32")  # samples that were not finite or absurd
+    repeated: int = wire("u32")  # samples that had come before
+    skipped: int = wire("u32")  # sample frames that were not the next ones
+    missing: int = wire("u32")  # pvid_link_counters of the board's decoder
+    malformed: int = wire("u32")
+    bad_crc: int = wire("u32")
+    foreign: int = wire("u32")
 
 
 @dataclass(frozen=True)
@@ -388,8 +388,8 @@ class Hash(Message):
     """Board to PC: the running hash (fnv.h) after the header's tick."""
 
     TYPE = 8
-    session: int = _wire("u32")
-    hash: int = _wire("u32")
+    session: int = wire("u32")
+    hash: int = wire("u32")
 
 
 @dataclass(frozen=True)
@@ -398,10 +398,10 @@ class Credit(Message):
     so again, with hello and status."""
 
     TYPE = 9
-    session: int = _wire("u32")
-    room: int = _wire("u32")
-    hash: int = _wire("u32")  # running, after that tick
-    reason: int = _wire("u8")  # of the last tick
+    session: int = wire("u32")
+    room: int = wire("u32")
+    hash: int = wire("u32")  # running, after that tick
+    reason: int = wire("u8")  # of the last tick
 
 
 MESSAGES.pop(0)

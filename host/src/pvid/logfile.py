@@ -29,8 +29,7 @@ from typing import Any
 
 from pvid import __version__, link
 from pvid.errors import PvidError
-from pvid.link import Message, Schema
-from pvid.link import _wire as wire
+from pvid.link import Message, Schema, wire
 
 MARK_NS = 1_000_000_000
 SYNC_NS = 5_000_000_000

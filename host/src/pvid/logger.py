@@ -185,15 +185,16 @@ class Starter:
     begin
         Makes a configuration, with a new session.
     anew
-        Also a board that is configured already: once, when the recording begins.
+        Also a board that is configured already, whenever the link has come up.
     """
 
     def __init__(self, send: Callable[[Message], None], begin: Callable[[], Configuration], anew: bool) -> None:
         self._send = send
         self._begin = begin
         self._anew = anew
+        self._fresh = False  # the link has just come up
         self._wanted: Configuration | None = None
-        self._sent = 0.0
+        self._sent = float("-inf")
 
     def take(self, record: Record, account: Account) -> None:
         """See logreader.Observer.
@@ -205,10 +206,11 @@ class Starter:
         """
         match record.item:
             case Segment():
-                self._wanted = None
-            case Hello() as hello if self._wanted is None and (hello.session == 0 or self._anew):
-                self._wanted = self._begin()
-                self._anew = False
+                self._wanted, self._fresh = None, True
+            case Hello() as hello if self._wanted is None:
+                if hello.session == 0 or (self._anew and self._fresh):
+                    self._wanted, self._sent = self._begin(), float("-inf")
+                self._fresh = False
             case Status() as status if self._wanted is not None and status.session == self._wanted.session:
                 if status.code != Code.RUNNING:
                     raise PvidError(f"the board refused: {refusal(status)}")

@@ -45,10 +45,14 @@ _HALF = 1 << 31
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples that the board took and the log has not: `samples` of them from tick `first` on."""
+    """Samples that the board took and the log has not: `samples` of them from tick `first` on.
+
+    `down`: they were taken while the link was down, between two segments.
+    """
 
     first: int
     samples: int
+    down: bool = False
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,8 @@ class Account:
     frames : of the board, that came through;  by_kind : of which kind
     missing : frames that the sequence numbers say were sent;  damaged : pieces that were no frame;  foreign : frames
     of a schema that nobody described;  cut : pieces where the link came up or went down amidst a frame
-    samples : that came;  missing_samples : between them
+    samples : that came;  missing_samples : between them;  unheard : that the board took while the link was down, as
+    far as the segments before and after it tell
     lasting : the last message of each kind
     """
 
@@ -106,6 +111,7 @@ class Account:
     cut: int = 0
     samples: int = 0
     missing_samples: int = 0
+    unheard: int = 0
     restarts: int = 0
     bytes: int = 0
     unix_ns: int = 0
@@ -126,7 +132,7 @@ class Account:
         many = len(self.segments)
         return (
             f"{self.frames} frames, {self.samples} samples in {many} segment{'' if many == 1 else 's'}; "
-            f"lost {self.missing} frames, {self.missing_samples} samples; "
+            f"lost {self.missing} frames, {self.missing_samples} samples, {self.unheard} while the link was down; "
             f"{self.damaged} damaged, {self.foreign} foreign, {self.cut} cut off, {self.restarts} restarts"
         )
 
@@ -155,6 +161,9 @@ class LogStream:
         self._held: Loss | None = None  # damage, until it is known whether the link went down there
         self._fresh = True  # no frame of the board in this segment yet
         self._next_tick: int | None = None
+        self._session = 0  # the last that was named, 0: none was
+        self._left: tuple[int, int] | None = None  # session and next tick when the link went down
+        self._joined: int | None = None  # first tick since then
         self._rig_pieces = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Record]:
@@ -215,7 +224,9 @@ class LogStream:
             for schema in self._decoder.schemas:
                 if schema != LOG_SCHEMA:
                     self._decoder.expect_anew(schema)
-            self._fresh, self._next_tick = True, None
+            if self._next_tick is not None and self._session != 0:
+                self._left = (self._session, self._next_tick)
+            self._fresh, self._next_tick, self._session, self._joined = True, None, 0, None
         elif isinstance(message, Mark):
             account.unix_ns = message.unix_ns
         elif isinstance(message, Close) and account.segments:
@@ -239,9 +250,22 @@ class LogStream:
             account.segments[-1].frames += 1
         if began:
             yield from self._restart(frame.tick)
+        self._session = getattr(message, "session", 0) or self._session
+        if self._left is not None and self._session != 0 and self._joined is not None:
+            yield from self._rejoin(frame.tick)
         if isinstance(message, Raw | RawCount):
+            self._joined = frame.tick if self._joined is None else self._joined
             yield from self._follow(frame.tick, len(message.values))
         yield self._record(frame.tick, message)
+
+    def _rejoin(self, tick: int) -> Iterator[Record]:
+        """Tells what the board took while the link was down, now that it is known whether it is the same session."""
+        assert self._left is not None and self._joined is not None
+        (session, expected), self._left = self._left, None
+        unheard = (self._joined - expected) & 0xFFFFFFFF
+        if session == self._session and 0 < unheard < _HALF:
+            self.account.unheard += unheard
+            yield self._record(tick, Gap(expected, unheard, down=True))
 
     def _restart(self, tick: int) -> Iterator[Record]:
         self._next_tick = 0

@@ -1,0 +1,224 @@
+"""Recordings put to the test: many frames through `pvid log`, and hours of a board that dies and a line that breaks."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import tty
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import serial
+
+from pvid.errors import PvidError
+from pvid.link import Raw, Source, encode_raw
+from pvid.logger import Logger
+from pvid.logreader import Account, LogReader
+from pvid.logverify import Stretch, Verifier
+from pvid.rigfile import RigFile
+from pvid.stream_image import settings_number
+from pvid.stream_rig import StreamRig, stream_rig
+from pvid.target import Port, Target, open_port, open_target
+
+_SAMPLES_A_FRAME = 16
+_BYTES_A_SAMPLE = 10.0  # about, with all that goes with it
+
+
+# ---- how many frames, at what price
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """Of one recording: frames that came and that are missing, processor time of the logger [s], its resident memory
+    [kB] after a quarter of the frames and at the end."""
+
+    frames: int
+    lost: int
+    cpu_s: float
+    early_kb: int
+    late_kb: int
+
+
+def send_frames(line: int, count: int) -> None:
+    """Writes `count` frames of samples to a file descriptor, once something has come from it."""
+    payload = Raw.of_values(np.zeros(_SAMPLES_A_FRAME), np.zeros(_SAMPLES_A_FRAME)).payload
+    os.read(line, 4096)
+    for sequence in range(count):
+        data = encode_raw(Raw.TYPE, sequence, _SAMPLES_A_FRAME * sequence, payload)
+        while data:
+            data = data[os.write(line, data) :]
+    os.read(line, 1)  # until the other side has gone: what was not yet read is lost with this process
+
+
+def throughput(count: int) -> Throughput:
+    """Records `count` frames, sent as fast as they are taken, in a process of its own; see Throughput.
+
+    Raises
+    ------
+    PvidError
+        When the recording fails.
+    """
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    code = f"from pvid.bench.field import send_frames; send_frames({ours}, {count})"
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "a.pvlog"
+        arguments = ["log", os.ttyname(theirs), str(log), "--samples", str(_SAMPLES_A_FRAME * count)]
+        sender = subprocess.Popen([sys.executable, "-c", code], pass_fds=[ours])
+        logger = subprocess.Popen(
+            [sys.executable, "-m", "pvid", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        try:
+            quarter = count * len(encode_raw(Raw.TYPE, 0, 0, bytes(8 * _SAMPLES_A_FRAME))) // 4
+            while logger.poll() is None and (not log.exists() or log.stat().st_size < quarter):
+                time.sleep(0.01)
+            early = late = _resident_kb(logger.pid)
+            while True:
+                pid, status, usage = os.wait4(logger.pid, os.WNOHANG)
+                if pid:
+                    break
+                late = _resident_kb(logger.pid) or late
+                time.sleep(0.01)
+            assert logger.stderr is not None
+            if os.waitstatus_to_exitcode(status) not in (0, 1):
+                raise PvidError(f"the recording failed: {logger.stderr.read().decode()[-300:]}")
+        finally:
+            for process in (sender, logger):
+                process.kill()
+                process.wait()
+            os.close(ours)
+            os.close(theirs)
+        reader = LogReader(log)
+        for _ in reader:
+            pass
+    account = reader.account
+    return Throughput(account.frames, account.missing + account.damaged, usage.ru_utime + usage.ru_stime, early, late)
+
+
+def _resident_kb(pid: int) -> int:
+    """0 when the process has ended."""
+    try:
+        found = re.search(r"VmRSS:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text())
+    except OSError:
+        return 0
+    return int(found.group(1)) if found else 0
+
+
+# ---- a long recording with accidents
+
+
+@dataclass
+class _Shaky:
+    """A port at which accidents happen when so many bytes have been read."""
+
+    port: Port
+    accidents: list[tuple[float, Callable[[], None]]]
+    received: list[int]
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Of the port; the accident first."""
+        if self.accidents and self.received[0] >= self.accidents[0][0]:
+            self.accidents.pop(0)[1]()
+        data = self.port.read(size)
+        self.received[0] += len(data)
+        return data
+
+    def write(self, data: bytes, /) -> int | None:
+        """Of the port."""
+        return self.port.write(data)
+
+    def close(self) -> None:
+        """Of the port."""
+        self.port.close()
+
+
+class _Kept(Target):
+    """A target whose emulator goes on when its port is closed."""
+
+    def close(self) -> None:
+        """The port alone."""
+        self.port.close()
+
+
+@dataclass
+class ShakyEmulator:
+    """A source (pvid.logger): an emulator that is killed twice, and whose terminal is closed once, on the way."""
+
+    name: str
+    rig: StreamRig
+    bytes: float  # that are expected in all
+    usb: None = None
+    _target: Target | None = None
+    _place: str = ""
+    _received: list[int] = field(default_factory=lambda: [0])
+    _accidents: list[tuple[float, Callable[[], None]]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        shares = ((0.25, self._kill), (0.5, self._close), (0.75, self._kill))
+        self._accidents = [(share * self.bytes, accident) for share, accident in shares]
+
+    def _kill(self) -> None:
+        assert self._target is not None and self._target.process is not None
+        self._target.process.kill()
+        self._target.process.wait()
+
+    def _close(self) -> None:
+        assert self._target is not None
+        self._target.port.close()
+        raise serial.SerialException("the terminal was closed")
+
+    def _wrapped(self, port: Port) -> Port:
+        return _Shaky(port, self._accidents, self._received)
+
+    def open(self) -> Target:
+        """See pvid.logger.Source."""
+        running = self._target
+        if running is not None and running.process is not None and running.process.poll() is None:
+            running.port = self._wrapped(open_port(self._place))
+            return running
+        if running is not None:
+            Target.close(running)
+        started = open_target(self.name, self.rig)
+        self._place = str(getattr(started.port, "port", ""))
+        self._target = _Kept(started.name, started.core, self._wrapped(started.port), started.process)
+        return self._target
+
+    def end(self) -> None:
+        """Ends the emulator."""
+        if self._target is not None:
+            Target.close(self._target)
+
+
+def field_log(
+    name: str, samples: int, log: Path, progress: Callable[[int], None] | None = None
+) -> tuple[Account, list[Stretch]]:
+    """Records `samples` of a board that samples as fast as the line goes, with three accidents, and verifies the log.
+
+    The board starts over whenever the link comes up, so that every segment can be verified.
+    """
+    rig = RigFile.standard()
+    assert rig.sample_rate is not None
+    board = stream_rig(rig, rig.sample_rate)
+    settings = settings_number(board)
+    every = round(rig.sample_rate)
+    source = ShakyEmulator(name, board, _BYTES_A_SAMPLE * samples)
+    try:
+        Logger(
+            source=source,
+            out=log,
+            rig=rig.text(),
+            samples=samples,
+            begin=lambda: board.configure(settings, every, every, Source.SENSOR_PACED),
+            anew=True,
+        ).run()
+    finally:
+        source.end()
+    reader = LogReader(log)
+    stretches = list(Verifier(rig, progress).stretches(reader))
+    return reader.account, stretches
