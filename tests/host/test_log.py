@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -23,7 +24,7 @@ from pvid import link
 from pvid.bench.field import field_log, throughput
 from pvid.errors import PvidError
 from pvid.logfile import LOG_SCHEMA, LOG_SCHEMA_TEXT, Close, LogWriter, Mark, Segment
-from pvid.logger import PortSource
+from pvid.logger import Logger, PortSource
 from pvid.logreader import Account, Gap, LogReader, LogStream, Record, Restart
 from pvid.native import Native
 from pvid.stream_rig import stream_rig
@@ -237,6 +238,7 @@ class Board:
     """field_board.py as a process behind a symbolic link."""
 
     def __init__(self, place: Path, **settings: int) -> None:
+        self.place = place
         command = [sys.executable, str(ROOT / "tests" / "host" / "field_board.py"), str(place), json.dumps(settings)]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
@@ -246,6 +248,7 @@ class Board:
         assert self.process.stdout.readline() == "sent\n"
 
     def kill(self) -> None:
+        self.place.unlink(missing_ok=True)  # the terminal's name may soon be that of somebody else's
         self.process.kill()
         self.process.communicate()
 
@@ -424,6 +427,41 @@ def test_a_board_that_refuses_is_told(tmp_path: Path) -> None:
     assert "the board refused: its image was made for other settings" in done.stderr
     _, account = read(tmp_path / "out.pvlog")
     assert account.segments[0].why is not None and account.frames > 0
+
+
+def test_a_log_that_cannot_be_written_ends_with_its_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk: the recorder's error reaches the caller, observers are closed, what was written opens."""
+    line = field_board.PtyLine(tmp_path / "board")
+    real, written_bytes = os.write, 0
+
+    def full(file: int, data: bytes) -> int:
+        nonlocal written_bytes
+        if file == line.ours:
+            return real(file, data)
+        if written_bytes > 2500:
+            raise OSError(28, "No space left on device")
+        written_bytes += len(data)
+        return real(file, data)
+
+    class Watching:
+        closed = False
+
+        def take(self, record: Record, account: Account) -> None:
+            if isinstance(record.item, Segment):
+                line.write(b"".join(field_board.cheap_frames(20)))
+
+        def idle(self, account: Account) -> None: ...
+
+        def close(self, account: Account) -> None:
+            self.closed = True
+
+    watching = Watching()
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(PvidError, match="cannot write .*out.pvlog: No space left on device"):
+        Logger(PortSource(str(tmp_path / "board")), tmp_path / "out.pvlog", [watching], duration_s=20).run()
+    assert watching.closed
+    _, account = read(tmp_path / "out.pvlog")
+    assert account.segments[0].why is None
 
 
 def test_what_the_board_took_while_the_link_was_down_is_counted(tmp_path: Path, sent: list[bytes]) -> None:

@@ -11,7 +11,7 @@ import contextlib
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
@@ -111,7 +111,7 @@ class Recorder(threading.Thread):
         self.stop = threading.Event()
         self.why = "ended"
         self.connected = False
-        self.error: PvidError | None = None
+        self.error: Exception | None = None
         self._target: Target | None = None
         self._sent = 0
 
@@ -125,7 +125,7 @@ class Recorder(threading.Thread):
                 if reopened is None:
                     return
                 target = reopened
-        except PvidError as error:
+        except Exception as error:  # raised again in the thread that waits for this one
             self.error = error
         finally:
             self.connected = False
@@ -296,14 +296,12 @@ class Logger:
             recorder.start()
             try:
                 self._follow(file, recorder)
+                self._hand_out(self.stream.end())
             finally:
                 recorder.stop.set()
                 recorder.join()
-        for record in self.stream.end():
-            for one in self._observers:
-                one.take(record, self.stream.account)
-        for one in self._observers:
-            one.close(self.stream.account)
+                for one in self._observers:
+                    one.close(self.stream.account)
         if recorder.error is not None:
             if not self.stream.account.segments and writer.start == 0:
                 self.out.unlink()
@@ -331,9 +329,12 @@ class Logger:
                 recorder.stop.set()
 
     def _catch_up(self, data: bytes) -> bool:
-        for record in self.stream.feed(data):
-            for one in self._observers:
-                one.take(record, self.stream.account)
+        self._hand_out(self.stream.feed(data))
         for one in self._observers:
             one.idle(self.stream.account)
         return bool(data)
+
+    def _hand_out(self, records: Iterable[Record]) -> None:
+        for record in records:
+            for one in self._observers:
+                one.take(record, self.stream.account)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import select
 import subprocess
+import termios
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -92,7 +93,7 @@ def open_port(name: str) -> Port:
             port.dtr = False
             port.rts = False
         port.open()
-    except (serial.SerialException, OSError, ValueError) as error:
+    except (serial.SerialException, OSError, ValueError, termios.error) as error:
         raise PvidError(f"cannot open the port {name}: {error}") from error
     return port
 
