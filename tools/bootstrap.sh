@@ -83,8 +83,6 @@ missing_packages() {
     fi
     if [[ $1 == test ]]; then
         need binutils command -v readelf
-        need chromium command -v chromium
-        need chromium-driver command -v chromedriver
         need clang command -v clang
         need clang-tidy command -v clang-tidy
         need cppcheck command -v cppcheck
@@ -182,7 +180,7 @@ make_environment() {
 }
 
 install_requirements() { # install_requirements PROFILE
-    local pinned stamp extras=parquet,web
+    local pinned stamp extras=parquet
     pinned=$(sha256sum <"$root/host/pyproject.toml")
     for stamp in "$venv/installed-test" "$venv/installed-$1"; do
         [[ -f $stamp && $(<"$stamp") == "$pinned" ]] && return

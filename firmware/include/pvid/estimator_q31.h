@@ -21,6 +21,10 @@
 #include "pvid/model_q31.h"
 #include "pvid/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Largest |N_i|, |Y| and |Y - N^T theta| of a row that is taken in. */
 #define PVID_ROW_LIMIT_Q31 ((int32_t)1 << 28)
 
@@ -168,5 +172,9 @@ uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_gro
 
 /* Standard errors, kappa and residual of the present estimate, as pvid_estimator_assess_f32. Changes nothing. */
 void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31 *estimate);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

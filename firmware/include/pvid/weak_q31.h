@@ -26,6 +26,10 @@
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/weak_job.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What is integrated twice from a window's start: U F, F and U. */
 #define PVID_WEAK_INTEGRALS_Q31 3
 
@@ -150,5 +154,9 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
