@@ -83,6 +83,8 @@ missing_packages() {
     fi
     if [[ $1 == test ]]; then
         need binutils command -v readelf
+        need chromium command -v chromium
+        need chromium-driver command -v chromedriver
         need clang command -v clang
         need clang-tidy command -v clang-tidy
         need cppcheck command -v cppcheck
@@ -180,7 +182,7 @@ make_environment() {
 }
 
 install_requirements() { # install_requirements PROFILE
-    local pinned stamp extras=parquet
+    local pinned stamp extras=parquet,web
     pinned=$(sha256sum <"$root/host/pyproject.toml")
     for stamp in "$venv/installed-test" "$venv/installed-$1"; do
         [[ -f $stamp && $(<"$stamp") == "$pinned" ]] && return

@@ -9,6 +9,7 @@ import itertools
 import json
 import os
 import sys
+import time
 import tty
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -110,6 +111,15 @@ def _estimate(session: int, updates: int, assessed: npt.NDArray[np.void], reason
     )
 
 
+def in_time(sent: Iterable[tuple[int, link.Message]], per_second: int) -> Iterator[tuple[int, link.Message]]:
+    """The same, so many ticks a second; 0: at once."""
+    began = time.monotonic()
+    for tick, message in sent:
+        if per_second and (ahead := began + tick / per_second - time.monotonic()) > 0:
+            time.sleep(ahead)
+        yield tick, message
+
+
 def frames(sent: Iterable[tuple[int, link.Message]], first_sequence: int = 0) -> Iterator[bytes]:
     """Encoded."""
     for sequence, (tick, message) in zip(itertools.count(first_sequence), sent):  # noqa: B905
@@ -151,7 +161,8 @@ def main() -> None:
     if "cheap" in settings:
         sent = cheap_frames(settings["cheap"])
     else:
-        sent = frames(messages(Field(settings["ticks"], settings.get("seed", 1)), Native()))
+        field = Field(settings["ticks"], settings.get("seed", 1), settings.get("estimate_every", 500))
+        sent = frames(in_time(messages(field, Native()), settings.get("per_second", 0)))
     line.await_word()
     for frame in sent:
         line.write(frame)

@@ -245,7 +245,6 @@ def wait_for_all(path: Path) -> None:
 
 
 def test_log_draws_on_a_terminal_and_leaves_the_last_picture(tmp_path: Path, board: Path) -> None:
-    field_board.rig().write(tmp_path / "rig.toml")
     terminal = Terminal(tmp_path, "--duration", "4")
     seen = terminal.read_to_end()
     assert terminal.process.returncode == 0, seen

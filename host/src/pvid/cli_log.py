@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import click
@@ -12,6 +13,8 @@ from rich.console import Console
 from pvid.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
 from pvid.errors import PvidError
 from pvid.link import Configuration, Source
+from pvid.livepage import DEFAULT as LIVE_PAGE
+from pvid.livepage import is_local, page
 from pvid.logger import EmulatorSource, Logger, PortSource
 from pvid.logreader import Account, LogReader, Observer
 from pvid.logrig import rig_of_log
@@ -42,6 +45,13 @@ from pvid.tee import Tee
     help="Share of frames or samples that may be lost without exit code 1.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Nothing but the summary at the end.")
+@click.option(
+    "--web",
+    metavar="[HOST:PORT]",
+    is_flag=False,
+    flag_value=LIVE_PAGE,
+    help=f"A live page with moving plots for a browser, behind PORT and OUT.  [default: {LIVE_PAGE}]",
+)
 def log_command(
     port: str,
     out: Path,
@@ -54,6 +64,7 @@ def log_command(
     tees: tuple[str, ...],
     allow_loss: float,
     quiet: bool,
+    web: str | None,
 ) -> int:
     """Records what a board sends on PORT into the log OUT, until Ctrl-C.
 
@@ -73,29 +84,36 @@ def log_command(
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)
     l1 = None if rig is None else rig.l1
-    observers: list[Observer] = [Tee(one, l1) for one in tees]
-    if not quiet:
-        observers.append(_view(f"{port} -> {out}", l1))
-    logger = Logger(
-        source=EmulatorSource(port, lambda: open_target(port, board)) if emulated and board else PortSource(port),
-        out=out,
-        observers=observers,
-        rig=None if rig is None else rig.text(),
-        append=append,
-        duration_s=duration,
-        samples=samples,
-        begin=begin,
-        anew=anew,
-    )
-    return print_account(logger.run(), allow_loss)
+    title = f"{port} -> {out}"
+    with page(web, out, title) if web is not None else nullcontext("") as address:
+        observers: list[Observer] = [Tee(one, l1) for one in tees]
+        if not quiet:
+            observers.append(_view(title, l1, address))
+        logger = Logger(
+            source=EmulatorSource(port, lambda: open_target(port, board)) if emulated and board else PortSource(port),
+            out=out,
+            observers=observers,
+            rig=None if rig is None else rig.text(),
+            append=append,
+            duration_s=duration,
+            samples=samples,
+            begin=begin,
+            anew=anew,
+        )
+        account = logger.run()
+    return print_account(account, allow_loss)
 
 
-def _view(title: str, l1: float | None) -> Observer:
+def _view(title: str, l1: float | None, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
+    if address and not is_local(address):
+        messages.print(f"whoever reaches this machine can look at {address}", highlight=False)
     console = Console()
     if sys.stdout.isatty() and not console.is_dumb_terminal:
-        return LiveView(console, title, l1)
+        return LiveView(console, title, l1, address)
     messages.print(f"{title}; Ctrl-C ends the recording", highlight=False)
+    if address:
+        messages.print(f"live page: {address}", highlight=False)
     return StatusLine(sys.stderr)
 
 

@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 
+from pvid.axis_limits import interesting
 from pvid.errors import PvidError
 from pvid.identify import PHYSICAL, UNITS, Identification
 
@@ -23,19 +24,6 @@ LABELS = {
     "l2": "joint to centre of mass l2",
     "rho2": "radius of gyration rho2",
 }
-
-
-def interesting(value: Float, band: Float) -> tuple[float, float]:
-    """Limits that show where the estimate ends and how it got there: twice the last band, and the last 3/4."""
-    known = np.flatnonzero(np.isfinite(value) & np.isfinite(band))
-    if not len(known):
-        return math.nan, math.nan
-    last = known[-1]
-    settled = value[known[len(known) // 4 :]]
-    low = min(float(settled.min()), float(value[last] - 2 * band[last]))
-    high = max(float(settled.max()), float(value[last] + 2 * band[last]))
-    margin = 0.05 * (high - low)
-    return low - margin, high + margin
 
 
 def convergence(result: Identification, path: Path, *, truth: dict[str, float] | None = None, title: str = "") -> None:

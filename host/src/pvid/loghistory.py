@@ -13,13 +13,30 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.link import Hello, Message
-from pvid.logreader import Record
+from pvid.logreader import Account, Record
 from pvid.logvalues import TABLES, Values
 
 Float = npt.NDArray[np.float64]
 
 NUMBERS = tuple(name for name, column in TABLES["estimates"].items() if column.kind == "f8" and name != "t")
 _MOST_SAMPLES = 200_000
+
+
+class Rates:
+    """Samples and bytes a second, over the last seconds."""
+
+    def __init__(self, over_s: float = 2.0) -> None:
+        self._over_s = over_s
+        self._counts: deque[tuple[float, int, int]] = deque()  # when, samples, bytes
+
+    def now(self, account: Account, when: float) -> tuple[float, float]:
+        """At the time `when` (of time.monotonic), which may be asked often."""
+        counts = self._counts
+        counts.append((when, account.samples, account.bytes))
+        while len(counts) > 2 and when - counts[1][0] > self._over_s:
+            counts.popleft()
+        passed = max(when - counts[0][0], 1e-9)
+        return (account.samples - counts[0][1]) / passed, (account.bytes - counts[0][2]) / passed
 
 
 class Thinned:

@@ -15,13 +15,23 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
-from pvid.link import Code, Core, Form, Status
-from pvid.loghistory import History
+from pvid.loghistory import History, Rates
 from pvid.logreader import Account, Record
-from pvid.logwords import KAPPA_WEAK, PARAMETERS, kappa_share, kappa_words, reason_words, residual_words, with_error
+from pvid.logwords import (
+    KAPPA_WEAK,
+    PARAMETERS,
+    board_words,
+    kappa_share,
+    kappa_words,
+    link_words,
+    loss_words,
+    reason_words,
+    received_words,
+    residual_words,
+    with_error,
+)
 
 _PERIOD_S = 0.25
-_RATE_OVER_S = 2.0
 _BAR = 30
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _WIDEST = 110
@@ -46,7 +56,8 @@ class LiveView:
         self._title = title
         self._page = page
         self._began = self._drawn = time.monotonic()
-        self._counts = [(self._began, 0, 0)]  # when, samples, bytes
+        self._rates = Rates()
+        self._rates.now(Account(), self._began)
         self._live = Live(console=console, auto_refresh=False)
         self._ended = False
 
@@ -86,51 +97,15 @@ class LiveView:
 
     def _link(self, account: Account, now: float) -> Table:
         rows = _labelled()
-        rows.add_row("board", Text(self._board(account)))
-        last = account.segments[-1] if account.segments else None
-        if last is None:
-            rows.add_row("link", Text("opening", style="yellow"))
-        elif last.why is None:
-            rows.add_row("link", f"up, segment {last.number}")
-        else:
-            rows.add_row("link", Text(f"down: {last.why}; waiting for it to come back", style="red"))
-        samples, received = self._rates(account, now)
-        rows.add_row(
-            "received",
-            f"{account.samples} samples ({samples:.0f} per second), {account.bytes / 1e6:.2f} MB "
-            f"({received / 1e3:.1f} kB/s)",
-        )
-        rows.add_row("lost", _losses(account))
+        rows.add_row("board", Text(board_words(self.history.hello, account)))
+        up, how = link_words(account)
+        rows.add_row("link", Text(how, style="" if up else "yellow"))
+        rows.add_row("received", received_words(account, *self._rates.now(account, now)))
+        lost = loss_words(account)
+        rows.add_row("lost", Text(lost, style="red") if lost else Text("nothing", style="green"))
         if self._page:
             rows.add_row("live page", Text(self._page))
         return rows
-
-    def _board(self, account: Account) -> str:
-        hello = self.history.hello
-        if hello is None:
-            return "has not said yet who it is"
-        form, core = (
-            kinds(number).name.lower() if number in list(kinds) else str(number)
-            for kinds, number in ((Form, hello.form), (Core, hello.core))
-        )
-        text = f"{hello.board}: {form} form, core {core}, {hello.sample_rate:g} samples per second"
-        status = account.lasting.get(Status)
-        if isinstance(status, Status) and status.code != Code.RUNNING and status.code in list(Code):
-            text += f"; {Code(status.code).name.lower().replace('_', ' ')}"
-        return text
-
-    @property
-    def _weak(self) -> bool:
-        return self.history.hello is not None and self.history.hello.form == Form.WEAK
-
-    def _rates(self, account: Account, now: float) -> tuple[float, float]:
-        """Samples and bytes a second, over the last two seconds."""
-        counts = self._counts
-        counts.append((now, account.samples, account.bytes))
-        while len(counts) > 2 and now - counts[1][0] > _RATE_OVER_S:
-            counts.pop(0)
-        passed = max(now - counts[0][0], 1e-9)
-        return (account.samples - counts[0][1]) / passed, (account.bytes - counts[0][2]) / passed
 
     def _parameters(self) -> Table:
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_edge=False)
@@ -164,7 +139,7 @@ class LiveView:
         rows.add_row(
             "residual",
             Text(line.ljust(_BAR), style="cyan")
-            + Text(f"  {residual:.3g} {residual_words(self._weak)}" if line else "  none yet"),
+            + Text(f"  {residual:.3g} {residual_words(history.hello)}" if line else "  none yet"),
         )
         t, phi, y = history.samples()
         if len(t):
@@ -182,19 +157,6 @@ def _labelled() -> Table:
     rows.add_column(style="bold", min_width=9)
     rows.add_column()
     return rows
-
-
-def _losses(account: Account) -> Text:
-    parts = [
-        (account.missing_samples, "samples"),
-        (account.missing, "frames"),
-        (account.damaged, "damaged pieces"),
-        (account.foreign, "foreign frames"),
-    ]
-    told = ", ".join(f"{count} {what}" for count, what in parts if count)
-    if not told:
-        return Text("nothing", style="green")
-    return Text(f"{told} ({100 * account.lost_share:.2g} %)", style="red")
 
 
 def _span(x: npt.NDArray[np.float64]) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from pvid.link import Code, Core, Form, Hello, Status
+from pvid.logreader import Account
 from pvid.native import Reason
 
 # Values.TABLES["estimates"] has the same names.
@@ -37,6 +39,51 @@ KAPPA_MIN, KAPPA_WEAK, KAPPA_GOOD = 3e-5, 1e-3, 5e-3
 _KAPPA_SHOWN = (1e-6, 1.0)
 
 
+def board_words(hello: Hello | None, account: Account) -> str:
+    """Who the board is, and what it does if it does not simply run."""
+    if hello is None:
+        return "has not said yet who it is"
+    form, core = (
+        kinds(number).name.lower() if number in list(kinds) else str(number)
+        for kinds, number in ((Form, hello.form), (Core, hello.core))
+    )
+    text = f"{hello.board}: {form} form, core {core}, {hello.sample_rate:g} samples per second"
+    status = account.lasting.get(Status)
+    if isinstance(status, Status) and status.code != Code.RUNNING and status.code in list(Code):
+        text += f"; {Code(status.code).name.lower().replace('_', ' ')}"
+    return text
+
+
+def link_words(account: Account) -> tuple[bool, str]:
+    """Whether the link is up, and how it is."""
+    if not account.segments:
+        return False, "opening"
+    last = account.segments[-1]
+    if last.why is None:
+        return True, f"up, segment {last.number}"
+    return False, f"down: {last.why}"
+
+
+def received_words(account: Account, samples: float, received: float) -> str:
+    """What came, and `samples` and `received` bytes a second."""
+    return (
+        f"{account.samples} samples ({samples:.0f} per second), {account.bytes / 1e6:.2f} MB "
+        f"({received / 1e3:.1f} kB/s)"
+    )
+
+
+def loss_words(account: Account) -> str:
+    """What was lost; empty when nothing was."""
+    parts = [
+        (account.missing_samples, "samples"),
+        (account.missing, "frames"),
+        (account.damaged, "damaged pieces"),
+        (account.foreign, "foreign frames"),
+    ]
+    told = ", ".join(f"{count} {what}" for count, what in parts if count)
+    return f"{told} ({100 * account.lost_share:.2g} %)" if told else ""
+
+
 def reason_words(reason: str) -> str:
     """What a reason (Reason.text) means, in a sentence; empty for one of another version."""
     return next((words for one, words in _REASONS.items() if one.text == reason), "")
@@ -59,8 +106,9 @@ def kappa_share(kappa: float) -> float:
     return min(1.0, max(0.0, (math.log10(kappa) - low) / (high - low)))
 
 
-def residual_words(weak: bool) -> str:
+def residual_words(hello: Hello | None) -> str:
     """What the residuals are so many times of."""
+    weak = hello is not None and hello.form == Form.WEAK
     return "times the encoder's noise" if weak else "times the row_sd that was configured"
 
 

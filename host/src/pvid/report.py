@@ -17,9 +17,10 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from scipy.signal import savgol_filter, welch
 
+from pvid.axis_limits import interesting
 from pvid.capture import Run, read_run
 from pvid.errors import PvidError
-from pvid.figures import LABELS, interesting
+from pvid.figures import LABELS
 from pvid.identify import LINEAR, PHYSICAL, ZERO, identify
 from pvid.link import Estimate, Form, Hello
 from pvid.logreader import LogReader
