@@ -32,23 +32,32 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     const int32_t diagonal = s[j][j];
     int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
     for (size_t k = j + 1u; k < n; k++) {
-        pivot -= pvid_product_q31(self->u[j][k], self->u[j][k]);
+        pivot -= (int64_t)self->u[j][k] * self->u[j][k];
     }
     self->positive = self->positive && pvid_pivot_is_data_q31(pivot, diagonal);
     if (!self->positive) {
         return;
     }
-    if (j == 0u) {
-        self->first_pivot = (int32_t)(pivot / diagonal);
-    }
+    self->pivot[j] = pivot;
+    self->first_pivot = (j == 0u) ? (int32_t)(pivot / diagonal) : 0;
     self->inverse[j] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
     for (size_t i = 0; i < j; i++) {
         int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
         for (size_t k = j + 1u; k < n; k++) {
-            sum -= pvid_product_q31(self->u[i][k], self->u[j][k]);
+            sum -= (int64_t)self->u[i][k] * self->u[j][k];
         }
         self->u[i][j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
     }
+}
+
+int32_t pvid_cholesky_least_pivot_q31(const pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P])
+{
+    int32_t least = PVID_ONE_Q30;
+    for (size_t j = 0; j < self->n; j++) {
+        const int32_t relative = (int32_t)(self->pivot[j] / s[j][j]);
+        least = (relative < least) ? relative : least;
+    }
+    return least;
 }
 
 bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P])
@@ -66,7 +75,7 @@ void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[],
         const size_t i = self->n - turn;
         int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
         for (size_t k = i + 1u; k < self->n; k++) {
-            sum -= pvid_product_q31(self->u[i][k], x[k]);
+            sum -= (int64_t)self->u[i][k] * x[k];
         }
         x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
     }
@@ -77,7 +86,7 @@ static void solve_upper(const pvid_cholesky_q31 *self, const int32_t rhs[], int3
     for (size_t i = 0; i < self->n; i++) {
         int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
         for (size_t k = 0; k < i; k++) {
-            sum -= pvid_product_q31(self->u[k][i], x[k]);
+            sum -= (int64_t)self->u[k][i] * x[k];
         }
         x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
     }

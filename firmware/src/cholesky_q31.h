@@ -28,6 +28,9 @@ int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limi
 void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n);
 void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j);
 
+/* The least relative pivot of the factor of s, Q30. */
+int32_t pvid_cholesky_least_pivot_q31(const pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P]);
+
 /* Factors the n x n matrix whose upper triangle is s, diagonal in [2^28, 2^30), the others within +-2^30. Returns
  * false iff a diagonal entry is below that or a relative pivot is below 2^-PVID_PIVOT_SHIFT; first_pivot is 0 then. */
 bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P]);

@@ -9,6 +9,7 @@
 
 #define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
 #define FORMAT_MAX 64
+#define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
 
 /* ---- configuration ---- */
 
@@ -84,6 +85,9 @@ static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
     if ((config->kappa_min < 0) || (config->kappa_min > (PVID_ONE_Q30 - (PVID_ONE_Q30 / 1000)))) {
         return PVID_BAD_KAPPA_MIN;
     }
+    if (config->noise_margin > NOISE_MARGIN_MAX) {
+        return PVID_BAD_NOISE_MARGIN;
+    }
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
 }
 
@@ -149,6 +153,7 @@ pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimat
     self->correlation = config->correlation;
     self->step_limit = config->step_limit;
     self->kappa_min = config->kappa_min;
+    self->noise_margin = config->noise_margin;
     self->divider = config->divider;
     return PVID_OK;
 }
@@ -175,13 +180,14 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
     int64_t e = y;
     for (size_t i = 0; i < self->model->n_theta; i++) {
         fits = fits && within_row_limit(n[i]);
-        const int32_t held = (int32_t)pvid_clamp_q31(n[i], PVID_ROW_LIMIT_Q31);
-        e -= pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(held, self->mantissa[i]), self->shift[i]), TERM_MAX);
+        const int64_t held = pvid_clamp_q31(n[i], PVID_ROW_LIMIT_Q31);
+        e -= pvid_clamp_q31(pvid_scale_q31(held * self->mantissa[i], self->shift[i]), TERM_MAX);
     }
     if (!fits || !within_row_limit(e)) {
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
+    self->energy = pvid_clamp_q31(self->energy + (e * e), PVID_WIDE);
     pvid_information_add_q31(&self->information, n, (int32_t)e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;

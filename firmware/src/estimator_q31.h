@@ -14,6 +14,7 @@
 
 #define PVID_HELD_LIMIT (2 * PVID_SUM_LIMIT) /* of |b|, rr and what a step may add to them */
 #define PVID_ROW_SD_BITS 8                   /* format of row_sd beyond Y's */
+#define PVID_SIZE_BITS 22                    /* of the size of a step: |dp| in it still is an int64 */
 #define PVID_S_BITS 32                       /* of the unit of s; see pvid_estimator_solve_q31 */
 #define PVID_NOTHING_Q31 (-200)              /* exponent of 0: never the largest */
 
@@ -49,7 +50,34 @@ int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, in
 /* Sets theta = f(p), and what rows are multiplied with. */
 void pvid_estimator_take_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
 
+/* s^2 of a row: residual sum of squares over degrees of freedom, row_sd^2 while there are none; divided by 4^exponent
+ * as the sums are. */
+pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self);
+
+/* row_sd^2 as that. */
+pvid_scaled_q31 pvid_estimator_expected_variance_q31(const pvid_estimator_q31 *self);
+
+/* ---- the parts of an assessment ---- */
+
+/* Weight, residual and the variances they give. */
+void pvid_estimator_residual_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                 pvid_estimate_q31 *estimate);
+
+/* s += wide^2 / start_sd^2. */
+void pvid_estimator_widen_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve);
+
+/* Column a of U^-1 and its length. */
+void pvid_estimator_invert_q31(pvid_estimator_solve_q31 *solve, size_t a);
+
+/* Standard error of p[a] and its correlation with those before it, from wide^2 (S + H)^-1. */
+void pvid_estimator_errors_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, size_t a,
+                               pvid_estimate_q31 *estimate);
+
 /* ---- the system ---- */
+
+/* s less what noise of solve->variance puts into C^T M C, so many times over as the margin says. */
+void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
+                                   int64_t rest[][PVID_MAX_P]);
 
 /* h: powers of two that bring M's diagonal into [2^28, 2^30). */
 void pvid_system_exponents_q31(const pvid_information_q31 *information, int16_t h[]);

@@ -1,4 +1,4 @@
-/* The solve in stages. */
+/* The solve and the assessment in stages. */
 #include <string.h>
 
 #include "count.h"
@@ -9,20 +9,24 @@ enum {
     STAGE_JACOBIAN, /* C at p, scaled */
     STAGE_FORCE,
     STAGE_PROJECT, /* n_p times: a row of S */
-    STAGE_PRIOR,   /* S + H0, scaled */
-    STAGE_FACTOR,  /* n_p times: a pivot */
+    STAGE_INFORM,  /* is there more in S than noise puts there? In parts: less that, then a few pivots at a time */
+    STAGE_FACTOR,  /* S + H0 and its factor, likewise */
     STAGE_SOLVE,   /* dp */
     STAGE_STEP,    /* where p and theta go with it */
     STAGE_FOLLOW,  /* a few rows of M dtheta at a time */
-    STAGE_FALL,    /* what rr loses */
     STAGE_COMMIT,
     STAGE_FOLD, /* in parts */
-    STAGE_DONE
+    STAGE_DONE,
+    STAGE_RESIDUAL, /* of an assessment, before STAGE_INFORM */
+    STAGE_KAPPA,    /* and after it: S, its factor, and what that says */
+    STAGE_WIDEN,    /* S with what the start said, and its factor */
+    STAGE_INVERT,   /* n_p times: a column */
+    STAGE_ERRORS    /* likewise */
 };
 
-#define ROWS_A_STAGE 4u
+#define ROWS_A_STAGE 8u
 #define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
-#define SIZE_BITS 22                /* format of the size of a step: |dp| in it still is an int64 */
+#define PIVOTS_A_STAGE 2u
 
 static void hold(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
 {
@@ -65,17 +69,59 @@ static void project_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q
     solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->c, solve->start, row);
 }
 
-static void prior_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+/* S as it is to be factored. */
+static void begin_factor(pvid_estimator_solve_q31 *solve, uint8_t n_p, const int64_t s[][PVID_MAX_P])
+{
+    pvid_system_equilibrate_q31(n_p, s, solve->g, solve->q);
+    pvid_cholesky_begin_q31(&solve->factor, n_p);
+}
+
+/* Parts of a stage that factors: one prepares the matrix, then the parameters are eliminated, from the last, a few at a
+ * time. */
+static size_t factor_parts(size_t n_p)
+{
+    return 1u + ((n_p + (PIVOTS_A_STAGE - 1u)) / PIVOTS_A_STAGE);
+}
+
+static void eliminate_part(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part)
+{
+    const size_t first = (part - 1u) * PIVOTS_A_STAGE;
+    const size_t end = ((n_p - first) > PIVOTS_A_STAGE) ? (first + PIVOTS_A_STAGE) : n_p;
+    for (size_t turn = first + 1u; turn <= end; turn++) {
+        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q, n_p - turn);
+    }
+}
+
+static bool asks_for_noise(const pvid_estimator_q31 *self)
+{
+    return (self->noise_margin > 0u) && (self->model->noisy[1] > 0u);
+}
+
+static void inform_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
 {
     const uint8_t n_p = self->model->n_p;
-    for (size_t a = 0; a < n_p; a++) {
+    solve->informed = true;
+    if (!asks_for_noise(self)) {
+        return;
+    }
+    if (part == 0u) {
+        int64_t rest[PVID_MAX_P][PVID_MAX_P];
+        pvid_system_without_noise_q31(self, solve, rest);
+        begin_factor(solve, n_p, (const int64_t(*)[PVID_MAX_P])rest);
+        return;
+    }
+    eliminate_part(solve, n_p, part);
+    solve->informed = solve->factor.positive;
+}
+
+static void add_prior(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    for (size_t a = 0; a < self->model->n_p; a++) {
         const int32_t exponent = (int32_t)self->prior_exponent[a] + (2 * (int32_t)self->information.exponent);
         const int64_t prior = pvid_system_prior_q31(self->prior[a], exponent, solve->f[a]);
         solve->s[a][a] += prior;
         solve->first_prior = (a == 0u) ? prior : solve->first_prior;
     }
-    pvid_system_equilibrate_q31(n_p, (const int64_t(*)[PVID_MAX_P])solve->s, solve->g, solve->q);
-    pvid_cholesky_begin_q31(&solve->factor, n_p);
 }
 
 /* Whether the data speak of p[0]: what of its information no other parameter can imitate is a part kappa of its
@@ -88,18 +134,22 @@ static bool is_excited(const pvid_estimator_q31 *self, const pvid_estimator_solv
     return (kappa >= self->kappa_min) && (own || (self->kappa_min == 0));
 }
 
-/* Eliminates a parameter, the last one at index 0. */
-static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t index)
+static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
 {
-    const size_t left = self->model->n_p - (index + 1u);
-    pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q, left);
-    if (left > 0u) {
+    const uint8_t n_p = self->model->n_p;
+    if (part == 0u) {
+        add_prior(self, solve);
+        begin_factor(solve, n_p, (const int64_t(*)[PVID_MAX_P])solve->s);
+        return;
+    }
+    eliminate_part(solve, n_p, part);
+    if ((part + 1u) < factor_parts(n_p)) {
         return;
     }
     solve->reason = PVID_UPDATED;
     if (!solve->factor.positive) {
         hold(self, solve, PVID_HELD_PIVOT);
-    } else if (!is_excited(self, solve)) {
+    } else if (!solve->informed || !is_excited(self, solve)) {
         hold(self, solve, PVID_HELD_NOT_EXCITED);
     }
 }
@@ -113,7 +163,7 @@ static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     int64_t rhs[PVID_MAX_P] = {0};
     int32_t x[PVID_MAX_P];
     for (size_t k = 0; k < model->n_c; k++) {
-        rhs[model->c_column[k]] += pvid_product_q31(solve->c[k], solve->force[model->c_row[k]]);
+        rhs[model->c_column[k]] += (int64_t)solve->c[k] * solve->force[model->c_row[k]];
     }
     for (size_t a = 0; a < model->n_p; a++) {
         rhs[a] = pvid_scale_q31(rhs[a], solve->g[a]);
@@ -132,7 +182,7 @@ static int64_t size_of(const pvid_estimator_q31 *self, const int64_t dp[])
     int64_t size = 0;
     for (size_t a = 0; a < self->model->n_p; a++) {
         const int32_t reference = pvid_is_positive_q31(self->model, a) ? self->p[a] : self->start_sd[a];
-        const int64_t own = (int64_t)(pvid_magnitude_q31(dp[a]) << SIZE_BITS) / reference;
+        const int64_t own = (int64_t)(pvid_magnitude_q31(dp[a]) << PVID_SIZE_BITS) / reference;
         size = (own > size) ? own : size;
     }
     return size;
@@ -141,7 +191,7 @@ static int64_t size_of(const pvid_estimator_q31 *self, const int64_t dp[])
 /* p[n_p] = where the step leads: shortened to the step limit, within the bounds. */
 static void take_step(pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int64_t size, int32_t p[])
 {
-    const int64_t limit = (int64_t)self->step_limit << (SIZE_BITS - 16);
+    const int64_t limit = (int64_t)self->step_limit << (PVID_SIZE_BITS - 16);
     const bool limited = size > limit;
     const int32_t factor = limited ? (int32_t)((limit << 31) / size) : 0;
     bool bounded = false;
@@ -187,7 +237,10 @@ static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve
 {
     memcpy(solve->p, self->p, sizeof solve->p);
     if (solve->reason == PVID_UPDATED) {
-        take_step(self, solve, size_of(self, solve->dp), solve->p);
+        solve->size = size_of(self, solve->dp);
+        take_step(self, solve, solve->size, solve->p);
+    } else if (solve->has_refuge) {
+        memcpy(solve->p, solve->refuge, sizeof solve->p);
     }
     self->model->theta(solve->p, solve->theta);
     scale_theta_step(self, solve);
@@ -202,11 +255,11 @@ static size_t follow_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
         size_t at = i;
         int64_t sum = 0;
         for (size_t j = 0; j < i; j++) {
-            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
+            sum += (int64_t)solve->m[at] * solve->theta_step[j];
             at += (n - 1u) - j;
         }
         for (size_t j = i; j < n; j++) {
-            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
+            sum += (int64_t)solve->m[at] * solve->theta_step[j];
             at++;
         }
         solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_HELD_LIMIT);
@@ -227,7 +280,7 @@ static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solv
     const int32_t exponent = pvid_to_block_q31((uint32_t)n, both, 30, mantissa);
     int64_t fall = 0;
     for (size_t j = 0; j < n; j++) {
-        fall += pvid_product_q31(solve->theta_step[j], mantissa[j]);
+        fall += (int64_t)solve->theta_step[j] * mantissa[j];
     }
     return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->step_exponent + exponent)), PVID_HELD_LIMIT);
 }
@@ -235,7 +288,8 @@ static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solv
 /* Moves p, theta, b and rr together: b -= M dtheta. */
 static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    if (solve->reason != PVID_UPDATED) {
+    const bool steps = solve->reason == PVID_UPDATED;
+    if (!steps && !solve->has_refuge) {
         return;
     }
     const size_t n = self->model->n_theta;
@@ -247,9 +301,11 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
         b[i] = pvid_clamp_q31(sums[i], PVID_HELD_LIMIT);
         fits = fits && (pvid_magnitude_q31(b[i] - solve->moved[i]) <= (uint64_t)PVID_HELD_LIMIT);
     }
-    const int64_t residual = sums[n] - solve->fall;
+    const int64_t residual = sums[n] - fall_of(self, solve);
     if (!fits || (residual > PVID_HELD_LIMIT)) {
-        hold(self, solve, PVID_HELD_PIVOT);
+        if (steps) {
+            hold(self, solve, PVID_HELD_PIVOT);
+        }
         return;
     }
     for (size_t i = 0; i < n; i++) {
@@ -258,7 +314,9 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     sums[n] = (residual > 0) ? residual : 0;
     pvid_estimator_take_theta_q31(self, solve->theta);
     memcpy(self->p, solve->p, sizeof self->p);
-    pvid_count_up(&self->counters.updates);
+    if (steps) {
+        pvid_count_up(&self->counters.updates);
+    }
 }
 
 /* Counts a group; whether a solve is due. */
@@ -272,15 +330,28 @@ static bool is_due(pvid_estimator_q31 *self)
     return true;
 }
 
-void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group)
+static void begin(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    solve->ends_group = ends_group;
     solve->reason = PVID_ACCUMULATED;
+    solve->stage = STAGE_MATRIX;
     solve->index = 0;
     solve->start = 0;
-    solve->stage = STAGE_MATRIX;
+    solve->ends_group = false;
+    solve->judging = false;
+    solve->informed = true;
+    solve->has_refuge = false;
     solve->gain = PVID_ONE_Q30;
+    solve->size = 0;
+    solve->variance = pvid_estimator_expected_variance_q31(self); /* while p may still be far off */
+}
+
+void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group)
+{
+    begin(self, solve);
+    solve->ends_group = ends_group;
     if (ends_group) {
+        solve->energy = self->energy;
+        self->energy = 0;
         solve->gain = self->gain;
         solve->stage = (uint8_t)(is_due(self) ? STAGE_MATRIX : STAGE_FOLD);
     } else if (self->gain < PVID_ONE_Q30) {
@@ -288,11 +359,53 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
     }
 }
 
-bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                         pvid_estimate_q31 *estimate)
+{
+    begin(self, solve);
+    solve->judging = true;
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
+}
+
+/* What follows once a stage is over. */
+static uint8_t after(const pvid_estimator_solve_q31 *solve)
+{
+    switch (solve->stage) {
+    case STAGE_JACOBIAN:
+        return solve->judging ? (uint8_t)STAGE_PROJECT : (uint8_t)STAGE_FORCE;
+    case STAGE_PROJECT:
+        return solve->judging ? (uint8_t)STAGE_RESIDUAL : (uint8_t)STAGE_INFORM;
+    case STAGE_RESIDUAL:
+        return STAGE_INFORM;
+    case STAGE_INFORM:
+        return solve->judging ? (uint8_t)STAGE_KAPPA : (uint8_t)STAGE_FACTOR;
+    case STAGE_COMMIT:
+        return solve->ends_group ? (uint8_t)STAGE_FOLD : (uint8_t)STAGE_DONE;
+    case STAGE_ERRORS:
+        return STAGE_DONE;
+    default:
+        return (uint8_t)(solve->stage + 1u);
+    }
+}
+
+/* Takes the index after a stage, and says where the stage is over; returns whether nothing is left. */
+static bool proceed(pvid_estimator_solve_q31 *solve, size_t next, size_t all)
+{
+    solve->index = (uint8_t)next;
+    if (next >= all) {
+        solve->index = 0;
+        solve->stage = after(solve);
+    }
+    return solve->stage == STAGE_DONE;
+}
+
+/* The stages that a solve and an assessment share. */
+static bool look(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const size_t index = solve->index;
-    size_t next = index + 1u; /* index after this stage, */
-    size_t all = 1;           /* and where the stage is over */
+    size_t next = index + 1u;
+    size_t all = 1;
     switch (solve->stage) {
     case STAGE_MATRIX:
         next = matrix_stage(self, solve, index);
@@ -301,19 +414,30 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
     case STAGE_JACOBIAN:
         pvid_system_jacobian_q31(self, solve->h, solve->c, solve->f);
         break;
-    case STAGE_FORCE:
-        scale_force(self, solve);
-        break;
     case STAGE_PROJECT:
         project_stage(self, solve);
         all = self->model->n_p;
         break;
-    case STAGE_PRIOR:
-        prior_stage(self, solve);
+    default: /* STAGE_INFORM */
+        inform_stage(self, solve, index);
+        all = factor_parts(self->model->n_p);
+        break;
+    }
+    return proceed(solve, next, all);
+}
+
+bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t index = solve->index;
+    size_t next = index + 1u;
+    size_t all = 1;
+    switch (solve->stage) {
+    case STAGE_FORCE:
+        scale_force(self, solve);
         break;
     case STAGE_FACTOR:
         factor_stage(self, solve, index);
-        all = self->model->n_p;
+        all = factor_parts(self->model->n_p);
         break;
     case STAGE_SOLVE:
         solve_stage(self, solve);
@@ -325,9 +449,6 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
         next = follow_stage(self, solve, index);
         all = self->model->n_theta;
         break;
-    case STAGE_FALL:
-        solve->fall = fall_of(self, solve);
-        break;
     case STAGE_COMMIT:
         commit_stage(self, solve);
         break;
@@ -335,16 +456,77 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
         pvid_information_end_group_q31(&self->information, index, self->fresh);
         all = PVID_INFORMATION_END_PARTS;
         break;
-    default:
+    case STAGE_DONE:
         return true;
+    default:
+        return look(self, solve);
     }
-    solve->index = (uint8_t)next;
-    if (next >= all) {
-        const bool over = (solve->stage == STAGE_COMMIT) && !solve->ends_group;
-        solve->index = 0;
-        solve->stage = (uint8_t)(over ? STAGE_DONE : (solve->stage + 1));
+    return proceed(solve, next, all);
+}
+
+static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
+{
+    if (part == 0u) {
+        begin_factor(solve, (uint8_t)n_p, (const int64_t(*)[PVID_MAX_P])solve->s);
+        return;
     }
-    return solve->stage == STAGE_DONE;
+    if (part < factor_parts(n_p)) {
+        eliminate_part(solve, n_p, part);
+    } else if (solve->factor.positive) {
+        estimate->kappa = solve->factor.first_pivot;
+        estimate->least_pivot =
+            pvid_cholesky_least_pivot_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q);
+    }
+}
+
+static void widen_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
+{
+    const uint8_t n_p = self->model->n_p;
+    if (part == 0u) {
+        pvid_estimator_widen_q31(self, solve);
+        begin_factor(solve, n_p, (const int64_t(*)[PVID_MAX_P])solve->s);
+    } else {
+        eliminate_part(solve, n_p, part);
+    }
+}
+
+bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                  pvid_estimate_q31 *estimate)
+{
+    const size_t n_p = self->model->n_p;
+    const size_t index = solve->index;
+    size_t all = n_p;
+    switch (solve->stage) {
+    case STAGE_RESIDUAL:
+        pvid_estimator_residual_q31(self, solve, estimate);
+        all = 1;
+        break;
+    case STAGE_KAPPA:
+        kappa_stage(solve, n_p, index, estimate);
+        all = factor_parts(n_p) + 1u;
+        break;
+    case STAGE_WIDEN:
+        widen_stage(self, solve, index);
+        all = factor_parts(n_p);
+        break;
+    case STAGE_INVERT:
+        pvid_estimator_invert_q31(solve, index);
+        break;
+    case STAGE_ERRORS:
+        pvid_estimator_errors_q31(self, solve, index, estimate);
+        break;
+    case STAGE_DONE:
+        return true;
+    default:
+        return look(self, solve);
+    }
+    return proceed(solve, index + 1u, all);
+}
+
+/* M, C, S, and whether there is more in it than noise. */
+static size_t looking_stages(const pvid_model_q31 *model)
+{
+    return pvid_system_row_stages_q31(model->n_theta) + 1u + model->n_p + factor_parts(model->n_p);
 }
 
 uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_group)
@@ -352,6 +534,12 @@ uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_gro
     const pvid_model_q31 *model = self->model;
     const size_t follow = (model->n_theta + (ROWS_A_STAGE - 1u)) / ROWS_A_STAGE;
     const size_t fold = ends_group ? PVID_INFORMATION_END_PARTS : 0u;
-    /* and seven that come once */
-    return (uint16_t)(pvid_system_row_stages_q31(model->n_theta) + (2u * model->n_p) + follow + fold + 7u);
+    /* and four that come once: force, solve, step, commit */
+    return (uint16_t)(looking_stages(model) + factor_parts(model->n_p) + follow + fold + 4u);
+}
+
+uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self)
+{
+    const pvid_model_q31 *model = self->model;
+    return (uint16_t)(looking_stages(model) + 2u + (2u * factor_parts(model->n_p)) + (2u * model->n_p));
 }

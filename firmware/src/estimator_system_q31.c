@@ -1,5 +1,6 @@
 /* The system S dp = F in integers: M, C and S scaled by powers of two such that 30 bits hold all that matters. */
 #include "estimator_q31.h"
+#include "scaled_q31.h"
 
 /* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
 #define ENTRIES_A_STAGE 18u
@@ -76,11 +77,11 @@ static void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int64_t
 {
     size_t at = j;
     for (size_t i = 0; i < j; i++) {
-        t[i] += pvid_product_q31(m[at], a);
+        t[i] += (int64_t)m[at] * a;
         at += (n - 1u) - i;
     }
     for (size_t i = j; i < n; i++) {
-        t[i] += pvid_product_q31(m[at], a);
+        t[i] += (int64_t)m[at] * a;
         at++;
     }
 }
@@ -100,7 +101,7 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
         s[b] = 0;
     }
     for (size_t k = start; k < model->n_c; k++) {
-        s[model->c_column[k]] += pvid_product_q31(c[k], (int32_t)t[model->c_row[k]]);
+        s[model->c_column[k]] += c[k] * t[model->c_row[k]];
     }
     return end;
 }
@@ -119,6 +120,46 @@ void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int
     for (size_t a = 0; a < n_p; a++) {
         for (size_t b = a; b < n_p; b++) {
             q[a][b] = (int32_t)pvid_clamp_q31(pvid_scale_q31(s[a][b], g[a] + g[b]), PVID_ONE_Q30);
+        }
+    }
+}
+
+/* The noise of so many rows in units of m: its products 00, 01, 11 of the two noisy entries of N. */
+static void scale_noise(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int32_t noise[])
+{
+    const uint8_t *noisy = self->model->noisy;
+    const int64_t weight = self->information.sums[self->information.n_sums - 1u];
+    const pvid_scaled_q31 rows = pvid_scaled_times_q31(pvid_scaled_of_q31(weight, -16), solve->variance);
+    const pvid_scaled_q31 much = pvid_scaled_times_q31(pvid_scaled_of_q31(self->noise_margin, -16), rows);
+    for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
+        const int32_t h = solve->h[noisy[i / 2u]] + solve->h[noisy[(i + 1u) / 2u]];
+        const pvid_scaled_q31 own = pvid_scaled_times_q31(much, self->noise[i]);
+        noise[i] = (int32_t)pvid_clamp_q31(pvid_scaled_fixed_q31(own, -h), INT32_MAX);
+    }
+}
+
+void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
+                                   int64_t rest[][PVID_MAX_P])
+{
+    const pvid_model_q31 *model = self->model;
+    int32_t noise[PVID_NOISE_TRACES_Q31];
+    int32_t c[2][PVID_MAX_P] = {{0}, {0}}; /* the noisy rows of C */
+    scale_noise(self, solve, noise);
+    for (size_t k = 0; k < model->n_c; k++) {
+        for (size_t i = 0; i < 2u; i++) {
+            if (model->c_row[k] == model->noisy[i]) {
+                c[i][model->c_column[k]] = solve->c[k];
+            }
+        }
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        int64_t t[2];
+        for (size_t i = 0; i < 2u; i++) {
+            const int64_t sum = ((int64_t)noise[i] * c[0][a]) + ((int64_t)noise[i + 1u] * c[1][a]);
+            t[i] = pvid_round_shift_q31(sum, PVID_S_BITS);
+        }
+        for (size_t b = a; b < model->n_p; b++) {
+            rest[a][b] = solve->s[a][b] - ((c[0][b] * t[0]) + (c[1][b] * t[1]));
         }
     }
 }

@@ -55,7 +55,7 @@ static uint32_t design_of(uint32_t hash, const pvid_weak_design_q31 *design)
     const size_t half = (design->taps - 1u) / 2u;
     const size_t functions = design->functions;
     const int32_t limits[] = {design->phi_max, design->y_max, design->u_max};
-    const uint8_t single[] = {design->smooth_bits, design->phi_shift, design->u_shift, design->uf_shift,
+    const uint8_t single[] = {design->lag,      design->smooth_bits, design->phi_shift, design->u_shift, design->uf_shift,
                               design->sum_shift};
     uint32_t running = pvid_fnv_word(hash, design->taps);
     running = pvid_fnv_word(running, design->decimation);
@@ -91,16 +91,28 @@ static uint32_t estimator_of(uint32_t hash, const pvid_estimator_config_q31 *con
     running = pvid_fnv_word(running, config->row_weight);
     running = pvid_fnv_word(running, config->step_limit);
     running = words(running, &config->kappa_min, 1);
+    running = pvid_fnv_word(running, config->noise_margin);
     return pvid_fnv_word(running, config->divider);
+}
+
+static uint32_t trust_of(uint32_t hash, const pvid_trust_config_q31 *config)
+{
+    const int32_t limits[] = {config->kappa_min, config->se_max};
+    uint32_t running = words(hash, limits, sizeof limits / sizeof limits[0]);
+    running = pvid_fnv_word(running, config->misfit_max);
+    running = pvid_fnv_word(running, config->groups_min);
+    return pvid_fnv_word(running, config->shut_max);
 }
 
 uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)
 {
     const pvid_model_q31 *model = config->zero_unknown ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;
-    const int32_t scalars[] = {config->phi_offset, config->y_offset, config->drive_min};
+    const int32_t scalars[] = {config->phi_offset, config->y_offset, config->drive_min, config->pivot_noise.m,
+                               config->pivot_noise.e};
     uint32_t hash = words(PVID_FNV_START, scalars, sizeof scalars / sizeof scalars[0]);
     hash = design_of(hash, config->design);
     hash = pvid_fnv_word(hash, config->zero_unknown ? 1u : 0u);
     hash = pvid_fnv_word(hash, config->iterations);
-    return estimator_of(hash, &config->estimator, model->n_theta, model->n_p);
+    hash = estimator_of(hash, &config->estimator, model->n_theta, model->n_p);
+    return trust_of(hash, &config->trust);
 }

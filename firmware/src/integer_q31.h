@@ -31,19 +31,6 @@ static inline int32_t pvid_floor_shift_32_q31(int32_t x, uint32_t s)
     return x >> s;
 }
 
-/* a b by four multiplications of 16 by 16 bits: half of what a core without a long multiplication takes for 64 by 64. */
-int64_t pvid_product_in_halves_q31(int32_t a, int32_t b);
-
-/* a b. */
-static inline int64_t pvid_product_q31(int32_t a, int32_t b)
-{
-#if defined(__ARM_ARCH_6M__)
-    return pvid_product_in_halves_q31(a, b);
-#else
-    return (int64_t)a * b;
-#endif
-}
-
 /* x 2^-s rounded half up; any s >= 0, x < INT64_MAX. */
 static inline int64_t pvid_round_shift_q31(int64_t x, uint32_t s)
 {
@@ -77,13 +64,8 @@ uint32_t pvid_square_root_q31(uint64_t x);
 /* The reciprocal of 1 <= x < 2^31; m is short of the quotient by less than 2. */
 pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x);
 
-/* r 2^e = sqrt(m 2^exponent), r below 2^31 and of 30 bits at least unless m is 0; 0 <= m <= PVID_WIDE. The greatest such r where
- * m < 2^60; beyond that m may lose its last bit. */
-typedef struct {
-    int32_t r;
-    int32_t e;
-} pvid_root_q31;
-
+/* r 2^e = sqrt(m 2^exponent), r below 2^31 and of 30 bits at least unless m is 0; 0 <= m <= PVID_WIDE. The greatest
+ * such r where m < 2^60; beyond that m may lose its last bit. */
 pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent);
 
 /* a b 2^-31 rounded half up, |b| < 2^31. */

@@ -17,7 +17,7 @@ static int64_t lift(int64_t x)
 
 static int64_t product(int32_t a, int32_t b)
 {
-    return pvid_round_shift_q31(pvid_product_q31(a, b), DOWN);
+    return pvid_round_shift_q31((int64_t)a * b, DOWN);
 }
 
 static void zeroed_theta_of(const int32_t p[], int64_t theta[])
@@ -128,6 +128,7 @@ const pvid_model_q31 pvid_kapitza_weak_q31 = {
     .n_p = PVID_KAPITZA_WEAK_P,
     .n_c = 16,
     .positive = 7u,
+    .noisy = {1, 4},
     .c_row = c_row,
     .c_column = c_column,
     .theta = theta_of,
@@ -140,6 +141,7 @@ const pvid_model_q31 pvid_kapitza_weak_zeroed_q31 = {
     .n_p = PVID_KAPITZA_P,
     .n_c = 8,
     .positive = 7u,
+    .noisy = {1, 4},
     .c_row = zeroed_c_row,
     .c_column = zeroed_c_column,
     .theta = zeroed_theta_of,

@@ -25,6 +25,8 @@ static const uint32_t layout[] = {
     PLACE(estimator.p),
     PLACE(estimator.fresh),
     PLACE(estimator.counters),
+    PLACE(trust),
+    PLACE(trust.estimate),
     PVID_MAX_P,
     PVID_MAX_THETA_Q31,
     PVID_MAX_TAPS,

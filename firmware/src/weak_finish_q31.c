@@ -4,7 +4,9 @@
 #include <string.h>
 
 #include "cholesky_q31.h"
+#include "estimator_q31.h"
 #include "integer_q31.h"
+#include "scaled_q31.h"
 #include "weak_window_q31.h"
 
 /* Columns of a row once it is assembled, in place of its terms. */
@@ -14,6 +16,7 @@ enum {
     STAGE_COMBINE,  /* K times: a row of the Gram matrix at p */
     STAGE_ASSEMBLE, /* the columns of a few functions at a time */
     STAGE_FACTOR,   /* K times, long rows in parts: a row of its Cholesky factor */
+    STAGE_TRACE,    /* likewise: a row of its inverse, and what noise is in it */
     STAGE_WHITEN,   /* likewise: a row of L^-1 (Y, N, a, b) */
     STAGE_SQUARE_A, /* the length of a */
     STAGE_DIRECTION_A,
@@ -23,18 +26,22 @@ enum {
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
+    STAGE_NOISE, /* what there is in the rows */
     STAGE_ADD,   /* K times: a row to the estimator */
     STAGE_SOLVE, /* `iterations` solves of several stages each */
+    STAGE_ASSESS, /* several stages */
+    STAGE_JUDGE,  /* is the estimate to be published? */
     STAGE_IDLE
 };
 
 /* Functions whose columns one stage takes that assembles them, looks along a direction, removes it. */
-#define ASSEMBLED_A_STAGE 2u
+#define ASSEMBLED_A_STAGE 3u
 #define ALONG_A_STAGE 6u
 #define REMOVED_A_STAGE 3u
 
 /* Parts of a long row. WHITEN_PARTS divides PVID_WEAK_COLUMNS_Q31. */
 #define FACTOR_PARTS 2u
+#define TRACE_PARTS 3u
 #define WHITEN_PARTS 3u
 
 /* Largest entry of a column once it is whitened: that of a row. */
@@ -42,6 +49,14 @@ enum {
 
 #define COMBINATION_BITS 29 /* six of them times a Gram table of 30 bits fit an int64 */
 #define DIRECTION_BITS 27   /* squares of 64 of them likewise */
+
+/* The noise in the rows is asked for to a few per cent: tables of 14 bits and rows of 13 do, whose products add up in 32
+ * bits. */
+#define GRAM_22 3u          /* the first of the three Gram tables that speak of chi'' and chi alone: 22, 20 + 02, 00 */
+#define GRAM_DOWN 16u       /* from a table's 30 bits to 14 */
+#define INVERSE_BITS 15
+#define INVERSE_LIMIT ((int32_t)1 << 26) /* 64 of them times an entry of L fit an int64 */
+#define ROW_BITS 12
 
 void pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self)
 {
@@ -70,8 +85,9 @@ static factor_of_table reduced(int64_t m, int32_t bits, int32_t length)
 /* The residual of p has the filter chi'''' + d1 w chi'' + d2 w^2 chi: what its noise covariance is made of, beside
  * G44. The factors get one format, that of the table which needs the most of it. */
 void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
-                                const pvid_estimator_q31 *estimator)
+                                const pvid_estimator_q31 *estimator, pvid_scaled_q31 pivot)
 {
+    const pvid_scaled_q31 none = {0, 0};
     const factor_of_table two = reduced(estimator->theta[1], estimator->theta_bits[1], 30);
     const factor_of_table zero = reduced(estimator->theta[4], estimator->theta_bits[4], 30);
     const factor_of_table table[PVID_WEAK_GRAMS] = {
@@ -94,6 +110,12 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_desi
         self->combination[i] = (int32_t)pvid_scale_q31(part[i].m, part[i].bits - common);
     }
     self->gram_bits = (int16_t)common;
+    for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
+        self->trace[i] = none;
+    }
+    /* in units of Y, whatever the sums were divided by */
+    const int64_t square = (int64_t)estimator->row_sd * estimator->row_sd;
+    self->expected = pvid_scaled_plus_q31(pvid_scaled_of_q31(square, -2 * PVID_ROW_SD_BITS), pivot);
     self->whitened = true;
     self->saturated = false;
     self->iteration = 0;
@@ -184,7 +206,7 @@ static void factor_entries(pvid_weak_finish_q31 *self, size_t row, size_t first,
     for (size_t j = first; j < last; j++) {
         int64_t sum = (int64_t)l[j] * PVID_ONE_Q30;
         for (size_t i = 0; i < j; i++) {
-            sum -= pvid_product_q31(l[i], above[i]);
+            sum -= (int64_t)l[i] * above[i];
         }
         l[j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
         above += j + 1u;
@@ -197,7 +219,7 @@ static void factor_diagonal(pvid_weak_finish_q31 *self, size_t row)
     const int32_t *l = &self->factor[row_start(row)];
     int64_t pivot = (int64_t)l[row] * PVID_ONE_Q30;
     for (size_t j = 0; j < row; j++) {
-        pivot -= pvid_product_q31(l[j], l[j]);
+        pivot -= (int64_t)l[j] * l[j];
     }
     self->whitened = self->whitened && pvid_pivot_is_data_q31(pivot, l[row]);
     const uint64_t square = self->whitened ? (uint64_t)pivot : (uint64_t)((int64_t)1 << 60);
@@ -212,6 +234,86 @@ static void factor_part(pvid_weak_finish_q31 *self, row_part part)
     factor_entries(self, part.row, (part.part == 0u) ? 0u : middle, completes ? part.row : middle);
     if (completes) {
         factor_diagonal(self, part.row);
+    }
+}
+
+/* r L = e_row^T, from the last entry back: entries first..last-1 of r. */
+static void invert_entries(pvid_weak_finish_q31 *self, size_t row, size_t first, size_t last)
+{
+    for (size_t turn = 1; turn <= last - first; turn++) {
+        const size_t j = last - turn;
+        int64_t sum = (j == row) ? ((int64_t)PVID_ONE_Q30 << INVERSE_BITS) : 0;
+        size_t at = row_start(j + 1u) + j;
+        for (size_t k = j + 1u; k <= row; k++) {
+            sum -= (int64_t)self->inverted[k] * self->factor[at];
+            at += k + 1u;
+        }
+        self->inverted[j] = pvid_divide_q31(sum, self->inverse[j], INVERSE_LIMIT);
+    }
+}
+
+/* The row of L^-1 with the exponents of R0's rows, as a block of ROW_BITS. */
+static void weigh_row(pvid_weak_finish_q31 *self, size_t row)
+{
+    int32_t largest = PVID_NOTHING_Q31;
+    for (size_t j = 0; j <= row; j++) {
+        const int32_t length = pvid_length_q31(self->inverted[j]) - self->exponent[j];
+        largest = (length > largest) ? length : largest;
+    }
+    self->inverted_exponent = (int16_t)(largest - ROW_BITS);
+    for (size_t j = 0; j <= row; j++) {
+        const int32_t shift = self->inverted_exponent + self->exponent[j];
+        self->inverted[j] = (int32_t)pvid_scale_q31(self->inverted[j], shift);
+    }
+}
+
+/* w^T G w for the first entries of a Gram table. */
+static int64_t form_of(const PVID_TABLE int32_t *gram, const int32_t w[], size_t n)
+{
+    int64_t sum = 0;
+    for (size_t a = 0; a < n; a++) {
+        int32_t below = 0;
+        for (size_t b = 0; b < a; b++) {
+            below += w[b] * pvid_floor_shift_32_q31(gram[b], GRAM_DOWN);
+        }
+        const int32_t own = w[a] * pvid_floor_shift_32_q31(gram[a], GRAM_DOWN);
+        sum += w[a] * ((2 * (int64_t)below) + own);
+        gram += a + 1u;
+    }
+    return sum;
+}
+
+/* Adds a row of L^-1 to the trace of R0^-1 G: the noise that the whitened rows have in the columns whose filters are
+ * chi'' and chi, where they have a variance of 1 in Y. */
+static void trace_row(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, size_t row, size_t which)
+{
+    const size_t table = GRAM_22 + which;
+    const int64_t form = form_of(&design->gram[table * row_start(design->functions)], self->inverted, row + 1u);
+    const int32_t table_bits = (int32_t)design->gram_bits[table] - (int32_t)GRAM_DOWN;
+    const int32_t exponent = (2 * (self->inverted_exponent - INVERSE_BITS)) - table_bits + (self->gram_bits - 30);
+    self->trace[which] = pvid_scaled_plus_q31(self->trace[which], pvid_scaled_of_q31(form, exponent));
+}
+
+/* Three parts: the row of the inverse but for its costliest entries; these, and what it is worth in the first table;
+ * and in the others. */
+static void trace_part(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, row_part part)
+{
+    const bool whole = part.parts == 1u;
+    if (!self->whitened) {
+        return;
+    }
+    const size_t middle = part.row / 8u;
+    if (part.part == 0u) {
+        invert_entries(self, part.row, middle, part.row + 1u);
+    }
+    if (whole || (part.part == 1u)) {
+        invert_entries(self, part.row, 0, middle);
+        weigh_row(self, part.row);
+        trace_row(self, design, part.row, 0);
+    }
+    if (whole || (part.part == 2u)) {
+        trace_row(self, design, part.row, 1);
+        trace_row(self, design, part.row, 2);
     }
 }
 
@@ -238,7 +340,7 @@ static void whiten_part(pvid_weak_finish_q31 *self, row_part part, int32_t sums[
         }
         int64_t sum = (int64_t)held(self, pvid_scale_q31(x[i], shift)) * PVID_ONE_Q30;
         for (size_t j = 0; j < row; j++) {
-            sum -= pvid_product_q31(l[j], sums[j][i]);
+            sum -= (int64_t)l[j] * sums[j][i];
         }
         x[i] = held(self, pvid_divide_q31(sum, self->inverse[row], COLUMN_LIMIT));
     }
@@ -256,7 +358,7 @@ static void find_length(pvid_weak_finish_q31 *self, size_t functions, size_t col
     }
     (void)pvid_to_block_q31((uint32_t)functions, wide, DIRECTION_BITS, self->direction);
     for (size_t k = 0; k < functions; k++) {
-        square += (uint64_t)(pvid_product_q31(self->direction[k], self->direction[k]));
+        square += (uint64_t)((int64_t)self->direction[k] * self->direction[k]);
     }
     const pvid_reciprocal_q31 none = {0, 0};
     self->length = (square > 0u) ? pvid_reciprocal_of_q31(pvid_square_root_q31(square)) : none;
@@ -278,7 +380,7 @@ static void find_components(pvid_weak_finish_q31 *self, size_t first, size_t las
     }
     for (size_t k = first; k < last; k++) {
         for (size_t i = 0; i < PVID_WEAK_COLUMNS_Q31; i++) {
-            self->along[i] += pvid_product_q31(self->direction[k], sums[k][i]);
+            self->along[i] += (int64_t)self->direction[k] * sums[k][i];
         }
     }
 }
@@ -294,6 +396,26 @@ static void remove_components(pvid_weak_finish_q31 *self, size_t first, size_t l
     }
 }
 
+/* Before the rows: what noise there is in the entries of N, in their formats; the last that is known where the window
+ * keeps the whitening of its design. */
+static void tell_noise(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
+                       pvid_estimator_q31 *estimator)
+{
+    if (!self->whitened) {
+        return;
+    }
+    const uint8_t *noisy = estimator->model->noisy;
+    for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
+        const size_t first = noisy[i / 2u];
+        const size_t second = noisy[(i + 1u) / 2u];
+        /* n_bits - y_bits of both, and half of the mixed one: its table holds G20 + G02 */
+        const int32_t bits = (estimator->align[first] - estimator->theta_bits[first]) +
+                             (estimator->align[second] - estimator->theta_bits[second]) - ((i == 1u) ? 1 : 0);
+        const pvid_scaled_q31 mean = pvid_scaled_over_q31(self->trace[i], pvid_scaled_of_q31(design->functions, 0));
+        estimator->noise[i] = pvid_scaled_shifted_q31(mean, bits);
+    }
+}
+
 /* A row to the estimator; its reason is told if it was refused. */
 static void add_row(const pvid_weak_finish_q31 *self, const int32_t column[PVID_WEAK_TERMS_Q31],
                     pvid_estimator_q31 *estimator, pvid_reason *reason)
@@ -305,6 +427,17 @@ static void add_row(const pvid_weak_finish_q31 *self, const int32_t column[PVID_
     }
 }
 
+static void begin_solves(pvid_weak_finish_q31 *self, pvid_estimator_q31 *estimator, const pvid_trust_q31 *trust)
+{
+    const int32_t *refuge = pvid_trust_refuge_q31(trust);
+    pvid_estimator_begin_q31(estimator, &self->solve, true);
+    self->energy = self->solve.energy;
+    if (refuge != NULL) {
+        self->solve.has_refuge = true;
+        memcpy(self->solve.refuge, refuge, sizeof self->solve.refuge);
+    }
+}
+
 /* A stage of a solve; true once the last one of the window is complete. */
 static bool solve_on(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estimator_q31 *estimator)
 {
@@ -312,12 +445,24 @@ static bool solve_on(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estima
         return false;
     }
     self->iteration++;
+    self->reason = self->solve.reason;
+    self->size = self->solve.size;
     /* not due: the divider says that this window only accumulates */
-    if ((self->iteration >= iterations) || (self->solve.reason == PVID_ACCUMULATED)) {
+    if ((self->iteration >= iterations) || (self->reason == PVID_ACCUMULATED)) {
         return true;
     }
     pvid_estimator_begin_q31(estimator, &self->solve, false);
     return false;
+}
+
+static void judge(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, pvid_estimator_q31 *estimator,
+                  pvid_trust_q31 *trust)
+{
+    const pvid_scaled_q31 freedom = pvid_scaled_of_q31((int64_t)design->functions - 2, 0);
+    const pvid_scaled_q31 expected = pvid_scaled_times_q31(freedom, self->expected);
+    const pvid_scaled_q31 surplus = pvid_scaled_over_q31(pvid_scaled_of_q31(self->energy, 0), expected);
+    self->reason = pvid_trust_judge_q31(trust, estimator, self->reason, self->size, self->solve.informed,
+                                        pvid_scaled_fixed_q31(surplus, PVID_SURPLUS_BITS), &self->candidate);
 }
 
 static size_t at_most(size_t first, size_t few, size_t all)
@@ -348,6 +493,10 @@ static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
         factor_part(self, part_of_triangle(functions, FACTOR_PARTS, index));
         *all = parts_of_triangle(functions, FACTOR_PARTS);
         break;
+    case STAGE_TRACE:
+        trace_part(self, design, part_of_triangle(functions, TRACE_PARTS, index));
+        *all = parts_of_triangle(functions, TRACE_PARTS);
+        break;
     case STAGE_WHITEN:
         whiten_part(self, part_of_triangle(functions, WHITEN_PARTS, index), sums);
         *all = parts_of_triangle(functions, WHITEN_PARTS);
@@ -375,21 +524,43 @@ static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
     return next;
 }
 
+/* What a stage has to find when it starts. */
+static void begin_stage(pvid_weak_finish_q31 *self, pvid_estimator_q31 *estimator, const pvid_trust_q31 *trust)
+{
+    if (self->stage == STAGE_SOLVE) {
+        begin_solves(self, estimator, trust);
+    } else if (self->stage == STAGE_ASSESS) {
+        pvid_estimator_begin_assessment_q31(estimator, &self->solve, &self->candidate);
+    }
+}
+
 void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, uint8_t iterations,
-                               int32_t sums[][PVID_WEAK_TERMS_Q31], pvid_estimator_q31 *estimator, pvid_reason *reason)
+                               int32_t sums[][PVID_WEAK_TERMS_Q31], pvid_estimator_q31 *estimator,
+                               pvid_trust_q31 *trust, pvid_reason *reason)
 {
     size_t next = (size_t)self->index + 1u;
-    size_t all = design->functions;
+    size_t all = 1;
     switch (self->stage) {
+    case STAGE_NOISE:
+        tell_noise(self, design, estimator);
+        break;
     case STAGE_ADD:
         add_row(self, sums[self->index], estimator, reason);
+        all = design->functions;
         break;
     case STAGE_SOLVE:
         if (!solve_on(self, iterations, estimator)) {
             return;
         }
-        *reason = self->solve.reason;
-        next = all;
+        break;
+    case STAGE_ASSESS:
+        if (!pvid_estimator_assess_on_q31(estimator, &self->solve, &self->candidate)) {
+            return;
+        }
+        break;
+    case STAGE_JUDGE:
+        judge(self, design, estimator, trust);
+        *reason = self->reason;
         break;
     case STAGE_IDLE:
         return;
@@ -401,15 +572,14 @@ void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_desig
     if (next >= all) {
         self->index = 0;
         self->stage++;
-        if (self->stage == STAGE_SOLVE) {
-            pvid_estimator_begin_q31(estimator, &self->solve, true);
-        }
+        begin_stage(self, estimator, trust);
     }
 }
 
 uint32_t pvid_weak_finish_stages_q31(uint8_t functions, uint8_t iterations, const pvid_estimator_q31 *estimator)
 {
-    const size_t triangles = parts_of_triangle(functions, FACTOR_PARTS) + parts_of_triangle(functions, WHITEN_PARTS);
+    const size_t triangles = parts_of_triangle(functions, FACTOR_PARTS) + parts_of_triangle(functions, TRACE_PARTS) +
+                             parts_of_triangle(functions, WHITEN_PARTS);
     const uint32_t along = (functions + (ALONG_A_STAGE - 1u)) / ALONG_A_STAGE;
     const uint32_t removed = (functions + (REMOVED_A_STAGE - 1u)) / REMOVED_A_STAGE;
     const uint32_t assembled = (functions + (ASSEMBLED_A_STAGE - 1u)) / ASSEMBLED_A_STAGE;
@@ -417,5 +587,5 @@ uint32_t pvid_weak_finish_stages_q31(uint8_t functions, uint8_t iterations, cons
     const uint32_t rows = once + (2u * (2u + along + removed));
     const uint32_t first = pvid_estimator_stages_q31(estimator, true);
     const uint32_t more = pvid_estimator_stages_q31(estimator, false);
-    return rows + first + ((iterations - 1u) * more);
+    return rows + first + ((iterations - 1u) * more) + pvid_estimator_assessment_stages_q31(estimator) + 2u;
 }

@@ -5,6 +5,7 @@
 
 #include "count.h"
 #include "integer_q31.h"
+#include "scaled_q31.h"
 #include "weak_finish_q31.h"
 #include "weak_front_q31.h"
 #include "weak_schedule.h"
@@ -12,6 +13,7 @@
 
 #define U_LIMIT ((int32_t)1 << 18)
 #define COUNTS_LIMIT ((int32_t)1 << 24)
+#define EXPONENT_LIMIT 200
 
 static bool is_count(int32_t x, int32_t limit)
 {
@@ -33,7 +35,7 @@ static bool design_is_valid(const pvid_weak_design_q31 *design)
         !pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
         (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
         (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
-        (design->chi == NULL) || (design->gram == NULL) || (design->multiplier == NULL)) {
+        (design->chi == NULL) || (design->gram == NULL) || (design->multiplier == NULL) || (design->lag < 1u)) {
         return false;
     }
     bool valid = is_count(design->phi_max, COUNTS_LIMIT) && is_count(design->y_max, COUNTS_LIMIT) &&
@@ -46,6 +48,11 @@ static bool design_is_valid(const pvid_weak_design_q31 *design)
     return valid;
 }
 
+static bool pivot_noise_is_valid(pvid_scaled_q31 noise)
+{
+    return (noise.m >= 0) && (noise.m <= PVID_ONE_Q30) && (noise.e >= -EXPONENT_LIMIT) && (noise.e <= EXPONENT_LIMIT);
+}
+
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
@@ -53,13 +60,20 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     if ((config->drive_min < 0) || (config->drive_min > U_LIMIT)) {
         return PVID_BAD_DRIVE_MIN;
     }
+    if (!pivot_noise_is_valid(config->pivot_noise)) {
+        return PVID_BAD_PIVOT_NOISE;
+    }
     if (!design_is_valid(design)) {
         return PVID_BAD_DESIGN;
     }
     memset(self, 0, sizeof *self);
     pvid_estimator_config_q31 estimator = config->estimator;
     estimator.model = config->zero_unknown ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;
-    const pvid_status status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    pvid_status status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_trust_init_q31(&self->trust, &config->trust, &self->estimator);
     if (status != PVID_OK) {
         return status;
     }
@@ -70,6 +84,7 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     self->phi_offset = config->phi_offset;
     self->y_offset = config->y_offset;
     self->zero_unknown = config->zero_unknown;
+    self->pivot_noise = config->pivot_noise;
     self->zero_bits = (int8_t)(config->zero_unknown ? config->estimator.p_bits[PVID_KAPITZA_C] : 0);
     pvid_weak_front_init_q31(&self->front, design);
     const int64_t drive_min = (int64_t)config->drive_min * (design->window - 1);
@@ -89,6 +104,32 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     return PVID_OK;
 }
 
+static void restart_bend(pvid_weak_bend_q31 *self)
+{
+    self->wait = 1;
+    self->known = 0;
+    self->due = false;
+}
+
+static void next_bend(pvid_weak_bend_q31 *self, uint8_t lag, int32_t f)
+{
+    self->due = false;
+    self->wait--;
+    if (self->wait > 0u) {
+        return;
+    }
+    self->wait = lag;
+    if (self->known < 2u) {
+        self->known++;
+    } else {
+        const int32_t bend = (f - self->before[0]) - (self->before[0] - self->before[1]);
+        self->square = (int64_t)bend * bend;
+        self->due = true;
+    }
+    self->before[1] = self->before[0];
+    self->before[0] = f;
+}
+
 static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
 {
     window->index = index;
@@ -106,6 +147,7 @@ void pvid_weak_gap_q31(pvid_weak_q31 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);
     pvid_weak_front_reset_q31(&self->front);
+    restart_bend(&self->bend);
     restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
     restart_window(&self->window[1], (uint16_t)(hop - 1u));
     memset(self->sums[self->window[1].buffer], 0, sizeof self->sums[0]);
@@ -122,6 +164,7 @@ static void place_zero(pvid_weak_q31 *self, const pvid_weak_window_q31 *window)
     const uint64_t sum = pvid_magnitude_q31(pvid_scale_q31(window->f_sum, -self->zero_bits));
     const int64_t mean = (int64_t)(sum / (self->design->window - 1u));
     pvid_estimator_place_q31(&self->estimator, PVID_KAPITZA_C, (window->f_sum < 0) ? -mean : mean);
+    pvid_trust_place_q31(&self->trust, &self->estimator);
 }
 
 /* A window that has come round hands its sums over and goes on in the buffer that is free. Its last sample, which has
@@ -138,7 +181,8 @@ static bool turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
     window->buffer = self->finish.buffer;
     self->finish.buffer = full;
     place_zero(self, window);
-    pvid_weak_finish_begin_q31(&self->finish, self->design, &self->estimator);
+    const pvid_scaled_q31 pivot = pvid_scaled_times_q31(self->pivot_noise, pvid_weak_window_bend_q31(window));
+    pvid_weak_finish_begin_q31(&self->finish, self->design, &self->estimator, pivot);
     return true;
 }
 
@@ -146,6 +190,7 @@ static bool turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 static bool next_sample(pvid_weak_q31 *self)
 {
     bool kept = true;
+    next_bend(&self->bend, self->design->lag, self->f);
     for (size_t i = 0; i < 2u; i++) {
         pvid_weak_window_q31 *window = &self->window[i];
         window->index++;
@@ -171,7 +216,7 @@ static inline void add_slice(pvid_weak_q31 *self)
     const size_t end = first + self->slice;
     const size_t last = (end < design->functions) ? end : design->functions;
     if (first == 0u) {
-        pvid_weak_window_terms_q31(window, design, self->f, self->u, self->term);
+        pvid_weak_window_terms_q31(window, design, self->f, self->u, &self->bend, self->term);
     }
     pvid_weak_window_add_q31(window, design, self->term, first, last, self->sums[window->buffer]);
     self->function = (uint8_t)last;
@@ -192,7 +237,7 @@ static void work_on(pvid_weak_q31 *self, pvid_reason *reason)
 {
     for (uint8_t i = 0; (i < self->together) && pvid_weak_finish_is_busy_q31(&self->finish); i++) {
         pvid_weak_finish_step_q31(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
-                                  &self->estimator, reason);
+                                  &self->estimator, &self->trust, reason);
     }
 }
 
@@ -236,4 +281,9 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
         work_on(self, &reason);
     }
     return reason;
+}
+
+const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self)
+{
+    return &self->trust.estimate;
 }

@@ -1,6 +1,7 @@
 /* The C side of pvid.native_q31: replays a run through the shipped fixed-point core and records every tick. */
 #include "replay_q31.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -18,6 +19,7 @@ const uint32_t pvid_native_layout_q31[] = {
     (uint32_t)sizeof(pvid_weak_config_q31),
     FIELD(pvid_weak_config_q31, zero_unknown),
     FIELD(pvid_weak_config_q31, estimator),
+    FIELD(pvid_weak_config_q31, trust),
     (uint32_t)sizeof(pvid_fir_bank_q31),
     FIELD(pvid_fir_bank_q31, phi_shift),
     FIELD(pvid_fir_bank_q31, weights),
@@ -31,6 +33,10 @@ const uint32_t pvid_native_layout_q31[] = {
     FIELD(pvid_estimator_q31, counters),
     (uint32_t)sizeof(pvid_weak_q31),
     FIELD(pvid_weak_q31, estimator),
+    FIELD(pvid_weak_q31, trust),
+    FIELD(pvid_weak_q31, trust.published),
+    FIELD(pvid_weak_q31, trust.long_mean),
+    FIELD(pvid_weak_q31, trust.estimate),
     (uint32_t)sizeof(pvid_differentiator_q31),
     (uint32_t)sizeof(pvid_strong_q31),
     FIELD(pvid_strong_q31, estimator),
@@ -61,7 +67,16 @@ static void record_tick(const pvid_record_q31 *record, uint32_t tick, const pvid
         *record->running_hash = pvid_fnv_estimator_q31(*record->running_hash, estimator, reason);
         record->hash[tick] = *record->running_hash;
     }
-    if ((record->estimate != NULL) && ((tick % record->estimate_every) == 0u)) {
+}
+
+static bool is_estimate_due(const pvid_record_q31 *record, uint32_t tick)
+{
+    return (record->estimate != NULL) && ((tick % record->estimate_every) == 0u);
+}
+
+static void record_assessment(const pvid_record_q31 *record, uint32_t tick, const pvid_estimator_q31 *estimator)
+{
+    if (is_estimate_due(record, tick)) {
         pvid_estimator_assess_q31(estimator, &record->estimate[tick / record->estimate_every]);
     }
 }
@@ -71,7 +86,15 @@ void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi
 {
     for (uint32_t tick = 0; tick < ticks; tick++) {
         const pvid_reason reason = pvid_weak_step_q31(self, phi[tick], y[tick]);
+        const pvid_estimate_q31 *estimate = pvid_weak_estimate_q31(self);
         record_tick(record, tick, &self->estimator, reason);
+        if (record->published != NULL) {
+            const size_t n_p = self->estimator.model->n_p;
+            memcpy(&record->published[tick * n_p], estimate->p, n_p * sizeof estimate->p[0]);
+        }
+        if (is_estimate_due(record, tick)) {
+            record->estimate[tick / record->estimate_every] = *estimate;
+        }
     }
 }
 
@@ -81,6 +104,7 @@ void pvid_replay_strong_q31(pvid_strong_q31 *self, uint32_t ticks, const int32_t
     for (uint32_t tick = 0; tick < ticks; tick++) {
         const pvid_reason reason = pvid_strong_step_q31(self, phi[tick], y[tick]);
         record_tick(record, tick, &self->estimator, reason);
+        record_assessment(record, tick, &self->estimator);
     }
 }
 
@@ -92,6 +116,7 @@ void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_
         const pvid_reason added = pvid_estimator_add_q31(self, &n[tick * n_theta], y[tick]);
         const pvid_reason reason = (added == PVID_ACCUMULATED) ? pvid_estimator_update_q31(self) : added;
         record_tick(record, tick, self, reason);
+        record_assessment(record, tick, self);
     }
 }
 

@@ -21,10 +21,6 @@
 #include "pvid/model_q31.h"
 #include "pvid/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Largest |N_i|, |Y| and |Y - N^T theta| of a row that is taken in. */
 #define PVID_ROW_LIMIT_Q31 ((int32_t)1 << 28)
 
@@ -49,8 +45,25 @@ typedef struct {
     uint32_t row_weight;          /* Q16, 1..2^16 */
     uint32_t step_limit;          /* Q16, 1..0.9: largest |dp/p| (|dp|/start_sd where p may be zero) */
     int32_t kappa_min;            /* Q30, 0..0.999 */
+    uint32_t noise_margin;        /* Q16: no step while the data say less than so many times what noise of row_sd
+                                     would; 0: not asked. For models that know what noise makes */
     uint16_t divider;             /* groups of rows a solve, 1.. */
 } pvid_estimator_config_q31;
+
+/* m 2^e: 2^29 <= |m| <= 2^30, or 0. */
+typedef struct {
+    int32_t m;
+    int32_t e;
+} pvid_scaled_q31;
+
+/* r 2^e, a square root: r of 30 or 31 bits, or 0. */
+typedef struct {
+    int32_t r;
+    int32_t e;
+} pvid_root_q31;
+
+/* What is known of the noise inside the rows, beside that of Y: PVID_NOISE_TRACES numbers of model.h. */
+#define PVID_NOISE_TRACES_Q31 3
 
 /* The sums M, b, rr and weight. */
 typedef struct {
@@ -86,6 +99,9 @@ typedef struct {
     uint32_t correlation;
     uint32_t step_limit;
     int32_t kappa_min;
+    uint32_t noise_margin;
+    pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by whoever makes the rows */
+    int64_t energy; /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
     pvid_counters counters;
@@ -105,15 +121,27 @@ typedef struct {
     int32_t u[PVID_MAX_P][PVID_MAX_P];       /* above the diagonal */
     pvid_reciprocal_q31 inverse[PVID_MAX_P]; /* 1 / U_jj in Q30 is m 2^(k - 31) */
     int32_t first_pivot;                     /* pivot of index 0 over its diagonal entry, Q30 */
+    int64_t pivot[PVID_MAX_P];               /* Q60 */
 } pvid_cholesky_q31;
 
-/* A solve in progress, kept by the caller; begin and advance write to it, `reason` is to be read. */
+/* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be read when it is
+ * complete, refuge may be set after begin. */
 typedef struct {
     pvid_reason reason;
     uint8_t stage;
     uint8_t index; /* of the row within the stage */
     uint8_t start; /* of the column of C in work among its non-zeros */
     bool ends_group;
+    bool judging;    /* an assessment */
+    bool informed;   /* the data say more than noise does */
+    bool has_refuge;
+    int32_t refuge[PVID_MAX_P]; /* where p goes if it may not step */
+    int64_t size;    /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
+    int64_t energy;  /* sum of e^2 of the group's rows at the p they met */
+    pvid_scaled_q31 variance; /* of a row's noise, divided by 4^exponent as the sums are */
+    pvid_root_q31 wide;       /* root of the variance that standard errors are made of */
+    int32_t column[PVID_MAX_P][PVID_MAX_P]; /* of an inverted factor, and */
+    pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
     int32_t gain;
     int32_t m[PVID_MAX_MOMENTS_Q31];     /* M_ij = m_ij 2^(h_i + h_j) */
     int16_t h[PVID_MAX_THETA_Q31];
@@ -127,12 +155,11 @@ typedef struct {
     int32_t q[PVID_MAX_P][PVID_MAX_P];   /* s_ab 2^-(g_a + g_b), which is factored */
     pvid_cholesky_q31 factor;
     int64_t dp[PVID_MAX_P];
-    int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved, rr -= fall */
+    int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved */
     int64_t theta[PVID_MAX_THETA_Q31];
     int32_t theta_step[PVID_MAX_THETA_Q31]; /* theta_step_j 2^(step_exponent - h_j) in units of Y per N */
     int32_t step_exponent;
     int64_t moved[PVID_MAX_THETA_Q31];
-    int64_t fall;
 } pvid_estimator_solve_q31;
 
 /* What is published. */
@@ -141,6 +168,7 @@ typedef struct {
     int32_t se[PVID_MAX_P]; /* standard errors in the same formats; start_sd where data say nothing */
     int32_t correlation[PVID_MAX_P][PVID_MAX_P]; /* of the errors, Q30: covariance_ab = se_a se_b correlation_ab */
     int32_t kappa;          /* Q30, 0..1: see estimator.h */
+    int32_t least_pivot;    /* likewise */
     int32_t residual_sd;    /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1 */
     uint32_t weight;        /* rows remembered */
 } pvid_estimate_q31;
@@ -173,8 +201,11 @@ uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_gro
 /* Standard errors, kappa and residual of the present estimate, as pvid_estimator_assess_f32. Changes nothing. */
 void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31 *estimate);
 
-#ifdef __cplusplus
-}
-#endif
+/* The same in stages: begin, then assess_on until it returns true. */
+void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                         pvid_estimate_q31 *estimate);
+bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                  pvid_estimate_q31 *estimate);
+uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self);
 
 #endif

@@ -24,11 +24,8 @@
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/kapitza_weak_q31.h"
+#include "pvid/trust_q31.h"
 #include "pvid/weak_job.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* What is integrated twice from a window's start: U F, F and U. */
 #define PVID_WEAK_INTEGRALS_Q31 3
@@ -46,6 +43,7 @@ typedef struct {
     uint16_t decimation; /* D, 1..PVID_MAX_DECIMATION */
     uint16_t window;     /* W [decimated samples], odd, 9..PVID_MAX_WEAK_WINDOW */
     uint8_t functions;   /* K, 4..PVID_MAX_FUNCTIONS */
+    uint8_t lag;         /* decimated samples between the three that F'' is taken from for the alarm, 1..255 */
     uint8_t smooth_bits; /* format of smooth */
     uint8_t phi_shift;   /* F = (centre 2^smooth_bits + sum smooth q) 2^-phi_shift */
     uint8_t u_shift;     /* U = (sum second q) 2^-u_shift */
@@ -73,7 +71,10 @@ typedef struct {
     int32_t drive_min;  /* rms of U over a window below which it is dropped, 0..2^18; 0: none is */
     bool zero_unknown;  /* true: p = (w, d1, d2, c); false: p = (w, d1, d2), c = 0 */
     uint8_t iterations; /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; one where gain < 1 */
+    pvid_scaled_q31 pivot_noise; /* variance that the pivot sensor's noise gives a row [Y's integer^2] for each mean
+                                    square of a second difference of F, m 2^e; 0: an exact pivot. For the alarm only */
     pvid_estimator_config_q31 estimator; /* model is filled in by init */
+    pvid_trust_config_q31 trust; /* which estimates are published */
 } pvid_weak_config_q31;
 
 /* The front end: a ring of counts, and the FIR job of the last complete block in slices. */
@@ -95,7 +96,18 @@ typedef struct {
     int64_t f_sum;
     int64_t u_sum;
     int64_t u_square_sum;
+    int64_t bend_square_sum; /* of the second differences of F that fell into the window */
+    uint16_t bends;          /* how many did */
 } pvid_weak_window_q31;
+
+/* Second differences F(t) - 2 F(t - lag) + F(t - 2 lag), one every `lag` decimated samples. */
+typedef struct {
+    uint8_t wait;      /* samples until the next */
+    uint8_t known;     /* samples in `before`, 0..2 */
+    bool due;          /* the present sample ends one */
+    int32_t before[2]; /* F one lag and two lags ago */
+    int64_t square;    /* of the one that is due */
+} pvid_weak_bend_q31;
 
 #define PVID_WEAK_FACTOR_Q31 ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 
@@ -112,10 +124,18 @@ typedef struct {
     int16_t exponent[PVID_MAX_FUNCTIONS];           /* of the rows of the Gram matrix */
     pvid_reciprocal_q31 inverse[PVID_MAX_FUNCTIONS]; /* of the factor's diagonal */
     int32_t factor[PVID_WEAK_FACTOR_Q31];           /* R0, then its Cholesky factor, Q30 */
+    int32_t inverted[PVID_MAX_FUNCTIONS];           /* a row of the factor's inverse, Q15, then a block of it */
+    int16_t inverted_exponent;
+    pvid_scaled_q31 trace[PVID_NOISE_TRACES_Q31];   /* noise in the columns, a row of unit noise variance */
     pvid_reciprocal_q31 length;                     /* of the column that is being projected out */
     int32_t direction[PVID_MAX_FUNCTIONS];          /* of it, Q30; length 1 or 0 */
     int64_t along[PVID_WEAK_COLUMNS_Q31];           /* the columns' components along it, Q30 */
+    pvid_reason reason;       /* of the last solve, then of the window */
+    int64_t size;             /* of the last step, relative, Q22 */
+    int64_t energy;           /* of the window's rows */
+    pvid_scaled_q31 expected; /* variance of a row's noise */
     pvid_estimator_solve_q31 solve;
+    pvid_estimate_q31 candidate; /* for publication */
 } pvid_weak_finish_q31;
 
 /* State; only the functions below write to it. */
@@ -134,12 +154,15 @@ typedef struct {
     bool warm;             /* a window has been completed since the restart */
     int32_t f;             /* the present decimated sample */
     int32_t u;
+    pvid_scaled_q31 pivot_noise;
     pvid_weak_front_q31 front;
+    pvid_weak_bend_q31 bend;
     pvid_weak_window_q31 window[2];
     pvid_weak_finish_q31 finish;
     int32_t term[PVID_WEAK_TERMS_Q31]; /* of the window in work */
     int32_t sums[3][PVID_MAX_FUNCTIONS][PVID_WEAK_TERMS_Q31];
     pvid_estimator_q31 estimator;
+    pvid_trust_q31 trust;
 } pvid_weak_q31;
 
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range (PVID_BAD_DESIGN,
@@ -152,11 +175,11 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
  * PVID_REJECTED_SATURATED. */
 pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y);
 
+/* What is published: the last estimate that could be trusted, the start until there is one (then
+ * self->trust.published is false). */
+const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
+
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

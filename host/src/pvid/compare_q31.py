@@ -47,6 +47,9 @@ def first_difference(record: RecordQ31, twin: TwinRecordQ31, lane: int = 0) -> D
         (record.exponent[:, None], twin.exponent[:, lane, None]),
         (record.reason[:, None], twin.reason[:, lane, None]),
     ]
+    if twin.published is not None and len(record.published):
+        names.append(lambda i: f"published {P_NAMES[i]}")
+        pairs.append((record.published, twin.published[:, :, lane]))
     found = []
     for order, ((core, other), name) in enumerate(zip(pairs, names, strict=True)):
         ticks, places = np.nonzero(core != other)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
-from pvid.native import Law, Native, Reason, StrongConfig, TrustConfig, WeakConfig, WeakIdentifier
+from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
 from pvid.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, config_of, weak_design_of
@@ -364,30 +364,24 @@ def _strong_in_q31(run: Run, rig: RigFile, config: StrongConfigQ31, every: int, 
 
 
 def _weak_in_q31(run: Run, rig: RigFile, config: WeakConfigQ31, every: int, native: Native) -> Identification:
-    """The fixed-point core has neither gate nor alarm yet: what it holds at the end is judged here, by the gate's
-    limits of kappa and standard errors alone."""
     phi, y = counts_of(rig, run)
     identifier = WeakIdentifierQ31(native, config)
     record = identifier.run(phi, y, sums=False, estimate_every=every)
-    last = identifier.assess()
+    last = identifier.estimate
     n_p = record.p.shape[1]
     p = p_of(config, last["p"][:n_p])
     if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
         p[3] += float(np.mean(run.phi - phi * rig.sensor.phi_lsb))
-    covariance = covariance_of(config, last)
-    trust = TrustConfig()
-    solved = np.flatnonzero(record.reason == Reason.UPDATED)
-    kappa = float(last["kappa"]) / 2**30
-    known = kappa >= trust.kappa_min and (np.sqrt(np.diag(covariance))[:3] <= trust.se_max * p[:3]).all()
+    trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
     counters = identifier.counters
     return _identification(
         rig,
         p=p,
-        covariance=covariance,
-        kappa=kappa,
-        trusted_s=float(run.t[solved[-1]]) if known and len(solved) else None,
-        misfit=None,
-        alarm=False,
+        covariance=covariance_of(config, last),
+        kappa=float(last["kappa"]) / 2**30,
+        trusted_s=float(run.t[trusted[-1]]) if len(trusted) else None,
+        misfit=identifier.misfit,
+        alarm=len(trusted) > 0 and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],

@@ -34,7 +34,7 @@ class EstimatorConfigQ31:
     """Settings of the fixed-point estimator, as in estimator_q31.h.
 
     p in the formats p_bits, Y and N in y_bits and n_bits; row_sd in 2^-8 of Y's unit; correlation, row_weight and
-    step_limit in Q16, gain and kappa_min in Q30.
+    step_limit and noise_margin in Q16, gain and kappa_min in Q30.
     """
 
     start: tuple[int, ...]
@@ -51,7 +51,19 @@ class EstimatorConfigQ31:
     row_weight: int = 2**16
     step_limit: int = 19661
     kappa_min: int = 10737
+    noise_margin: int = 0
     divider: int = 1
+
+
+@dataclass(frozen=True)
+class TrustConfigQ31:
+    """Which estimates are published, as in trust_q31.h: kappa_min in Q30, se_max in Q24, misfit_max in Q16."""
+
+    kappa_min: int = 32212
+    se_max: int = 838861
+    misfit_max: int = 98304
+    groups_min: int = 3
+    shut_max: int = 16
 
 
 @dataclass(frozen=True)
@@ -65,6 +77,8 @@ class WeakConfigQ31:
     drive_min: int = 0
     zero_unknown: bool = True
     iterations: int = 3
+    pivot_noise: tuple[int, int] = (0, 0)
+    trust: TrustConfigQ31 = TrustConfigQ31()
 
     @property
     def hop(self) -> int:
@@ -103,7 +117,26 @@ class EstimatorConfigStruct(ctypes.Structure):
         ("row_weight", ctypes.c_uint32),
         ("step_limit", ctypes.c_uint32),
         ("kappa_min", ctypes.c_int32),
+        ("noise_margin", ctypes.c_uint32),
         ("divider", ctypes.c_uint16),
+    ]
+
+
+class ScaledStruct(ctypes.Structure):
+    """pvid_scaled_q31."""
+
+    _fields_ = [("m", ctypes.c_int32), ("e", ctypes.c_int32)]
+
+
+class TrustConfigStruct(ctypes.Structure):
+    """pvid_trust_config_q31."""
+
+    _fields_ = [
+        ("kappa_min", ctypes.c_int32),
+        ("se_max", ctypes.c_int32),
+        ("misfit_max", ctypes.c_uint32),
+        ("groups_min", ctypes.c_uint16),
+        ("shut_max", ctypes.c_uint16),
     ]
 
 
@@ -115,6 +148,7 @@ class WeakDesignStruct(ctypes.Structure):
         ("decimation", ctypes.c_uint16),
         ("window", ctypes.c_uint16),
         ("functions", ctypes.c_uint8),
+        ("lag", ctypes.c_uint8),
         ("smooth_bits", ctypes.c_uint8),
         ("phi_shift", ctypes.c_uint8),
         ("u_shift", ctypes.c_uint8),
@@ -146,7 +180,9 @@ class WeakConfigStruct(ctypes.Structure):
         ("drive_min", ctypes.c_int32),
         ("zero_unknown", ctypes.c_bool),
         ("iterations", ctypes.c_uint8),
+        ("pivot_noise", ScaledStruct),
         ("estimator", EstimatorConfigStruct),
+        ("trust", TrustConfigStruct),
     ]
 
 
@@ -198,7 +234,8 @@ class RecordStruct(ctypes.Structure):
     """pvid_record_q31 of host/native/replay_q31.h."""
 
     _fields_ = [
-        (name, ctypes.c_void_p) for name in ("p", "sums", "exponent", "reason", "hash", "running_hash", "estimate")
+        (name, ctypes.c_void_p)
+        for name in ("p", "sums", "exponent", "reason", "hash", "running_hash", "published", "estimate")
     ] + [("estimate_every", ctypes.c_uint32)]
 
 
@@ -220,6 +257,7 @@ ESTIMATE_DTYPE = np.dtype(
         ("se", np.int32, (MAX_P,)),
         ("correlation", np.int32, (MAX_P, MAX_P)),
         ("kappa", np.int32),
+        ("least_pivot", np.int32),
         ("residual_sd", np.int32),
         ("weight", np.uint32),
     ]
@@ -251,13 +289,15 @@ def physical_q31(native: Native, estimate: npt.NDArray[np.void], scale: ScaleQ31
 @dataclass
 class RecordQ31:
     """What a replay left, one entry a tick: p int32 [ticks, n_p], sums int64 [ticks, n_sums] and their exponent,
-    reason, hash; estimate: structured [ticks / estimate_every]."""
+    reason, hash; published: p as published, like p, of the weak form (else empty); estimate: structured
+    [ticks / estimate_every], the published one in the weak form."""
 
     p: Int32
     sums: Int64
     exponent: npt.NDArray[np.uint8]
     reason: npt.NDArray[np.uint8]
     hash: npt.NDArray[np.uint32]
+    published: Int32
     estimate: npt.NDArray[np.void]
 
 
@@ -268,6 +308,10 @@ class _Layout(NamedTuple):
     counters_at: int  # in the estimator
     weak_size: int
     weak_estimator_at: int
+    weak_trust_at: int
+    weak_is_published_at: int
+    weak_misfit_at: int
+    weak_published_at: int
     differentiator_size: int
     strong_size: int
     strong_estimator_at: int
@@ -289,6 +333,7 @@ def _checked_layout(native: Native) -> _Layout:
         ctypes.sizeof(WeakConfigStruct),
         WeakConfigStruct.zero_unknown.offset,
         WeakConfigStruct.estimator.offset,
+        WeakConfigStruct.trust.offset,
         ctypes.sizeof(FirBankStruct),
         FirBankStruct.phi_shift.offset,
         FirBankStruct.weights.offset,
@@ -313,6 +358,7 @@ def estimator_struct(config: EstimatorConfigQ31) -> EstimatorConfigStruct:
     for name in ("y_bits", "row_sd", "forgetting_groups", "gain", "correlation", "row_weight", "step_limit"):
         setattr(struct, name, getattr(config, name))
     struct.kappa_min = config.kappa_min
+    struct.noise_margin = config.noise_margin
     struct.divider = config.divider
     return struct
 
@@ -323,6 +369,7 @@ class _IntegerStepper(Stepper[RecordQ31]):
     SAMPLE = np.int32
     ASSESS = "pvid_estimator_assess_q31"
     ESTIMATE = ESTIMATE_DTYPE
+    publishes = False
     n_p: int
     n_theta: int
 
@@ -335,6 +382,7 @@ class _IntegerStepper(Stepper[RecordQ31]):
             exponent=np.empty(ticks, np.uint8),
             reason=np.empty(ticks, np.uint8),
             hash=np.empty(ticks if hashes else 0, np.uint32),
+            published=np.empty((ticks if self.publishes else 0, self.n_p), np.int32),
             estimate=np.empty(estimates, ESTIMATE_DTYPE),
         )
         struct = RecordStruct(
@@ -344,6 +392,7 @@ class _IntegerStepper(Stepper[RecordQ31]):
             reason=record.reason.ctypes.data,
             hash=record.hash.ctypes.data if hashes else None,
             running_hash=self._hash.ctypes.data,
+            published=record.published.ctypes.data if self.publishes else None,
             estimate=record.estimate.ctypes.data if estimates else None,
             estimate_every=estimate_every,
         )
@@ -366,6 +415,7 @@ class WeakIdentifierQ31(_IntegerStepper):
     """pvid_weak_q31: phi, y in counts."""
 
     REPLAY = "pvid_replay_weak_q31"
+    publishes = True
 
     def __init__(self, native: Native, config: WeakConfigQ31) -> None:
         self.n_p, self.n_theta = (4, 8) if config.zero_unknown else (3, 5)
@@ -381,10 +431,29 @@ class WeakIdentifierQ31(_IntegerStepper):
             drive_min=config.drive_min,
             zero_unknown=config.zero_unknown,
             iterations=config.iterations,
+            pivot_noise=ScaledStruct(*config.pivot_noise),
             estimator=estimator_struct(config.estimator),
         )
+        _fill(struct.trust, config.trust, {})
+        self._layout = layout
         size, at = layout.weak_size, layout.weak_estimator_at
         super().__init__(native, "pvid_weak_init_q31", struct, size, at, layout.counters_at)
+
+    @property
+    def estimate(self) -> npt.NDArray[np.void]:
+        """The published estimate, the start until there is one; dtype ESTIMATE_DTYPE, shape ()."""
+        place = self._layout.weak_published_at
+        return np.array(np.frombuffer(self._state, ESTIMATE_DTYPE, 1, place)[0])
+
+    @property
+    def is_published(self) -> bool:
+        """Whether an estimate has been trusted yet."""
+        return bool(self._state[self._layout.weak_is_published_at] != b"\x00")
+
+    @property
+    def misfit(self) -> float:
+        """Mean of the residuals' variance over what is expected of it."""
+        return ctypes.c_int64.from_buffer(self._state, self._layout.weak_misfit_at).value / 2.0**24
 
     def gap(self) -> None:
         """pvid_weak_gap_q31: samples are missing before the next call of `run`."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.native import EstimatorConfig, Law
-from pvid.native_q31 import EstimatorConfigQ31, ScaleQ31, StrongConfigQ31, WeakConfigQ31
+from pvid.native_q31 import EstimatorConfigQ31, ScaleQ31, StrongConfigQ31, TrustConfigQ31, WeakConfigQ31
 from pvid.rigfile import RigFile, Sensor
 from pvid.setup import bank_of, nominal_start, strong_config, weak_config, weak_design_of
 from pvid.strong_design_q31 import StrongDesignQ31, strong_design_q31
@@ -180,14 +180,30 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
         gain=0 if e.law is Law.PSEUDOVELOCITY else 2**30,
         correlation=round(tables.overlap * 2**16),
         row_weight=round((functions - 2) / functions * 2**16),
+        noise_margin=round(e.noise_margin * 2**16),
     )
+    lag_s = tables.lag * tables.dt
     return WeakConfigQ31(
         design=tables,
         estimator=estimator,
         zero_unknown=float_config.zero_unknown,
         iterations=float_config.iterations,
         drive_min=round(float_config.drive_min * tables.dt**2 * 2.0**tables.u_bits),
+        pivot_noise=_scaled(float_config.pivot_noise / lag_s**4 * 4.0**estimator.y_bits),
+        trust=TrustConfigQ31(
+            kappa_min=round(float_config.trust.kappa_min * 2**30),
+            se_max=round(float_config.trust.se_max * 2**24),
+            misfit_max=round(float_config.trust.misfit_max * 2**16),
+            groups_min=float_config.trust.groups_min,
+            shut_max=float_config.trust.shut_max,
+        ),
     )
+
+
+def _scaled(x: float) -> tuple[int, int]:
+    """x >= 0 as pvid_scaled_q31: m 2^e, m of 30 bits."""
+    part, exponent = math.frexp(x)
+    return (round(part * 2.0**30), exponent - 30) if x > 0 else (0, 0)
 
 
 def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfigQ31:

@@ -73,7 +73,7 @@ class WeakTablesQ31:
 
     Attributes
     ----------
-    taps, decimation, window, functions : as in the float design
+    taps, decimation, window, functions, lag : as in the float design
     phi_max, y_max : full scale of the counts, about their offsets
     smooth, second : int32 [(taps - 1) / 2]
     smooth_bits : format of smooth
@@ -97,6 +97,7 @@ class WeakTablesQ31:
     decimation: int
     window: int
     functions: int
+    lag: int
     phi_max: int
     y_max: int
     u_max: int
@@ -268,6 +269,7 @@ def weak_tables_q31(
         decimation=design.decimation,
         window=window,
         functions=functions,
+        lag=design.lag,
         phi_max=phi_max,
         y_max=y_max,
         smooth=smooth,

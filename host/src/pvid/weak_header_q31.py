@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 import numpy.typing as npt
@@ -35,9 +36,10 @@ _SETTINGS = (
     "row_weight",
     "step_limit",
     "kappa_min",
+    "noise_margin",
     "divider",
 )
-_UNSIGNED = ("forgetting_groups", "correlation", "row_weight", "step_limit")
+_UNSIGNED = ("forgetting_groups", "correlation", "row_weight", "step_limit", "noise_margin")
 
 
 def estimator_lines(settings: EstimatorConfigQ31) -> list[str]:
@@ -87,7 +89,7 @@ def to_c_header_q31(config: WeakConfigQ31, l1: float, name: str, made_by: str) -
     """
     d = config.design
     k = d.functions
-    scalars = ("taps", "decimation", "window", "functions", "smooth_bits", "phi_shift", "u_shift", "uf_shift")
+    scalars = ("taps", "decimation", "window", "functions", "lag", "smooth_bits", "phi_shift", "u_shift", "uf_shift")
     lists = ("integral_shift", "high_shift", "product_shift")
     limits = ("phi_max", "y_max", "u_max")
     guard = f"{name.upper()}_H"
@@ -135,7 +137,11 @@ def to_c_header_q31(config: WeakConfigQ31, l1: float, name: str, made_by: str) -
             f"    .drive_min = {config.drive_min},",
             f"    .zero_unknown = {str(config.zero_unknown).lower()},",
             f"    .iterations = {config.iterations},",
+            f"    .pivot_noise = {{{config.pivot_noise[0]}, {config.pivot_noise[1]}}},",
             *estimator_lines(config.estimator),
+            "    .trust = {",
+            *(f"        .{field.name} = {getattr(config.trust, field.name)}," for field in fields(config.trust)),
+            "    },",
             "};",
             "",
             *scale_lines(config, l1, name),

@@ -29,6 +29,7 @@ class Factor:
     inverse: Int
     k: Int
     first_pivot: Int
+    least_pivot: Int
     ok: Mask
 
 
@@ -44,7 +45,7 @@ def factor(s: Int) -> Factor:
     inverse = np.zeros((n, lanes), np.int64)
     k = np.zeros((n, lanes), np.int64)
     ok = np.ones(lanes, np.bool_)
-    first = np.zeros(lanes, np.int64)
+    least = np.full(lanes, ONE, np.int64)
     for j in range(n - 1, -1, -1):
         diagonal = s[j, j]
         pivot = diagonal << 30
@@ -52,15 +53,15 @@ def factor(s: Int) -> Factor:
             pivot = pivot - u[j, i] * u[j, i]
         ok = ok & (diagonal >= 2**28) & (pivot >= (diagonal << (30 - PIVOT_SHIFT)))
         pivot = np.where(ok, pivot, np.int64(1) << 60)
-        if j == 0:
-            first = np.where(ok, pivot // np.maximum(diagonal, 1), 0)
+        relative = pivot // np.maximum(diagonal, 1)
+        least = np.minimum(least, relative)
         inverse[j], k[j] = reciprocal(square_root(pivot))
         for i in range(j):
             total = s[i, j] << 30
             for m in range(j + 1, n):
                 total = total - u[i, m] * u[j, m]
             u[i, j] = divide(total, inverse[j], k[j], ONE)
-    return Factor(u, inverse, k, first, ok)
+    return Factor(u, inverse, k, np.where(ok, relative, 0), np.where(ok, least, 0), ok)
 
 
 def lower_solve(f: Factor, rhs: Int) -> Int:
@@ -88,7 +89,10 @@ def upper_solve(f: Factor, rhs: Int) -> Int:
 
 def to_block(x: Int, bits: int) -> tuple[Int, Int]:
     """x [n, lanes] with one exponent a lane: (x 2^-h within `bits` bits, h)."""
-    h = bit_length(np.abs(x)).max(axis=0) - bits
+    largest = np.zeros(x.shape[1], np.int64)
+    for value in x:
+        largest = np.maximum(largest, bit_length(np.abs(value)))
+    h = largest - bits
     return scale(x, h), h
 
 

@@ -23,6 +23,7 @@ from pvid.twin.integer_q31 import (
     times_q31,
 )
 from pvid.twin.kapitza_weak_q31 import ModelQ31
+from pvid.twin.scaled_q31 import Scaled, pick, scaled
 
 Mask = npt.NDArray[np.bool_]
 Reasons = npt.NDArray[np.uint8]
@@ -49,6 +50,7 @@ _COUNTERS = (
     "held_uncertain",
     "held_out_of_range",
     "misfits",
+    "rejected_outlier",
 )
 
 
@@ -67,31 +69,29 @@ def decay(groups: int, block: int) -> int:
 
 
 class EstimatorQ31:
-    """pvid_estimator_q31 in every lane; all lanes share model, formats, divider and whether the law is a rate.
+    """pvid_estimator_q31 in every lane; all lanes share model, formats, gain, divider and forgetting.
 
     p int64 [n_p, lanes]; sums int64 [n_sums, lanes]: M, b, rr times 4^-exponent, weight in Q16.
     """
 
-    _ROWS_A_STAGE = 4
+    _ROWS_A_STAGE = 8
     _ENTRIES_A_STAGE = 18
+    _PIVOTS_A_STAGE = 2
     _END_PARTS = 2
 
     def __init__(self, configs: Sequence[EstimatorConfigQ31], model: ModelQ31) -> None:
         first = configs[0]
         for c in configs:
-            if (c.p_bits, c.n_bits, c.y_bits, c.divider, c.gain < ONE) != (
+            if (c.p_bits, c.n_bits, c.y_bits, c.gain, c.divider, c.forgetting_groups) != (
                 first.p_bits,
                 first.n_bits,
                 first.y_bits,
+                first.gain,
                 first.divider,
-                first.gain < ONE,
+                first.forgetting_groups,
             ):
-                raise PvidError("lanes of one twin must share formats, divider and whether the law is a rate")
+                raise PvidError("lanes of one twin must share formats, gain, divider and forgetting")
         self.model = model
-        self._upper = np.triu_indices(model.n_theta)
-        self._diagonal = np.flatnonzero(self._upper[0] == self._upper[1])
-        self._c_row, self._c_column = np.array(model.c_row), np.array(model.c_column)
-        self._columns = [np.flatnonzero(self._c_column == a) for a in range(model.n_p)]
         lanes = len(configs)
 
         def stacked(name: str) -> Int:
@@ -109,10 +109,14 @@ class EstimatorQ31:
         self.row_weight = lane("row_weight")
         self.step_limit = lane("step_limit")
         self.kappa_min = lane("kappa_min")
-        self.gain = lane("gain")
-        self.is_rate = first.gain < ONE  # a law that does not iterate
+        self.noise_margin = lane("noise_margin")
+        self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
+        self.energy = np.zeros(lanes, np.int64)
+        self.group_energy = self.energy
+        self.size = self.energy
+        self.gain = first.gain
         self.divider = first.divider
-        self.block, self.retention = integers([self._forgetting(c.forgetting_groups) for c in configs]).T
+        self.block, self.retention = self._forgetting(first.forgetting_groups)
         theta_bits, c_bits = model.formats(first.p_bits)
         # e = Y - sum N_i theta_i 2^-align_i;  C in units of e per N_i per p_a is c_k 2^c_exponent_k
         self.align = [t + n - first.y_bits for t, n in zip(theta_bits, first.n_bits, strict=True)]
@@ -123,7 +127,7 @@ class EstimatorQ31:
         self.theta_bits = theta_bits
         self.theta = model.theta(self.p)
         self.phase = 0
-        self.age = np.zeros(lanes, np.int64)
+        self.age = 0
         self.exponent = np.zeros(lanes, np.int64)
         self.sums = np.zeros((model.n_sums, lanes), np.int64)
         self.fresh = np.zeros((model.n_theta, lanes), np.int64)
@@ -155,6 +159,11 @@ class EstimatorQ31:
         """Number of lanes."""
         return int(self.p.shape[1])
 
+    @property
+    def is_rate(self) -> bool:
+        """Whether the law is a rate (g < 1) that does not iterate."""
+        return self.gain < ONE
+
     def mantissas(self, values: Int) -> tuple[Int, Int]:
         """values = m 2^h with m of 30 bits."""
         h = bit_length(np.abs(values)) - 30
@@ -169,12 +178,17 @@ class EstimatorQ31:
     def add(self, n: Int, y: Int) -> Reasons:
         """One row of a group: N [n_theta, lanes], Y [lanes]."""
         m, h = self.mantissas(self.theta)
-        terms = clamp(scale(clamp(n, ROW_LIMIT) * m, integers(self.align)[:, None] - h), TERM_MAX)
-        e = y - terms.sum(axis=0)
-        fits = (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
-        e = round_shift(np.where(fits, e, 0), self.exponent)
+        fits = np.abs(y) <= ROW_LIMIT
+        e = y
+        for i in range(self.model.n_theta):
+            fits = fits & (np.abs(n[i]) <= ROW_LIMIT)
+            e = e - clamp(scale(clamp(n[i], ROW_LIMIT) * m[i], self.align[i] - h[i]), TERM_MAX)
+        fits = fits & (np.abs(e) <= ROW_LIMIT)
+        e = np.where(fits, e, 0)
+        self.energy = clamp(self.energy + e * e, WIDE)
+        e = round_shift(e, self.exponent)
         row = round_shift(np.where(fits, n, 0), self.exponent)
-        upper, column = self._upper
+        upper, column = np.triu_indices(self.model.n_theta)
         weight = np.where(fits, self.row_weight, 0)
         self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
         if self.is_rate:
@@ -185,11 +199,17 @@ class EstimatorQ31:
         self.counters["rejected_saturated"] += ~fits
         return reason
 
-    def solve(self, ends_group: bool) -> Iterator[Reasons | None]:
-        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one."""
+    def solve(self, ends_group: bool, refuge: tuple[Mask, Int] | None = None) -> Iterator[Reasons | None]:
+        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one.
+
+        refuge: in which lanes p goes elsewhere if it may not step, and where [n_p, lanes].
+        """
         reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
         self.was_due = True
+        self.size = np.zeros(self.lanes, np.int64)
         if ends_group:
+            self.group_energy = self.energy
+            self.energy = np.zeros(self.lanes, np.int64)
             self.phase += 1
             self.was_due = self.phase >= self.divider
         elif self.is_rate:
@@ -200,7 +220,7 @@ class EstimatorQ31:
                 self.phase = 0
             for _ in range(self._stages_before_commit()):
                 yield None
-            reason = self._commit()
+            reason = self._commit(self.gain if ends_group else ONE, refuge)
             yield None if ends_group else reason
         if ends_group:
             self._forget(slice(0, self.model.n_sums // 2))
@@ -213,11 +233,22 @@ class EstimatorQ31:
         """Stages of a solve that is due."""
         return self._stages_before_commit() + 1 + (self._END_PARTS if ends_group else 0)
 
+    @property
+    def assessment_stages(self) -> int:
+        """Stages of an assessment: those that look, residual, two factors, kappa, columns and errors."""
+        return self._looking_stages() + 2 + 2 * self._factor_parts() + 2 * self.model.n_p
+
     def _stages_before_commit(self) -> int:
-        """Rows of M, C, force, rows of S, prior, pivots, solve, step, rows of M dtheta, fall."""
-        n_theta, n_p = self.model.n_theta, self.model.n_p
-        follow = -(-n_theta // self._ROWS_A_STAGE)
-        return self._matrix_stages() + 2 + n_p + 1 + n_p + 2 + follow + 1
+        """Those that look, factor, force, solve, step, rows of M dtheta."""
+        follow = -(-self.model.n_theta // self._ROWS_A_STAGE)
+        return self._looking_stages() + self._factor_parts() + follow + 3
+
+    def _factor_parts(self) -> int:
+        return 1 + -(-self.model.n_p // self._PIVOTS_A_STAGE)
+
+    def _looking_stages(self) -> int:
+        """Rows of M, C, rows of S, and whether there is more in it than noise."""
+        return self._matrix_stages() + 1 + self.model.n_p + self._factor_parts()
 
     def _matrix_stages(self) -> int:
         """Stages that scale M, a few rows each."""
@@ -234,17 +265,15 @@ class EstimatorQ31:
 
     def _forget(self, places: slice) -> None:
         """Lets some of the sums fade if it is time to."""
-        due = (self.age + 1 >= self.block) & (self.retention < 2**31 - 1)
-        if due.any():
-            self.sums[places] = np.where(due, times_q31(self.sums[places], self.retention), self.sums[places])
+        if self.age + 1 >= self.block and self.retention < 2**31 - 1:
+            self.sums[places] = times_q31(self.sums[places], integers(self.retention))
 
     def _end_group(self) -> None:
-        self.age = np.where(self.age + 1 >= self.block, 0, self.age + 1)
-        largest = np.maximum(self.sums[self._diagonal].max(axis=0), self.sums[-2])
+        self.age = 0 if self.age + 1 >= self.block else self.age + 1
+        largest = np.max(self._matrix(self.sums).diagonal(axis1=0, axis2=1), axis=1)
+        largest = np.maximum(largest, self.sums[-2])
         high = largest > SUM_LIMIT
         low = (largest < SUM_LOW) & (self.exponent > 0)
-        if not (high | low).any():
-            return
         change = np.where(high, 2, np.where(low, -2, 0))
         self.sums[:-1] = scale(self.sums[:-1], change)
         self.fresh = scale(self.fresh, change)
@@ -253,7 +282,7 @@ class EstimatorQ31:
     def _matrix(self, sums: Int) -> Int:
         n = self.model.n_theta
         m = np.empty((n, n, sums.shape[1]), np.int64)
-        upper, column = self._upper
+        upper, column = np.triu_indices(n)
         m[upper, column] = sums[: self.model.moments]
         m[column, upper] = sums[: self.model.moments]
         return m
@@ -262,43 +291,78 @@ class EstimatorQ31:
 
     def _equilibrated(self) -> tuple[Int, Int]:
         """(m, h): M_ij = m_ij 2^(h_i + h_j), m within 30 bits."""
-        h = cholesky.half_exponent(self.sums[self._diagonal])
-        row, column = self._upper
-        m = clamp(scale(self.sums[: self.model.moments], h[row] + h[column]), ONE)
-        return self._matrix(m), h
+        matrix = self._matrix(self.sums)
+        n = self.model.n_theta
+        h = np.stack([cholesky.half_exponent(matrix[i, i]) for i in range(n)])
+        return clamp(scale(matrix, h[:, None] + h[None]), ONE), h
 
     def _jacobian(self, h: Int) -> tuple[Int, Int]:
         """(c, f): C_ka = c_k 2^(f_a - h_row), c within 29 bits."""
         model = self.model
         c = model.jacobian(self.p)
-        exponent = integers(self.c_exponent)[:, None] + h[self._c_row]
-        lengths = length(c) + exponent
-        f = np.stack([np.maximum(lengths[own].max(axis=0), _NOTHING) for own in self._columns]) - 29
-        return scale(c, f[self._c_column] - exponent), f
+        f = np.full((model.n_p, self.lanes), _NOTHING, np.int64)
+        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
+            f[column] = np.maximum(f[column], length(c[k]) + self.c_exponent[k] + h[row])
+        f = f - 29
+        scaled = [
+            scale(c[k], f[column] - self.c_exponent[k] - h[row])
+            for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True))
+        ]
+        return np.stack(scaled), f
 
     def _project(self, c: Int, m: Int) -> Int:
         """The upper triangle of C^T M C, in units of 2^(f_a + f_b + 32) [n_p, n_p, lanes]."""
         model = self.model
         s = np.zeros((model.n_p, model.n_p, self.lanes), np.int64)
-        rows = self._c_row
-        for a, own in enumerate(self._columns):
-            t = round_shift((m[rows[own]] * c[own][:, None]).sum(axis=0), 32)
-            for b in range(a, model.n_p):
-                there = self._columns[b]
-                s[a, b] = (c[there] * t[rows[there]]).sum(axis=0)
+        for a in range(model.n_p):
+            own = [k for k, column in enumerate(model.c_column) if column == a]
+            t = np.zeros((model.n_theta, self.lanes), np.int64)
+            for k in own:
+                t = t + m[model.c_row[k]] * c[k]
+            t = round_shift(t, 32)
+            for k in range(own[0], len(model.c_row)):
+                b = model.c_column[k]
+                s[a, b] = s[a, b] + c[k] * t[model.c_row[k]]
         return s
 
     def _equilibrated_system(self, s: Int) -> tuple[Int, Int]:
         """(S in Q30, g): s_ab = S_ab 2^(g_a + g_b)."""
         n_p = self.model.n_p
-        g = cholesky.half_exponent(np.stack([s[a, a] for a in range(n_p)]))
+        g = np.stack([cholesky.half_exponent(s[a, a]) for a in range(n_p)])
         return clamp(scale(s, g[:, None] + g[None]), ONE), g
 
-    def _commit(self) -> Reasons:
+    def _informed(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
+        """Whether S less what noise of this variance puts there, so many times over, is still positive."""
+        model = self.model
+        if model.noisy is None:
+            return np.ones(self.lanes, np.bool_)
+        first, second = model.noisy
+        much = scaled(self.noise_margin, -16).times(scaled(self.sums[-1], -16).times(variance))
+        noise = [
+            clamp(much.times(own).fixed(-(h[i] + h[j])), 2**31 - 1)
+            for own, i, j in zip(self.noise, (first, first, second), (first, second, second), strict=True)
+        ]
+        rows = np.zeros((2, model.n_p, self.lanes), np.int64)
+        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
+            if row in model.noisy:
+                rows[model.noisy.index(row), column] = c[k]
+        rest = s.copy()
+        for a in range(model.n_p):
+            t = [round_shift(noise[i] * rows[0, a] + noise[i + 1] * rows[1, a], 32) for i in range(2)]
+            for b in range(a, model.n_p):
+                rest[a, b] = rest[a, b] - (rows[0, b] * t[0] + rows[1, b] * t[1])
+        return np.asarray((self.noise_margin == 0) | cholesky.factor(self._equilibrated_system(rest)[0]).ok)
+
+    def _expected_variance(self) -> Scaled:
+        """row_sd^2, divided by 4^exponent as the sums are."""
+        return scaled(self.row_sd * self.row_sd, -2 * (8 + self.exponent))
+
+    def _commit(self, gain: int, refuge: tuple[Mask, Int] | None) -> Reasons:
         model = self.model
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
+        informed = self._informed(s, c, h, self._expected_variance())
         prior = self._in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
         for a in range(model.n_p):
             s[a, a] = s[a, a] + prior[a]
@@ -307,24 +371,32 @@ class EstimatorQ31:
         own = round_shift(factor.first_pivot * q[0, 0], 31) >= scale(prior[0], 2 * g[0])
         excited = (factor.first_pivot >= self.kappa_min) & (own | (self.kappa_min == 0))
         reason = np.full(self.lanes, Reason.UPDATED, np.uint8)
-        reason[~excited] = Reason.HELD_NOT_EXCITED
+        reason[~(excited & informed)] = Reason.HELD_NOT_EXCITED
         reason[~factor.ok] = Reason.HELD_PIVOT
 
         b = self.sums[model.moments : model.moments + model.n_theta]
-        force, force_h = cholesky.to_block(scale(self._driving(b), h), 30)
+        force, force_h = cholesky.to_block(scale(self._driving(b, gain), h), 30)
         self.fresh[:] = 0
-        rhs = np.stack([(c[own] * force[self._c_row[own]]).sum(axis=0) for own in self._columns])
+        rhs = np.zeros((model.n_p, self.lanes), np.int64)
+        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
+            rhs[column] = rhs[column] + c[k] * force[row]
         x, x_h = cholesky.solve(factor, scale(rhs, g))
         dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
-        p = self._limited(dp, reason == Reason.UPDATED)
-        return self._follow(p, m, h, b, reason)
+        steps = reason == Reason.UPDATED
+        p = self._limited(dp, steps)
+        fleeing = np.zeros(self.lanes, np.bool_)
+        if refuge is not None:
+            fleeing = ~steps & refuge[0]
+            p = np.where(fleeing, refuge[1], p)
+        return self._follow(p, m, h, b, reason, fleeing)
 
-    def _driving(self, b: Int) -> Int:
+    def _driving(self, b: Int, gain: int) -> Int:
         """g b + (1 - g) sum N e since the last solve."""
-        if not self.is_rate:
+        if gain == ONE:
             return b
-        both = times_q31(b, 2 * self.gain) + times_q31(self.fresh, 2 * np.minimum(ONE - self.gain, ONE - 1))
-        return np.where(self.gain == 0, self.fresh, both)
+        if gain == 0:
+            return self.fresh
+        return times_q31(b, integers(2 * gain)) + times_q31(self.fresh, integers(2 * (ONE - gain)))
 
     def _limited(self, dp: Int, moving: Mask) -> Int:
         """Where the step leads: shortened to the step limit, within the bounds; p where nothing moves."""
@@ -332,6 +404,7 @@ class EstimatorQ31:
         for a in range(self.model.n_p):
             reference = self.p[a] if self.model.positive[a] else self.start_sd[a]
             size = np.maximum(size, (np.abs(dp[a]) << SIZE_BITS) // reference)
+        self.size = np.where(moving, size, 0)
         limit = self.step_limit << (SIZE_BITS - 16)
         limited = size > limit
         factor = (limit << 31) // np.maximum(size, limit + 1)
@@ -342,7 +415,7 @@ class EstimatorQ31:
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         return np.where(moving, x, self.p)
 
-    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons) -> Reasons:
+    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons, fleeing: Mask) -> Reasons:
         """Moves p, theta, b and rr together: b -= M dtheta, rr -= dtheta^T (b_old + b_new)."""
         model = self.model
         theta = model.theta(p)
@@ -351,53 +424,57 @@ class EstimatorQ31:
         v_h = np.max(length(step) - align + h, axis=0) - 29
         v = scale(step, v_h + align - h)
         b = clamp(b, HELD_LIMIT)
-        moved = clamp(scale((m * v[:, None]).sum(axis=0), -(h + v_h)), HELD_LIMIT)
+        moved = np.zeros_like(b)
+        for j in range(model.n_theta):
+            moved = moved + m[j] * v[j]
+        moved = clamp(scale(moved, -(h + v_h)), HELD_LIMIT)
         w, w_h = cholesky.to_block(scale(2 * b - moved, h), 30)
-        fall = (v * w).sum(axis=0)
+        fall = np.zeros(self.lanes, np.int64)
+        for j in range(model.n_theta):
+            fall = fall + v[j] * w[j]
         residual = self.sums[-2] - clamp(scale(fall, -(v_h + w_h)), HELD_LIMIT)
-        overflow = (reason == Reason.UPDATED) & ((residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0))
-        reason[overflow] = Reason.HELD_PIVOT
-        moving = reason == Reason.UPDATED
+        overflow = (residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0)
+        reason[overflow & (reason == Reason.UPDATED)] = Reason.HELD_PIVOT
+        moving = (reason == Reason.UPDATED) | (fleeing & ~overflow)
         kept = self.sums[model.moments : -2]
         self.sums[model.moments : -2] = np.where(moving, b - moved, kept)
         self.sums[-2] = np.where(moving, np.maximum(residual, 0), self.sums[-2])
         self.theta = np.where(moving, theta, self.theta)
         self.p = np.where(moving, p, self.p)
-        self.counters["updates"] += moving
+        self.counters["updates"] += reason == Reason.UPDATED
         self.counters["held_not_excited"] += reason == Reason.HELD_NOT_EXCITED
         self.counters["held_pivot"] += reason == Reason.HELD_PIVOT
         return reason
 
     # ---- what is published ----
 
-    def _row_variance(self) -> tuple[Int, Int]:
-        """(m, h): s^2 of a row is m 2^h, divided by 4^exponent as the sums are."""
-        residual, weight = self.sums[-2], self.sums[-1]
-        freedom = weight - (self.model.n_p << 16)
-        up = 62 - bit_length(residual)
-        divisor, divisor_h = self.mantissas(np.maximum(freedom, 1 << 16))
-        from_rows = self.mantissas(scale(residual, -up) // divisor)
-        from_start = self.mantissas(self.row_sd * self.row_sd)
-        few = freedom < (1 << 16)
-        m = np.where(few, from_start[0], from_rows[0])
-        h = np.where(few, from_start[1] - 2 * (8 + self.exponent), from_rows[1] - up - (divisor_h - 16))
-        return m, h
+    def _row_variance(self) -> Scaled:
+        """s^2 of a row, divided by 4^exponent as the sums are."""
+        freedom = self.sums[-1] - (self.model.n_p << 16)
+        from_rows = scaled(self.sums[-2], 0).over(scaled(np.maximum(freedom, 1 << 16), -16))
+        return pick(freedom < (1 << 16), self._expected_variance(), from_rows)
 
     def assess(self) -> npt.NDArray[np.void]:
         """pvid_estimator_assess_q31 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        return self.judged()[0]
+
+    def judged(self) -> tuple[npt.NDArray[np.void], Mask]:
+        """The assessment, and where the data say more than noise of the variance found would [lanes]."""
         n_p = self.model.n_p
         out = np.zeros(self.lanes, ESTIMATE_DTYPE)
         out["p"][:, :n_p] = self.p.T
         out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
-        variance, variance_h = self._row_variance()
-        residual, residual_e = root_of(variance, variance_h)
+        variance = self._row_variance()
+        residual, residual_e = root_of(*variance)
         out["residual_sd"] = clamp(scale(residual, -(residual_e + self.exponent + 8)), 2**31 - 1)
-        wide, wide_h = self.mantissas(variance * self.correlation)
-        root, root_e = root_of(wide, wide_h + variance_h - 16)
+        root, root_e = root_of(*variance.times(scaled(self.correlation, -16)))
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        out["kappa"] = cholesky.factor(self._equilibrated_system(s)[0]).first_pivot
+        informed = self._informed(s, c, h, variance)
+        alone = cholesky.factor(self._equilibrated_system(s)[0])
+        out["kappa"] = alone.first_pivot
+        out["least_pivot"] = alone.least_pivot
         prior, prior_exponent = self._square_ratio(root, root_e)
         for a in range(n_p):
             s[a, a] = s[a, a] + self._in_units_of_s(prior[a], prior_exponent[a], f[a])
@@ -418,4 +495,4 @@ class EstimatorQ31:
                 part = np.sign(x) * np.minimum(((np.abs(x) // r) << 30) // r_b, ONE)
                 out["correlation"][:, a, b] = np.where(factor.ok, part, 0)
                 out["correlation"][:, b, a] = out["correlation"][:, a, b]
-        return out
+        return out, informed

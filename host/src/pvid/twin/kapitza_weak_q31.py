@@ -16,7 +16,7 @@ _DOWN = 16
 
 @dataclass(frozen=True)
 class ModelQ31:
-    """pvid_model_q31: theta and the non-zeros of C as int64 within +-2^60, and their formats."""
+    """pvid_model_q31: theta and the non-zeros of C as int64 below 2^47, and their formats."""
 
     n_theta: int
     n_p: int
@@ -26,6 +26,7 @@ class ModelQ31:
     theta: Callable[[Int], Int]
     jacobian: Callable[[Int], Int]
     formats: Callable[[Sequence[int]], tuple[list[int], list[int]]]
+    noisy: tuple[int, int] | None = None  # entries of N that hold the sensor's noise
 
     @property
     def moments(self) -> int:
@@ -99,6 +100,7 @@ WEAK = ModelQ31(
     theta=lambda p: np.stack(_theta(p)),
     jacobian=lambda p: np.stack(_jacobian(p)),
     formats=_formats,
+    noisy=(1, 4),
 )
 
 ZEROED = ModelQ31(
@@ -110,4 +112,5 @@ ZEROED = ModelQ31(
     theta=lambda p: np.stack(_zeroed_theta(p)),
     jacobian=lambda p: np.stack(_zeroed_jacobian(p)),
     formats=_zeroed_formats,
+    noisy=(1, 4),
 )

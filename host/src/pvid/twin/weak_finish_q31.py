@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pvid.native import Reason
 from pvid.twin import cholesky_q31 as cholesky
-from pvid.twin.estimator_q31 import EstimatorQ31
+from pvid.twin.estimator_q31 import EstimatorQ31, length
 from pvid.twin.integer_q31 import (
     Int,
     clamp,
@@ -16,17 +18,23 @@ from pvid.twin.integer_q31 import (
     scale,
     square_root,
 )
+from pvid.twin.scaled_q31 import Scaled, pick, scaled
+from pvid.twin.trust_q31 import SURPLUS_BITS, TrustQ31
 from pvid.twin.weak_schedule import Mask, Work
+from pvid.twin.weak_window_q31 import Window
 from pvid.weak_design_q31 import COLUMN_TERMS, WeakTablesQ31
 
 COLUMNS = 12
 COLUMN_LIMIT = 2**28
 DIRECTION_BITS = 27
 _Y, _A, _B = 8, 9, 10
-_ASSEMBLED_A_STAGE = 2
+_ASSEMBLED_A_STAGE = 3
 _ALONG_A_STAGE = 6
 _REMOVED_A_STAGE = 3
-_FACTOR_PARTS, _WHITEN_PARTS = 2, 3
+_FACTOR_PARTS, _TRACE_PARTS, _WHITEN_PARTS = 2, 3, 3
+_GRAM_22, _GRAM_DOWN, _ROW_BITS = 3, 16, 12
+INVERSE_BITS = 15
+INVERSE_LIMIT = 2**26
 
 
 def assemble(sums: Int, design: WeakTablesQ31) -> Int:
@@ -102,17 +110,71 @@ class Held:
         return clamp(x, COLUMN_LIMIT)
 
 
-def whiten(x: Int, design: WeakTablesQ31, estimator: EstimatorQ31, held: Held) -> Int:
-    """L^-1 of the columns x [12, K, lanes]."""
+@dataclass(frozen=True)
+class Whitening:
+    """What `factor` gives, and the format of the Gram matrix, [lanes]."""
+
+    low: Int
+    inverse: Int
+    k: Int
+    exponents: Int
+    whitened: Mask
+    bits: Int
+
+
+def whitening(design: WeakTablesQ31, estimator: EstimatorQ31) -> Whitening:
+    """The factor of R0 at the estimator's p."""
     packed, bits = gram(design, estimator)
-    low, inverse, k, exponents, whitened = factor(packed, design.functions)
+    return Whitening(*factor(packed, design.functions), bits)
+
+
+def whiten(x: Int, by: Whitening, held: Held) -> Int:
+    """L^-1 of the columns x [12, K, lanes]."""
     out = np.zeros_like(x)
     for row in range(x.shape[1]):
-        total = held(scale(x[:, row], exponents[row] - (bits - 30) // 2), whitened) << 30
+        total = held(scale(x[:, row], by.exponents[row] - (by.bits - 30) // 2), by.whitened) << 30
         for j in range(row):
-            total = total - low[row, j] * out[:, j]
-        out[:, row] = held(cholesky.divide(total, inverse[row], k[row], COLUMN_LIMIT), whitened)
-    return np.where(whitened, out, held(x, ~whitened))
+            total = total - by.low[row, j] * out[:, j]
+        out[:, row] = held(cholesky.divide(total, by.inverse[row], by.k[row], COLUMN_LIMIT), by.whitened)
+    return np.where(by.whitened, out, held(x, ~by.whitened))
+
+
+def traces(design: WeakTablesQ31, by: Whitening) -> list[Scaled]:
+    """Sums over the rows of L^-1 of their products with the Gram tables 22, 20 + 02, 00."""
+    functions, lanes = by.inverse.shape
+    rows_of, columns_of = np.tril_indices(functions)
+    tables = np.zeros((3, functions, functions), np.int64)
+    tables[:, rows_of, columns_of] = design.gram[_GRAM_22:].astype(np.int64) >> _GRAM_DOWN
+    total = [scaled(np.zeros(lanes, np.int64), 0)] * 3
+    for row in range(functions):
+        inverted = np.zeros((row + 1, lanes), np.int64)
+        for j in range(row, -1, -1):
+            rest = np.full(lanes, cholesky.ONE << INVERSE_BITS if j == row else 0, np.int64)
+            for k in range(j + 1, row + 1):
+                rest = rest - inverted[k] * by.low[k, j]
+            inverted[j] = cholesky.divide(rest, by.inverse[j], by.k[j], INVERSE_LIMIT)
+        exponents = by.exponents[: row + 1]
+        h = np.max(length(inverted) - exponents, axis=0) - _ROW_BITS
+        w = scale(inverted, h + exponents)
+        for i, table in enumerate(tables[:, : row + 1, : row + 1]):
+            own = np.diagonal(table)[:, None]
+            below = np.sum((table - np.diag(np.diagonal(table)))[:, :, None] * w[None], axis=1)
+            form = np.sum(w * (2 * below + w * own), axis=0)
+            table_bits = design.gram_bits[_GRAM_22 + i] - _GRAM_DOWN
+            total[i] = total[i].plus(scaled(form, 2 * (h - INVERSE_BITS) - table_bits + by.bits - 30))
+    return total
+
+
+def noise_of(design: WeakTablesQ31, by: Whitening, estimator: EstimatorQ31) -> list[Scaled]:
+    """What `EstimatorQ31.noise` is to be: by the traces where the window is whitened, else as it was."""
+    noise = []
+    assert estimator.model.noisy is not None
+    first, second = estimator.model.noisy
+    more = [a - t for a, t in zip(estimator.align, estimator.theta_bits, strict=True)]
+    shifts = (2 * more[first], more[first] + more[second] - 1, 2 * more[second])
+    for own, known, shift in zip(traces(design, by), estimator.noise, shifts, strict=True):
+        noise.append(pick(by.whitened, own.over(scaled(design.functions, 0)).shifted(shift), known))
+    return noise
 
 
 def remove(x: Int, column: int, held: Held) -> Int:
@@ -125,21 +187,23 @@ def remove(x: Int, column: int, held: Held) -> Int:
     return held(x - round_shift(direction[None] * along[:, None], 30))
 
 
-def rows(sums: Int, design: WeakTablesQ31, estimator: EstimatorQ31) -> tuple[Int, Mask]:
+def rows(sums: Int, by: Whitening, design: WeakTablesQ31) -> tuple[Int, Mask]:
     """Whitened, projected columns [12, K, lanes] of a window with sums [K, 15], and where they did not fit."""
-    x = np.repeat(assemble(sums, design)[:, :, None], estimator.lanes, axis=2)
-    held = Held(estimator.lanes)
-    x = remove(remove(whiten(x, design, estimator, held), _A, held), _B, held)
+    lanes = len(by.whitened)
+    x = np.repeat(assemble(sums, design)[:, :, None], lanes, axis=2)
+    held = Held(lanes)
+    x = remove(remove(whiten(x, by, held), _A, held), _B, held)
     return x, held.saturated
 
 
 def _stages_before_add(design: WeakTablesQ31) -> int:
     functions = design.functions
     whole = functions // 3
-    triangles = 2 * whole + (_FACTOR_PARTS + _WHITEN_PARTS) * (functions - whole)
+    triangles = 3 * whole + (_FACTOR_PARTS + _TRACE_PARTS + _WHITEN_PARTS) * (functions - whole)
     assembled = -(-functions // _ASSEMBLED_A_STAGE)
     return (
-        functions
+        1
+        + functions
         + assembled
         + triangles
         + 2 * (2 + -(-functions // _ALONG_A_STAGE) + -(-functions // _REMOVED_A_STAGE))
@@ -149,24 +213,39 @@ def _stages_before_add(design: WeakTablesQ31) -> int:
 def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> int:
     """Stages of a window."""
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
-    return _stages_before_add(design) + design.functions + solves
+    return _stages_before_add(design) + design.functions + solves + estimator.assessment_stages + 1
 
 
-def stages(sums: Int, design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> Work:
-    """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
-    x, saturated = rows(sums, design, estimator)
+def stages(
+    window: Window, design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31, trust: TrustQ31, pivot: Scaled
+) -> Work:
+    """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None.
+
+    pivot: what the noise of the pivot's sensor adds to the variance of a row for each mean square of a second
+    difference of F.
+    """
+    expected = scaled(estimator.row_sd * estimator.row_sd, -16).plus(pivot.times(window.bend))
+    by = whitening(design, estimator)
+    x, saturated = rows(window.sums, by, design)
     for _ in range(_stages_before_add(design)):
         yield None
+    estimator.noise = noise_of(design, by, estimator)
     for k in range(design.functions):
         y = np.where(saturated, 2**31 - 1, x[_Y, k])
         added = estimator.add(x[: estimator.model.n_theta, k], y)
         yield None if (added == Reason.ACCUMULATED).all() else added
+    reason = np.full(estimator.lanes, Reason.ACCUMULATED, np.uint8)
     for iteration in range(iterations):
-        reason = None
-        for reason in estimator.solve(ends_group=iteration == 0):
-            if reason is None:
-                yield None
-        last = iteration + 1 == iterations or not estimator.was_due
-        yield reason if last else None
-        if last:
-            return
+        refuge = trust.refuge if iteration == 0 else None
+        for solved in estimator.solve(ends_group=iteration == 0, refuge=refuge):
+            yield None
+            if solved is not None:
+                reason = solved
+        if not estimator.was_due:
+            break
+    size = estimator.size
+    for _ in range(estimator.assessment_stages):
+        yield None
+    candidate, informed = estimator.judged()
+    surplus = scaled(estimator.group_energy, 0).over(scaled(design.functions - 2, 0).times(expected))
+    yield trust.judge(reason, size, informed, surplus.fixed(SURPLUS_BITS), candidate)

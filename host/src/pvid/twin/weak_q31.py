@@ -14,25 +14,24 @@ from pvid.twin import kapitza_weak_q31, weak_finish_q31, weak_front_q31, weak_wi
 from pvid.twin.differentiator import segments
 from pvid.twin.estimator_q31 import EstimatorQ31
 from pvid.twin.integer_q31 import Int, integers, scale
+from pvid.twin.scaled_q31 import Scaled
+from pvid.twin.trust_q31 import TrustQ31
 from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
+from pvid.twin.weak_window_q31 import Window
 
 
 @dataclass
 class TwinRecordQ31:
-    """State after every tick: p [ticks, n_p, lanes], sums [ticks, n, lanes], exponent and reason [ticks, lanes]."""
+    """State after every tick: p [ticks, n_p, lanes], sums [ticks, n, lanes], exponent and reason [ticks, lanes].
+
+    published: p as published, like p, of the weak form.
+    """
 
     p: npt.NDArray[np.int32]
     sums: Int
     exponent: npt.NDArray[np.uint8]
     reason: npt.NDArray[np.uint8]
-
-
-@dataclass(frozen=True)
-class Window:
-    """A whole window: sums [K, 15], and the sum of F."""
-
-    sums: Int
-    angle_sum: int
+    published: npt.NDArray[np.int32] | None = None
 
 
 class WeakTwinQ31:
@@ -42,6 +41,8 @@ class WeakTwinQ31:
         self.config = config
         model = kapitza_weak_q31.WEAK if config.zero_unknown else kapitza_weak_q31.ZEROED
         self.estimator = EstimatorQ31(estimators or [config.estimator], model)
+        self.trust = TrustQ31(config.trust, self.estimator)
+        self.pivot_noise = Scaled(*map(integers, config.pivot_noise))
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.schedule = Schedule.of(config.design)
         self.together = self.schedule.together(
@@ -86,9 +87,11 @@ class WeakTwinQ31:
             within[last] = free[last] = False
         driven = weak_window_q31.drives(u, design) >= threshold
         angles = weak_window_q31.angle_sums(f, design)
+        bends = weak_window_q31.bends(f, design)
         for m, sums in enumerate(weak_window_q31.sums(f, u, design)):
             tick = first + self.schedule.tick_of_window(m)
-            complete[tick] = Window(sums, int(angles[m])) if driven[m] else None
+            bend = Scaled(bends.m[m], bends.e[m])
+            complete[tick] = Window(sums, int(angles[m]), bend) if driven[m] else None
         self.schedule.occupy(free, first, last, len(f))
         return last + 1
 
@@ -99,6 +102,7 @@ class WeakTwinQ31:
         total = abs(int(scale(integers(window.angle_sum), -self.config.estimator.p_bits[3])))
         mean = total // (self.config.design.window - 1)
         self.estimator.place(3, -mean if window.angle_sum < 0 else mean)
+        self.trust.place()
 
     def _take(self, window: Window | None) -> Reasons | Work:
         """Why a window is dropped, or its stages."""
@@ -106,7 +110,9 @@ class WeakTwinQ31:
             self.estimator.counters["held_not_excited"] += 1
             return np.full(self.estimator.lanes, Reason.HELD_NOT_EXCITED, np.uint8)
         self._place_zero(window)
-        return weak_finish_q31.stages(window.sums, self.config.design, self.iterations, self.estimator)
+        return weak_finish_q31.stages(
+            window, self.config.design, self.iterations, self.estimator, self.trust, self.pivot_noise
+        )
 
     def _reject(self) -> Reason:
         self.estimator.counters["rejected_saturated"] += 1
@@ -131,14 +137,16 @@ class WeakTwinQ31:
         p = np.empty((ticks, n_p, lanes), np.int32)
         state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64)
         exponent = np.empty((ticks, lanes), np.uint8)
+        published = np.empty((ticks, n_p, lanes), np.int32)
 
         def record(tick: int, _: Reasons) -> None:
             p[tick] = estimator.p
             exponent[tick] = estimator.exponent
+            published[tick] = self.trust.estimate["p"][:, :n_p].T
             if sums:
                 state[tick] = estimator.sums
             if progress is not None and tick % 512 == 0:
                 progress(tick)
 
         reason = self.follow(phi, y, record)
-        return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)
+        return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason, published=published)

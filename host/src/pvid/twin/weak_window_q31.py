@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pvid.twin.integer_q31 import Int, round_shift
+from pvid.twin.scaled_q31 import Scaled, scaled
 from pvid.twin.weak_window import window_count
 from pvid.weak_design_q31 import HIGH_TERMS, TERM_BITS, TERMS, WeakTablesQ31
 
@@ -25,6 +28,27 @@ def angle_sums(f: Int, design: WeakTablesQ31) -> Int:
     hop = (design.window - 1) // 2
     index = hop * np.arange(window_count(len(f), hop))[:, None] + np.arange(design.window - 1)
     return np.asarray(np.sum(f[index], axis=1, dtype=np.int64))
+
+
+def bends(f: Int, design: WeakTablesQ31) -> Scaled:
+    """Mean square of the second differences of F that fell into each window [windows]."""
+    hop = (design.window - 1) // 2
+    squares, due = np.zeros(len(f), np.int64), np.zeros(len(f), np.int64)
+    ends = np.arange(2 * design.lag, len(f), design.lag)
+    squares[ends] = ((f[ends] - f[ends - design.lag]) - (f[ends - design.lag] - f[ends - 2 * design.lag])) ** 2
+    due[ends] = 1
+    index = hop * np.arange(window_count(len(f), hop))[:, None] + np.arange(design.window - 1)
+    count = np.sum(due[index], axis=1)
+    return scaled(np.sum(squares[index], axis=1), 0).over(scaled(np.maximum(count, 1), 0))
+
+
+@dataclass(frozen=True)
+class Window:
+    """A whole window: sums [K, 15], the sum of F, and the mean square of its second differences."""
+
+    sums: Int
+    angle_sum: int
+    bend: Scaled
 
 
 def _terms(index: int, now: Int, twice: Int, design: WeakTablesQ31) -> Int:

@@ -1,0 +1,153 @@
+#include "pvid/trust_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "count.h"
+#include "estimator_q31.h"
+
+/* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
+#define ARRIVED 19661 /* 0.3, Q16 */
+#define SMALL_STEP (((int64_t)1 << PVID_SIZE_BITS) / 10000)
+
+/* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
+#define LONG_MEMORY 4096u
+
+/* One group that the model cannot explain at all must not outweigh thousands. */
+#define SURPLUS_MAX ((int64_t)1000000 << PVID_SURPLUS_BITS)
+
+#define ERROR_BITS 24 /* of se_max */
+
+static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
+{
+    if ((config->kappa_min < 0) || (config->kappa_min > (PVID_ONE_Q30 - (PVID_ONE_Q30 / 1000)))) {
+        return PVID_BAD_PUBLISH_KAPPA;
+    }
+    if (config->se_max <= 0) {
+        return PVID_BAD_SE_MAX;
+    }
+    if ((config->misfit_max != 0u) && (config->misfit_max < ((uint32_t)1 << 16))) {
+        return PVID_BAD_MISFIT_MAX;
+    }
+    return PVID_OK;
+}
+
+void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
+{
+    memcpy(self->estimate.p, estimator->p, sizeof self->estimate.p);
+}
+
+pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q31 *config,
+                                const pvid_estimator_q31 *estimator)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    const pvid_status status = config_is_valid(config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    memset(self, 0, sizeof *self);
+    self->config = *config;
+    const uint64_t fading = ((uint64_t)1 << 31) - (uint64_t)estimator->information.retention;
+    const uint64_t groups = ((uint64_t)estimator->information.block << 31) / fading; /* of memory; all but never ends */
+    const uint64_t held = (groups < LONG_MEMORY) ? groups : LONG_MEMORY;
+    self->long_memory = (uint16_t)((held < PVID_TRUST_LONG) ? PVID_TRUST_LONG : held);
+    pvid_trust_place_q31(self, estimator);
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        self->estimate.se[a] = estimator->start_sd[a];
+        self->estimate.correlation[a][a] = PVID_ONE_Q30;
+    }
+    return PVID_OK;
+}
+
+const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self)
+{
+    return ((self->config.shut_max > 0u) && (self->shut >= self->config.shut_max)) ? self->estimate.p : NULL;
+}
+
+/* ---- the alarm ---- */
+
+static void take_surplus(pvid_trust_q31 *self, int64_t surplus)
+{
+    const int64_t x = pvid_clamp_q31(surplus, SURPLUS_MAX);
+    if (self->judged < self->long_memory) {
+        self->judged++;
+    }
+    self->long_mean += (x - self->long_mean) / (int64_t)self->judged;
+    self->recent[self->next] = x;
+    self->next = (uint8_t)((self->next + 1u == PVID_TRUST_SHORT) ? 0u : (self->next + 1u));
+    int64_t sum = 0;
+    for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
+        sum += self->recent[i];
+    }
+    const int64_t limit = (int64_t)self->config.misfit_max << (PVID_SURPLUS_BITS - 16);
+    const bool lately = (self->judged >= PVID_TRUST_SHORT) && ((2 * sum) > (3 * (limit * (int64_t)PVID_TRUST_SHORT)));
+    const bool at_length = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
+    self->misfit = (limit > 0) && (lately || at_length);
+}
+
+/* ---- the gate ---- */
+
+/* Largest standard error of the positive parameters, relative to them, Q24. */
+static int64_t widest(const pvid_estimator_q31 *estimator, const pvid_estimate_q31 *candidate)
+{
+    int64_t most = 0;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_q31(estimator->model, a)) {
+            const int64_t relative = ((int64_t)candidate->se[a] << ERROR_BITS) / candidate->p[a];
+            most = (relative > most) ? relative : most;
+        }
+    }
+    return most;
+}
+
+static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
+                           int64_t size, bool informed, const pvid_estimate_q31 *candidate)
+{
+    if (reason != PVID_UPDATED) {
+        return reason;
+    }
+    if (!informed || (candidate->kappa < self->config.kappa_min) || (candidate->least_pivot < self->config.kappa_min)) {
+        return PVID_HELD_NOT_EXCITED;
+    }
+    const int64_t error = widest(estimator, candidate);
+    const int64_t held = pvid_clamp_q31(error, (int64_t)1 << 44);
+    const int64_t near = pvid_round_shift_q31(held * ARRIVED, 16u + (ERROR_BITS - PVID_SIZE_BITS));
+    const bool arrived = size <= ((near > SMALL_STEP) ? near : SMALL_STEP);
+    if ((self->groups < self->config.groups_min) || (error > self->config.se_max) || !arrived) {
+        return PVID_HELD_UNCERTAIN;
+    }
+    return PVID_UPDATED;
+}
+
+pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
+                                 bool informed, int64_t surplus, const pvid_estimate_q31 *candidate)
+{
+    pvid_count_up_16(&self->groups);
+    if (reason == PVID_ACCUMULATED) { /* no solve was due */
+        return reason;
+    }
+    if (reason == PVID_UPDATED) {
+        self->shut = 0;
+    } else if (pvid_trust_refuge_q31(self) != NULL) {
+        self->shut = 0; /* p is back */
+    } else {
+        pvid_count_up_16(&self->shut);
+    }
+    if (self->published) {
+        take_surplus(self, surplus);
+    }
+    pvid_reason told = verdict(self, estimator, reason, size, informed, candidate);
+    if (told == PVID_UPDATED) {
+        self->estimate = *candidate;
+        self->published = true;
+        if (self->misfit) {
+            pvid_count_up(&estimator->counters.misfits);
+            told = PVID_MISFIT;
+        }
+    } else if (told == PVID_HELD_UNCERTAIN) {
+        pvid_count_up(&estimator->counters.held_uncertain);
+    } else if ((told == PVID_HELD_NOT_EXCITED) && (reason == PVID_UPDATED)) {
+        pvid_count_up(&estimator->counters.held_not_excited);
+    }
+    return told;
+}

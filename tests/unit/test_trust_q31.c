@@ -1,0 +1,218 @@
+/* Which estimates of the fixed-point core are published: the gate, the alarm, the way back. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "pvid/pvid.h"
+
+#define PER_CENT(x) ((x) / 100.0)
+
+static pvid_estimator_q31 estimator;
+static pvid_trust_q31 trust;
+
+/* The defaults of trust.h: 3e-5, 5 %, 1.5. */
+static const pvid_trust_config_q31 defaults = {32212, 838861, 98304, 3, 16};
+
+static int64_t q24(double x)
+{
+    return (int64_t)(x * 16777216.0);
+}
+
+static int64_t size(double x)
+{
+    return (int64_t)(x * 4194304.0);
+}
+
+static int start_again(void **state)
+{
+    (void)state;
+    pvid_estimator_config_q31 config = {.model = &pvid_kapitza_weak_q31,
+                                        .row_sd = 256,
+                                        .gain = 1 << 30,
+                                        .correlation = 1u << 16,
+                                        .row_weight = 1u << 16,
+                                        .step_limit = 19661,
+                                        .divider = 1};
+    for (int i = 0; i < 4; i++) {
+        config.start[i] = (i < 3) ? (10 << 20) : 0;
+        config.start_sd[i] = 1 << 20;
+        config.lower[i] = (i < 3) ? (1 << 17) : -(1 << 20);
+        config.upper[i] = 100 << 20;
+        config.p_bits[i] = 20;
+    }
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    assert_int_equal(pvid_trust_init_q31(&trust, &defaults, &estimator), PVID_OK);
+    return 0;
+}
+
+/* An estimate with relative standard errors of `error`. */
+static pvid_estimate_q31 candidate(double error, double kappa)
+{
+    pvid_estimate_q31 estimate;
+    memset(&estimate, 0, sizeof estimate);
+    for (int i = 0; i < 4; i++) {
+        estimate.p[i] = 20 << 20;
+        estimate.se[i] = (int32_t)(error * (20 << 20));
+    }
+    estimate.kappa = (int32_t)(kappa * 1073741824.0);
+    estimate.least_pivot = 1 << 24;
+    return estimate;
+}
+
+static pvid_reason judge(pvid_reason solved, double moved, bool informed, double surplus, pvid_estimate_q31 estimate)
+{
+    return pvid_trust_judge_q31(&trust, &estimator, solved, size(moved), informed, q24(surplus), &estimate);
+}
+
+static pvid_reason judge_good(double surplus)
+{
+    return judge(PVID_UPDATED, 1.0e-5, true, surplus, candidate(PER_CENT(1), 1.0e-2));
+}
+
+static void the_first_groups_are_never_published(void **state)
+{
+    (void)state;
+    assert_int_equal(judge_good(1.0), PVID_HELD_UNCERTAIN);
+    assert_int_equal(judge_good(1.0), PVID_HELD_UNCERTAIN);
+    assert_false(trust.published);
+    assert_memory_equal(trust.estimate.p, estimator.p, sizeof estimator.p);
+    assert_int_equal(judge_good(1.0), PVID_UPDATED);
+    assert_true(trust.published);
+    assert_int_equal(estimator.counters.held_uncertain, 2);
+}
+
+static void what_is_held_leaves_the_published_estimate_and_says_why(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        (void)judge_good(1.0);
+    }
+    const pvid_estimate_q31 before = trust.estimate;
+    const pvid_estimate_q31 fine = candidate(PER_CENT(2), 1.0e-2);
+    assert_int_equal(judge(PVID_HELD_PIVOT, 0.0, true, 1.0, fine), PVID_HELD_PIVOT);
+    assert_int_equal(judge(PVID_HELD_NOT_EXCITED, 0.0, true, 1.0, fine), PVID_HELD_NOT_EXCITED);
+    assert_int_equal(judge(PVID_ACCUMULATED, 0.0, true, 1.0, fine), PVID_ACCUMULATED);
+    assert_int_equal(judge(PVID_UPDATED, 0.0, false, 1.0, fine), PVID_HELD_NOT_EXCITED);
+    assert_int_equal(judge(PVID_UPDATED, 0.0, true, 1.0, candidate(PER_CENT(2), 2.9e-5)), PVID_HELD_NOT_EXCITED);
+    pvid_estimate_q31 imitated = fine;
+    imitated.least_pivot = 21474; /* 2e-5: one mode of motion */
+    assert_int_equal(judge(PVID_UPDATED, 0.0, true, 1.0, imitated), PVID_HELD_NOT_EXCITED);
+    assert_int_equal(judge(PVID_UPDATED, 0.0, true, 1.0, candidate(PER_CENT(5.1), 1.0e-2)), PVID_HELD_UNCERTAIN);
+    pvid_estimate_q31 unknown = fine;
+    unknown.se[1] = INT32_MAX; /* saturated */
+    unknown.p[1] = 1;
+    assert_int_equal(judge(PVID_UPDATED, 0.0, true, 1.0, unknown), PVID_HELD_UNCERTAIN);
+    assert_int_equal(judge(PVID_UPDATED, 0.0061, true, 1.0, fine), PVID_HELD_UNCERTAIN); /* 0.3 of 2 % is 0.6 % */
+    assert_memory_equal(&before, &trust.estimate, sizeof before);
+    assert_int_equal(judge(PVID_UPDATED, 0.0059, true, 1.0, fine), PVID_UPDATED);
+    assert_memory_equal(&fine, &trust.estimate, sizeof fine);
+    /* a step of a ten-thousandth is small whatever the errors */
+    assert_int_equal(judge(PVID_UPDATED, 9.9e-5, true, 1.0, candidate(1.0e-6, 1.0e-2)), PVID_UPDATED);
+    assert_int_equal(judge(PVID_UPDATED, 1.02e-4, true, 1.0, candidate(1.0e-6, 1.0e-2)), PVID_HELD_UNCERTAIN);
+}
+
+static void after_sixteen_refusals_p_goes_back(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 16; i++) {
+        assert_null(pvid_trust_refuge_q31(&trust));
+        (void)judge(PVID_HELD_NOT_EXCITED, 0.0, true, 1.0, candidate(1.0, 0.0));
+    }
+    assert_ptr_equal(pvid_trust_refuge_q31(&trust), trust.estimate.p);
+    (void)judge(PVID_HELD_NOT_EXCITED, 0.0, true, 1.0, candidate(1.0, 0.0)); /* it went */
+    assert_null(pvid_trust_refuge_q31(&trust));
+}
+
+static void a_step_ends_the_refusals(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 15; i++) {
+        (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, candidate(1.0, 0.0));
+    }
+    (void)judge_good(1.0);
+    (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, candidate(1.0, 0.0));
+    assert_null(pvid_trust_refuge_q31(&trust));
+}
+
+static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        (void)judge_good(1000.0); /* before the first publication p is on its way: not counted */
+    }
+    for (int i = 0; i < 7; i++) {
+        assert_int_equal(judge_good(2.4), PVID_UPDATED);
+    }
+    assert_int_equal(judge_good(2.4), PVID_MISFIT); /* eight groups, 2.4 > 2.25 */
+    assert_true(trust.published);
+    assert_int_equal(estimator.counters.misfits, 1);
+    int groups = 0;
+    while (judge_good(0.5) == PVID_MISFIT) {
+        groups++;
+    }
+    assert_in_range(groups, 0, 40);
+    assert_int_equal(judge_good(0.5), PVID_UPDATED);
+}
+
+static void a_small_surplus_takes_sixteen_groups(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3 + 15; i++) {
+        assert_true(judge_good(1.6) != PVID_MISFIT);
+    }
+    assert_int_equal(judge_good(1.6), PVID_MISFIT);
+}
+
+/* One group that the model cannot explain at all must not outweigh thousands. */
+static void a_surplus_beyond_all_bounds_is_held(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        pvid_estimate_q31 fine = candidate(PER_CENT(1), 1.0e-2);
+        (void)pvid_trust_judge_q31(&trust, &estimator, PVID_UPDATED, 0, true, (int64_t)1 << 62, &fine);
+    }
+    assert_int_equal(trust.recent[0], q24(1.0e6));
+    assert_int_equal(trust.long_mean, q24(1.0e6));
+}
+
+static void a_bad_setting_is_named(void **state)
+{
+    (void)state;
+    pvid_trust_config_q31 config = defaults;
+    config.kappa_min = -1;
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_BAD_PUBLISH_KAPPA);
+    config = defaults;
+    config.kappa_min = 1 << 30;
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_BAD_PUBLISH_KAPPA);
+    config = defaults;
+    config.se_max = 0;
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_BAD_SE_MAX);
+    config = defaults;
+    config.misfit_max = 65535;
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_BAD_MISFIT_MAX);
+    config.misfit_max = 0; /* no alarm */
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_OK);
+    for (int i = 0; i < 40; i++) {
+        assert_true(judge_good(1000.0) != PVID_MISFIT);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(the_first_groups_are_never_published, start_again),
+        cmocka_unit_test_setup(what_is_held_leaves_the_published_estimate_and_says_why, start_again),
+        cmocka_unit_test_setup(after_sixteen_refusals_p_goes_back, start_again),
+        cmocka_unit_test_setup(a_step_ends_the_refusals, start_again),
+        cmocka_unit_test_setup(large_residuals_raise_the_alarm_and_small_ones_end_it, start_again),
+        cmocka_unit_test_setup(a_small_surplus_takes_sixteen_groups, start_again),
+        cmocka_unit_test_setup(a_surplus_beyond_all_bounds_is_held, start_again),
+        cmocka_unit_test_setup(a_bad_setting_is_named, start_again),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
