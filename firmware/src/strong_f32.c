@@ -44,6 +44,11 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
                               GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
 }
 
+void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen)
+{
+    self->frozen = frozen;
+}
+
 void pvid_strong_gap_f32(pvid_strong_f32 *self)
 {
     pvid_differentiator_reset_f32(&self->phi);
@@ -103,6 +108,9 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
     const float u[3] = {d_y[2] * self->inverse_l1, d_y[3] * self->inverse_l1, d_y[4] * self->inverse_l1};
     const float drive = self->drive + (self->drive_forgetting * ((u[0] * u[0]) - self->drive));
     self->drive = pvid_finite_f32(drive) ? drive : self->drive;
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
     if (self->drive < self->drive_min) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;

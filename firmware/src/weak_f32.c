@@ -160,6 +160,11 @@ void pvid_weak_gap_f32(pvid_weak_f32 *self)
     self->bend.due = false;
 }
 
+void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen)
+{
+    self->frozen = frozen;
+}
+
 static void next_bend(pvid_weak_bend_f32 *self, uint8_t lag, float phi)
 {
     self->due = false;
@@ -192,6 +197,9 @@ static void place_zero(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
 /* Why a window that is complete cannot be used; PVID_ACCUMULATED if it can. */
 static pvid_reason objection(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
 {
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
     if ((self->drive_min > 0.0f) && (pvid_weak_window_drive_f32(window, self->design->window) < self->drive_min)) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;

@@ -140,8 +140,8 @@ static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *
     for (size_t k = first; k < last; k++) {
         float e = columns[k][PVID_WEAK_COLUMN_Y];
         for (size_t i = 0; i < estimator->model->n_theta; i++) {
-            const size_t linear = PVID_KAPITZA_WEAK_THETA;
-            const size_t column = (i < linear) ? i : ((PVID_WEAK_COLUMN_C1 + i) - linear);
+            const size_t linear = (size_t)PVID_KAPITZA_WEAK_THETA;
+            const size_t column = (i < linear) ? i : ((i - linear) + (size_t)PVID_WEAK_COLUMN_C1);
             e -= columns[k][column] * estimator->theta[i];
         }
         self->energy += e * e;

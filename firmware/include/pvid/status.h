@@ -51,8 +51,9 @@ typedef enum {
     PVID_REJECTED_SATURATED,     /* a row beyond PVID_ROW_LIMIT */
     PVID_HELD_UNCERTAIN,         /* not published: standard errors too wide, or p still on its way */
     PVID_HELD_OUT_OF_RANGE,      /* window dropped: the angle went beyond what the equations are good for */
-    PVID_MISFIT                  /* the parameters took a step, but the residuals are larger than the sensors'
+    PVID_MISFIT,                 /* the parameters took a step, but the residuals are larger than the sensors'
                                     noise explains: the model is not this mechanism's */
+    PVID_HELD_FROZEN             /* not taken in, because the identifier is frozen */
 } pvid_reason;
 
 #endif

@@ -41,6 +41,7 @@ typedef struct {
     float drive;            /* mean square of u over about a second [1/s^4] */
     float drive_forgetting; /* part of it that a tick replaces */
     float drive_min;        /* mean square below which no row is taken in */
+    bool frozen;
     pvid_gate_f32 gate;
     pvid_estimator_f32 estimator;
 } pvid_strong_f32;
@@ -56,6 +57,11 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_strong_gap_f32(pvid_strong_f32 *self);
+
+/* Freezes the identifier, or lets it go on. While it is frozen nothing is taken in: p and the sums stay, and nothing is
+ * forgotten; the differentiators are kept filled, so that it goes on without a bump with the next sample. Ticks that
+ * would have given a row return PVID_HELD_FROZEN. */
+void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen);
 
 #ifdef __cplusplus
 }

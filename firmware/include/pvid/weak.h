@@ -235,6 +235,7 @@ typedef struct {
     uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
     uint8_t function;      /* functions of that window that have, 0..K-1 */
     bool warm;             /* a window has been completed since the restart */
+    bool frozen;           /* windows are gathered and dropped */
     float phi;             /* the present decimated sample [rad] */
     float u;               /* [1/s^2] */
     pvid_weak_front_f32 front;
@@ -267,6 +268,12 @@ const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self);
+
+/* Freezes the identifier, or lets it go on. While it is frozen every window that is completed is dropped with
+ * PVID_HELD_FROZEN: p and the sums stay, and nothing is forgotten. One that is being worked off is finished, in less
+ * than half a window. Samples are gathered all the while, so that it goes on without a bump: the first window after is
+ * at most half a window away, and may have begun before. */
+void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen);
 
 #ifdef __cplusplus
 }

@@ -30,6 +30,7 @@ _REASONS = {
     Reason.REJECTED_SATURATED: "a sample was absurdly large and was left out",
     Reason.HELD_UNCERTAIN: "standard errors too wide, or still on the way; the last trusted estimate stays",
     Reason.HELD_OUT_OF_RANGE: "the angle went beyond what the equations are good for; that window was dropped",
+    Reason.HELD_FROZEN: "frozen: nothing is taken in",
     Reason.MISFIT: "the estimate took a step, but residuals exceed the sensors' noise: friction, large angles or "
     "another mechanism",
 }

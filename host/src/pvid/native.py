@@ -44,6 +44,7 @@ class Reason(IntEnum):
     HELD_UNCERTAIN = 8
     HELD_OUT_OF_RANGE = 9
     MISFIT = 10
+    HELD_FROZEN = 11
 
     @property
     def text(self) -> str:
@@ -726,10 +727,21 @@ class _FloatStepper(Stepper[Record]):
         return record, struct
 
 
-class StrongIdentifier(_FloatStepper):
+class _Freezable(_FloatStepper):
+    """With a function that freezes it."""
+
+    FREEZE: ClassVar[str]
+
+    def freeze(self, frozen: bool) -> None:
+        """Takes nothing in, or goes on."""
+        getattr(self.native.library, self.FREEZE)(self._state, ctypes.c_bool(frozen))
+
+
+class StrongIdentifier(_Freezable):
     """pvid_strong_f32: phi [rad], y [m]."""
 
     REPLAY = "pvid_replay_strong_f32"
+    FREEZE = "pvid_strong_freeze_f32"
 
     def __init__(self, native: Native, config: StrongConfig) -> None:
         struct, self._tables = strong_config_struct(config)
@@ -737,10 +749,11 @@ class StrongIdentifier(_FloatStepper):
         super().__init__(native, "pvid_strong_init_f32", struct, size, at, native._counters_at)
 
 
-class WeakIdentifier(_FloatStepper):
+class WeakIdentifier(_Freezable):
     """pvid_weak_f32: phi [rad], y [m]."""
 
     REPLAY = "pvid_replay_weak_f32"
+    FREEZE = "pvid_weak_freeze_f32"
     publishes = True
 
     def __init__(self, native: Native, config: WeakConfig) -> None:

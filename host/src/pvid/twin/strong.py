@@ -44,6 +44,7 @@ class StrongTwin:
     def __init__(self, config: StrongConfig, estimators: Sequence[EstimatorConfig] | None = None) -> None:
         self.config = config
         self.estimator = Estimator(estimators or [config.estimator], config.sample_rate)
+        self.frozen: Mask | None = None  # [ticks], to be set before a run
         rate = np.float32(config.sample_rate)
         floor = np.float32(1e-6) * self.estimator.row_variance
         self.gate = Gate(config.gate, rate, np.float32(0.25) * rate, floor)
@@ -60,6 +61,8 @@ class StrongTwin:
         n, row_y = model.rows(d_phi, u)
         fate = np.full(len(phi32), Reason.ACCUMULATED, np.uint8)
         fate[ready & ~self._driven(u[:, 0], ready)] = Reason.HELD_NOT_EXCITED
+        if self.frozen is not None:
+            fate[self.frozen] = Reason.HELD_FROZEN
         fate[~ready] = Reason.WARMING_UP
         fate[~finite] = Reason.REJECTED_NOT_FINITE
         return n, row_y, fate
@@ -152,7 +155,7 @@ def follow_rows(
             reason[tick] = estimator.step(wide_n[tick], wide_y[tick], gate)
         else:
             reason[tick] = fate[tick]
-            if fate[tick] != Reason.WARMING_UP:
+            if fate[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
                 estimator.counters[Reason(fate[tick]).name.lower()] += 1
         after(tick, reason[tick])
     return reason

@@ -45,6 +45,7 @@ class WeakTwin:
         ]
         pattern = kapitza_weak.WEAK if config.zero_unknown else kapitza_weak.ZEROED
         pattern = kapitza_weak.FRICTION if config.friction else pattern
+        self.frozen: Mask | None = None  # [ticks], to be set before a run
         self.estimator = RelativeEstimator(lanes, float(rate), pattern)
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.angle = Angle(config, len(lanes)) if config.full_angle or config.friction else None
@@ -87,6 +88,7 @@ class WeakTwin:
                     phi=part[0][samples],
                     u=part[1][samples],
                     driven=bool(driven[m]),
+                    frozen=self.frozen is not None and bool(self.frozen[tick]),
                     mean=seen.mean[m],
                     lowest=seen.lowest[m],
                     highest=seen.highest[m],
@@ -99,6 +101,8 @@ class WeakTwin:
         """Why a window is dropped [lanes], None if it is not; all lanes must agree."""
         estimator = self.estimator
         lanes = estimator.p.shape[1]
+        if window.frozen:
+            return np.full(lanes, Reason.HELD_FROZEN, np.uint8)
         if not window.driven:
             estimator.counters["held_not_excited"] += 1
             return np.full(lanes, Reason.HELD_NOT_EXCITED, np.uint8)

@@ -73,13 +73,14 @@ def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
 
 @dataclass(frozen=True)
 class Window:
-    """A whole window at its handing over: sums [K, 13], samples phi [rad] and u [1/s^2] [W], whether it is driven, and
-    what `observe` says of it."""
+    """A whole window at its handing over: sums [K, 13], samples phi [rad] and u [1/s^2] [W], whether it is driven,
+    whether it comes while the identifier is frozen, and what `observe` says of it."""
 
     sums: Float32
     phi: Float32
     u: Float32
     driven: bool
+    frozen: bool
     mean: np.float32
     lowest: np.float32
     highest: np.float32
