@@ -68,7 +68,7 @@ def test_the_view_says_all_there_is_to_know(sent: list[bytes]) -> None:
     assert "field: weak form, core f32, 1000 samples per second" in seen
     assert f"{TICKS} samples" in seen and "lost       nothing" in seen
     assert f"{newest['kappa']:.2g}  good" in seen and "times the encoder's noise" in seen
-    assert "updated" in seen and "the estimate took a step and is trusted" in seen
+    assert "updated" in seen and "the estimate took a step" in seen
     assert "a port -> a [bold]log" in seen
     assert "rad, pivot" in seen
 
@@ -88,6 +88,19 @@ def test_before_anything_has_come_the_view_says_so(sent: list[bytes]) -> None:
 def test_without_the_rods_length_there_are_no_physical_parameters(sent: list[bytes]) -> None:
     seen = view_of(sent, l1=None)
     assert "radius of gyration" not in seen and "L1 L2" in seen
+
+
+def test_an_estimate_outside_the_physical_region_is_told_as_such(sent: list[bytes]) -> None:
+    decoder, frames = link.Decoder(), []
+    for item in decoder.feed(b"".join(sent)):
+        assert isinstance(item, link.Frame)
+        wild = item.message
+        if isinstance(wild, link.Estimate):
+            wild = replace(wild, p=(11.56, 0.25, 0.2, 0.0, 0.0, 0.0))
+        frames.append(link.encode(wild, item.sequence, item.tick))
+    seen = view_of(frames)
+    assert "g*, l2, rho2" in seen and "outside the physical region" in seen and "radius of gyration" not in seen
+    assert "outside" not in view_of(frames, l1=None)
 
 
 def test_what_a_board_says_of_itself_is_no_markup(native: Native) -> None:

@@ -107,6 +107,10 @@ def test_modes_of_the_standard_rig() -> None:
     assert modes(P) == pytest.approx((0.742, 2.56), rel=2e-3)  # MATH.md section 6
 
 
+def test_parameters_outside_the_physical_region_have_no_modes() -> None:
+    assert modes(np.array([11.56, 0.25, 0.2])) == modes(np.array([-1.0, 9.0, 5.0])) == ()
+
+
 # ---- the report
 
 
@@ -170,6 +174,16 @@ def test_plot_of_a_log_without_estimates_identifies_it_first(native: Native, tmp
     recording = recording_of(tmp_path / "raw.pvlog", None)
     assert "weak form, stationary law, core f32" in recording.title
     assert recording.physical[-1] == pytest.approx([9.5, 0.12, 0.08], rel=0.02)
+
+
+def test_a_report_of_an_estimate_outside_the_physical_region(log: Path, tmp_path: Path) -> None:
+    recording = recording_of(log, None)
+    nowhere = np.full_like(recording.physical, np.nan)
+    wild = replace(recording, physical=nowhere, physical_se=nowhere, p=np.array([11.56, 0.25, 0.2, 0.0]))
+    write_report(wild, tmp_path / "wild.svg")
+    text = shown(tmp_path / "wild.svg")
+    assert "last estimate: outside the physical region: w = 11.56, d1 = 0.25, d2 = 0.2" in text and "nan" not in text
+    assert "mode at" not in text
 
 
 def test_a_board_that_began_anew_is_marked(native: Native, tmp_path: Path) -> None:

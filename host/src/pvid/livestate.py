@@ -111,7 +111,10 @@ class LiveState(threading.Thread):
             value = self._history.newest.get(name, math.nan)
             if not math.isnan(value):
                 told, spread = with_error(value, self._history.newest[f"{name}_se"])
-                rows.append({"symbol": symbol, "meaning": meaning, "unit": unit, "value": told, "error": spread})
+                rows.append({"symbol": symbol, "meaning": meaning, "unit": unit, "value": told, "error": f"± {spread}"})
+        if not self._history.is_physical:
+            meaning = "outside the physical region"
+            rows.append({"symbol": "g*, l2, rho2", "meaning": meaning, "unit": "", "value": "", "error": ""})
         return rows
 
     def _estimates(self) -> dict[str, Any]:

@@ -6,6 +6,7 @@ first record, by the PC's clock when a segment began and the board's from there 
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Any
 
@@ -94,6 +95,11 @@ class History:
     def has_physical(self) -> bool:
         """Whether g, l2 and rho2 can be computed."""
         return self._values.l1 is not None
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether the newest estimate lies in the physical region; so it is called where that cannot be known."""
+        return not self.has_physical or math.isfinite(self.newest.get("l2", 0.0))
 
     def take(self, record: Record) -> None:
         """The next record."""

@@ -117,14 +117,15 @@ class LiveView:
         for name, (symbol, meaning, unit) in PARAMETERS.items():
             value = self.history.newest.get(name, math.nan)
             error = self.history.newest.get(f"{name}_se", math.nan)
-            if math.isnan(value) and not (name == "w" and not self.history.newest):
-                continue
             if math.isnan(value):
-                table.add_row("none yet", "the first estimate comes when a window of samples is full")
                 continue
             relative = f"{100 * error / abs(value):.2g} %" if name != "c" and value else ""
             told, spread = with_error(value, error)
             table.add_row(symbol, meaning, told, f"± {spread} {unit}", relative)
+        if not self.history.newest:
+            table.add_row("none yet", "the first estimate comes when a window of samples is full")
+        elif not self.history.is_physical:
+            table.add_row("g*, l2, rho2", "outside the physical region")
         return table
 
     def _quality(self) -> Table:

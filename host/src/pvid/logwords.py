@@ -20,7 +20,7 @@ PARAMETERS = {
 }
 
 _REASONS = {
-    Reason.UPDATED: "the estimate took a step and is trusted",
+    Reason.UPDATED: "the estimate took a step",
     Reason.WARMING_UP: "the first window of samples is not full yet",
     Reason.ACCUMULATED: "samples taken in, the next step comes with the next window",
     Reason.HELD_NOT_EXCITED: "drive or motion say too little of the parameters; the last estimate stays",

@@ -37,6 +37,7 @@ _UNITS = {"g": "m/s²", "l2": "m", "rho2": "m"}
 _RUNS = (".csv", ".csv.gz", ".npz", ".parquet")
 _LAGS = 24
 _RESOLUTION_HZ = 0.05  # of the spectra, where the run is long enough
+_LEAST_SHOWN_HZ = 10.0
 _SMOOTHING_S = 0.071  # of the angle's rate, as in the weak form's front end
 _MOST_DOTS = 20_000
 _LAST_S = 5.0  # of the motion, drawn dark
@@ -157,12 +158,13 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     )
 
 
-def modes(p: Float) -> tuple[float, float]:
-    """Frequencies at rest [Hz], the slow one first, of s^4 + d1 w s^2 + d2 w^2."""
+def modes(p: Float) -> tuple[float, ...]:
+    """Frequencies at rest [Hz], the slow one first, of s^4 + d1 w s^2 + d2 w^2; none if there are none."""
     w, d1, d2 = p[:3]
-    root = math.sqrt(max(d1**2 - 4 * d2, 0.0))
-    slow, fast = (math.sqrt(max(w * (d1 + sign * root) / 2, 0.0)) / (2 * math.pi) for sign in (-1, 1))
-    return slow, fast
+    if d1**2 < 4 * d2 or min(w, d1, d2) <= 0:
+        return ()
+    root = math.sqrt(d1**2 - 4 * d2)
+    return tuple(math.sqrt(w * (d1 + sign * root) / 2) / (2 * math.pi) for sign in (-1, 1))
 
 
 def write_report(recording: Recording, path: Path) -> None:
@@ -197,8 +199,11 @@ def _last(recording: Recording) -> str:
     for name, value, error in zip(PHYSICAL, recording.physical[-1], recording.physical_se[-1], strict=True):
         told, spread = with_error(float(value), float(error))
         parts.append(f"{name} = {told} ± {spread} {_UNITS[name]}")
+    if not np.isfinite(recording.physical[-1]).all():
+        linear = ", ".join(f"{name} = {value:.4g}" for name, value in zip(LINEAR, recording.p, strict=False))
+        parts = [f"outside the physical region: {linear}"]
     reasons = ", ".join(f"{count} {reason}" for reason, count in recording.reasons.items())
-    told = f"last estimate: {', '.join(parts)} (± standard error)"
+    told = f"last estimate: {', '.join(parts)} " + ("" if len(parts) == 1 else " (± standard error)")
     return f"{told}\nestimates: {reasons}" if reasons else told
 
 
@@ -215,7 +220,8 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     axes[0].set_title("Convergence")
     kappa = axes[3]
     kappa.semilogy(t, np.where(recording.kappa > 0, recording.kappa, np.nan), color="C2", label="kappa")
-    kappa.axhline(KAPPA_MIN, color="C3", linestyle="--", label="nothing is published below")
+    if recording.rig.identifier.form == "weak":
+        kappa.axhline(KAPPA_MIN, color="C3", linestyle="--", label="nothing is published below")
     kappa.set_ylabel("kappa: how far apart\nthe data tell the parameters [1]")
     kappa.set_xlabel(f"time {recording.clock} [s]")
     for axis in axes:
@@ -271,8 +277,8 @@ def _spectra(recording: Recording, axis: Axes) -> None:
     length = min(len(run.t), round(run.sample_rate / _RESOLUTION_HZ))
     frequency, height = welch(run.y - run.y.mean(), run.sample_rate, "hann", length)
     _, angle = welch(run.phi - run.phi.mean(), run.sample_rate, "hann", length)
-    both = modes(recording.p)
-    shown = (frequency > 0) & (frequency <= min(4 * both[1], run.sample_rate / 2))
+    found = modes(recording.p)
+    shown = (frequency > 0) & (frequency <= max((_LEAST_SHOWN_HZ, *(4 * one for one in found))))
     acceleration = np.sqrt(height) * (2 * np.pi * frequency) ** 2
     drive = axis.semilogy(frequency[shown], acceleration[shown], color="C0", label="pivot's acceleration")
     axis.set_ylabel("acceleration [m/s²/√Hz]", color="C0")
@@ -280,7 +286,7 @@ def _spectra(recording: Recording, axis: Axes) -> None:
     motion = other.semilogy(frequency[shown], np.sqrt(angle)[shown], color="C1", label="angle phi")
     other.set_ylabel("angle [rad/√Hz]", color="C1")
     lines = [*drive, *motion]
-    for one in both:
+    for one in found:
         lines += [axis.axvline(one, color="C3", linestyle="--", label=f"mode at {one:.3g} Hz")]
     for scale in (axis, other):  # room for the legend
         low, high = scale.get_ylim()

@@ -58,7 +58,7 @@ function drawWords(state) {
   place("kappaShare").value = state.kappaShare;
   place("parameters").replaceChildren(...state.parameters.map((one) => {
     const row = document.createElement("tr");
-    for (const text of [one.symbol, one.meaning, one.value, `± ${one.error} ${one.unit}`]) {
+    for (const text of [one.symbol, one.meaning, one.value, `${one.error} ${one.unit}`]) {
       row.insertCell().textContent = text;
     }
     row.cells[1].className = "quiet";
