@@ -267,9 +267,11 @@ static inline void add_slice(pvid_weak_f32 *self)
     const size_t end = first + self->slice;
     const size_t last = (end < design->functions) ? end : design->functions;
     if (first == 0u) {
-        pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, &self->bend, self->term);
+        pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, &self->bend,
+                                   self->term[self->turn][window->index % 2u]);
     }
-    pvid_weak_window_add_f32(window, design, self->term, first, last, self->sums[window->buffer]);
+    pvid_weak_window_add_f32(window, design, (const float(*)[PVID_WEAK_SAMPLE_TERMS])self->term[self->turn], first,
+                             last, self->sums[window->buffer]);
     self->function = (uint8_t)last;
     if (last == design->functions) {
         self->function = 0;

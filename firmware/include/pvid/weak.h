@@ -113,6 +113,9 @@ typedef struct {
 /* What a window gathers for each test function: eight sums with chi'', four with chi, one with chi''''. */
 #define PVID_WEAK_TERMS 13
 
+/* What a sample brings to these sums. */
+#define PVID_WEAK_SAMPLE_TERMS 8
+
 /* One of the two windows. */
 typedef struct {
     uint16_t index; /* of the present decimated sample in the window, 0..W-2 */
@@ -242,7 +245,7 @@ typedef struct {
     pvid_weak_bend_f32 bend;
     pvid_weak_window_f32 window[2];
     pvid_weak_finish_f32 finish;
-    float term[PVID_WEAK_TERMS]; /* of the window in work */
+    float term[2][2][PVID_WEAK_SAMPLE_TERMS]; /* of each window: of its last even and of its last odd sample */
     float sums[3][PVID_MAX_FUNCTIONS][PVID_WEAK_TERMS];
     pvid_estimator_f32 estimator;
     pvid_trust_f32 trust;
