@@ -816,10 +816,19 @@ def bench_side_by_side(update: Path | None) -> int:
 @_UPDATE
 @click.option("--budget", type=click.Path(path_type=Path, exists=True), help="Write the figures as this file's budget.")
 @click.option("--check", type=click.Path(path_type=Path, exists=True), help="Hold the figures against this budget.")
-def sizes_command(update: Path | None, budget: Path | None, check: Path | None) -> int:
+@click.option("--profile", "profiled", metavar="BOARD", help="Where a tick's instructions go on a board, by function.")
+def sizes_command(update: Path | None, budget: Path | None, check: Path | None, profiled: str | None) -> int:
     """Flash, RAM, stack and instructions a tick on every board, built and run in its emulator."""
     from pvid import sizes
 
+    if profiled is not None:
+        if budget is not None or check is not None:
+            raise PvidError("--profile has no budget: leave --budget and --check out")
+        from pvid import boards, profile
+
+        profiles = {form: profile.profile(boards.board(profiled), form) for form in ("strong", "weak")}
+        _update_readme(update, "profile", _markdown(profile.HEADER, profile.table_rows(profiles)))
+        return DONE
     footprints = {}
     with progress_bar("boards", len(sizes.CONFIGURATIONS)) as advance:
         for done, configuration in enumerate(sizes.CONFIGURATIONS):
