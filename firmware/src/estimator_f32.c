@@ -198,11 +198,7 @@ static inline float innovate(const pvid_estimator_f32 *self, const float n[], fl
 /* innovation += C^T N e */
 static inline void listen(pvid_estimator_f32 *self, const float gradient[], float e)
 {
-    PVID_UNROLL
-    for (size_t a = 0; a < PVID_MAX_P; a++) {
-        if (a >= self->model->n_p) {
-            break;
-        }
+    for (size_t a = 0; a < self->model->n_p; a++) {
         self->innovation[a] += gradient[a] * e;
     }
 }
@@ -260,56 +256,89 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
 
 /* ---- the solve ---- */
 
-/* One step of p from S and F, for a model that projects its sums by itself; `gain` is g of estimator.h. */
-PVID_ALWAYS_INLINE pvid_reason step_from(pvid_estimator_f32 *self, bool three, float gain, float s[][PVID_MAX_P],
-                                         float rhs[])
+static pvid_reason hold(uint32_t *counter, pvid_reason reason)
 {
-    const size_t n_p = three ? 3u : self->model->n_p;
-    const float(*upper)[PVID_MAX_P] = (const float(*)[PVID_MAX_P])s;
+    pvid_count_up(counter);
+    return reason;
+}
+
+/* Adds the prior and turns F into the right-hand side, for parameter a; `gain` is g of estimator.h. */
+static inline void complete_system(pvid_estimator_f32 *self, size_t a, float gain, float s[][PVID_MAX_P], float rhs[])
+{
+    s[a][a] += self->prior[a];
+    rhs[a] = (gain * rhs[a]) + ((1.0f - gain) * self->innovation[a]);
+    self->innovation[a] = 0.0f;
+}
+
+/* One step of p from S and F, for a model that projects its sums by itself. */
+static pvid_reason step_of_any(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+{
+    const uint8_t n_p = self->model->n_p;
     float dp[PVID_MAX_P];
     pvid_cholesky_f32 factor;
-    PVID_UNROLL
-    for (size_t a = 0; a < PVID_MAX_P; a++) {
-        if (a >= n_p) {
-            break;
-        }
-        s[a][a] += self->prior[a];
-        rhs[a] = (gain * rhs[a]) + ((1.0f - gain) * self->innovation[a]);
-        self->innovation[a] = 0.0f;
+    for (size_t a = 0; a < n_p; a++) {
+        complete_system(self, a, gain, s, rhs);
     }
-    if (!(three ? pvid_cholesky_factor_three_f32(&factor, upper)
-                : pvid_cholesky_factor_f32(&factor, (uint8_t)n_p, upper))) {
-        pvid_count_up(&self->counters.held_pivot);
-        return PVID_HELD_PIVOT;
+    if (!pvid_cholesky_factor_f32(&factor, n_p, (const float(*)[PVID_MAX_P])s)) {
+        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
     if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
-        pvid_count_up(&self->counters.held_not_excited);
-        return PVID_HELD_NOT_EXCITED;
+        return hold(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
     }
-    if (three) {
-        pvid_cholesky_solve_three_f32(&factor, rhs, dp);
-    } else {
-        pvid_cholesky_solve_f32(&factor, rhs, dp);
-    }
-    const float size = pvid_estimator_size_f32(self, n_p, dp);
+    pvid_cholesky_solve_f32(&factor, rhs, dp);
+    const float size = pvid_estimator_size_f32(self, dp);
     if (!pvid_finite_f32(size)) {
-        pvid_count_up(&self->counters.held_pivot);
-        return PVID_HELD_PIVOT;
+        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
-    pvid_estimator_take_step_f32(self, n_p, dp, size, self->p);
+    pvid_estimator_take_step_f32(self, dp, size, self->p);
     pvid_count_up(&self->counters.updates);
     return PVID_UPDATED;
 }
 
-/* With n_p a constant 3, the paper's, S and its factor stay in registers. */
-static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+static inline float size_of_three(const pvid_estimator_f32 *self, const float dp[])
 {
-    return step_from(self, true, gain, s, rhs);
+    const uint32_t first = pvid_estimator_reach_f32(self, 0, dp[0]);
+    const uint32_t second = pvid_estimator_reach_f32(self, 1, dp[1]);
+    const uint32_t third = pvid_estimator_reach_f32(self, 2, dp[2]);
+    const uint32_t larger = (second > first) ? second : first;
+    return pvid_from_bits_f32((third > larger) ? third : larger);
 }
 
-static pvid_reason step_of_any(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+static inline void take_step_of_three(pvid_estimator_f32 *self, const float dp[], float size)
 {
-    return step_from(self, false, gain, s, rhs);
+    const float part = pvid_estimator_part_f32(self, size);
+    bool bounded = false;
+    self->p[0] = pvid_estimator_moved_f32(self, 0, part * dp[0], &bounded);
+    self->p[1] = pvid_estimator_moved_f32(self, 1, part * dp[1], &bounded);
+    self->p[2] = pvid_estimator_moved_f32(self, 2, part * dp[2], &bounded);
+    if (bounded) {
+        pvid_count_up(&self->counters.bounded);
+    }
+}
+
+/* step_of_any for three parameters, the paper's number: the same, written out, so that S, its factor and dp stay in
+ * registers. */
+static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+{
+    float dp[PVID_MAX_P];
+    pvid_cholesky_f32 factor;
+    complete_system(self, 0, gain, s, rhs);
+    complete_system(self, 1, gain, s, rhs);
+    complete_system(self, 2, gain, s, rhs);
+    if (!pvid_cholesky_factor_three_f32(&factor, (const float(*)[PVID_MAX_P])s)) {
+        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
+    }
+    if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
+        return hold(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
+    }
+    pvid_cholesky_solve_three_f32(&factor, rhs, dp);
+    const float size = size_of_three(self, dp);
+    if (!pvid_finite_f32(size)) {
+        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
+    }
+    take_step_of_three(self, dp, size);
+    pvid_count_up(&self->counters.updates);
+    return PVID_UPDATED;
 }
 
 static inline pvid_reason step_of(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])

@@ -11,7 +11,6 @@
 #include "count.h"
 #include "finite_f32.h"
 #include "pvid/estimator.h"
-#include "unroll.h"
 
 static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
 {
@@ -30,49 +29,57 @@ static inline uint8_t pvid_gated_f32(const pvid_model_f32 *model)
     return (model->n_gated > 0u) ? model->n_gated : model->n_p;
 }
 
-/* How far dp goes, as a part of what each parameter is measured by: its own value where it is
- * positive, else the standard deviation of its start. Not finite if dp is not: the bits of |x| order
- * as |x| does, infinity and NaN last. */
-static inline float pvid_estimator_size_f32(const pvid_estimator_f32 *self, size_t n_p, const float dp[])
+/* How far a step goes in parameter a, as a part of what it is measured by: its own value where it is positive, else the
+ * standard deviation of its start. As bits: those of |x| order as |x| does, infinity and NaN last. */
+static inline uint32_t pvid_estimator_reach_f32(const pvid_estimator_f32 *self, size_t a, float step)
+{
+    const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
+    return pvid_bits_f32(step / reference[a]) & 0x7FFFFFFFu;
+}
+
+/* The farthest of all parameters; not finite if dp is not. */
+static inline float pvid_estimator_size_f32(const pvid_estimator_f32 *self, const float dp[])
 {
     uint32_t largest = 0;
-    PVID_UNROLL
-    for (size_t a = 0; a < PVID_MAX_P; a++) {
-        if (a >= n_p) {
-            break;
-        }
-        const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
-        const uint32_t bits = pvid_bits_f32(dp[a] / reference[a]) & 0x7FFFFFFFu;
-        largest = (bits > largest) ? bits : largest;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        const uint32_t reach = pvid_estimator_reach_f32(self, a, dp[a]);
+        largest = (reach > largest) ? reach : largest;
     }
     return pvid_from_bits_f32(largest);
 }
 
-/* p[n_p] = where the step dp leads: shortened to the step limit, within the bounds. */
-static inline void pvid_estimator_take_step_f32(pvid_estimator_f32 *self, size_t n_p, const float dp[], float size,
-                                                float p[])
+/* Where a step leads in parameter a, within its bounds. */
+static inline float pvid_estimator_moved_f32(const pvid_estimator_f32 *self, size_t a, float step, bool *bounded)
 {
-    float factor = 1.0f;
-    bool bounded = false;
-    if (size > self->step_limit) {
-        factor = self->step_limit / size;
-        pvid_count_up(&self->counters.limited);
+    float x = self->p[a] + step;
+    if (x > self->upper[a]) {
+        x = self->upper[a];
+        *bounded = true;
     }
-    PVID_UNROLL
-    for (size_t a = 0; a < PVID_MAX_P; a++) {
-        if (a >= n_p) {
-            break;
-        }
-        float x = self->p[a] + (factor * dp[a]);
-        if (x > self->upper[a]) {
-            x = self->upper[a];
-            bounded = true;
-        }
-        if (x < self->lower[a]) {
-            x = self->lower[a];
-            bounded = true;
-        }
-        p[a] = x;
+    if (x < self->lower[a]) {
+        x = self->lower[a];
+        *bounded = true;
+    }
+    return x;
+}
+
+/* Part of a step of this size that is taken. */
+static inline float pvid_estimator_part_f32(pvid_estimator_f32 *self, float size)
+{
+    if (size > self->step_limit) {
+        pvid_count_up(&self->counters.limited);
+        return self->step_limit / size;
+    }
+    return 1.0f;
+}
+
+/* p[n_p] = where the step dp leads: shortened to the step limit, within the bounds. */
+static inline void pvid_estimator_take_step_f32(pvid_estimator_f32 *self, const float dp[], float size, float p[])
+{
+    const float part = pvid_estimator_part_f32(self, size);
+    bool bounded = false;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        p[a] = pvid_estimator_moved_f32(self, a, part * dp[a], &bounded);
     }
     if (bounded) {
         pvid_count_up(&self->counters.bounded);

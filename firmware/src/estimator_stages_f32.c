@@ -107,10 +107,10 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
     if (solve->reason == PVID_UPDATED) {
         float dp[PVID_MAX_P];
         pvid_cholesky_solve_f32(&solve->factor, rhs, dp);
-        const float size = pvid_estimator_size_f32(self, model->n_p, dp);
+        const float size = pvid_estimator_size_f32(self, dp);
         if (pvid_finite_f32(size)) {
             solve->size = size;
-            pvid_estimator_take_step_f32(self, model->n_p, dp, size, solve->p);
+            pvid_estimator_take_step_f32(self, dp, size, solve->p);
         } else {
             hold(self, solve, PVID_HELD_PIVOT);
         }

@@ -44,24 +44,42 @@ static size_t number_of_sums(const pvid_information_f32 *self)
     return (size_t)self->n_moments + self->n_theta + 2u;
 }
 
-/* Inlined twice: with n_theta a constant 8, that of the weak form, the compiler writes the loops out. */
-static inline void accumulate_of(size_t n_theta, const float *restrict n, float y, float row_weight,
-                                 float *restrict low)
+/* All products of a row, the packed upper triangle by rows, then N y, y^2 and the weight. */
+static inline void accumulate_any(size_t n_theta, const float *restrict n, float y, float row_weight,
+                                  float *restrict low)
 {
-    PVID_UNROLL
     for (size_t i = 0; i < n_theta; i++) {
-        PVID_UNROLL
         for (size_t j = i; j < n_theta; j++) {
             *low += n[i] * n[j];
             low++;
         }
     }
-    PVID_UNROLL
     for (size_t i = 0; i < n_theta; i++) {
         low[i] += y * n[i];
     }
     low[n_theta] += y * y;
     low[n_theta + 1u] += row_weight;
+}
+
+#define EIGHT 8u
+
+/* The same for the weak form's number of entries, a constant: the compiler writes the loops out. */
+static inline void accumulate_eight(const float *restrict n, float y, float row_weight, float *restrict low)
+{
+    PVID_UNROLL
+    for (size_t i = 0; i < EIGHT; i++) {
+        PVID_UNROLL
+        for (size_t j = i; j < EIGHT; j++) {
+            *low += n[i] * n[j];
+            low++;
+        }
+    }
+    PVID_UNROLL
+    for (size_t i = 0; i < EIGHT; i++) {
+        low[i] += y * n[i];
+    }
+    low[EIGHT] += y * y;
+    low[EIGHT + 1u] += row_weight;
 }
 
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
@@ -70,10 +88,10 @@ void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *
     if (model->accumulate != NULL) {
         model->accumulate(n, y, self->high, self->low, sums);
     } else {
-        if (model->n_theta == 8u) {
-            accumulate_of(8, n, y, self->row_weight, self->low);
+        if (model->n_theta == EIGHT) {
+            accumulate_eight(n, y, self->row_weight, self->low);
         } else {
-            accumulate_of(model->n_theta, n, y, self->row_weight, self->low);
+            accumulate_any(model->n_theta, n, y, self->row_weight, self->low);
         }
         if (sums != NULL) {
             pvid_information_read_f32(self, sums);

@@ -18,6 +18,12 @@
 
 #include "pvid/weak.h"
 
+/* Whether there is a correction: never where it is left out, and then nothing refers to the functions below. */
+static inline bool pvid_weak_angle_is_asked_f32(const pvid_weak_angle_f32 *self)
+{
+    return (PVID_FULL_ANGLE == 1) && (self != NULL);
+}
+
 /* No samples, correction off. Passes 1..PVID_MAX_PASSES. */
 void pvid_weak_angle_init_f32(pvid_weak_angle_f32 *self, const pvid_weak_config_f32 *config);
 

@@ -44,7 +44,7 @@ static bool angle_is_valid(const pvid_weak_config_f32 *config)
         return true;
     }
     const bool room = !config->friction || (config->zero_unknown && PVID_KAPITZA_HAS_FRICTION);
-    return room && (config->angle != NULL) && (config->passes >= 1u) && (config->passes <= PVID_MAX_PASSES);
+    return room && pvid_weak_angle_is_asked_f32(config->angle) && (config->passes >= 1u) && (config->passes <= PVID_MAX_PASSES);
 }
 
 static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
@@ -117,8 +117,8 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     self->angle_limit = config->angle_limit;
     self->slice = pvid_weak_functions_a_tick(design->decimation, design->functions);
     self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
-    if (config->full_angle || config->friction) {
-        self->angle = config->angle;
+    self->angle = (config->full_angle || config->friction) ? config->angle : NULL;
+    if (pvid_weak_angle_is_asked_f32(self->angle)) {
         pvid_weak_angle_init_f32(self->angle, config);
     }
     const uint32_t stages = pvid_weak_finish_stages_f32(design, self->iterations, &self->estimator, self->angle);
@@ -239,7 +239,7 @@ static pvid_reason next_sample(pvid_weak_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
     next_bend(&self->bend, self->design->lag, self->phi);
-    if (self->angle != NULL) {
+    if (pvid_weak_angle_is_asked_f32(self->angle)) {
         pvid_weak_angle_keep_f32(self->angle, self->phi, self->u);
     }
     for (size_t i = 0; i < 2u; i++) {

@@ -121,7 +121,7 @@ void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator
 {
     pvid_weak_whiten_begin_f32(&self->whiten, estimator->p);
     self->angle = angle;
-    if (angle != NULL) {
+    if (pvid_weak_angle_is_asked_f32(angle)) {
         pvid_weak_angle_begin_f32(angle, estimator->p);
     }
     self->expected = expected;
@@ -155,7 +155,7 @@ static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *est
     if (self->whiten.whitened) {
         memcpy(estimator->noise, self->whiten.trace, sizeof estimator->noise);
     }
-    if (self->angle != NULL) {
+    if (pvid_weak_angle_is_asked_f32(self->angle)) {
         pvid_information_fade_f32(&estimator->information, pvid_weak_angle_ageing_f32(self->angle));
     }
 }
@@ -208,7 +208,7 @@ static bool assess_on(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *de
     const bool stepped = self->reason == PVID_UPDATED;
     self->reason = pvid_trust_judge_f32(trust, estimator, self->reason, self->size, self->solve.informed, surplus,
                                         &self->candidate);
-    if ((self->angle != NULL) && stepped) {
+    if (pvid_weak_angle_is_asked_f32(self->angle) && stepped) {
         const float worst = pvid_trust_widest_f32(estimator, &self->candidate);
         if (pvid_weak_angle_settle_f32(self->angle, estimator->p, worst, trust->groups)) {
             pvid_trust_restart_alarm_f32(trust); /* until p has left where the uncorrected rows had led it */
@@ -233,7 +233,8 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         assemble(sums[row]);
         break;
     case STAGE_LACK:
-        if ((self->angle != NULL) && !pvid_weak_angle_step_f32(self->angle, design, estimator->theta, sums)) {
+        if (pvid_weak_angle_is_asked_f32(self->angle) &&
+            !pvid_weak_angle_step_f32(self->angle, design, estimator->theta, sums)) {
             return;
         }
         done = functions;
@@ -318,7 +319,7 @@ uint32_t pvid_weak_finish_stages_f32(const pvid_weak_design_f32 *design, uint8_t
                                      const pvid_estimator_f32 *estimator, const pvid_weak_angle_f32 *angle)
 {
     const uint32_t functions = design->functions;
-    const uint32_t lack = (angle != NULL) ? pvid_weak_angle_stages_f32(angle, design) : 1u;
+    const uint32_t lack = pvid_weak_angle_is_asked_f32(angle) ? pvid_weak_angle_stages_f32(angle, design) : 1u;
     const uint32_t parts = (functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
     const uint32_t rows = ((4u + TRACE_STAGES) * functions) + 2u + (4u * parts) + lack;
     const uint32_t first = pvid_estimator_stages_f32(estimator, true);

@@ -42,6 +42,10 @@ void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, fl
     const float i2_f = integrate(self, F, phi, half_dt, correction);
     const float i2_u = integrate(self, U, u, half_dt, correction);
     observe(self, phi, u, bend);
+    if (self->index == 0u) { /* no weight, and 0 times what is infinite would not be 0 */
+        memset(term, 0, PVID_WEAK_SAMPLE_TERMS * sizeof term[0]);
+        return;
+    }
     const float steps = (float)self->index;
     const float i2_one = (dt * dt) * ((0.5f * (steps * steps)) - (1.0f / 6.0f));
     const float t = dt * (steps - (0.5f * (float)(samples - 1u)));

@@ -24,7 +24,8 @@ enum {
     PVID_TERM_Y = 12      /* chi'''' phi */
 };
 
-/* Integrates up to the decimated sample phi [rad], u [1/s^2] at self->index and writes its terms.
+/* Integrates up to the decimated sample phi [rad], u [1/s^2] at self->index and writes its terms, 0 for the window's
+ * first sample, which has no weight.
  * I2 is the double integral from the window's first sample, by the trapezoid rule less dt^2/6 times
  * the integrand; t is the time from the window's middle. Cost: 40 operations. */
 void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, float dt, float phi, float u,

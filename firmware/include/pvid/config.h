@@ -100,6 +100,15 @@
 #define PVID_TABLE
 #endif
 
+/* 0 leaves the weak form's correction for large angles and friction out of the image, 3 kB on a Cortex-M4F, and
+ * init refuses full_angle and friction. By itself the linker cannot: a setting that init reads asks for them. */
+#ifndef PVID_FULL_ANGLE
+#define PVID_FULL_ANGLE 1
+#endif
+#if PVID_FULL_ANGLE != 0 && PVID_FULL_ANGLE != 1
+#error "PVID_FULL_ANGLE must be 0 or 1"
+#endif
+
 /* Called on misuse (NULL where an object is needed). Replace it by your own trap or reset. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))

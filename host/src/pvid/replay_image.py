@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -269,10 +270,11 @@ def parse_report(text: str) -> ReplayReport:
 # ---- the image
 
 
-def build_image(target: Board, run: ReplayRun) -> tuple[Path, Path]:
+def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None = None) -> tuple[Path, Path]:
     """Builds the replay image of `run` for a board under build/targets; returns (image, build tree).
 
-    The strong form's windows are as long as its five points, so that its state is what a board would hold.
+    The strong form's windows are as long as its five points, so that its state is what a board would hold; `macros`
+    of pvid/config.h come on top.
     """
     text = header(run)
     name = f"{run.form}-{run.core}-{run.ticks}-{zlib.crc32(text.encode()):08x}"
@@ -285,7 +287,9 @@ def build_image(target: Board, run: ReplayRun) -> tuple[Path, Path]:
         design = run.config.design
         options |= {"PVID_MAX_TAPS": str(design.taps), "PVID_MAX_DECIMATION": str(design.decimation)}
         options |= {"PVID_MAX_FUNCTIONS": str(design.functions)}
-    tree = build(target, BUILD / f"{target.name}-{name}", options)
+    options |= macros or {}
+    suffix = "".join(f"-{macro}-{value}" for macro, value in (macros or {}).items())
+    tree = build(target, BUILD / f"{target.name}-{name}{suffix}", options)
     return tree / "apps" / "replay" / "replay.elf", tree
 
 
