@@ -1,4 +1,4 @@
-"""A build without the correction for large angles (PVID_FULL_ANGLE 0): it links, keeps the bits, refuses the setting."""
+"""A build without the correction for large angles (PVID_FULL_ANGLE 0) links, keeps the bits, refuses the setting."""
 
 from __future__ import annotations
 
