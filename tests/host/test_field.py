@@ -10,21 +10,19 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
-from test_stream import standard_rig
+from test_stream import KINDS, standard_rig
 
 from pvid.errors import PvidError
 from pvid.field import FieldRecord, collect
 from pvid.link import SCHEMA_TEXT, Source, encode
 from pvid.native import Native
+from pvid.port import Port
 from pvid.stream_image import settings_number
 from pvid.stream_rig import StreamRig
-from pvid.target import HOST_TARGET, Port, Target, open_target
+from pvid.target import HOST_TARGET, Target, open_target
 from pvid.twin.sensor import SensorConstants, counts
 
 TICKS = 9000  # two announcements more in the weak form's 1 kHz
-KINDS = pytest.mark.parametrize(
-    ("form", "core"), [("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31")]
-)
 
 
 @cache
@@ -50,7 +48,7 @@ def assert_replays(record: FieldRecord, rig: StreamRig, form: str, native: Nativ
     assert all(hashes[tick - 1] == value for tick, value in record.hashes.items())
 
 
-@KINDS
+@pytest.mark.parametrize(("form", "core"), KINDS)
 @pytest.mark.parametrize("name", [HOST_TARGET, "microbit", "mps2-an386", "virt-rv32imac"])
 def test_a_board_samples_by_itself(name: str, form: str, core: str, native: Native) -> None:
     rig = standard_rig(form, core)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,12 +19,15 @@ import pytest
 from pvid.errors import PvidError
 from pvid.link import Estimate
 from pvid.native import Native, WeakConfig
+from pvid.port import Port
 from pvid.replay_image import SAMPLE_RATE, ReplayRun, native_hashes, standard_run
 from pvid.rig import STANDARD_PENDULUM
 from pvid.stream_rig import StreamRig
-from pvid.target import HOST_TARGET, Playback, Port, Target, judge, open_target, play
+from pvid.target import HOST_TARGET, Playback, Target, judge, open_target, play, verify
 
 TICKS = 5000
+LONG = 40_000
+KINDS = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
 EMULATED = (
     "microbit",
     "mps2-an385",
@@ -73,7 +77,7 @@ def play_standard(
     return play(target, rig_of(run), phi, y, reopen=reopen, patience_s=patience_s, resend_s=0.5)
 
 
-@pytest.mark.parametrize(("form", "core"), [("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31")])
+@pytest.mark.parametrize(("form", "core"), KINDS)
 @pytest.mark.parametrize("name", [HOST_TARGET, *EMULATED])
 def test_every_target_computes_the_bits_of_the_host(name: str, form: str, core: str, native: Native) -> None:
     playback = play_standard(open_target(name, standard_rig(form, core)), form, core)
@@ -82,6 +86,18 @@ def test_every_target_computes_the_bits_of_the_host(name: str, form: str, core: 
     assert playback.missing_hashes == []
     assert (playback.done, playback.restarts) == (TICKS, 0)
     assert playback.hello is not None and name.endswith(playback.hello.board[:16])
+
+
+@pytest.mark.parametrize(("form", "core"), KINDS)
+def test_a_long_run_stays_equal_on_two_boards_at_once(form: str, core: str, native: Native) -> None:
+    run = standard_run(form, LONG, core)
+    phi, y = (run.phi, run.y) if core == "f32" else (run.counts[:, 0], run.counts[:, 1])
+    rig = rig_of(run)
+    with ThreadPoolExecutor(2) as pool:
+        verdicts = list(pool.map(lambda name: verify(name, rig, native, phi, y), ("mps2-an386", "virt-rv32imac")))
+    for verdict in verdicts:
+        assert verdict.equal, verdict.text
+        assert verdict.playback.done == LONG and len(verdict.playback.hashes) == LONG // 500
 
 
 def test_the_last_estimate_is_that_of_the_core(native: Native) -> None:
@@ -183,8 +199,9 @@ def test_a_killed_emulator_is_started_again_and_the_run_over(name: str, form: st
 
 
 def test_a_port_that_is_gone_for_good_ends_with_what_is_missing(native: Native) -> None:
+    target = start_to_be_killed(HOST_TARGET, "weak", 20_000)  # built first
     began = time.monotonic()
-    playback = play_standard(start_to_be_killed(HOST_TARGET, "weak", 20_000), "weak", patience_s=3)
+    playback = play_standard(target, "weak", patience_s=3)
     assert time.monotonic() - began < 20
     verdict = judge(playback, expected("weak", native))
     assert not verdict.equal
@@ -243,7 +260,7 @@ def test_a_wrong_bit_is_not_called_equal(native: Native) -> None:
 def test_an_unknown_target_is_named() -> None:
     with pytest.raises(PvidError, match="there is no target mps2; there are stream-host, microbit"):
         open_target("mps2", standard_rig("weak"))
-    with pytest.raises(PvidError, match="cannot open the port /dev/nowhere"):
+    with pytest.raises(PvidError, match="there is no port /dev/nowhere"):
         open_target("/dev/nowhere", standard_rig("weak"))
 
 

@@ -23,7 +23,8 @@ from pvid.errors import PvidError
 from pvid.link import Code, Configuration, Credit, Hello, Message, Status, encode
 from pvid.logfile import LogWriter, Segment
 from pvid.logreader import Account, LogStream, Observer, Record
-from pvid.target import COMING_UP_S, Port, Target, open_port, refusal
+from pvid.port import Port, open_port
+from pvid.target import COMING_UP_S, Target, refusal
 
 _CHUNK = 1 << 14
 _RETRY_S = 0.25

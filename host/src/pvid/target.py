@@ -10,11 +10,9 @@ from __future__ import annotations
 import re
 import select
 import subprocess
-import termios
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -37,23 +35,14 @@ from pvid.link import (
 )
 from pvid.link import Status as BoardStatus
 from pvid.native import Native, Status
+from pvid.port import Port, open_port
 from pvid.stream_image import build_image, settings_number
 from pvid.stream_rig import StreamRig
 
 SAMPLES_A_FRAME = 64
 HOST_TARGET = "stream-host"
 EMULATORS = tuple(name for name, board in BOARDS.items() if board.toolchain != "avr")
-COMING_UP_S = 2.0  # longest wait for an emulator's first word
-
-
-class Port(Protocol):
-    """What `play` needs of a serial port; pyserial's have it."""
-
-    def read(self, size: int = 1, /) -> bytes: ...
-
-    def write(self, data: bytes, /) -> int | None: ...
-
-    def close(self) -> None: ...
+COMING_UP_S = 20.0  # longest wait for an emulator's first word: it always has one, however busy the machine
 
 
 class PortGoneError(Exception):
@@ -77,25 +66,6 @@ class Target:
             self.process.wait()
             if self.process.stdout is not None:
                 self.process.stdout.close()
-
-
-def open_port(name: str) -> Port:
-    """A serial port by device or URL, 115200 baud; DTR and RTS low, so that opening resets no board.
-
-    Raises
-    ------
-    PvidError
-        When it cannot be opened.
-    """
-    try:
-        port = serial.serial_for_url(name, do_not_open=True, baudrate=115200, timeout=0.02, write_timeout=5)
-        if "://" not in name:
-            port.dtr = False
-            port.rts = False
-        port.open()
-    except (serial.SerialException, OSError, ValueError, termios.error) as error:
-        raise PvidError(f"cannot open the port {name}: {error}") from error
-    return port
 
 
 def open_target(name: str, rig: StreamRig, wrap: Callable[[Port], Port] = lambda port: port) -> Target:

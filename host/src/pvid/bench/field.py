@@ -21,10 +21,11 @@ from pvid.link import Raw, Source, encode_raw
 from pvid.logger import Logger
 from pvid.logreader import Account, LogReader
 from pvid.logverify import Stretch, Verifier
+from pvid.port import Port, open_port
 from pvid.rigfile import RigFile
 from pvid.stream_image import settings_number
 from pvid.stream_rig import StreamRig, stream_rig
-from pvid.target import Port, Target, open_port, open_target
+from pvid.target import Target, open_target
 
 _SAMPLES_A_FRAME = 16
 _BYTES_A_SAMPLE = 10.0  # about, with all that goes with it
