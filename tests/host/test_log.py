@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -306,12 +307,17 @@ def wait_for(path: Path, condition: Callable[[Account], bool]) -> Account:
 
 
 def test_log_records_all_and_ends_with_a_summary(tmp_path: Path, boards: Boards, pvid: Loggers) -> None:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listener.bind(("127.0.0.1", 0))
     boards(ticks=TICKS)
-    process = pvid()
+    process = pvid("--tee", f"udp://127.0.0.1:{listener.getsockname()[1]}")
     wait_for(tmp_path / "out.pvlog", lambda account: account.samples == TICKS)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=20)
     assert process.returncode == 0, err
+    listener.settimeout(5)
+    assert set(json.loads(listener.recv(4096))) == {"timestamp", "tick", "samples"}
+    listener.close()
     assert f"{TICKS} samples in 1 segment; lost 0 frames, 0 samples, 0 while the link was down; 0 damaged" in out
     assert "ended by SIGINT" in out
     records, account = read(tmp_path / "out.pvlog")
