@@ -195,6 +195,14 @@ Q31 = {
     "estimator.row_weight": Range(1, 2**16, Status.BAD_ROW_WEIGHT),
     "estimator.step_limit": Range(1, 58982, Status.BAD_STEP_LIMIT),
     "estimator.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_KAPPA_MIN),
+    "estimator.noise_margin": Range(0, 2**30, Status.BAD_NOISE_MARGIN),
+    "pivot_noise.m": Range(0, 2**30, Status.BAD_PIVOT_NOISE),
+    "pivot_noise.e": Range(-200, 200, Status.BAD_PIVOT_NOISE),
+    "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
+    "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
+    "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
+    "trust.groups_min": Range(0, 65535, Status.OK),
+    "trust.shut_max": Range(0, 65535, Status.OK),
     "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
 }
 RANGES = {
@@ -224,6 +232,7 @@ REFUSED = {
         "design.window": (0, 7, 156, 65535),
         "design.functions": (0, 3, 255),
         "design.smooth_bits": (32, 255),
+        "design.lag": (0,),
         **{f"design.{shift}": (63, 255) for shift in ("phi_shift", "u_shift", "uf_shift")},
         **{f"design.{full_scale}": (0, -1, LEAST, 2**31 - 1) for full_scale in ("phi_max", "y_max", "u_max")},
         "design.sum_shift": (0, 31, 255),
