@@ -32,7 +32,7 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     const int32_t diagonal = s[j][j];
     int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
     for (size_t k = j + 1u; k < n; k++) {
-        pivot -= (int64_t)self->u[j][k] * self->u[j][k];
+        pivot -= pvid_product_q31(self->u[j][k], self->u[j][k]);
     }
     self->positive = self->positive && pvid_pivot_is_data_q31(pivot, diagonal);
     if (!self->positive) {
@@ -44,7 +44,7 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     for (size_t i = 0; i < j; i++) {
         int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
         for (size_t k = j + 1u; k < n; k++) {
-            sum -= (int64_t)self->u[i][k] * self->u[j][k];
+            sum -= pvid_product_q31(self->u[i][k], self->u[j][k]);
         }
         self->u[i][j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
     }
@@ -75,7 +75,7 @@ void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[],
         const size_t i = self->n - turn;
         int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
         for (size_t k = i + 1u; k < self->n; k++) {
-            sum -= (int64_t)self->u[i][k] * x[k];
+            sum -= pvid_product_q31(self->u[i][k], x[k]);
         }
         x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
     }
@@ -86,7 +86,7 @@ static void solve_upper(const pvid_cholesky_q31 *self, const int32_t rhs[], int3
     for (size_t i = 0; i < self->n; i++) {
         int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
         for (size_t k = 0; k < i; k++) {
-            sum -= (int64_t)self->u[k][i] * x[k];
+            sum -= pvid_product_q31(self->u[k][i], x[k]);
         }
         x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
     }

@@ -48,8 +48,8 @@ static bool sum_fits(const pvid_fir_bank_q31 *bank, size_t order, int32_t full_s
         away += 2u * pvid_magnitude_q31(weight[i]);
         at_centre -= is_even(order) ? (2 * (int64_t)weight[i]) : 0;
     }
-    const int64_t largest = (int64_t)((away + pvid_magnitude_q31(at_centre)) * (uint64_t)full_scale);
-    return (shift <= 62u) && (pvid_round_shift_q31(largest, shift) <= PVID_DERIVATIVE_LIMIT_Q31);
+    const uint64_t largest = (away + pvid_magnitude_q31(at_centre)) * (uint64_t)full_scale;
+    return (shift <= 62u) && (pvid_round_shift_q31((int64_t)largest, shift) <= PVID_DERIVATIVE_LIMIT_Q31);
 }
 
 static bool is_full_scale(int32_t counts)

@@ -180,8 +180,8 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
     int64_t e = y;
     for (size_t i = 0; i < self->model->n_theta; i++) {
         fits = fits && within_row_limit(n[i]);
-        const int64_t held = pvid_clamp_q31(n[i], PVID_ROW_LIMIT_Q31);
-        e -= pvid_clamp_q31(pvid_scale_q31(held * self->mantissa[i], self->shift[i]), TERM_MAX);
+        const int32_t held = (int32_t)pvid_clamp_q31(n[i], PVID_ROW_LIMIT_Q31);
+        e -= pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(held, self->mantissa[i]), self->shift[i]), TERM_MAX);
     }
     if (!fits || !within_row_limit(e)) {
         pvid_count_up(&self->counters.rejected_saturated);

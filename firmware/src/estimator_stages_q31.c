@@ -163,7 +163,7 @@ static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     int64_t rhs[PVID_MAX_P] = {0};
     int32_t x[PVID_MAX_P];
     for (size_t k = 0; k < model->n_c; k++) {
-        rhs[model->c_column[k]] += (int64_t)solve->c[k] * solve->force[model->c_row[k]];
+        rhs[model->c_column[k]] += pvid_product_q31(solve->c[k], solve->force[model->c_row[k]]);
     }
     for (size_t a = 0; a < model->n_p; a++) {
         rhs[a] = pvid_scale_q31(rhs[a], solve->g[a]);
@@ -255,11 +255,11 @@ static size_t follow_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
         size_t at = i;
         int64_t sum = 0;
         for (size_t j = 0; j < i; j++) {
-            sum += (int64_t)solve->m[at] * solve->theta_step[j];
+            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
             at += (n - 1u) - j;
         }
         for (size_t j = i; j < n; j++) {
-            sum += (int64_t)solve->m[at] * solve->theta_step[j];
+            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
             at++;
         }
         solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_HELD_LIMIT);
@@ -280,7 +280,7 @@ static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solv
     const int32_t exponent = pvid_to_block_q31((uint32_t)n, both, 30, mantissa);
     int64_t fall = 0;
     for (size_t j = 0; j < n; j++) {
-        fall += (int64_t)solve->theta_step[j] * mantissa[j];
+        fall += pvid_product_q31(solve->theta_step[j], mantissa[j]);
     }
     return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->step_exponent + exponent)), PVID_HELD_LIMIT);
 }

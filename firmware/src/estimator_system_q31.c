@@ -77,11 +77,11 @@ static void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int64_t
 {
     size_t at = j;
     for (size_t i = 0; i < j; i++) {
-        t[i] += (int64_t)m[at] * a;
+        t[i] += pvid_product_q31(m[at], a);
         at += (n - 1u) - i;
     }
     for (size_t i = j; i < n; i++) {
-        t[i] += (int64_t)m[at] * a;
+        t[i] += pvid_product_q31(m[at], a);
         at++;
     }
 }
@@ -101,7 +101,7 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
         s[b] = 0;
     }
     for (size_t k = start; k < model->n_c; k++) {
-        s[model->c_column[k]] += c[k] * t[model->c_row[k]];
+        s[model->c_column[k]] += pvid_product_q31(c[k], (int32_t)t[model->c_row[k]]);
     }
     return end;
 }

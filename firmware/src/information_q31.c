@@ -50,18 +50,18 @@ void pvid_information_add_q31(pvid_information_q31 *self, const int32_t n[], int
     int64_t *sum = self->sums;
     for (size_t i = 0; i < n_theta; i++) {
         for (size_t j = i; j < n_theta; j++) {
-            *sum += (int64_t)row[i] * row[j];
+            *sum += pvid_product_q31(row[i], row[j]);
             sum++;
         }
     }
     for (size_t i = 0; i < n_theta; i++) {
-        const int64_t product = (int64_t)row[i] * error;
+        const int64_t product = pvid_product_q31(row[i], error);
         sum[i] += product;
         if (fresh != NULL) {
             fresh[i] += product;
         }
     }
-    sum[n_theta] += (int64_t)error * error;
+    sum[n_theta] += pvid_product_q31(error, error);
     sum[n_theta + 1u] += self->row_weight;
 }
 

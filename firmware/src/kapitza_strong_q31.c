@@ -26,7 +26,7 @@ static bool take_powers(int32_t x, int32_t u, const uint8_t shift[], size_t coun
     bool fits = take(-(int64_t)x, shift[0], &out[count - 1u]);
     for (size_t k = 1; k < count; k++) {
         const size_t at = (count - 1u) - k;
-        fits = take((int64_t)u * out[at + 1u], shift[k], &out[at]) && fits;
+        fits = take(pvid_product_q31(u, out[at + 1u]), shift[k], &out[at]) && fits;
     }
     return fits;
 }
@@ -36,12 +36,12 @@ bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *shifts, const int32_
                                  int32_t n[PVID_KAPITZA_STRONG_THETA])
 {
     /* Y = 2 u' (u' phi'') - u (u'' phi'' + 2 u' phi''' - u phi''''), and N_1 is that bracket less u phi'''' */
-    const int64_t u0_phi4 = (int64_t)u[0] * phi[4];
-    const int64_t bracket = (((int64_t)u[2] * phi[2]) + (2 * ((int64_t)u[1] * phi[3]))) - u0_phi4;
+    const int64_t u0_phi4 = pvid_product_q31(u[0], phi[4]);
+    const int64_t bracket = (pvid_product_q31(u[2], phi[2]) + (2 * pvid_product_q31(u[1], phi[3]))) - u0_phi4;
     int32_t a;
     int32_t b;
-    if (!take(bracket, shifts->part, &a) || !take((int64_t)u[1] * phi[2], shifts->part, &b) ||
-        !take((2 * ((int64_t)u[1] * b)) - ((int64_t)u[0] * a), shifts->y, y) ||
+    if (!take(bracket, shifts->part, &a) || !take(pvid_product_q31(u[1], phi[2]), shifts->part, &b) ||
+        !take((2 * pvid_product_q31(u[1], b)) - pvid_product_q31(u[0], a), shifts->y, y) ||
         !take(bracket - u0_phi4, shifts->n_a, &n[N_A]) || !take(-(int64_t)phi[4], shifts->n_e, &n[N_E])) {
         return false;
     }
@@ -64,7 +64,7 @@ static int64_t lift(int64_t x)
 
 static int64_t product(int32_t a, int32_t b)
 {
-    return pvid_round_shift_q31((int64_t)a * b, DOWN);
+    return pvid_round_shift_q31(pvid_product_q31(a, b), DOWN);
 }
 
 /* powers[k] = x w^k for k = 1..count, from the first. */

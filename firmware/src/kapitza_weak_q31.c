@@ -17,7 +17,7 @@ static int64_t lift(int64_t x)
 
 static int64_t product(int32_t a, int32_t b)
 {
-    return pvid_round_shift_q31((int64_t)a * b, DOWN);
+    return pvid_round_shift_q31(pvid_product_q31(a, b), DOWN);
 }
 
 static void zeroed_theta_of(const int32_t p[], int64_t theta[])

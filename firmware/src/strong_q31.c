@@ -72,7 +72,7 @@ static pvid_reason refuse(pvid_strong_q31 *self)
 static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int32_t u[])
 {
     for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
-        const int64_t exact = pvid_round_shift_q31((int64_t)d_y[k] * self->u_multiplier, self->u_shift);
+        const int64_t exact = pvid_round_shift_q31(pvid_product_q31(d_y[k], self->u_multiplier), self->u_shift);
         if (!is_within(exact, PVID_DERIVATIVE_LIMIT_Q31)) {
             return false;
         }
@@ -98,7 +98,7 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
     if (!accelerations(self, d_y, u)) {
         return refuse(self);
     }
-    self->drive += pvid_times_q31(((int64_t)u[0] * u[0]) - self->drive, self->drive_forgetting);
+    self->drive += pvid_times_q31(pvid_product_q31(u[0], u[0]) - self->drive, self->drive_forgetting);
     if (self->drive < self->drive_min) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;

@@ -206,7 +206,7 @@ static void factor_entries(pvid_weak_finish_q31 *self, size_t row, size_t first,
     for (size_t j = first; j < last; j++) {
         int64_t sum = (int64_t)l[j] * PVID_ONE_Q30;
         for (size_t i = 0; i < j; i++) {
-            sum -= (int64_t)l[i] * above[i];
+            sum -= pvid_product_q31(l[i], above[i]);
         }
         l[j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
         above += j + 1u;
@@ -219,7 +219,7 @@ static void factor_diagonal(pvid_weak_finish_q31 *self, size_t row)
     const int32_t *l = &self->factor[row_start(row)];
     int64_t pivot = (int64_t)l[row] * PVID_ONE_Q30;
     for (size_t j = 0; j < row; j++) {
-        pivot -= (int64_t)l[j] * l[j];
+        pivot -= pvid_product_q31(l[j], l[j]);
     }
     self->whitened = self->whitened && pvid_pivot_is_data_q31(pivot, l[row]);
     const uint64_t square = self->whitened ? (uint64_t)pivot : (uint64_t)((int64_t)1 << 60);
@@ -340,7 +340,7 @@ static void whiten_part(pvid_weak_finish_q31 *self, row_part part, int32_t sums[
         }
         int64_t sum = (int64_t)held(self, pvid_scale_q31(x[i], shift)) * PVID_ONE_Q30;
         for (size_t j = 0; j < row; j++) {
-            sum -= (int64_t)l[j] * sums[j][i];
+            sum -= pvid_product_q31(l[j], sums[j][i]);
         }
         x[i] = held(self, pvid_divide_q31(sum, self->inverse[row], COLUMN_LIMIT));
     }
@@ -358,7 +358,7 @@ static void find_length(pvid_weak_finish_q31 *self, size_t functions, size_t col
     }
     (void)pvid_to_block_q31((uint32_t)functions, wide, DIRECTION_BITS, self->direction);
     for (size_t k = 0; k < functions; k++) {
-        square += (uint64_t)((int64_t)self->direction[k] * self->direction[k]);
+        square += (uint64_t)(pvid_product_q31(self->direction[k], self->direction[k]));
     }
     const pvid_reciprocal_q31 none = {0, 0};
     self->length = (square > 0u) ? pvid_reciprocal_of_q31(pvid_square_root_q31(square)) : none;
@@ -380,7 +380,7 @@ static void find_components(pvid_weak_finish_q31 *self, size_t first, size_t las
     }
     for (size_t k = first; k < last; k++) {
         for (size_t i = 0; i < PVID_WEAK_COLUMNS_Q31; i++) {
-            self->along[i] += (int64_t)self->direction[k] * sums[k][i];
+            self->along[i] += pvid_product_q31(self->direction[k], sums[k][i]);
         }
     }
 }

@@ -53,7 +53,7 @@ def test_the_host_computes_the_bits_of_the_twin(form: str, native: Native) -> No
         assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
 
 
-@pytest.mark.parametrize(("form", "core"), [("strong", "f32"), ("weak", "f32"), ("weak", "q31")])
+@pytest.mark.parametrize(("form", "core"), [(form, core) for form in ("strong", "weak") for core in ("f32", "q31")])
 def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measured: Measured, native: Native) -> None:
     boards = set()
     for configuration, (_, report) in measured.items():

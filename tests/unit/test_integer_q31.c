@@ -66,6 +66,25 @@ static void a_shift_left_saturates(void **unused)
     assert_int_equal(pvid_clamp_q31(4, 5), 4);
 }
 
+static void a_product_in_halves_is_the_product(void **unused)
+{
+    (void)unused;
+    static const int32_t edges[] = {0, 1, -1, 32767, 32768, 65535, 65536, -32768, -65536, INT32_MAX, INT32_MIN,
+                                    0x7FFF0000, -0x7FFF0001};
+    const size_t n = sizeof edges / sizeof edges[0];
+    for (size_t i = 0; i < n; i++) {
+        for (size_t j = 0; j < n; j++) {
+            assert_int_equal(pvid_product_in_halves_q31(edges[i], edges[j]), (int64_t)edges[i] * edges[j]);
+        }
+    }
+    uint64_t state = 6;
+    for (int i = 0; i < 20000; i++) {
+        const int32_t a = (int32_t)(random_wide(&state) / ((int64_t)1 << 31));
+        const int32_t b = (int32_t)(random_wide(&state) / ((int64_t)1 << 31));
+        assert_int_equal(pvid_product_in_halves_q31(a, b), (int64_t)a * b);
+    }
+}
+
 static void bits_are_counted(void **unused)
 {
     (void)unused;
@@ -178,6 +197,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_shift_right_rounds_half_up),
         cmocka_unit_test(a_shift_left_saturates),
+        cmocka_unit_test(a_product_in_halves_is_the_product),
         cmocka_unit_test(bits_are_counted),
         cmocka_unit_test(a_root_is_the_largest_whose_square_fits),
         cmocka_unit_test(a_scaled_root_keeps_thirty_bits),

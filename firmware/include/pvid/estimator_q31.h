@@ -21,6 +21,10 @@
 #include "pvid/model_q31.h"
 #include "pvid/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Largest |N_i|, |Y| and |Y - N^T theta| of a row that is taken in. */
 #define PVID_ROW_LIMIT_Q31 ((int32_t)1 << 28)
 
@@ -207,5 +211,9 @@ void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_es
 bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
                                   pvid_estimate_q31 *estimate);
 uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

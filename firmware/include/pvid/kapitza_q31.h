@@ -12,6 +12,10 @@
 
 #include "pvid/estimator_q31.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PVID_KAPITZA_BITS_Q31 24
 
 /* What turns p into metres; `pvid weak-table --core q31` writes it. */
@@ -34,5 +38,9 @@ typedef struct {
  * se unwritten, iff p lies outside the physical region, a parameter is beyond 127 or scale is not as described. */
 bool pvid_kapitza_physical_q31(const pvid_estimate_q31 *estimate, const pvid_kapitza_scale_q31 *scale,
                                pvid_kapitza_q31 *value, pvid_kapitza_q31 *se);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

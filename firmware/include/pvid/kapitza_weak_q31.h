@@ -5,10 +5,18 @@
 #include "pvid/kapitza_weak.h"
 #include "pvid/model_q31.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* The encoder's zero unknown: 8 entries of theta, p = (w, d1, d2, c). */
 extern const pvid_model_q31 pvid_kapitza_weak_q31;
 
 /* A zeroed encoder: 5 entries of theta, p = (w, d1, d2). */
 extern const pvid_model_q31 pvid_kapitza_weak_zeroed_q31;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

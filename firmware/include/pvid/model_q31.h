@@ -2,7 +2,7 @@
  *
  * The same as model.h tells the float core: theta = f(p) and the non-zeros of its Jacobian C. Numbers are integers
  * with a format: a value is its integer times 2^-bits. The formats of p come from the configuration; the model says
- * which formats theta and C have then. theta and C are int64 within +-2^47, so that no digit of p is lost.
+ * which formats theta and C have then. theta and C are int64 within +-2^60, so that no digit of p is lost.
  */
 #ifndef PVID_MODEL_Q31_H
 #define PVID_MODEL_Q31_H

@@ -10,6 +10,10 @@
 #include "pvid/estimator_q31.h"
 #include "pvid/trust.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PVID_SURPLUS_BITS 24
 
 /* Settings; pvid.setup_q31 derives them from those of trust.h. */
@@ -54,5 +58,9 @@ const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self);
  * Returns what is to be told; counts it. */
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
                                  bool informed, int64_t surplus, const pvid_estimate_q31 *candidate);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

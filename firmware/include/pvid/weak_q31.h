@@ -27,6 +27,10 @@
 #include "pvid/trust_q31.h"
 #include "pvid/weak_job.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What is integrated twice from a window's start: U F, F and U. */
 #define PVID_WEAK_INTEGRALS_Q31 3
 
@@ -181,5 +185,9 @@ const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

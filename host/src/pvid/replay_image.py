@@ -78,14 +78,20 @@ class ReplayRun:
 
 
 @cache
-def standard_run(form: str, ticks: int, core: str = "f32") -> ReplayRun:
+def standard_run(form: str, ticks: int, core: str = "f32", divider: int = 1) -> ReplayRun:
     """The standard rig (linear truth) for `ticks`: weak form at 1 kHz and 14 bits, strong form (five points) at 50 Hz
-    and 20 bits."""
+    and 20 bits, with a solve every `divider` groups of rows."""
     sensors = replace(standard_sensors(ENCODER_BITS[form]), random_offset=False)
     rate = SAMPLE_RATE[form]
     run = simulate(sensors=sensors, truth="linear", sample_rate=rate, duration=ticks / rate, seed=1).run
     standard = RigFile.standard()
-    identifier = replace(standard.identifier, form=form, differentiator="finite-difference", stride=1)  # type: ignore[arg-type]
+    identifier = replace(
+        standard.identifier,
+        form=form,  # type: ignore[arg-type]
+        differentiator="finite-difference",
+        stride=1,
+        divider=divider,
+    )
     rig = replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb))
     start = standard_start(1)
     config = config_of(rig, run.sample_rate, start)

@@ -46,7 +46,7 @@ class Configuration:
         return f"{self.board.name} {self.form} {self.core}"
 
 
-ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"))
+ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
 
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
 ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}

@@ -89,10 +89,7 @@ def upper_solve(f: Factor, rhs: Int) -> Int:
 
 def to_block(x: Int, bits: int) -> tuple[Int, Int]:
     """x [n, lanes] with one exponent a lane: (x 2^-h within `bits` bits, h)."""
-    largest = np.zeros(x.shape[1], np.int64)
-    for value in x:
-        largest = np.maximum(largest, bit_length(np.abs(value)))
-    h = largest - bits
+    h = bit_length(np.abs(x)).max(axis=0) - bits
     return scale(x, h), h
 
 

@@ -69,7 +69,7 @@ def decay(groups: int, block: int) -> int:
 
 
 class EstimatorQ31:
-    """pvid_estimator_q31 in every lane; all lanes share model, formats, gain, divider and forgetting.
+    """pvid_estimator_q31 in every lane; all lanes share model, formats, divider and whether the law is a rate.
 
     p int64 [n_p, lanes]; sums int64 [n_sums, lanes]: M, b, rr times 4^-exponent, weight in Q16.
     """
@@ -82,16 +82,19 @@ class EstimatorQ31:
     def __init__(self, configs: Sequence[EstimatorConfigQ31], model: ModelQ31) -> None:
         first = configs[0]
         for c in configs:
-            if (c.p_bits, c.n_bits, c.y_bits, c.gain, c.divider, c.forgetting_groups) != (
+            if (c.p_bits, c.n_bits, c.y_bits, c.divider, c.gain < ONE) != (
                 first.p_bits,
                 first.n_bits,
                 first.y_bits,
-                first.gain,
                 first.divider,
-                first.forgetting_groups,
+                first.gain < ONE,
             ):
-                raise PvidError("lanes of one twin must share formats, gain, divider and forgetting")
+                raise PvidError("lanes of one twin must share formats, divider and whether the law is a rate")
         self.model = model
+        self._upper = np.triu_indices(model.n_theta)
+        self._diagonal = np.flatnonzero(self._upper[0] == self._upper[1])
+        self._c_row, self._c_column = np.array(model.c_row), np.array(model.c_column)
+        self._columns = [np.flatnonzero(self._c_column == a) for a in range(model.n_p)]
         lanes = len(configs)
 
         def stacked(name: str) -> Int:
@@ -114,9 +117,10 @@ class EstimatorQ31:
         self.energy = np.zeros(lanes, np.int64)
         self.group_energy = self.energy
         self.size = self.energy
-        self.gain = first.gain
+        self.gain = lane("gain")
+        self.is_rate = first.gain < ONE  # a law that does not iterate
         self.divider = first.divider
-        self.block, self.retention = self._forgetting(first.forgetting_groups)
+        self.block, self.retention = integers([self._forgetting(c.forgetting_groups) for c in configs]).T
         theta_bits, c_bits = model.formats(first.p_bits)
         # e = Y - sum N_i theta_i 2^-align_i;  C in units of e per N_i per p_a is c_k 2^c_exponent_k
         self.align = [t + n - first.y_bits for t, n in zip(theta_bits, first.n_bits, strict=True)]
@@ -127,7 +131,7 @@ class EstimatorQ31:
         self.theta_bits = theta_bits
         self.theta = model.theta(self.p)
         self.phase = 0
-        self.age = 0
+        self.age = np.zeros(lanes, np.int64)
         self.exponent = np.zeros(lanes, np.int64)
         self.sums = np.zeros((model.n_sums, lanes), np.int64)
         self.fresh = np.zeros((model.n_theta, lanes), np.int64)
@@ -159,11 +163,6 @@ class EstimatorQ31:
         """Number of lanes."""
         return int(self.p.shape[1])
 
-    @property
-    def is_rate(self) -> bool:
-        """Whether the law is a rate (g < 1) that does not iterate."""
-        return self.gain < ONE
-
     def mantissas(self, values: Int) -> tuple[Int, Int]:
         """values = m 2^h with m of 30 bits."""
         h = bit_length(np.abs(values)) - 30
@@ -178,17 +177,14 @@ class EstimatorQ31:
     def add(self, n: Int, y: Int) -> Reasons:
         """One row of a group: N [n_theta, lanes], Y [lanes]."""
         m, h = self.mantissas(self.theta)
-        fits = np.abs(y) <= ROW_LIMIT
-        e = y
-        for i in range(self.model.n_theta):
-            fits = fits & (np.abs(n[i]) <= ROW_LIMIT)
-            e = e - clamp(scale(clamp(n[i], ROW_LIMIT) * m[i], self.align[i] - h[i]), TERM_MAX)
-        fits = fits & (np.abs(e) <= ROW_LIMIT)
+        terms = clamp(scale(clamp(n, ROW_LIMIT) * m, integers(self.align)[:, None] - h), TERM_MAX)
+        e = y - terms.sum(axis=0)
+        fits = (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
         e = np.where(fits, e, 0)
         self.energy = clamp(self.energy + e * e, WIDE)
         e = round_shift(e, self.exponent)
         row = round_shift(np.where(fits, n, 0), self.exponent)
-        upper, column = np.triu_indices(self.model.n_theta)
+        upper, column = self._upper
         weight = np.where(fits, self.row_weight, 0)
         self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
         if self.is_rate:
@@ -220,7 +216,7 @@ class EstimatorQ31:
                 self.phase = 0
             for _ in range(self._stages_before_commit()):
                 yield None
-            reason = self._commit(self.gain if ends_group else ONE, refuge)
+            reason = self._commit(refuge)
             yield None if ends_group else reason
         if ends_group:
             self._forget(slice(0, self.model.n_sums // 2))
@@ -265,15 +261,17 @@ class EstimatorQ31:
 
     def _forget(self, places: slice) -> None:
         """Lets some of the sums fade if it is time to."""
-        if self.age + 1 >= self.block and self.retention < 2**31 - 1:
-            self.sums[places] = times_q31(self.sums[places], integers(self.retention))
+        due = (self.age + 1 >= self.block) & (self.retention < 2**31 - 1)
+        if due.any():
+            self.sums[places] = np.where(due, times_q31(self.sums[places], self.retention), self.sums[places])
 
     def _end_group(self) -> None:
-        self.age = 0 if self.age + 1 >= self.block else self.age + 1
-        largest = np.max(self._matrix(self.sums).diagonal(axis1=0, axis2=1), axis=1)
-        largest = np.maximum(largest, self.sums[-2])
+        self.age = np.where(self.age + 1 >= self.block, 0, self.age + 1)
+        largest = np.maximum(self.sums[self._diagonal].max(axis=0), self.sums[-2])
         high = largest > SUM_LIMIT
         low = (largest < SUM_LOW) & (self.exponent > 0)
+        if not (high | low).any():
+            return
         change = np.where(high, 2, np.where(low, -2, 0))
         self.sums[:-1] = scale(self.sums[:-1], change)
         self.fresh = scale(self.fresh, change)
@@ -282,7 +280,7 @@ class EstimatorQ31:
     def _matrix(self, sums: Int) -> Int:
         n = self.model.n_theta
         m = np.empty((n, n, sums.shape[1]), np.int64)
-        upper, column = np.triu_indices(n)
+        upper, column = self._upper
         m[upper, column] = sums[: self.model.moments]
         m[column, upper] = sums[: self.model.moments]
         return m
@@ -291,44 +289,36 @@ class EstimatorQ31:
 
     def _equilibrated(self) -> tuple[Int, Int]:
         """(m, h): M_ij = m_ij 2^(h_i + h_j), m within 30 bits."""
-        matrix = self._matrix(self.sums)
-        n = self.model.n_theta
-        h = np.stack([cholesky.half_exponent(matrix[i, i]) for i in range(n)])
-        return clamp(scale(matrix, h[:, None] + h[None]), ONE), h
+        h = cholesky.half_exponent(self.sums[self._diagonal])
+        row, column = self._upper
+        m = clamp(scale(self.sums[: self.model.moments], h[row] + h[column]), ONE)
+        return self._matrix(m), h
 
     def _jacobian(self, h: Int) -> tuple[Int, Int]:
         """(c, f): C_ka = c_k 2^(f_a - h_row), c within 29 bits."""
         model = self.model
         c = model.jacobian(self.p)
-        f = np.full((model.n_p, self.lanes), _NOTHING, np.int64)
-        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
-            f[column] = np.maximum(f[column], length(c[k]) + self.c_exponent[k] + h[row])
-        f = f - 29
-        scaled = [
-            scale(c[k], f[column] - self.c_exponent[k] - h[row])
-            for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True))
-        ]
-        return np.stack(scaled), f
+        exponent = integers(self.c_exponent)[:, None] + h[self._c_row]
+        lengths = length(c) + exponent
+        f = np.stack([np.maximum(lengths[own].max(axis=0), _NOTHING) for own in self._columns]) - 29
+        return scale(c, f[self._c_column] - exponent), f
 
     def _project(self, c: Int, m: Int) -> Int:
         """The upper triangle of C^T M C, in units of 2^(f_a + f_b + 32) [n_p, n_p, lanes]."""
         model = self.model
         s = np.zeros((model.n_p, model.n_p, self.lanes), np.int64)
-        for a in range(model.n_p):
-            own = [k for k, column in enumerate(model.c_column) if column == a]
-            t = np.zeros((model.n_theta, self.lanes), np.int64)
-            for k in own:
-                t = t + m[model.c_row[k]] * c[k]
-            t = round_shift(t, 32)
-            for k in range(own[0], len(model.c_row)):
-                b = model.c_column[k]
-                s[a, b] = s[a, b] + c[k] * t[model.c_row[k]]
+        rows = self._c_row
+        for a, own in enumerate(self._columns):
+            t = round_shift((m[rows[own]] * c[own][:, None]).sum(axis=0), 32)
+            for b in range(a, model.n_p):
+                there = self._columns[b]
+                s[a, b] = (c[there] * t[rows[there]]).sum(axis=0)
         return s
 
     def _equilibrated_system(self, s: Int) -> tuple[Int, Int]:
         """(S in Q30, g): s_ab = S_ab 2^(g_a + g_b)."""
         n_p = self.model.n_p
-        g = np.stack([cholesky.half_exponent(s[a, a]) for a in range(n_p)])
+        g = cholesky.half_exponent(np.stack([s[a, a] for a in range(n_p)]))
         return clamp(scale(s, g[:, None] + g[None]), ONE), g
 
     def _informed(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
@@ -357,7 +347,7 @@ class EstimatorQ31:
         """row_sd^2, divided by 4^exponent as the sums are."""
         return scaled(self.row_sd * self.row_sd, -2 * (8 + self.exponent))
 
-    def _commit(self, gain: int, refuge: tuple[Mask, Int] | None) -> Reasons:
+    def _commit(self, refuge: tuple[Mask, Int] | None) -> Reasons:
         model = self.model
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
@@ -375,11 +365,9 @@ class EstimatorQ31:
         reason[~factor.ok] = Reason.HELD_PIVOT
 
         b = self.sums[model.moments : model.moments + model.n_theta]
-        force, force_h = cholesky.to_block(scale(self._driving(b, gain), h), 30)
+        force, force_h = cholesky.to_block(scale(self._driving(b), h), 30)
         self.fresh[:] = 0
-        rhs = np.zeros((model.n_p, self.lanes), np.int64)
-        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
-            rhs[column] = rhs[column] + c[k] * force[row]
+        rhs = np.stack([(c[own] * force[self._c_row[own]]).sum(axis=0) for own in self._columns])
         x, x_h = cholesky.solve(factor, scale(rhs, g))
         dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
         steps = reason == Reason.UPDATED
@@ -390,13 +378,12 @@ class EstimatorQ31:
             p = np.where(fleeing, refuge[1], p)
         return self._follow(p, m, h, b, reason, fleeing)
 
-    def _driving(self, b: Int, gain: int) -> Int:
+    def _driving(self, b: Int) -> Int:
         """g b + (1 - g) sum N e since the last solve."""
-        if gain == ONE:
+        if not self.is_rate:
             return b
-        if gain == 0:
-            return self.fresh
-        return times_q31(b, integers(2 * gain)) + times_q31(self.fresh, integers(2 * (ONE - gain)))
+        both = times_q31(b, 2 * self.gain) + times_q31(self.fresh, 2 * np.minimum(ONE - self.gain, ONE - 1))
+        return np.where(self.gain == 0, self.fresh, both)
 
     def _limited(self, dp: Int, moving: Mask) -> Int:
         """Where the step leads: shortened to the step limit, within the bounds; p where nothing moves."""
@@ -424,14 +411,9 @@ class EstimatorQ31:
         v_h = np.max(length(step) - align + h, axis=0) - 29
         v = scale(step, v_h + align - h)
         b = clamp(b, HELD_LIMIT)
-        moved = np.zeros_like(b)
-        for j in range(model.n_theta):
-            moved = moved + m[j] * v[j]
-        moved = clamp(scale(moved, -(h + v_h)), HELD_LIMIT)
+        moved = clamp(scale((m * v[:, None]).sum(axis=0), -(h + v_h)), HELD_LIMIT)
         w, w_h = cholesky.to_block(scale(2 * b - moved, h), 30)
-        fall = np.zeros(self.lanes, np.int64)
-        for j in range(model.n_theta):
-            fall = fall + v[j] * w[j]
+        fall = (v * w).sum(axis=0)
         residual = self.sums[-2] - clamp(scale(fall, -(v_h + w_h)), HELD_LIMIT)
         overflow = (residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0)
         reason[overflow & (reason == Reason.UPDATED)] = Reason.HELD_PIVOT

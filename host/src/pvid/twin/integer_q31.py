@@ -37,7 +37,7 @@ def scale(x: Int, s: npt.ArrayLike) -> Int:
 
 def clamp(x: Int, limit: int) -> Int:
     """x held within +-limit."""
-    return np.clip(x, -limit, limit)
+    return np.minimum(np.maximum(x, -limit), limit)
 
 
 def bit_length(x: Int) -> Int:

@@ -16,7 +16,7 @@ _DOWN = 16
 
 @dataclass(frozen=True)
 class ModelQ31:
-    """pvid_model_q31: theta and the non-zeros of C as int64 below 2^47, and their formats."""
+    """pvid_model_q31: theta and the non-zeros of C as int64 within +-2^60, and their formats."""
 
     n_theta: int
     n_p: int

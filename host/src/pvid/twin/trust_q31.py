@@ -32,7 +32,7 @@ class TrustQ31:
         self.groups = 0
         self.shut = np.zeros(lanes, np.int64)
         self.judged = np.zeros(lanes, np.int64)
-        self.long_memory = max(min((estimator.block << 31) // (2**31 - estimator.retention), _LONG_MEMORY), _LONG)
+        self.long_memory = np.clip((estimator.block << 31) // (2**31 - estimator.retention), _LONG, _LONG_MEMORY)
         self.next = np.zeros(lanes, np.int64)
         self.published = np.zeros(lanes, np.bool_)
         self.misfit = np.zeros(lanes, np.bool_)
