@@ -369,7 +369,7 @@ def test_a_port_that_is_not_there_and_a_log_that_is(tmp_path: Path, pvid: Logger
     process = pvid()
     out, err = process.communicate(timeout=30)
     assert process.returncode == 2
-    assert err.splitlines()[-1].startswith("pvid: cannot open the port board")
+    assert err.splitlines()[-1] == "pvid: there is no port board: is the board plugged in?"
     assert not (tmp_path / "out.pvlog").exists()
     (tmp_path / "out.pvlog").write_bytes(b"")
     again = pvid()
