@@ -126,10 +126,8 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
         return reason;
     }
-    if (reason == PVID_UPDATED) {
+    if ((reason == PVID_UPDATED) || (pvid_trust_refuge_q31(self) != NULL)) { /* a refuge: p is back */
         self->shut = 0;
-    } else if (pvid_trust_refuge_q31(self) != NULL) {
-        self->shut = 0; /* p is back */
     } else {
         pvid_count_up_16(&self->shut);
     }
