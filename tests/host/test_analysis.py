@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -77,7 +78,8 @@ def test_planted_faults_are_found(copy: Path) -> None:
 def test_required_rule_is_not_deviated_from_more_often_than_written(copy: Path) -> None:
     page = copy / "firmware" / "MISRA.md"
     text = page.read_text(encoding="utf-8")
-    assert "| misra 10.3 (required) | 7 |" in text
-    page.write_text(text.replace("| misra 10.3 (required) | 7 |", "| misra 10.3 (required) | 0 |"), encoding="utf-8")
+    text, changes = re.subn(r"(\| misra 10\.3 \(required\) \|) \d+ \|", r"\1 0 |", text)
+    assert changes == 1
+    page.write_text(text, encoding="utf-8")
     done = subprocess.run([sys.executable, copy / "tools/analyse.py"], capture_output=True, text=True, check=False)
     assert "1 findings, MISRA.md says 0" in done.stdout  # the one of fnv.c
