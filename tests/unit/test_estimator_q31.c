@@ -1,0 +1,242 @@
+/* The fixed-point estimator: what init refuses, rows that do not fit, a solve in stages and at once, the way back. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "pvid/pvid.h"
+
+#define ONE_Q20 (1 << 20) /* of rows */
+#define ONE_Q26 (1 << 26) /* of p, whose bounds end at 2^30 then */
+
+static pvid_estimator_config_q31 config;
+static pvid_estimator_q31 estimator;
+static pvid_estimator_solve_q31 solve;
+
+/* w, d1, d2 of 2, 3, 1 and c of 0. */
+static int start_again(void **state)
+{
+    (void)state;
+    memset(&config, 0, sizeof config);
+    config.model = &pvid_kapitza_weak_q31;
+    for (int i = 0; i < 4; i++) {
+        config.start[i] = (i < 3) ? ((i == 2) ? ONE_Q26 : ((2 + i) * ONE_Q26)) : 0;
+        config.start_sd[i] = ONE_Q26;
+        config.lower[i] = (i < 3) ? (ONE_Q26 / 16) : -ONE_Q26;
+        config.upper[i] = 16 * ONE_Q26;
+        config.p_bits[i] = 26;
+    }
+    for (int i = 0; i < 8; i++) {
+        config.n_bits[i] = 20;
+    }
+    config.y_bits = 20;
+    config.row_sd = 256;
+    config.gain = 1 << 30;
+    config.correlation = 1u << 16;
+    config.row_weight = 1u << 16;
+    config.step_limit = 58982;
+    config.divider = 1;
+    return 0;
+}
+
+static void begin(void)
+{
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+}
+
+/* Row k of a motion that tells all parameters apart, for p = (2.2, 2.8, 1.1, 0.05) without noise. */
+static void row_of(uint32_t k, int32_t n[8], int32_t *y)
+{
+    static const double theta[8] = {2.8, 2.8 * 2.2, 1.1, 1.1 * 2.2, 1.1 * 2.2 * 2.2,
+                                    1.1 * 0.05, 1.1 * 0.05 * 2.2, 1.1 * 0.05 * 2.2 * 2.2};
+    double sum = 0.0;
+    for (uint32_t i = 0; i < 8u; i++) {
+        n[i] = (int32_t)((((k * 7u) + (i * 13u) + (k * i * i * 5u)) % 41u)) * (ONE_Q20 / 40) - (ONE_Q20 / 2);
+        sum += theta[i] * n[i];
+    }
+    *y = (int32_t)sum;
+}
+
+static void add_rows(uint32_t first, uint32_t last)
+{
+    for (uint32_t k = first; k < last; k++) {
+        int32_t n[8];
+        int32_t y;
+        row_of(k, n, &y);
+        assert_int_equal(pvid_estimator_add_q31(&estimator, n, y), PVID_ACCUMULATED);
+    }
+}
+
+static void assert_refused(pvid_status status)
+{
+    memset(&estimator, 0x5A, sizeof estimator);
+    static pvid_estimator_q31 before;
+    before = estimator;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), status);
+    assert_memory_equal(&before, &estimator, sizeof before); /* nothing is half made */
+    (void)start_again(NULL);
+}
+
+static void init_names_what_it_refuses(void **state)
+{
+    (void)state;
+    config.model = NULL;
+    assert_refused(PVID_BAD_MODEL);
+    config.p_bits[2] = 65;
+    assert_refused(PVID_BAD_MODEL);
+    config.n_bits[7] = -65;
+    assert_refused(PVID_BAD_MODEL);
+    config.y_bits = 100;
+    assert_refused(PVID_BAD_MODEL);
+    config.lower[0] = 0; /* w is positive */
+    assert_refused(PVID_BAD_BOUNDS);
+    config.upper[3] = config.lower[3];
+    assert_refused(PVID_BAD_BOUNDS);
+    config.start[1] = config.upper[1] + 1;
+    assert_refused(PVID_BAD_START);
+    config.start_sd[0] = 0;
+    assert_refused(PVID_BAD_START_SD);
+    config.row_sd = 0;
+    assert_refused(PVID_BAD_ROW_SD);
+    config.forgetting_groups = 3;
+    assert_refused(PVID_BAD_FORGETTING);
+    config.gain = -1;
+    assert_refused(PVID_BAD_FEEDBACK);
+    config.correlation = 65535;
+    assert_refused(PVID_BAD_CORRELATION);
+    config.row_weight = 0;
+    assert_refused(PVID_BAD_ROW_WEIGHT);
+    config.step_limit = 0;
+    assert_refused(PVID_BAD_STEP_LIMIT);
+    config.kappa_min = 1 << 30;
+    assert_refused(PVID_BAD_KAPPA_MIN);
+    config.noise_margin = (1u << 30) + 1u;
+    assert_refused(PVID_BAD_NOISE_MARGIN);
+    config.divider = 0;
+    assert_refused(PVID_BAD_DIVIDER);
+    begin();
+}
+
+static void gauss_newton_steps_end_at_the_parameters_that_made_the_rows(void **state)
+{
+    (void)state;
+    begin();
+    add_rows(0, 100);
+    assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
+    for (int i = 0; i < 6; i++) {
+        assert_int_equal(pvid_estimator_iterate_q31(&estimator), PVID_UPDATED);
+    }
+    static const double truth[4] = {2.2, 2.8, 1.1, 0.05};
+    for (int i = 0; i < 4; i++) {
+        /* float64's least squares ends 3e-7 away: Y is truncated to 2^-20 */
+        const double error = ((double)estimator.p[i] / ONE_Q26) - truth[i];
+        assert_true((error < 6.0e-7) && (error > -6.0e-7));
+    }
+}
+
+static void a_row_beyond_its_format_changes_nothing_but_the_counter(void **state)
+{
+    (void)state;
+    begin();
+    add_rows(0, 5);
+    const pvid_estimator_q31 before = estimator;
+    int32_t n[8] = {0};
+    assert_int_equal(pvid_estimator_add_q31(&estimator, n, PVID_ROW_LIMIT_Q31 + 1), PVID_REJECTED_SATURATED);
+    n[7] = INT32_MIN;
+    assert_int_equal(pvid_estimator_add_q31(&estimator, n, 0), PVID_REJECTED_SATURATED);
+    n[7] = 0;
+    n[0] = PVID_ROW_LIMIT_Q31; /* fits, but not its residual of three times as much */
+    assert_int_equal(pvid_estimator_add_q31(&estimator, n, 0), PVID_REJECTED_SATURATED);
+    assert_int_equal(estimator.counters.rejected_saturated, 3);
+    estimator.counters.rejected_saturated = 0;
+    assert_memory_equal(&before, &estimator, sizeof before);
+}
+
+static void a_solve_in_stages_is_the_solve_at_once(void **state)
+{
+    (void)state;
+    begin();
+    add_rows(0, 60);
+    static pvid_estimator_q31 other;
+    other = estimator;
+    uint32_t stages = 0;
+    pvid_estimator_begin_q31(&other, &solve, true);
+    do {
+        stages++;
+    } while (!pvid_estimator_advance_q31(&other, &solve));
+    assert_int_equal(stages, pvid_estimator_stages_q31(&other, true));
+    assert_int_equal(solve.reason, pvid_estimator_update_q31(&estimator));
+    assert_memory_equal(&other, &estimator, sizeof other);
+    stages = 0;
+    static pvid_estimate_q31 in_stages;
+    static pvid_estimate_q31 at_once;
+    pvid_estimator_begin_assessment_q31(&other, &solve, &in_stages);
+    do {
+        stages++;
+    } while (!pvid_estimator_assess_on_q31(&other, &solve, &in_stages));
+    assert_int_equal(stages, pvid_estimator_assessment_stages_q31(&other));
+    pvid_estimator_assess_q31(&estimator, &at_once);
+    assert_memory_equal(&in_stages, &at_once, sizeof at_once);
+    assert_memory_equal(&other, &estimator, sizeof other); /* an assessment changes nothing */
+}
+
+/* Held for want of information, p goes to its refuge, and b with it: as if the rows had been met there. */
+static void a_refuge_is_where_p_goes_that_may_not_step(void **state)
+{
+    (void)state;
+    config.kappa_min = (1 << 30) - (1 << 21); /* no data are that good */
+    begin();
+    add_rows(0, 60);
+    pvid_estimator_begin_q31(&estimator, &solve, true);
+    const int32_t there[4] = {3 * ONE_Q26, 2 * ONE_Q26, 2 * ONE_Q26, ONE_Q26 / 8};
+    solve.has_refuge = true;
+    memcpy(solve.refuge, there, sizeof there);
+    while (!pvid_estimator_advance_q31(&estimator, &solve)) {
+    }
+    assert_int_equal(solve.reason, PVID_HELD_NOT_EXCITED);
+    assert_int_equal(estimator.counters.updates, 0);
+    assert_memory_equal(estimator.p, there, sizeof there);
+    static pvid_estimator_q31 moved;
+    moved = estimator;
+    memcpy(config.start, there, sizeof there);
+    begin();
+    add_rows(0, 60);
+    for (size_t i = 36; i < 45u; i++) { /* b and rr: M dtheta has 30 digits */
+        const int64_t difference = moved.information.sums[i] - estimator.information.sums[i];
+        const int64_t largest = estimator.information.sums[44];
+        assert_true((difference < (largest >> 20)) && (difference > -(largest >> 20)));
+    }
+}
+
+/* Before there are rows the start is what is known. */
+static void without_rows_the_start_is_published(void **state)
+{
+    (void)state;
+    begin();
+    pvid_estimate_q31 estimate;
+    pvid_estimator_assess_q31(&estimator, &estimate);
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(estimate.p[i], config.start[i]);
+        assert_in_range(estimate.se[i], config.start_sd[i] - 2, config.start_sd[i] + 2);
+    }
+    assert_int_equal(estimate.kappa, 0);
+    assert_int_equal(estimate.least_pivot, 0);
+    assert_int_equal(estimate.weight, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(init_names_what_it_refuses, start_again),
+        cmocka_unit_test_setup(gauss_newton_steps_end_at_the_parameters_that_made_the_rows, start_again),
+        cmocka_unit_test_setup(a_row_beyond_its_format_changes_nothing_but_the_counter, start_again),
+        cmocka_unit_test_setup(a_solve_in_stages_is_the_solve_at_once, start_again),
+        cmocka_unit_test_setup(a_refuge_is_where_p_goes_that_may_not_step, start_again),
+        cmocka_unit_test_setup(without_rows_the_start_is_published, start_again),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
