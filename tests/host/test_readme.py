@@ -45,7 +45,7 @@ def test_the_example_identifies_the_standard_rig(tmp_path: Path) -> None:
 def test_every_command_the_readme_names_exists() -> None:
     from pvid.cli import commands
 
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"\./tools/pvid ([a-z-]+)", readme))
-    assert named, "the README names no command"
+    pages = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "host" / "README.md"]
+    named = set(re.findall(r"\./tools/pvid ([a-z-]+)", "".join(page.read_text(encoding="utf-8") for page in pages)))
+    assert named, "the READMEs name no command"
     assert named <= set(commands.commands)

@@ -126,7 +126,7 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
 
 
 def table_rows(footprints: dict[Configuration, Footprint]) -> list[tuple[str, ...]]:
-    """Cells of the README's table, as in HEADER."""
+    """Cells of the table in firmware/README.md, as in HEADER."""
     return [
         (
             f"{configuration.board.core} ({configuration.board.name})",

@@ -344,7 +344,7 @@ def _cell(lane: Lane, one: Outcome, ticks: int) -> str:
 
 
 def tables(results: Results) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """Marker, header and rows of the README's tables."""
+    """Marker, header and rows of the tables in host/README.md."""
     for marker, lanes in (
         ("longevity-weak", WEAK_LANES),
         ("longevity-strong", STRONG_LANES),
