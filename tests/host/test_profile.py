@@ -1,4 +1,4 @@
-"""Where a tick's instructions go: the functions' counts are the whole, and the table in firmware/README.md is theirs."""
+"""Where a tick's instructions go: functions' counts are the whole, and the table in firmware/README.md is theirs."""
 
 from __future__ import annotations
 

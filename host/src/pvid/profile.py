@@ -136,7 +136,7 @@ def _by_function(counts: str, symbols: list[_Symbol]) -> dict[tuple[str, str], f
 
 
 def table_rows(profiles: dict[str, Profile]) -> list[tuple[str, ...]]:
-    """Cells of the table in firmware/README.md, as in HEADER, from profiles by form; each form's last line is what was measured."""
+    """Cells of the table, as in HEADER, from profiles by form; each form's last line is what was measured."""
     rows: list[tuple[str, ...]] = []
     for form, one in profiles.items():
         shown = {function: n for function, n in one.functions.items() if n >= LEAST_SHARE * one.measured}
