@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ def counts() -> tuple[Counts, Counts]:
     return phi, np.rint(run.y / RIG.sensor.y_lsb).astype(np.int64)
 
 
+@cache
 def configuration(seed: int = 0, zero_unknown: bool = True, **identifier: Any) -> WeakConfigQ31:
     """The standard rig's settings, a start within 50 % of the truth."""
     rig = replace(RIG, identifier=replace(RIG.identifier, zero=zero_unknown, **identifier))
