@@ -292,7 +292,7 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
     elif target.toolchain == "avr":
         design = run.config.design
         options |= {"PVID_MAX_TAPS": str(design.taps), "PVID_MAX_DECIMATION": str(design.decimation)}
-        options |= {"PVID_MAX_FUNCTIONS": str(design.functions)}
+        options |= {"PVID_MAX_FUNCTIONS": str(design.functions), "PVID_MAX_THETA_Q31": "8"}
     options |= macros or {}
     suffix = "".join(f"-{macro}-{value}" for macro, value in (macros or {}).items())
     tree = build(target, BUILD / f"{target.name}-{name}{suffix}", options)
