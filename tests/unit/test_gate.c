@@ -1,0 +1,144 @@
+/* The outlier gate: what it learns, what it keeps out, and that it does not stay shut. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "pvid/gate.h"
+
+#define FLOOR 0.25f
+
+static pvid_gate_f32 gate;
+
+static void start(float sigmas, float patience_s, float memory)
+{
+    const pvid_gate_config_f32 config = {.sigmas = sigmas, .patience_s = patience_s};
+    assert_int_equal(pvid_gate_init_f32(&gate, &config, 100.0f, memory, FLOOR), PVID_OK);
+}
+
+static void no_gate_lets_everything_in(void **state)
+{
+    (void)state;
+    start(0.0f, 0.0f, 4.0f);
+    for (int i = 0; i < 20; i++) {
+        assert_true(pvid_gate_passes_f32(&gate, (i % 2 == 0) ? 1.0f : 1.0e20f));
+    }
+    assert_true(gate.judged == 0.0f);
+}
+
+static void it_learns_the_mean_square_and_judges_by_it(void **state)
+{
+    (void)state;
+    start(3.0f, 0.0f, 4.0f);
+    const float squares[4] = {100.0f, 4.0f, 8.0f, 8.0f};
+    const float means[4] = {100.0f, 52.0f, 52.0f - (44.0f / 3.0f), 30.0f};
+    for (int i = 0; i < 4; i++) {
+        assert_true(pvid_gate_passes_f32(&gate, squares[i])); /* whatever it is */
+        assert_true(fabsf(gate.scale - means[i]) < 1.0e-4f);
+    }
+    assert_true(gate.judged == 4.0f);
+    /* the scale is 30: up to 270 passes, and takes a fourth of the way; beyond is kept out and changes nothing */
+    assert_false(pvid_gate_passes_f32(&gate, 271.0f));
+    assert_true(fabsf(gate.scale - 30.0f) < 1.0e-4f);
+    assert_true(pvid_gate_passes_f32(&gate, 9.0f * gate.scale));
+    assert_true(fabsf(gate.scale - (30.0f + (240.0f / 4.0f))) < 1.0e-3f);
+    assert_true(gate.judged == 4.0f);
+}
+
+static void what_is_no_number_is_not_its_business(void **state)
+{
+    (void)state;
+    start(3.0f, 0.0f, 1.0f);
+    assert_true(pvid_gate_passes_f32(&gate, 1.0f));
+    assert_true(pvid_gate_passes_f32(&gate, NAN));
+    assert_true(pvid_gate_passes_f32(&gate, INFINITY));
+    assert_true(gate.scale == 1.0f);
+    assert_false(pvid_gate_passes_f32(&gate, 3.0e38f));
+}
+
+static void the_scale_stays_between_its_floor_and_its_ceiling(void **state)
+{
+    (void)state;
+    start(3.0f, 0.0f, 2.0f);
+    for (int i = 0; i < 50; i++) {
+        assert_true(pvid_gate_passes_f32(&gate, 0.0f));
+        assert_true(gate.scale >= FLOOR);
+    }
+    assert_true(gate.scale == FLOOR);
+    assert_true(pvid_gate_passes_f32(&gate, 9.0f * FLOOR));
+    start(1.0e3f, 0.0f, 1.0f);
+    for (int i = 0; i < 20; i++) {
+        (void)pvid_gate_passes_f32(&gate, 3.0e38f);
+        assert_true(gate.scale <= 1.0e30f);
+    }
+    assert_true(gate.scale == 1.0e30f);
+}
+
+/* Nothing but outliers: within the time of patience the scale grows by 1e4. */
+static void it_does_not_stay_shut(void **state)
+{
+    (void)state;
+    start(3.0f, 2.0f, 1.0f); /* 200 residuals */
+    assert_true(pvid_gate_passes_f32(&gate, 1.0f));
+    int kept_out = 0;
+    while (!pvid_gate_passes_f32(&gate, 9.0e4f)) {
+        kept_out++;
+        assert_true(kept_out < 1000);
+    }
+    /* ln 1e4 / ln(1 + ln 1e4 / 200) */
+    assert_in_range(kept_out, 204, 206);
+    start(3.0f, 0.0f, 1.0f); /* for ever */
+    assert_true(pvid_gate_passes_f32(&gate, 1.0f));
+    for (int i = 0; i < 5000; i++) {
+        assert_false(pvid_gate_passes_f32(&gate, 9.0e4f));
+    }
+    /* no faster than by 1e3 a residual, however short the patience */
+    start(3.0f, 1.0e-30f, 1.0f);
+    assert_true(gate.widening == 1001.0f);
+    start(3.0f, 1.0f, 0.0f);
+    assert_true(gate.memory == 1.0f);
+}
+
+static void its_settings_end_where_they_say(void **state)
+{
+    (void)state;
+    const struct {
+        float sigmas;
+        float patience_s;
+        pvid_status status;
+    } cases[] = {
+        {0.0f, 0.0f, PVID_OK},
+        {2.0f, 0.0f, PVID_OK},
+        {1.0e3f, 1.0e12f, PVID_OK},
+        {1.9999999f, 0.0f, PVID_BAD_GATE_SIGMAS},
+        {1000.0001f, 0.0f, PVID_BAD_GATE_SIGMAS},
+        {-1.0e-45f, 0.0f, PVID_BAD_GATE_SIGMAS},
+        {1.0e-45f, 0.0f, PVID_BAD_GATE_SIGMAS},
+        {NAN, 0.0f, PVID_BAD_GATE_SIGMAS},
+        {INFINITY, 0.0f, PVID_BAD_GATE_SIGMAS},
+        {0.0f, -1.0e-45f, PVID_BAD_GATE_PATIENCE},
+        {0.0f, 1.0001e12f, PVID_BAD_GATE_PATIENCE},
+        {0.0f, NAN, PVID_BAD_GATE_PATIENCE},
+        {0.0f, INFINITY, PVID_BAD_GATE_PATIENCE},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const pvid_gate_config_f32 config = {.sigmas = cases[i].sigmas, .patience_s = cases[i].patience_s};
+        assert_int_equal(pvid_gate_init_f32(&gate, &config, 100.0f, 4.0f, FLOOR), cases[i].status);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_gate_lets_everything_in),
+        cmocka_unit_test(it_learns_the_mean_square_and_judges_by_it),
+        cmocka_unit_test(what_is_no_number_is_not_its_business),
+        cmocka_unit_test(the_scale_stays_between_its_floor_and_its_ceiling),
+        cmocka_unit_test(it_does_not_stay_shut),
+        cmocka_unit_test(its_settings_end_where_they_say),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
