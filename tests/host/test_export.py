@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -235,15 +237,16 @@ def listener() -> socket.socket:
 def teed(scheme: str, listener: socket.socket, sent: list[tuple[int, link.Message]]) -> list[bytes]:
     tee = Tee(f"{scheme}://127.0.0.1:{listener.getsockname()[1]}", L1)
     stream = LogStream()
+    listener.settimeout(0)
     got = []
     for record in stream.feed(b"".join(field_board.frames(sent))):
         tee.take(record, stream.account)
         tee.idle(stream.account)
-        if isinstance(record.item, link.Raw):
-            got += [listener.recv(4096) for _ in record.item.values]
-        elif isinstance(record.item, link.Estimate):
-            got.append(listener.recv(4096))
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                got.append(listener.recv(1 << 16))
     tee.close(stream.account)
+    assert max(map(len, got)) <= 1432  # what Teleplot's page gives for a local network; PlotJuggler takes 2048
     return got
 
 
@@ -259,12 +262,36 @@ def test_the_tee_sends_json(listener: socket.socket, sent: list[tuple[int, link.
     assert {"w", "w_se", "g", "kappa"} <= set(estimate) and "reason" not in estimate
 
 
+def as_teleplot_reads(datagram: bytes) -> Iterator[tuple[str, float, float, str]]:
+    """Name, time [s], value, unit, by the rules of its parser (teleplot-js, parseVariablesData)."""
+    for line in datagram.decode().split("\n"):
+        name, colon, rest = line.partition(":")
+        assert colon and not set(name) & set(":|,") and not line.startswith((">", "|", "3D|"))
+        values, _, unit = rest.partition("§")
+        assert not set(unit) & set(",;:|.")
+        for one in values.split(";"):
+            when, value = one.split(":")
+            yield name, float(when) / 1000, float(value), unit
+
+
 def test_the_tee_speaks_teleplot(listener: socket.socket, sent: list[tuple[int, link.Message]]) -> None:
-    lines = b"".join(teed("teleplot", listener, sent[:40])).decode().splitlines()
-    name, when, value = lines[1].split(":")
-    assert name == "samples.phi" and int(when) >= 0
-    assert value == f"{expected_samples()[0, 0].item()!r}§rad"
-    assert any(line.startswith("estimates.kappa:") and "§" not in line for line in lines)
+    got = [one for datagram in teed("teleplot", listener, sent[:40]) for one in as_teleplot_reads(datagram)]
+    angles = [one for one in got if one[0] == "samples.phi"]
+    expected = expected_samples()[: len(angles), 0]
+    assert len(angles) > 100 and [one[2] for one in angles] == expected.tolist()
+    assert {one[3] for one in angles} == {"rad"}
+    assert np.diff([one[1] for one in angles]) == pytest.approx(np.full(len(angles) - 1, 1e-3), abs=1e-6)
+    units = {name: unit for name, _, _, unit in got}
+    assert (units["samples.y"], units["estimates.w"], units["estimates.kappa"]) == ("m", "1/s^2", "")
+    assert {"estimates.g", "estimates.g_se", "samples.t"} <= set(units)
+
+
+def test_teleplots_times_have_all_digits_at_any_rate(listener: socket.socket) -> None:
+    hello = link.Hello(1, 0, 4, 0, 0, 7, 16_000.0, 1e-4, 1e-6, (1.0,) * 6, "fast")
+    raw = link.Raw.of_values(np.arange(40), np.arange(40))
+    got = [one for data in teed("teleplot", listener, [(0, hello), (0, raw)]) for one in as_teleplot_reads(data)]
+    times = [when for name, when, _, _ in got if name == "samples.phi"]
+    assert len(times) == 40 and np.diff(times) == pytest.approx(np.full(39, 62.5e-6), abs=1e-6)
 
 
 def test_nobody_need_listen_and_a_bad_address_is_told(sent: list[tuple[int, link.Message]]) -> None:

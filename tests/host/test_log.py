@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -13,6 +15,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from fnmatch import fnmatch
 from pathlib import Path
 
 import field_board
@@ -393,26 +396,128 @@ def test_too_much_loss_is_exit_code_1(tmp_path: Path, pvid: Loggers) -> None:
     assert lenient.wait(timeout=30) == 0
 
 
-def test_a_usb_device_is_found_again_by_its_identity(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Info:
-        def __init__(self, device: str, serial_number: str | None, location: str) -> None:
-            self.device, self.serial_number, self.location = device, serial_number, location
-            self.vid, self.pid = 0x0483, 0x5740
+class Plugged:
+    """USB serial devices as Linux shows them, read by pyserial's own list_ports; which ports are opened."""
 
-    ports = [Info("/dev/ttyACM0", "A1", "1-1"), Info("/dev/ttyACM1", "B2", "1-2"), Info("/dev/ttyACM2", None, "1-3")]
-    opened: list[str] = []
-    monkeypatch.setattr("pvid.logger.list_ports.comports", lambda: ports)
-    monkeypatch.setattr("pvid.logger.open_port", opened.append)
-    with_serial, without = PortSource("/dev/ttyACM1"), PortSource("/dev/ttyACM2")
-    with_serial.open()
-    without.open()
-    assert with_serial.usb == {"vid": 0x0483, "pid": 0x5740, "serial": "B2"}
-    assert without.usb == {"vid": 0x0483, "pid": 0x5740, "location": "1-3"}
-    ports[:] = [Info("/dev/ttyACM1", "A1", "1-1"), Info("/dev/ttyACM7", "B2", "2-4")]
-    with_serial.open()
-    assert opened == ["/dev/ttyACM1", "/dev/ttyACM2", "/dev/ttyACM7"]
-    with pytest.raises(PvidError, match="the device of /dev/ttyACM2 is not plugged in"):
-        without.open()
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._sys = folder / "sys"
+        self._ports: dict[str, Path] = {}
+        self.opened: list[str] = []
+        exists, realpath = os.path.exists, os.path.realpath
+        monkeypatch.setattr("os.path.exists", lambda path: exists(self._place(path)))
+        monkeypatch.setattr("os.path.realpath", lambda path: realpath(self._place(path)))
+        monkeypatch.setattr("serial.tools.list_ports_linux.glob.glob", self._glob)
+        monkeypatch.setattr("pvid.logger.open_port", self.opened.append)
+
+    def _glob(self, pattern: str) -> list[str]:
+        return [f"/dev/{name}" for name in self._ports if fnmatch(f"/dev/{name}", pattern)]
+
+    def _place(self, path: str) -> str:
+        found = re.fullmatch(r"/sys/class/tty/(\w+)/device", str(path))
+        return str(self._ports.get(found[1], path)) if found else path
+
+    def plug(self, socket: str, *ports: str, serial: str | None, product: str = "5740") -> None:
+        """A device in a USB socket, each of its ports an interface of its own."""
+        device = self._sys / "devices" / socket
+        device.mkdir(parents=True)
+        told = {"idVendor": "0483", "idProduct": product, "bNumInterfaces": f"{len(ports):2d}", "serial": serial}
+        for name, text in told.items():
+            if text is not None:
+                (device / name).write_text(f"{text}\n")
+        (self._sys / "bus" / "usb").mkdir(parents=True, exist_ok=True)
+        for number, port in enumerate(ports):
+            interface = device / f"{socket}:1.{number}"
+            interface.mkdir()
+            (interface / "subsystem").symlink_to(self._sys / "bus" / "usb")
+            self._ports[port] = interface
+
+    def pull(self, socket: str) -> None:
+        """Whatever is in that socket."""
+        self._ports = {port: place for port, place in self._ports.items() if place.parent.name != socket}
+        shutil.rmtree(self._sys / "devices" / socket)
+
+    def again(self, source: PortSource) -> str:
+        """The port at which a source is opened now."""
+        source.open()
+        return self.opened[-1]
+
+
+@pytest.fixture
+def plugged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plugged:
+    """No USB device yet."""
+    return Plugged(tmp_path, monkeypatch)
+
+
+def test_a_usb_device_is_found_again_by_its_serial_number(plugged: Plugged) -> None:
+    plugged.plug("1-1", "ttyACM0", serial="A1")
+    plugged.plug("1-2", "ttyACM1", serial="B2")
+    source = PortSource("/dev/ttyACM1")
+    assert plugged.again(source) == "/dev/ttyACM1"
+    assert source.usb == {"vid": 0x0483, "pid": 0x5740, "serial": "B2", "interface": ""}
+    plugged.pull("1-1")
+    plugged.pull("1-2")
+    with pytest.raises(PvidError, match="the device of /dev/ttyACM1 is not plugged in"):
+        source.open()
+    plugged.plug("1-2", "ttyACM1", serial="A1")  # the other board has its port, and it has another socket
+    plugged.plug("2-4.1", "ttyACM7", serial="B2")
+    assert plugged.again(source) == "/dev/ttyACM7"
+
+
+def test_a_usb_device_without_a_serial_number_is_found_again_in_its_socket(plugged: Plugged) -> None:
+    plugged.plug("1-1", "ttyUSB0", serial=None)
+    plugged.plug("1-2", "ttyUSB1", serial=None)
+    source = PortSource("/dev/ttyUSB1")
+    assert plugged.again(source) == "/dev/ttyUSB1"
+    assert source.usb is not None and source.usb["location"] == "1-2"
+    plugged.pull("1-1")
+    plugged.pull("1-2")
+    plugged.plug("1-2", "ttyUSB0", serial=None)
+    assert plugged.again(source) == "/dev/ttyUSB0"
+    plugged.pull("1-2")
+    plugged.plug("1-1", "ttyUSB1", serial=None)  # has its port, but not its socket
+    with pytest.raises(PvidError, match="is not plugged in"):
+        source.open()
+    plugged.plug("1-2", "ttyUSB2", serial=None, product="6001")  # has its socket, but is another make
+    with pytest.raises(PvidError, match="is not plugged in"):
+        source.open()
+
+
+def test_two_boards_with_the_same_serial_number_are_told_apart_by_their_sockets(plugged: Plugged) -> None:
+    plugged.plug("1-1", "ttyACM0", serial="0001")
+    plugged.plug("1-2", "ttyACM1", serial="0001")
+    source = PortSource("/dev/ttyACM1")
+    source.open()
+    plugged.pull("1-2")
+    with pytest.raises(PvidError, match="is not plugged in"):
+        source.open()  # the other one is not taken for it
+    plugged.plug("1-2", "ttyACM4", serial="0001")
+    assert plugged.again(source) == "/dev/ttyACM4"
+
+
+def test_a_second_board_with_the_same_serial_number_that_comes_later_is_told(plugged: Plugged) -> None:
+    plugged.plug("1-1", "ttyACM0", serial="0001")
+    source = PortSource("/dev/ttyACM0")
+    source.open()
+    plugged.plug("1-2", "ttyACM1", serial="0001")
+    with pytest.raises(PvidError, match="/dev/ttyACM0 and /dev/ttyACM1 are alike, and either may be the device of"):
+        source.open()
+
+
+def test_the_ports_of_one_adapter_are_told_apart(plugged: Plugged) -> None:
+    plugged.plug("1-1", "ttyACM0", "ttyACM1", "ttyACM2", serial="FT4")
+    source = PortSource("/dev/ttyACM1")
+    source.open()
+    assert source.usb == {"vid": 0x0483, "pid": 0x5740, "serial": "FT4", "interface": "1.1"}
+    plugged.pull("1-1")
+    plugged.plug("3-2", "ttyACM5", "ttyACM6", "ttyACM7", serial="FT4")
+    assert plugged.again(source) == "/dev/ttyACM6"
+
+
+def test_a_port_that_is_no_usb_device_is_found_again_by_its_name(plugged: Plugged) -> None:
+    plugged.plug("1-1", "ttyACM0", serial="A1")
+    source = PortSource("/dev/serial/by-id/usb-A1")
+    assert [plugged.again(source), plugged.again(source)] == 2 * ["/dev/serial/by-id/usb-A1"]
+    assert source.usb is None
 
 
 def test_a_board_that_refuses_is_told(tmp_path: Path) -> None:

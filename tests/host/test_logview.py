@@ -26,7 +26,7 @@ from rich.console import Console
 from pvid import link
 from pvid.loghistory import NUMBERS, History, Thinned, envelope
 from pvid.logreader import Account, LogReader, LogStream, Record
-from pvid.logvalues import Values
+from pvid.logvalues import Rows, Values
 from pvid.logview import LiveView, sparkline
 from pvid.logwords import kappa_share, kappa_words, reason_words, with_error
 from pvid.native import Native, Reason
@@ -197,6 +197,47 @@ def test_the_history_is_that_of_the_log_in_bounded_memory(sent: list[bytes], tmp
     for name in NUMBERS:
         assert set(history.estimates(name)) <= set(whole.estimates(name))
         assert history.newest[name] == whole.estimates(name)[-1]
+
+
+def test_the_view_costs_the_same_however_many_frames_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted in calls that turn records into numbers, between two pictures: a hundred times the frames are as many."""
+    rows, calls = Values.rows, 0
+
+    def counted(values: Values, record: Record) -> Iterator[Rows]:
+        nonlocal calls
+        calls += 1
+        return rows(values, record)
+
+    monkeypatch.setattr(Values, "rows", counted)
+    points, n = 50, field_board.SAMPLES_A_FRAME
+    estimate = link.Estimate(7, 1, (31.0, 9.0, 5.0, 0.0, 0.0, 0.0), (1e-6,) * 21, 0.01, 1e-4, 1.0, 0)
+    spent = []
+    for frames in (200, 20_000):
+        history = History(0.3, points=points)
+        calls = 0
+        for i in range(frames):
+            history.take(Record(0, 1, n * i, link.Raw.of_values(np.full(n, i), np.zeros(n))))
+            history.take(Record(0, 1, n * (i + 1), replace(estimate, updates=i)))
+        assert history.newest["w"] == 31.0 and history.samples()[1, -1] == frames - 1
+        assert len(history.estimates("w")) >= points
+        spent.append(calls)
+        history.reason  # noqa: B018 - looking once more costs nothing
+        assert calls == spent[-1]
+    # of each kept estimate one, and one of the samples before it; as often as more is put aside than may be
+    assert spent[0] <= 2 * 2 * points and spent[1] <= 3 * 2 * 2 * points
+
+
+def test_a_flood_is_drawn_as_what_comes_slowly(sent: list[bytes]) -> None:
+    """The same history, whether somebody looks after every record or only at the end."""
+    often, seldom, stream = History(0.3, points=20), History(0.3, points=20), LogStream()
+    for record in stream.feed(b"".join(sent)):
+        often.take(record)
+        often.samples()
+        seldom.take(record)
+    assert often.newest == seldom.newest and often.reason == seldom.reason
+    assert np.array_equal(often.samples(), seldom.samples())
+    for name in ("t", *NUMBERS):
+        assert np.array_equal(often.estimates(name), seldom.estimates(name), equal_nan=True)
 
 
 # ---- the program

@@ -273,10 +273,14 @@ class Samples(Message):
     phi_y: bytes = wire("f32", None)
 
     @property
+    def count(self) -> int:
+        """How many ticks."""
+        return len(self.phi_y) // 8
+
+    @property
     def values(self) -> npt.NDArray[np.float32]:
         """float32 [n, 2]: phi, y."""
-        whole = len(self.phi_y) // 8
-        return np.frombuffer(self.phi_y[: 8 * whole], "<f4").astype(np.float32).reshape(whole, 2)
+        return np.frombuffer(self.phi_y[: 8 * self.count], "<f4").astype(np.float32).reshape(self.count, 2)
 
     @classmethod
     def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:
@@ -306,10 +310,14 @@ class Counts(Message):
     phi_y: bytes = wire("i32", None)
 
     @property
+    def count(self) -> int:
+        """How many ticks."""
+        return len(self.phi_y) // 8
+
+    @property
     def values(self) -> npt.NDArray[np.int32]:
         """int32 [n, 2]: phi, y."""
-        whole = len(self.phi_y) // 8
-        return np.frombuffer(self.phi_y[: 8 * whole], "<i4").astype(np.int32).reshape(whole, 2)
+        return np.frombuffer(self.phi_y[: 8 * self.count], "<i4").astype(np.int32).reshape(self.count, 2)
 
     @classmethod
     def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:

@@ -58,8 +58,9 @@ class Source(Protocol):
 class PortSource:
     """A serial port, a pseudo-terminal or a URL of pyserial.
 
-    A USB device is found again by vendor, product and serial number, whichever port it then has; without a serial
-    number by the socket that it is plugged into. Anything else is found again by its name.
+    A USB device is found again by vendor, product, serial number and interface, whichever port it then has. One without
+    a serial number, or of which another with the same one was plugged in, is found again in the socket that it was in.
+    Anything else, a symbolic link of udev's among it, is found again by its name.
     """
 
     name: str
@@ -68,21 +69,50 @@ class PortSource:
     def open(self) -> Target:
         """See Source."""
         place = self.name
+        devices = {one.device: found for one in list_ports.comports() if (found := _identity(one)) is not None}
         if self.usb is None:
-            self.usb = next((_identity(one) for one in list_ports.comports() if one.device == place), None)
+            self.usb = _lasting(devices.get(place), list(devices.values()))
         else:
-            place = next((one.device for one in list_ports.comports() if _identity(one) == self.usb), "")
-            if not place:
-                raise PvidError(f"the device of {self.name} is not plugged in")
+            place = _find(self.usb, devices, self.name)
         return Target(self.name, "unknown", open_port(place))
 
 
 def _identity(info: Any) -> dict[str, Any] | None:
-    """Of a port as pyserial lists it; None when it is no USB device."""
+    """Of a port as pyserial lists it; None when it is no USB device.
+
+    pyserial's location is the socket ("1-1.2"), and of a device with several interfaces also which one ("1-1.2:1.0").
+    The ports of one adapter have its serial number in common and differ in that.
+    """
     if info.vid is None:
         return None
-    where = {"serial": info.serial_number} if info.serial_number else {"location": info.location}
-    return {"vid": info.vid, "pid": info.pid, **where}
+    location = info.location or ""
+    return {
+        "vid": info.vid,
+        "pid": info.pid,
+        "serial": info.serial_number or "",
+        "interface": location.partition(":")[2],
+        "location": location,
+    }
+
+
+def _lasting(device: dict[str, Any] | None, all_devices: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """What of an identity a device keeps when it is plugged in again; None: nothing by which it could be told."""
+    if device is None:
+        return None
+    alike = [one for one in all_devices if {**one, "location": ""} == {**device, "location": ""}]
+    if device["serial"] and len(alike) == 1:
+        return {key: value for key, value in device.items() if key != "location"}
+    return device if device["location"] else None
+
+
+def _find(usb: dict[str, Any], devices: dict[str, dict[str, Any]], name: str) -> str:
+    """The port of the device with that identity."""
+    found = [place for place, device in devices.items() if usb.items() <= device.items()]
+    if not found:
+        raise PvidError(f"the device of {name} is not plugged in")
+    if len(found) > 1:
+        raise PvidError(f"{' and '.join(found)} are alike, and either may be the device of {name}")
+    return found[0]
 
 
 @dataclass

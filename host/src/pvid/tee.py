@@ -1,10 +1,20 @@
-"""Numbers by UDP while they come: JSON for PlotJuggler and whoever else listens, or Teleplot's own lines."""
+"""Numbers by UDP while they come: JSON for PlotJuggler and whoever else listens, or Teleplot's own lines.
+
+JSON as PlotJuggler's "UDP Server" takes it (plotjuggler_plugins/DataStreamUDP and the JSON parser of its repository,
+github.com/facontidavide/PlotJuggler): an object a datagram of less than 2048 bytes; objects within it become paths
+(`/estimates/w`); its time is a number of seconds in a field at the top, which the user names there: "timestamp".
+
+Teleplot as its page has it (github.com/nesnes/teleplot, "Telemetry Format"): lines `name:time:value§unit`, time in
+milliseconds, more `time:value` of the same name behind a `;`, lines apart by newlines, a datagram up to 1432 bytes; no
+`:` and `|` in a name, none of `,;:|.` in a unit.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import socket
+from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 from pvid.errors import PvidError
@@ -13,14 +23,15 @@ from pvid.logvalues import TABLES, Rows, Values
 
 _TABLES = ("samples", "estimates")
 _LEFT_OUT = ("segment", "run", "log_time", "tick")
+_TELEPLOT_ROWS = 8  # a row of samples is at most 3 points of 46 bytes
 
 
 class Tee:
     """An observer that sends samples and estimates to `udp://host:port` or `teleplot://host:port`.
 
-    udp: a JSON object a datagram, `{"timestamp": 1.7e9, "tick": 5, "estimates": {"w": 31.6, ...}}`, time in seconds.
-    teleplot: lines `estimates.w:1700000000000:31.6§1/s^2`, time in milliseconds. Nobody need listen; what does not
-    get through is lost, as UDP is.
+    udp: `{"timestamp": 1.7e9, "tick": 5, "estimates": {"w": 31.6, ...}}`, one for each row.
+    teleplot: `estimates.w:1700000000000:31.6§1/s^2`, up to eight rows of a table together. Nobody need listen; what does
+    not get through is lost, as UDP is.
 
     Parameters
     ----------
@@ -45,7 +56,7 @@ class Tee:
             found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         except OSError as error:
             raise PvidError(f"cannot send to {address}: {error.strerror}") from error
-        self._datagram = _teleplot if parts.scheme == "teleplot" else _json
+        self._datagrams = _teleplot if parts.scheme == "teleplot" else _json
         self._values = Values(l1)
         self._socket = socket.socket(found[0], socket.SOCK_DGRAM)
         self._to = found[4]
@@ -54,9 +65,9 @@ class Tee:
         """See logreader.Observer."""
         for rows in self._values.rows(record):
             if rows.table in _TABLES:
-                for index in range(len(rows.columns["t"])):
+                for datagram in self._datagrams(rows):
                     with contextlib.suppress(OSError):  # nobody there: the log has it all
-                        self._socket.sendto(self._datagram(rows, index), self._to)
+                        self._socket.sendto(datagram, self._to)
 
     def idle(self, account: Account) -> None:
         """See logreader.Observer."""
@@ -72,16 +83,32 @@ def _numbers(rows: Rows, index: int) -> dict[str, float]:
     return {name: value for name, value in values.items() if not isinstance(value, str) and value == value}
 
 
-def _json(rows: Rows, index: int) -> bytes:
-    when = rows.columns["log_time"][index] / 1e9
-    content = {"timestamp": when, "tick": int(rows.columns["tick"][index]), rows.table: _numbers(rows, index)}
-    return (json.dumps(content) + "\n").encode()
+def _json(rows: Rows) -> Iterator[bytes]:
+    for index in range(len(rows.columns["t"])):
+        when = rows.columns["log_time"][index] / 1e9
+        content = {"timestamp": when, "tick": int(rows.columns["tick"][index]), rows.table: _numbers(rows, index)}
+        yield (json.dumps(content) + "\n").encode()
 
 
-def _teleplot(rows: Rows, index: int) -> bytes:
-    when = rows.columns["log_time"][index] // 1_000_000
-    lines = []
-    for name, value in _numbers(rows, index).items():
-        unit = TABLES[rows.table][name].unit
-        lines.append(f"{rows.table}.{name}:{when}:{value!r}" + (f"§{unit}" if unit != "1" else ""))
-    return ("\n".join(lines) + "\n").encode()
+def _teleplot(rows: Rows) -> Iterator[bytes]:
+    count = len(rows.columns["t"])
+    for first in range(0, count, _TELEPLOT_ROWS):
+        points: dict[str, list[str]] = {}
+        for index in range(first, min(first + _TELEPLOT_ROWS, count)):
+            when = _milliseconds(int(rows.columns["log_time"][index]))
+            for name, value in _numbers(rows, index).items():
+                points.setdefault(name, []).append(f"{when}:{value!r}")
+        yield "\n".join(
+            f"{rows.table}.{name}:{';'.join(told)}{_unit(rows.table, name)}" for name, told in points.items()
+        ).encode()
+
+
+def _milliseconds(ns: int) -> str:
+    """All of its digits: at more than 1000 samples a second whole milliseconds would not tell them apart."""
+    whole, rest = divmod(ns, 1_000_000)
+    return f"{whole}.{rest:06d}".rstrip("0") if rest else str(whole)
+
+
+def _unit(table: str, name: str) -> str:
+    unit = TABLES[table][name].unit
+    return f"§{unit}" if unit != "1" else ""
