@@ -16,6 +16,7 @@ import pytest
 from pvid import link
 from pvid.logfile import LogWriter
 from pvid.logreader import LogReader
+from pvid.logrig import rig_of_log
 from pvid.logverify import Stretch, Verifier
 from pvid.native import Native
 from pvid.rigfile import RigFile
@@ -164,20 +165,68 @@ def pvid(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
 
 
+def altered(log: Path, out: Path, change: Callable[[link.Message], link.Message | None], behind: int) -> int:
+    """Copies a log with the first message behind that tick changed for which `change` is not None; returns its tick.
+
+    The frame is encoded again as a board would that had computed this: no checksum tells.
+    """
+    pieces = log.read_bytes().split(b"\0")
+    for i, piece in enumerate(pieces):
+        for item in link.Decoder().feed(piece + b"\0"):
+            if isinstance(item, link.Frame) and item.tick > behind and (changed := change(item.message)) is not None:
+                pieces[i] = link.encode(changed, item.sequence, item.tick)[:-1]
+                out.write_bytes(b"\0".join(pieces))
+                return item.tick
+    raise AssertionError("there is no such message")
+
+
+def _wrong_hash(message: link.Message) -> link.Message | None:
+    return replace(message, hash=message.hash ^ 0x100) if isinstance(message, link.Hash) else None
+
+
+def _wrong_d1(message: link.Message) -> link.Message | None:
+    if isinstance(message, link.Estimate):
+        return _wrong_in("p", 1)(message)
+    if isinstance(message, link.EstimateQ31):
+        return replace(message, p=(message.p[0], message.p[1] ^ 1, *message.p[2:]))
+    return None
+
+
+def _wrong_sample(message: link.Message) -> link.Message | None:
+    """One bit of the first angle: a count, or some 1e-4 of a float's value (the last bit may be lost in rounding)."""
+    if not isinstance(message, link.Raw | link.RawCount):
+        return None
+    place, bit = (0, 1) if isinstance(message, link.RawCount) else (1, 0x80)
+    phi_y = bytearray(message.phi_y)
+    phi_y[place] ^= bit
+    return replace(message, phi_y=bytes(phi_y))
+
+
 @pytest.mark.parametrize(
-    ("target", "form", "core", "samples"),
+    ("target", "identifier", "samples", "change"),
     [
-        (HOST_TARGET, "weak", "f32", 4000),
-        (HOST_TARGET, "weak", "q31", 4000),
-        (HOST_TARGET, "strong", "f32", 800),
-        ("mps2-an386", "weak", "f32", 8000),
-        ("mps2-an386", "weak", "q31", 4000),
+        (HOST_TARGET, {"form": "weak", "core": "f32"}, 3000, _wrong_sample),
+        (HOST_TARGET, {"form": "weak", "core": "f32", "law": "pseudovelocity"}, 3000, _wrong_d1),
+        (HOST_TARGET, {"form": "weak", "core": "f32", "full_angle": True, "damping": True}, 3000, _wrong_hash),
+        (HOST_TARGET, {"form": "weak", "core": "f32", "outlier_gate": 4.0, "forgetting_s": 10.0}, 3000, _wrong_hash),
+        (HOST_TARGET, {"form": "weak", "core": "q31"}, 3000, _wrong_d1),
+        (HOST_TARGET, {"form": "strong", "core": "f32"}, 1000, _wrong_d1),
+        (HOST_TARGET, {"form": "strong", "core": "f32", "law": "pseudovelocity"}, 1000, _wrong_hash),
+        (HOST_TARGET, {"form": "strong", "core": "q31"}, 1000, _wrong_sample),
+        ("mps2-an386", {"form": "weak", "core": "f32"}, 8000, _wrong_hash),
+        ("mps2-an386", {"form": "weak", "core": "q31"}, 4000, _wrong_hash),
     ],
+    ids=lambda one: "-".join(map(str, one.values())) if isinstance(one, dict) else getattr(one, "__name__", None),
 )
-def test_a_field_log_of_the_firmware_verifies(tmp_path: Path, target: str, form: str, core: str, samples: int) -> None:
+def test_a_field_log_of_the_firmware_verifies_and_an_altered_bit_is_named(
+    tmp_path: Path,
+    target: str,
+    identifier: dict[str, Any],
+    samples: int,
+    change: Callable[[link.Message], link.Message | None],
+) -> None:
     rig = RigFile.standard()
-    identifier = replace(rig.identifier, form=form, core=core)  # type: ignore[arg-type]
-    replace(rig, identifier=identifier).write(tmp_path / "rig.toml")
+    replace(rig, identifier=replace(rig.identifier, **identifier)).write(tmp_path / "rig.toml")
     pace = [] if target == HOST_TARGET else ["--paced"]
     done = pvid(tmp_path, "log", target, "a.pvlog", "--rig", "rig.toml", "--samples", str(samples), *pace)
     assert done.returncode == 0, done.stderr
@@ -185,6 +234,15 @@ def test_a_field_log_of_the_firmware_verifies(tmp_path: Path, target: str, form:
     assert checked.returncode == 0, checked.stdout + checked.stderr
     assert "estimates and hashes equal in every bit" in checked.stdout
     assert "lost 0 frames, 0 samples" in checked.stdout
+    tick = altered(tmp_path / "a.pvlog", tmp_path / "b.pvlog", change, samples // 2)
+    (wrong,) = Verifier(rig_of_log(tmp_path / "b.pvlog")).stretches(LogReader(tmp_path / "b.pvlog"))
+    found = wrong.difference
+    assert found is not None and wrong.checked > 2, wrong.text
+    if change is _wrong_sample:  # it shows when its window is full, in the strong form at the next hash
+        assert tick < found.tick <= tick + (1400 if identifier["form"] == "weak" else 200)
+    else:
+        assert (found.tick, found.variable) == (tick, "hash" if change is _wrong_hash else "d1")
+        assert (found.core_word ^ found.twin_word) == (0x100 if change is _wrong_hash else 1)
 
 
 def test_verify_tells_by_its_exit_code(tmp_path: Path, sent: Sent) -> None:

@@ -157,7 +157,7 @@ def test_a_sparkline_has_its_median_at_half_height() -> None:
 
 @given(st.integers(1, 50), st.integers(0, 3000))
 def test_a_thinned_history_is_even_bounded_and_has_the_newest(points: int, count: int) -> None:
-    thinned = Thinned(points)
+    thinned: Thinned[tuple[float, ...]] = Thinned(points)
     for i in range(count):
         thinned.append((float(i),))
         assert len(thinned.rows) <= 2 * points

@@ -12,8 +12,8 @@ import numpy as np
 from pvid.boards import BUILD, ROOT, Board, build, keep_header, one_at_a_time
 from pvid.ctables import float_array, float_literal, struct_initializer
 from pvid.errors import PvidError
-from pvid.link import Core
-from pvid.native import Law, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
+from pvid.link import MAX_P, Core
+from pvid.native import MAX_MOMENTS, Law, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
 from pvid.native_q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.stream_rig import FixedConfig, FloatConfig, StreamRig
 from pvid.strong_header_q31 import strong_header_q31
@@ -122,6 +122,19 @@ def headers(rig: StreamRig) -> dict[str, str]:
     }
 
 
+def _sizes(config: FloatConfig | FixedConfig) -> dict[str, str]:
+    """Macros of pvid/config.h without which the settings would not fit, or take more room than they need."""
+    match config:
+        case StrongConfig():
+            return {"PVID_MAX_WINDOW": str(max(2 * config.half * config.stride + 1, 5))}
+        case StrongConfigQ31():
+            return {"PVID_MAX_WINDOW": str(config.design.bank.window)}
+        case WeakConfig(friction=True):
+            return {"PVID_MAX_P": str(MAX_P), "PVID_MAX_MOMENTS": str(MAX_MOMENTS)}
+        case _:
+            return {}
+
+
 def build_image(rig: StreamRig, board: Board | None) -> Path:
     """Builds the stream image for a board, or for this machine (None), under build/targets; returns it.
 
@@ -134,20 +147,17 @@ def build_image(rig: StreamRig, board: Board | None) -> Path:
     folder = BUILD / "runs" / name
     for file, text in headers(rig).items():
         keep_header(folder, file, text)
+    sizes = _sizes(rig.config)
     if board is None:
         tree = BUILD / f"{HOST}-{name}"
         with one_at_a_time(tree):
-            return _build_for_host(folder, tree, rig.core)
-    options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": rig.core.name.lower()}
-    if isinstance(rig.config, StrongConfig):
-        options["PVID_MAX_WINDOW"] = str(max(2 * rig.config.half * rig.config.stride + 1, 5))
-    elif isinstance(rig.config, StrongConfigQ31):
-        options["PVID_MAX_WINDOW"] = str(rig.config.design.bank.window)
+            return _build_for_host(folder, tree, rig.core, sizes)
+    options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": rig.core.name.lower(), **sizes}
     tree = build(board, BUILD / f"{board.name}-{name}", options)
     return tree / "apps" / "stream" / "stream.elf"
 
 
-def _build_for_host(folder: Path, tree: Path, core: Core) -> Path:
+def _build_for_host(folder: Path, tree: Path, core: Core, sizes: dict[str, str]) -> Path:
     """With the options of the core (firmware/cmake/PvidCompile.cmake)."""
     firmware = ROOT / "firmware"
     application = firmware / "apps" / "stream"
@@ -166,6 +176,7 @@ def _build_for_host(folder: Path, tree: Path, core: Core) -> Path:
     fresh = tree / "stream.new"
     includes = [firmware / "include", firmware / "link", firmware / "ports", folder]
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
+    command += [f"-D{name}={value}" for name, value in sizes.items()]
     command += [f"-I{one}" for one in includes] + [str(one) for one in sources] + ["-lm", "-o", str(fresh)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:

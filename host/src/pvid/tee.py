@@ -30,8 +30,8 @@ class Tee:
     """An observer that sends samples and estimates to `udp://host:port` or `teleplot://host:port`.
 
     udp: `{"timestamp": 1.7e9, "tick": 5, "estimates": {"w": 31.6, ...}}`, one for each row.
-    teleplot: `estimates.w:1700000000000:31.6§1/s^2`, up to eight rows of a table together. Nobody need listen; what does
-    not get through is lost, as UDP is.
+    teleplot: `estimates.w:1700000000000:31.6§1/s^2`, up to eight rows of a table together. Nobody need listen;
+    what does not get through is lost, as UDP is.
 
     Parameters
     ----------
