@@ -37,7 +37,10 @@ pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pv
     if (!pvid_within_f32(sample_rate_hz, 1.0e-3f, 1.0e6f)) {
         return PVID_BAD_SAMPLE_RATE;
     }
-    self->bank = *bank;
+    /* One by one: the padding of a copied struct would be that of the caller's, and end in snapshots. */
+    self->bank.half = bank->half;
+    self->bank.stride = bank->stride;
+    self->bank.weights = bank->weights;
     self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);
     const float rate = sample_rate_hz / (float)bank->stride;
     self->rate_power[0] = 1.0f;
