@@ -22,6 +22,7 @@ import field_board
 import numpy as np
 import numpy.typing as npt
 import pytest
+import serial
 from conftest import ROOT
 
 from pvid import link
@@ -31,6 +32,7 @@ from pvid.logfile import LOG_SCHEMA, LOG_SCHEMA_TEXT, Close, LogWriter, Mark, Se
 from pvid.logger import Logger, PortSource
 from pvid.logreader import Account, Gap, LogReader, LogStream, Record, Restart
 from pvid.native import Native
+from pvid.port import why_gone
 from pvid.stream_rig import stream_rig
 from pvid.target import HOST_TARGET, open_target
 
@@ -573,6 +575,53 @@ def test_a_log_that_cannot_be_written_ends_with_its_error(tmp_path: Path, monkey
     assert watching.closed
     _, account = read(tmp_path / "out.pvlog")
     assert account.segments[0].why is None
+
+
+def test_a_full_disk_is_told_with_what_the_log_holds(tmp_path: Path, boards: Boards) -> None:
+    """A limit of the shell's on the size of files stands for the disk."""
+    boards(ticks=20 * TICKS)
+    command = f"ulimit -f 100; exec {sys.executable} -m pvid log board out.pvlog"
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == "pvid: cannot write out.pvlog: File too large"
+    assert (tmp_path / "out.pvlog").stat().st_size == 100 * 1024
+    _, account = read(tmp_path / "out.pvlog")
+    assert account.samples > 1000 and (account.missing, account.damaged) == (0, 0)
+    assert f"{account.samples} samples in 1 segment; lost 0 frames" in done.stdout
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, boards: Boards) -> None:
+    boards(ticks=100)
+    (tmp_path / "folder").mkdir()
+    for out, why in (("nowhere/a.pvlog", "No such file or directory"), ("board/a.pvlog", "Not a directory")):
+        command = [sys.executable, "-m", "pvid", "log", "board", out]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+        assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"pvid: cannot write {out}: {why}")
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (serial.SerialException("device reports readiness to read but returned no data (...)"), "nothing is at its"),
+        (serial.SerialException("socket disconnected"), "nothing is at its other end any more"),
+        (OSError(5, "Input/output error"), "Input/output error"),
+        (serial.SerialException("something else"), "something else"),
+    ],
+)
+def test_a_port_that_is_gone_is_told_in_words(error: Exception, told: str) -> None:
+    assert why_gone(error).startswith(told)
+
+
+def test_a_failed_read_is_told_by_its_cause() -> None:
+    try:
+        try:
+            raise OSError(6, "No such device or address")
+        except OSError as error:
+            raise serial.SerialException(f"read failed: {error}")  # noqa: B904 - as pyserial does
+    except serial.SerialException as error:
+        assert why_gone(error) == "No such device or address"
 
 
 def test_what_the_board_took_while_the_link_was_down_is_counted(tmp_path: Path, sent: list[bytes]) -> None:

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from pvid import link
+from pvid.errors import PvidError
 from pvid.logfile import LogWriter
 from pvid.logreader import LogReader
 from pvid.logrig import rig_of_log
-from pvid.logverify import Stretch, Verifier
+from pvid.logverify import Stretch, Verdict, Verifier
 from pvid.native import Native
 from pvid.rigfile import RigFile
 from pvid.target import HOST_TARGET
@@ -125,7 +126,7 @@ def test_what_follows_a_lost_sample_is_not_verified_until_the_board_starts_over(
     gap = sent[lost][0]
     assert (first.first, first.ticks, first.verified) == (0, gap, True)
     assert (behind.first, behind.ticks, behind.verified) == (gap + n, TICKS - gap - n, False)
-    assert "what was before is not in the log" in behind.text
+    assert f"not verified, the samples of ticks {gap} to {gap + n - 1} were lost" in behind.text
     assert (anew.first, anew.verified, anew.difference) == (0, True, None)
     assert 0 < first.checked < checks(sent) and anew.checked > 0
 
@@ -147,7 +148,7 @@ def test_what_cannot_be_verified_says_why(tmp_path: Path, sent: Sent) -> None:
     assert reason("a", without) == "the board's configuration did not come with them"
     assert reason("b", silent) == "no estimate and no hash came with them"
     assert reason("c", [one for one in sent if one[0] >= 160]) == (
-        "what was before is not in the log, and the state hangs on it"
+        "its session began before this segment did, and the samples before tick 160 are not in it"
     )
     other = replace(field_board.rig(), l1=0.31)
     assert reason("d", sent, other) == "the board's image was made for other settings than the rig file's"
@@ -155,6 +156,46 @@ def test_what_cannot_be_verified_says_why(tmp_path: Path, sent: Sent) -> None:
     assert reason("e", sent, fixed) == "the board's image was made for other settings than the rig file's"
     (stretch,) = Verifier(None).stretches(LogReader(tmp_path / "d"))
     assert stretch.why_not == "the log holds no rig file: name it with --rig"
+
+
+def test_a_segment_of_an_old_session_alone_is_never_said_to_be_right(tmp_path: Path, sent: Sent) -> None:
+    """As when a line is closed and opened while the board samples on, and it is pulled before the board starts over."""
+    frames = list(field_board.frames(sent))
+    late = [frame for frame, (tick, _) in zip(frames, sent, strict=True) if 1600 <= tick < 2400]
+    stretches = verified(tmp_path / "a.pvlog", frames[:150], late, frames)
+    assert [(one.segment, one.verified) for one in stretches] == [(0, True), (1, False), (2, True)]
+    assert stretches[1].text == (
+        "segment 1, ticks 1600 to 2399: not verified, its session began before this segment did, and the samples "
+        "before tick 1600 are not in it"
+    )
+    verdict = Verdict()
+    for one in stretches:
+        verdict.add(one)
+    checked = stretches[0].checked + stretches[2].checked
+    assert verdict.text == (
+        f"in all: {checked} estimates and hashes equal in every bit, {stretches[0].ticks + TICKS} samples verified; "
+        "800 samples not verified; nothing verified of segment 1"
+    )
+
+
+def test_what_was_lost_within_a_segment_is_named(tmp_path: Path, sent: Sent) -> None:
+    frames = list(field_board.frames(sent))
+    without = [frame for frame, (tick, _) in zip(frames, sent, strict=True) if not 1600 <= tick < 1632]
+    begun, lost = verified(tmp_path / "a.pvlog", without)
+    assert begun.verified and begun.ticks == 1600
+    assert lost.text.endswith(
+        "not verified, the samples of ticks 1600 to 1631 were lost, and every bit after them depends on them"
+    )
+
+
+def test_an_empty_log_is_told_as_such(tmp_path: Path) -> None:
+    writer = LogWriter(tmp_path / "a.pvlog")
+    with pytest.raises(PvidError, match=r"a.pvlog is empty: the recording ended before the link had come up"):
+        list(LogReader(tmp_path / "a.pvlog"))
+    writer.begin("a port", None)
+    writer.close()
+    nothing = pvid(tmp_path, "verify", "a.pvlog")
+    assert nothing.returncode == 3 and nothing.stdout.startswith("nothing to verify: the log holds no samples\n")
 
 
 # ---- the program
@@ -258,6 +299,7 @@ def test_verify_tells_by_its_exit_code(tmp_path: Path, sent: Sent) -> None:
     assert pvid(tmp_path, "verify", "right.pvlog").returncode == 0
     different = pvid(tmp_path, "verify", "wrong.pvlog")
     assert different.returncode == 1 and "DIFFERENT at tick 160, hash: log" in different.stdout
+    assert "1 of 1 stretches DIFFERENT" in different.stdout
     assert pvid(tmp_path, "verify", "none.pvlog").returncode == 3
     noise = pvid(tmp_path, "verify", "noise")
     assert (noise.returncode, noise.stderr) == (2, "pvid: noise is no log of pvid: not one frame in 5 bytes\n")

@@ -204,6 +204,10 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(log: Path, native: Native
         write_report(recording, tmp_path / "out.xyz")
     with pytest.raises(PvidError, match="cannot write the report"):
         write_report(recording, tmp_path / "no" / "folder.png")
+    (tmp_path / "taken.png").mkdir()
+    with pytest.raises(PvidError, match="cannot write the report .*taken.png: Is a directory"):
+        write_report(recording, tmp_path / "taken.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]  # nothing half written is left
     writer = LogWriter(tmp_path / "short.pvlog", rig=field_board.rig().text())
     writer.begin("a port", None)
     sent = field_board.messages(field_board.Field(320, estimate_every=100), native)

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.appearing import appearing
 from pvid.errors import PvidError
 
 FloatArray = npt.NDArray[np.float64]
@@ -157,18 +158,11 @@ def write_run(path: str | os.PathLike[str], run: Run) -> None:
             raise PvidError(f"{path} is not written: {_shown(name)} is no name for a column.")
     _check(_Table(path, named, _row_place), run.sample_rate)
     content = write(path, named)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        try:
-            with temporary.open("xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            raise
+        with appearing(path) as temporary, temporary.open("xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
     except OSError as error:
         raise PvidError(f"{path} cannot be written: {_reason(error)}.") from error
 

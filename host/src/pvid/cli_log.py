@@ -100,7 +100,12 @@ def log_command(
             begin=begin,
             anew=anew,
         )
-        account = logger.run()
+        try:
+            account = logger.run()
+        except PvidError:
+            if logger.stream.account.segments:
+                print_account(logger.stream.account, 1.0)  # what was recorded before it is in the log
+            raise
     return print_account(account, allow_loss)
 
 
@@ -154,22 +159,22 @@ def verify_command(log: Path, rig_path: Path | None) -> int:
     """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
 
     The first difference is named. What follows a lost sample cannot be verified until the board counts from 0 again;
-    it is listed. Exit code 1 at a difference, 3 when nothing could be verified.
+    it is listed, and counted in the summary. Exit code 1 at a difference, 3 when nothing could be verified.
     """
-    from pvid.logverify import Verifier  # the twins, which other commands need not wait for
+    from pvid.logverify import Verdict, Verifier  # the twins, which other commands need not wait for
 
     rig = load(rig_path) if rig_path is not None else rig_of_log(log)
     reader = LogReader(log)
-    different = verified = 0
+    verdict = Verdict()
     with progress_bar("verifying", None) as advance:
         for stretch in Verifier(rig, advance).stretches(reader):
             click.echo(stretch.text)
-            different += stretch.difference is not None
-            verified += stretch.verified
+            verdict.add(stretch)
+    click.echo(verdict.text)
     click.echo(reader.account.text)
-    if different:
+    if verdict.different:
         return DIFFERENT
-    return DONE if verified else NOTHING_IDENTIFIED
+    return DONE if verdict.verified else NOTHING_IDENTIFIED
 
 
 @click.command(name="export")

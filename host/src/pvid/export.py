@@ -8,8 +8,8 @@ from __future__ import annotations
 import csv
 import importlib
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid import __version__
+from pvid.appearing import appearing
 from pvid.errors import PvidError
 from pvid.logreader import LogReader
 from pvid.logrig import hello_of_log
@@ -233,19 +234,6 @@ class McapWriter:
 FORMATS: dict[str, type[Writer]] = {"csv": CsvWriter, "parquet": ParquetWriter, "mcap": McapWriter, "npz": NpzWriter}
 
 
-@contextmanager
-def _appearing(base: Path, suffixes: list[str]) -> Iterator[dict[str, Path]]:
-    """Names to write under, by suffix; they become base + suffix if all goes well, and vanish if not."""
-    temporary = {suffix: base.with_name(f".{base.name}{suffix}.tmp") for suffix in suffixes}
-    try:
-        yield temporary
-        for suffix, path in temporary.items():
-            path.replace(base.with_name(base.name + suffix))
-    finally:
-        for path in temporary.values():
-            path.unlink(missing_ok=True)
-
-
 def export_log(log: Path, form: str, base: Path, l1: float | None) -> list[Path]:
     """Writes a log as one of FORMATS under the name `base` with the format's endings; returns what was written.
 
@@ -259,12 +247,13 @@ def export_log(log: Path, form: str, base: Path, l1: float | None) -> list[Path]
     kind = FORMATS[form]
     values = Values(l1, hello_of_log(log))
     try:
-        with _appearing(base, kind.suffixes()) as files:
+        with ExitStack() as stack:
+            files = {one: stack.enter_context(appearing(base.with_name(base.name + one))) for one in kind.suffixes()}
             writer = kind(base, files)
             for record in LogReader(log):
                 for rows in values.rows(record):
                     writer.write(rows)
             writer.close()
     except OSError as error:
-        raise PvidError(f"cannot write {error.filename or base}: {error.strerror}") from error
+        raise PvidError(f"cannot write {base}: {error.strerror}") from error
     return [base.with_name(base.name + suffix) for suffix in kind.suffixes()]

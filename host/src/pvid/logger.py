@@ -23,7 +23,7 @@ from pvid.errors import PvidError
 from pvid.link import Code, Configuration, Credit, Hello, Message, Status, encode
 from pvid.logfile import LogWriter, Segment
 from pvid.logreader import Account, LogStream, Observer, Record
-from pvid.port import Port, open_port
+from pvid.port import Port, open_port, why_gone
 from pvid.target import COMING_UP_S, Target, refusal
 
 _CHUNK = 1 << 14
@@ -196,7 +196,7 @@ class Recorder(threading.Thread):
             while time.monotonic() < limit and (data := port.read(_CHUNK)):
                 self.writer.take(data)
         except (serial.SerialException, OSError) as error:
-            return f"the port is gone: {error}"
+            return f"the port is gone: {why_gone(error)}"
         return self.why
 
     def _reopen(self) -> Target | None:

@@ -157,6 +157,7 @@ class LogStream:
         schemas = {SCHEMA: readers(MESSAGES), LOG_SCHEMA: readers(LOG_MESSAGES)}
         self.account = Account()
         self.rig: str | None = None
+        self.is_log = False  # whether the logger has written into it
         self._decoder = Decoder(schemas=schemas, learns=True)
         self._held: Loss | None = None  # damage, until it is known whether the link went down there
         self._fresh = True  # no frame of the board in this segment yet
@@ -217,6 +218,7 @@ class LogStream:
     def _of_logger(self, message: Message) -> Iterator[Record]:
         yield from self._release(cut=not isinstance(message, Mark))
         account = self.account
+        self.is_log = True
         if isinstance(message, Segment):
             account.unix_ns = message.unix_ns
             port = str(message.told.get("port", ""))
@@ -333,5 +335,7 @@ class LogReader:
         except OSError as error:
             raise PvidError(f"cannot read {self.path}: {error.strerror}") from error
         yield from stream.end()
+        if stream.is_log and not stream.account.segments and not stream.account.frames:
+            raise PvidError(f"{self.path} is empty: the recording ended before the link had come up")
         if not stream.account.frames and not stream.account.segments:
             raise PvidError(f"{self.path} is no log of pvid: not one frame in {stream.account.bytes} bytes")

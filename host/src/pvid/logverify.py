@@ -78,10 +78,54 @@ class Stretch:
 
 
 @dataclass
+class Verdict:
+    """What became of all stretches."""
+
+    samples: int = 0
+    verified: int = 0  # samples that the twin computed to the end
+    checked: int = 0
+    different: int = 0
+    stretches: int = 0
+    good: set[int] = field(default_factory=set)  # segments with a verified stretch that has no difference
+    bad: set[int] = field(default_factory=set)  # with a difference, or with nothing that could be verified
+
+    def add(self, stretch: Stretch) -> None:
+        """The next one."""
+        self.stretches += 1
+        self.samples += stretch.ticks
+        self.checked += stretch.checked
+        different = stretch.difference is not None
+        self.different += different
+        if stretch.verified and not different:
+            self.verified += stretch.ticks
+            self.good.add(stretch.segment)
+        else:
+            self.bad.add(stretch.segment)
+
+    @property
+    def text(self) -> str:
+        """In one sentence."""
+        if not self.stretches:
+            return "nothing to verify: the log holds no samples"
+        left = self.samples - self.verified
+        parts = [f"{self.checked} estimates and hashes equal in every bit, {self.verified} samples verified"]
+        if self.different:
+            parts.append(f"{self.different} of {self.stretches} stretches DIFFERENT")
+        if left:
+            parts.append(f"{left} samples not verified")
+        if lacking := sorted(self.bad - self.good):
+            parts.append(
+                f"nothing verified of segment{'' if len(lacking) == 1 else 's'} {', '.join(map(str, lacking))}"
+            )
+        return "in all: " + "; ".join(parts)
+
+
+@dataclass
 class _Open:
-    """A stretch that grows."""
+    """A stretch that grows; `lacks` says what is missing before it, if it does not begin at tick 0."""
 
     stretch: Stretch
+    lacks: str
     parts: list[npt.NDArray[Any]] = field(default_factory=list)
     checks: list[tuple[int, Check]] = field(default_factory=list)
 
@@ -110,6 +154,7 @@ class Verifier:
         self._hello: Hello | None = None
         self._configurations: dict[int, Configuration] = {}
         self._open: _Open | None = None
+        self._before: tuple[int, int] | None = None  # segment and tick where the last samples ended
         self._settings: dict[float, tuple[FloatConfig | FixedConfig, int]] = {}
 
     def stretches(self, records: Iterable[Record]) -> Iterator[Stretch]:
@@ -130,7 +175,8 @@ class Verifier:
             case Raw() | RawCount() as raw:
                 if self._open is None or record.tick != self._open.next:
                     yield from self._close()
-                    self._open = _Open(Stretch(record.segment, record.tick, 0))
+                    self._open = _Open(Stretch(record.segment, record.tick, 0), self._lacking(record))
+                self._before = record.segment, record.tick + raw.count
                 values = raw.values
                 self._open.stretch.ticks += len(values)
                 if self._open.stretch.first == 0:  # else it will not be computed
@@ -141,6 +187,13 @@ class Verifier:
                     self._open.checks.append((record.tick, check))
             case _:
                 pass
+
+    def _lacking(self, record: Record) -> str:
+        """What is missing before these samples, in a sentence."""
+        if self._before is None or self._before[0] != record.segment:
+            return f"its session began before this segment did, and the samples before tick {record.tick} are not in it"
+        first = self._before[1] if self._before[1] < record.tick else 0
+        return f"the samples of ticks {first} to {record.tick - 1} were lost, and every bit after them depends on them"
 
     def _close(self) -> Iterator[Stretch]:
         opened, self._open = self._open, None
@@ -155,7 +208,7 @@ class Verifier:
     def _verify(self, opened: _Open) -> None:
         stretch = opened.stretch
         if stretch.first != 0:
-            raise PvidError("what was before is not in the log, and the state hangs on it")
+            raise PvidError(opened.lacks)
         if not opened.checks:
             raise PvidError("no estimate and no hash came with them")
         stretch.session = opened.checks[-1][1].session

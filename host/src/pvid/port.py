@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import termios
 from typing import Protocol
 
@@ -62,3 +63,11 @@ def why_not_opened(name: str, error: Exception) -> str:
     if number in (errno.ENOTTY, errno.EISDIR):
         return f"{name} is no serial port"
     return f"cannot open the port {name}: {error}"
+
+
+def why_gone(error: Exception) -> str:
+    """A few words on a port that stopped working."""
+    if "returned no data" in str(error) or "disconnected" in str(error):
+        return "nothing is at its other end any more"
+    number = getattr(error, "errno", None) or getattr(error.__context__, "errno", None)
+    return os.strerror(number) if number else str(error)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from scipy.signal import savgol_filter, welch
 
+from pvid.appearing import appearing
 from pvid.axis_limits import interesting
 from pvid.capture import Run, read_run
 from pvid.errors import PvidError
@@ -186,8 +187,11 @@ def write_report(recording: Recording, path: Path) -> None:
         figure.align_ylabels(axes[:, 0])
         figure.align_ylabels(axes[:, 1])
         figure.suptitle("\n".join([recording.title, _last(recording), recording.account]), fontsize=12)
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
+        with appearing(path) as temporary:
+            figure.savefig(temporary, dpi=110, format=path.suffix[1:] or "png")
+    except OSError as error:
+        raise PvidError(f"cannot write the report {path}: {error.strerror}") from error
+    except ValueError as error:
         raise PvidError(f"cannot write the report {path}: {error}") from error
     finally:
         plt.close(figure)
