@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import socket
 import subprocess
@@ -18,10 +17,10 @@ from typing import Any
 import field_board
 import numpy as np
 import pytest
+from browser import chromium
 from click.testing import CliRunner
 from conftest import ROOT
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 
 from pvid.cli import commands
 from pvid.errors import PvidError
@@ -201,28 +200,11 @@ def board(tmp_path: Path) -> Iterator[Path]:
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Iterator[webdriver.Chrome]:
-    """Debian's Chromium without a screen, which notes every request and every complaint."""
-    options = webdriver.ChromeOptions()
-    options.binary_location = "/usr/bin/chromium"
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--window-size=1500,1150",
-        f"--user-data-dir={tmp_path / 'chromium'}",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options, Service("/usr/bin/chromedriver"))
-    driver.get("about:blank")
-    requests_of(driver)  # those of the browser's own first page
-    yield driver
-    driver.quit()
+    """A window at about:blank."""
+    with chromium(tmp_path / "chromium", 1500, 1150) as driver:
+        driver.get("about:blank")
+        requests_of(driver)  # those of the browser's own first page
+        yield driver
 
 
 def requests_of(browser: webdriver.Chrome) -> list[str]:
@@ -272,8 +254,6 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
         assert any(one.endswith("/plotly.min.js") for one in asked)
         assert all(one.startswith((f"http://{at}/", "data:", "blob:")) for one in asked), set(asked)
         assert browser.get_log("browser") == []  # type: ignore[no-untyped-call]
-        if shot := os.environ.get("PVID_SCREENSHOT"):
-            browser.save_screenshot(shot)
         logger.send_signal(signal.SIGINT)
         out, err = logger.communicate(timeout=30)
         assert logger.returncode == 0, err

@@ -32,7 +32,7 @@ from pvid.logwords import (
 )
 
 _PERIOD_S = 0.25
-_BAR = 30
+_BAR, _SHORT_BAR = 30, 18  # in a terminal of 100 columns and more, and in a narrower one
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _WIDEST = 110
 
@@ -132,14 +132,15 @@ class LiveView:
         rows = _labelled()
         newest, history = self.history.newest, self.history
         kappa, residual = newest.get("kappa", math.nan), newest.get("residual", math.nan)
-        filled = round(_BAR * kappa_share(kappa))
+        length = _BAR if self._console.width >= 100 else _SHORT_BAR
+        filled = round(length * kappa_share(kappa))
         style = "green" if kappa >= KAPPA_WEAK else "yellow"
-        bar = Text("█" * filled, style=style) + Text("░" * (_BAR - filled), style="dim")
+        bar = Text("█" * filled, style=style) + Text("░" * (length - filled), style="dim")
         rows.add_row("kappa", bar + Text(f"  {kappa:.2g}  {kappa_words(kappa)}" if newest else "  none yet"))
-        line = sparkline(history.estimates("residual"), _BAR)
+        line = sparkline(history.estimates("residual"), length)
         rows.add_row(
             "residual",
-            Text(line.ljust(_BAR), style="cyan")
+            Text(line.ljust(length), style="cyan")
             + Text(f"  {residual:.3g} {residual_words(history.hello)}" if line else "  none yet"),
         )
         t, phi, y = history.samples()

@@ -27,7 +27,7 @@ from pvid.link import Estimate, Form, Hello
 from pvid.logreader import LogReader
 from pvid.logrig import rig_of_log, run_of_log
 from pvid.logvalues import Values
-from pvid.logwords import KAPPA_MIN, with_error
+from pvid.logwords import KAPPA_MIN, reason_words, with_error
 from pvid.native import Native
 from pvid.residuals import Residuals, residuals_of
 from pvid.rigfile import RigFile
@@ -49,7 +49,7 @@ class Recording:
     """What is drawn.
 
     t : of the estimates, `clock` says since when [n, s];  physical, physical_se : g, l2, rho2 [n, 3];  kappa [n]
-    p : the last estimate, as residuals_of takes it;  reasons : how many estimates came with which
+    p : the last estimate, as residuals_of takes it;  reasons : how many estimates came with each;  state : the last
     breaks : when the board began anew or the link came up again [s];  account : what was recorded and lost
     run : the longest stretch of samples without a gap
     """
@@ -64,6 +64,7 @@ class Recording:
     kappa: Float
     p: Float
     reasons: dict[str, int]
+    state: str
     breaks: tuple[float, ...]
     account: str
 
@@ -132,6 +133,7 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         kappa=told["kappa"],
         p=np.array([*(told[name][-1] for name in (*LINEAR, ZERO)[:n_core]), *friction]),
         reasons={str(reason): int(count) for reason, count in counts},
+        state=str(told["reason"][-1]),
         breaks=tuple(t[1:][np.diff(told["run"]) > 0]),
         account=reader.account.text,
     )
@@ -153,8 +155,9 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
         kappa=result.trajectory.kappa,
         p=np.array([result.value[name] for name in names]),
         reasons={},
+        state=result.status,
         breaks=(),
-        account=f"{result.ticks} samples, {result.updates} updates, {result.lost} samples rejected; {result.status}"
+        account=f"{result.ticks} samples, {result.updates} updates, {result.lost} samples rejected"
         + ("; residuals without the friction that was estimated" if identifier.damping else ""),
     )
 
@@ -207,8 +210,9 @@ def _last(recording: Recording) -> str:
         linear = ", ".join(f"{name} = {value:.4g}" for name, value in zip(LINEAR, recording.p, strict=False))
         parts = [f"outside the physical region: {linear}"]
     reasons = ", ".join(f"{count} {reason}" for reason, count in recording.reasons.items())
-    told = f"last estimate: {', '.join(parts)} " + ("" if len(parts) == 1 else " (± standard error)")
-    return f"{told}\nestimates: {reasons}" if reasons else told
+    told = f"last estimate: {', '.join(parts)}" + ("" if len(parts) == 1 else "  (± standard error)")
+    state = f"{recording.state}: {reason_words(recording.state)}"
+    return "\n".join([told, state, f"estimates: {reasons}"] if reasons else [told, state])
 
 
 def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:

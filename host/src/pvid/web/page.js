@@ -13,13 +13,13 @@ function say(id, text, kind = "") {
   place(id).className = kind;
 }
 
-function draw(id, label, traces, axis = {}, below = "time since the first record [s]") {
+function draw(id, label, traces, axis = {}, legendTop = 1, below = "time since the first record [s]") {
   const layout = {
-    title: { text: label, font: { size: 14 }, x: 0.02, xanchor: "left" },
-    margin: { l: 64, r: 12, t: 34, b: 42 },
+    title: { text: label, font: { size: 13 }, x: 0.02, xanchor: "left" },
+    margin: { l: 58, r: 12, t: 30, b: 42 },
     xaxis: { title: { text: below, standoff: 6 } },
     yaxis: { exponentformat: "power", ...axis },
-    legend: { orientation: "h", x: 1, xanchor: "right", y: 1.0, yanchor: "bottom" },
+    legend: { x: 1, xanchor: "right", y: legendTop, yanchor: "top", bgcolor: "rgba(255, 255, 255, 0.7)", font: { size: 11 } },
     showlegend: traces.some((one) => one.name !== undefined && one.showlegend !== false),
     hovermode: "x",
     uirevision: "kept", // what was zoomed stays zoomed
@@ -72,10 +72,10 @@ async function drawPlots({ estimates, motion }) {
     await drawParameter(`parameter${i}`, t, one);
   }
   await draw("residualPlot", estimates.residualLabel, [curve(t, estimates.residual, ORANGE)], within(estimates.residualLimits));
-  await draw("kappaPlot", "kappa, how far apart the data tell the parameters", [
+  await draw("kappaPlot", "kappa: are the parameters told apart?", [
     curve(t, estimates.kappa, GREEN, { name: "kappa", showlegend: true }),
     curve(t, t.map(() => 3e-5), RED, { name: "nothing is published below", showlegend: true, line: { color: RED, dash: "dash" } }),
-  ], { type: "log", dtick: 1 });
+  ], { type: "log", dtick: 1 }, 0.5);
   await draw("phiPlot", "angle phi [rad]", [curve(motion.phi.t, motion.phi.x, BLUE)]);
   await draw("yPlot", "drive: height of the pivot y [mm]", [curve(motion.y.t, motion.y.x, BLUE)]);
 }
