@@ -174,16 +174,23 @@ static bool within_row_limit(int64_t x)
     return (x >= -PVID_ROW_LIMIT_Q31) && (x <= PVID_ROW_LIMIT_Q31);
 }
 
-pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
+bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e)
 {
     bool fits = within_row_limit(y);
-    int64_t e = y;
+    int64_t rest = y;
     for (size_t i = 0; i < self->model->n_theta; i++) {
         fits = fits && within_row_limit(n[i]);
         const int32_t held = (int32_t)pvid_clamp_q31(n[i], PVID_ROW_LIMIT_Q31);
-        e -= pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(held, self->mantissa[i]), self->shift[i]), TERM_MAX);
+        rest -= pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(held, self->mantissa[i]), self->shift[i]), TERM_MAX);
     }
-    if (!fits || !within_row_limit(e)) {
+    *e = rest;
+    return fits && within_row_limit(rest);
+}
+
+pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
+{
+    int64_t e;
+    if (!pvid_estimator_innovation_q31(self, n, y, &e)) {
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }

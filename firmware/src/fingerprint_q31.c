@@ -104,6 +104,11 @@ static uint32_t trust_of(uint32_t hash, const pvid_trust_config_q31 *config)
     return pvid_fnv_word(running, config->shut_max);
 }
 
+static uint32_t gate_of(uint32_t hash, const pvid_gate_config_q31 *config)
+{
+    return pvid_fnv_word(pvid_fnv_word(hash, config->sigmas), config->patience_groups);
+}
+
 uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)
 {
     const pvid_model_q31 *model = config->zero_unknown ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;
@@ -114,5 +119,6 @@ uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)
     hash = pvid_fnv_word(hash, config->zero_unknown ? 1u : 0u);
     hash = pvid_fnv_word(hash, config->iterations);
     hash = estimator_of(hash, &config->estimator, model->n_theta, model->n_p);
-    return trust_of(hash, &config->trust);
+    hash = trust_of(hash, &config->trust);
+    return gate_of(hash, &config->gate);
 }

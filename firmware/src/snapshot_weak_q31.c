@@ -14,6 +14,7 @@ static const uint32_t layout[] = {
     PLACE(front.ring),
     PLACE(window),
     PLACE(finish),
+    PLACE(finish.gate),
     PLACE(finish.factor),
     PLACE(finish.solve),
     PLACE(finish.solve.q),

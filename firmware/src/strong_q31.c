@@ -5,10 +5,24 @@
 #include <string.h>
 
 #include "count.h"
+#include "estimator_q31.h"
 #include "integer_q31.h"
+#include "scaled_q31.h"
 
 #define SHIFT_MAX 62u
 #define DRIVE_TICKS_MAX ((uint32_t)1 << 30)
+
+/* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
+#define GATE_MEMORY_PARTS 4u
+#define GATE_FLOOR_BITS 20 /* 1e-6 of its square */
+
+/* The gate's least scale: a part of row_sd^2, and no less than what rounding leaves of a row's dozen terms. */
+static pvid_scaled_q31 gate_floor(const pvid_estimator_q31 *estimator)
+{
+    const pvid_scaled_q31 rounding = pvid_scaled_of_q31(1, 0);
+    return pvid_scaled_plus_q31(
+        pvid_scaled_shifted_q31(pvid_estimator_expected_variance_q31(estimator), -GATE_FLOOR_BITS), rounding);
+}
 
 static bool shifts_are_valid(const uint8_t shift[], size_t n)
 {
@@ -36,7 +50,7 @@ pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config
         return PVID_BAD_DRIVE_MIN;
     }
     memset(self, 0, sizeof *self);
-    const pvid_status status = pvid_differentiator_init_q31(&self->differentiator, &config->bank);
+    pvid_status status = pvid_differentiator_init_q31(&self->differentiator, &config->bank);
     if (status != PVID_OK) {
         return status;
     }
@@ -49,7 +63,12 @@ pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config
     self->drive_forgetting = (int32_t)(INT32_MAX / config->drive_ticks);
     pvid_estimator_config_q31 estimator = config->estimator;
     estimator.model = &pvid_kapitza_strong_q31;
-    return pvid_estimator_init_q31(&self->estimator, &estimator);
+    status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    return pvid_gate_init_q31(&self->gate, &config->gate, config->drive_ticks / GATE_MEMORY_PARTS,
+                              gate_floor(&self->estimator));
 }
 
 void pvid_strong_gap_q31(pvid_strong_q31 *self)
@@ -81,6 +100,14 @@ static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int3
     return true;
 }
 
+/* Whether the row fits the estimate as well as rows usually do; one that does not fit its formats is not asked. */
+static bool passes(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
+{
+    int64_t e;
+    return !pvid_estimator_innovation_q31(&self->estimator, n, y, &e) ||
+           pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(e * e, 0));
+}
+
 pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
 {
     const int64_t angle = (int64_t)phi - self->phi_offset;
@@ -107,6 +134,10 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
     int32_t row_y;
     if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n)) {
         return refuse(self);
+    }
+    if ((self->gate.limit.m > 0) && !passes(self, n, row_y)) {
+        pvid_count_up(&self->estimator.counters.rejected_outlier);
+        return PVID_REJECTED_OUTLIER;
     }
     const pvid_reason added = pvid_estimator_add_q31(&self->estimator, n, row_y);
     return (added == PVID_ACCUMULATED) ? pvid_estimator_update_q31(&self->estimator) : added;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cholesky_q31.h"
+#include "count.h"
 #include "estimator_q31.h"
 #include "integer_q31.h"
 #include "scaled_q31.h"
@@ -26,7 +27,7 @@ enum {
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
-    STAGE_NOISE, /* what there is in the rows */
+    STAGE_NOISE, /* are the rows to be taken in? and what noise there is in them */
     STAGE_ADD,   /* K times: a row to the estimator */
     STAGE_SOLVE, /* `iterations` solves of several stages each */
     STAGE_ASSESS, /* several stages */
@@ -396,6 +397,34 @@ static void remove_components(pvid_weak_finish_q31 *self, size_t first, size_t l
     }
 }
 
+/* What a window's rows leave unexplained, a few functions at a time; a row that does not fit as large as can be. */
+static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *estimator, size_t first, size_t last,
+                          int32_t sums[][PVID_WEAK_TERMS_Q31])
+{
+    if (first == 0u) {
+        self->energy = 0;
+    }
+    for (size_t k = first; k < last; k++) {
+        int64_t e;
+        (void)pvid_estimator_innovation_q31(estimator, &sums[k][COLUMN_N], sums[k][COLUMN_Y], &e);
+        const int64_t held = pvid_clamp_q31(e, COLUMN_LIMIT);
+        self->energy = pvid_clamp_q31(self->energy + (held * held), PVID_WIDE);
+    }
+}
+
+/* Variance of the window's residuals over what is expected of it. */
+static pvid_scaled_q31 surplus_of(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
+{
+    const pvid_scaled_q31 freedom = pvid_scaled_of_q31((int64_t)design->functions - 2, 0);
+    return pvid_scaled_over_q31(pvid_scaled_of_q31(self->energy, 0), pvid_scaled_times_q31(freedom, self->expected));
+}
+
+/* Whether the window's rows are to be taken in. Those that do not fit are asked no more: they are refused as such. */
+static bool passes(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
+{
+    return (self->gate.limit.m == 0) || self->saturated || pvid_gate_passes_q31(&self->gate, surplus_of(self, design));
+}
+
 /* Before the rows: what noise there is in the entries of N, in their formats; the last that is known where the window
  * keeps the whitening of its design. */
 static void tell_noise(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
@@ -458,11 +487,9 @@ static bool solve_on(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estima
 static void judge(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, pvid_estimator_q31 *estimator,
                   pvid_trust_q31 *trust)
 {
-    const pvid_scaled_q31 freedom = pvid_scaled_of_q31((int64_t)design->functions - 2, 0);
-    const pvid_scaled_q31 expected = pvid_scaled_times_q31(freedom, self->expected);
-    const pvid_scaled_q31 surplus = pvid_scaled_over_q31(pvid_scaled_of_q31(self->energy, 0), expected);
-    self->reason = pvid_trust_judge_q31(trust, estimator, self->reason, self->size, self->solve.informed,
-                                        pvid_scaled_fixed_q31(surplus, PVID_SURPLUS_BITS), &self->candidate);
+    const int64_t surplus = pvid_scaled_fixed_q31(surplus_of(self, design), PVID_SURPLUS_BITS);
+    self->reason = pvid_trust_judge_q31(trust, estimator, self->reason, self->size, self->solve.informed, surplus,
+                                        &self->candidate);
 }
 
 static size_t at_most(size_t first, size_t few, size_t all)
@@ -473,7 +500,7 @@ static size_t at_most(size_t first, size_t few, size_t all)
 /* The stages up to the rows: those that the window's sums go through. Returns the index after the stage, and writes
  * where the stage is over to *all. */
 static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
-                      int32_t sums[][PVID_WEAK_TERMS_Q31], size_t *all)
+                      const pvid_estimator_q31 *estimator, int32_t sums[][PVID_WEAK_TERMS_Q31], size_t *all)
 {
     const size_t functions = design->functions;
     const size_t index = self->index;
@@ -519,6 +546,9 @@ static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
     default: /* STAGE_REMOVE_A, STAGE_REMOVE_B */
         next = at_most(index, REMOVED_A_STAGE, functions);
         remove_components(self, index, next, sums);
+        if ((self->stage == STAGE_REMOVE_B) && (self->gate.limit.m > 0)) {
+            add_residuals(self, estimator, index, next, sums);
+        }
         break;
     }
     return next;
@@ -542,6 +572,12 @@ void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_desig
     size_t all = 1;
     switch (self->stage) {
     case STAGE_NOISE:
+        if (!passes(self, design)) {
+            pvid_count_up(&estimator->counters.rejected_outlier);
+            *reason = PVID_REJECTED_OUTLIER;
+            self->stage = STAGE_IDLE;
+            return;
+        }
         tell_noise(self, design, estimator);
         break;
     case STAGE_ADD:
@@ -565,7 +601,7 @@ void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_desig
     case STAGE_IDLE:
         return;
     default:
-        next = prepare(self, design, sums, &all);
+        next = prepare(self, design, estimator, sums, &all);
         break;
     }
     self->index = (uint8_t)next;

@@ -15,6 +15,9 @@
 #define COUNTS_LIMIT ((int32_t)1 << 24)
 #define EXPONENT_LIMIT 200
 
+/* Windows that the gate's scale remembers; it stands relative to what noise explains, below which it never falls. */
+#define GATE_MEMORY 4u
+
 static bool is_count(int32_t x, int32_t limit)
 {
     return (x > 0) && (x <= limit);
@@ -74,6 +77,10 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
         return status;
     }
     status = pvid_trust_init_q31(&self->trust, &config->trust, &self->estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_gate_init_q31(&self->finish.gate, &config->gate, GATE_MEMORY, pvid_scaled_of_q31(1, 0));
     if (status != PVID_OK) {
         return status;
     }

@@ -203,6 +203,8 @@ Q31 = {
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.shut_max": Range(0, 65535, Status.OK),
+    "gate.sigmas": Range(2 << 16, 1000 << 16, Status.BAD_GATE_SIGMAS, besides=(0,)),
+    "gate.patience_groups": Range(0, 2**30, Status.BAD_GATE_PATIENCE),
     "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
 }
 RANGES = {

@@ -17,7 +17,6 @@ from pvid.native import GateConfig, Native, Reason, Status
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
 from pvid.setup import strong_config, weak_config
-from pvid.setup_q31 import config_for_run
 from pvid.twin.gate import Gate
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
@@ -189,8 +188,3 @@ def test_what_makes_no_gate_is_refused(form: str, gate_config: GateConfig, statu
             native.weak(replace(weak_config(RIG, 1000.0), gate=gate_config))
         else:
             native.strong(replace(strong_config(rig_with(form="strong", stride=8), 1000.0), gate=gate_config))
-
-
-def test_the_fixed_point_core_says_that_it_has_none(jolted: Run) -> None:
-    with pytest.raises(PvidError, match="core q31 has no outlier_gate"):
-        config_for_run(rig_with(outlier_gate=4.0), jolted)

@@ -12,7 +12,14 @@ from pvid.capture import Run
 from pvid.compare_q31 import first_difference, twin_hashes
 from pvid.errors import PvidError
 from pvid.native import Native, Reason
-from pvid.native_q31 import EstimatorConfigQ31, RowEstimatorQ31, StrongConfigQ31, StrongIdentifierQ31, strong_rows_q31
+from pvid.native_q31 import (
+    EstimatorConfigQ31,
+    GateConfigQ31,
+    RowEstimatorQ31,
+    StrongConfigQ31,
+    StrongIdentifierQ31,
+    strong_rows_q31,
+)
 from pvid.rig import STANDARD_DRIVE, Drive, Simulation, simulate, standard_sensors, standard_start
 from pvid.rigfile import Differentiator, RigFile
 from pvid.setup_q31 import counts_of, strong_config_q31
@@ -168,6 +175,7 @@ def test_hostile_counts_equal_the_twin(native: Native, name: str, differentiator
     for law, tau in zip(LAWS, (0.0, 0.5), strict=True):
         config = configuration(rig_of(differentiator, law, tau))
         assert_equal([native], config, *hostile(name, config))
+        assert_equal([native], replace(config, gate=GateConfigQ31(2 << 16, 50)), *hostile(name, config))
 
 
 def test_hostile_counts_are_not_merely_refused_at_the_door(native: Native) -> None:

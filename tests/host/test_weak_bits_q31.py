@@ -13,7 +13,7 @@ import pytest
 from pvid.compare_q31 import first_difference, twin_hashes
 from pvid.errors import PvidError
 from pvid.native import Native, Reason
-from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.native_q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
 from pvid.setup_q31 import p_of, weak_config_q31
@@ -180,6 +180,8 @@ def test_hostile_counts_equal_the_twin(native: Native, name: str) -> None:
     for tau in (0.0, 5.0):
         lanes = [configuration(seed, forgetting_s=tau).estimator for seed in range(2)]
         assert_lanes_equal([native], config, lanes, *hostile(name, config))
+    gated = replace(config, gate=GateConfigQ31(2 << 16, 20))
+    assert_lanes_equal([native], gated, [config.estimator], *hostile(name, config))
 
 
 def test_a_quarter_of_full_scale_in_phase_becomes_rows(native: Native) -> None:

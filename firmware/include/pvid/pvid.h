@@ -14,6 +14,7 @@
 #include "pvid/fnv.h"
 #include "pvid/fnv_q31.h"
 #include "pvid/gate.h"
+#include "pvid/gate_q31.h"
 #include "pvid/information.h"
 #include "pvid/kapitza.h"
 #include "pvid/kapitza_q31.h"

@@ -22,6 +22,7 @@
 
 #include "pvid/differentiator_q31.h"
 #include "pvid/estimator_q31.h"
+#include "pvid/gate_q31.h"
 #include "pvid/kapitza_strong_q31.h"
 
 #ifdef __cplusplus
@@ -38,6 +39,7 @@ typedef struct {
     int32_t drive_min;        /* rms of u over drive_ticks below which the pivot counts as still and no row is taken in,
                                  0..PVID_DERIVATIVE_LIMIT_Q31 in the format of u. 0: every row is taken in */
     uint32_t drive_ticks;     /* 1..2^30: ticks in about a second */
+    pvid_gate_config_q31 gate; /* on the innovation of a row; its scale remembers a quarter of drive_ticks */
     pvid_estimator_config_q31 estimator; /* model is filled in by init */
 } pvid_strong_config_q31;
 
@@ -52,6 +54,7 @@ typedef struct {
     int64_t drive;            /* mean square of u over about drive_ticks */
     int64_t drive_min;        /* mean square below which no row is taken in */
     int32_t drive_forgetting; /* part of it that a tick replaces, Q31 */
+    pvid_gate_q31 gate;
     pvid_estimator_q31 estimator;
 } pvid_strong_q31;
 
@@ -60,7 +63,8 @@ typedef struct {
 pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config);
 
 /* One tick: phi and y_A sampled together [counts]. Answers as pvid_strong_step_f32; PVID_REJECTED_SATURATED for a sample
- * beyond full scale, which empties the window, and for a row that does not fit, which does not. */
+ * beyond full scale, which empties the window, and for a row that does not fit, which does not; PVID_REJECTED_OUTLIER for
+ * a row that the gate kept out. */
 pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y);
 
 /* Tells the identifier that samples are missing: the window starts again, nothing else is lost. */

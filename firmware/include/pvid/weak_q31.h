@@ -23,6 +23,7 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
+#include "pvid/gate_q31.h"
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/trust_q31.h"
 #include "pvid/weak_job.h"
@@ -79,6 +80,7 @@ typedef struct {
                                     square of a second difference of F, m 2^e; 0: an exact pivot. For the alarm only */
     pvid_estimator_config_q31 estimator; /* model is filled in by init */
     pvid_trust_config_q31 trust; /* which estimates are published */
+    pvid_gate_config_q31 gate;   /* on the residuals of a window */
 } pvid_weak_config_q31;
 
 /* The front end: a ring of counts, and the FIR job of the last complete block in slices. */
@@ -136,7 +138,8 @@ typedef struct {
     int64_t along[PVID_WEAK_COLUMNS_Q31];           /* the columns' components along it, Q30 */
     pvid_reason reason;       /* of the last solve, then of the window */
     int64_t size;             /* of the last step, relative, Q22 */
-    int64_t energy;           /* of the window's rows */
+    int64_t energy;           /* of the window's rows: before they are added where the gate looks at it, then since */
+    pvid_gate_q31 gate;
     pvid_scaled_q31 expected; /* variance of a row's noise */
     pvid_estimator_solve_q31 solve;
     pvid_estimate_q31 candidate; /* for publication */
@@ -176,7 +179,7 @@ typedef struct {
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config);
 
 /* One tick: phi and y_A sampled together [counts]. Answers as pvid_weak_step_f32, but for a sample beyond full scale:
- * PVID_REJECTED_SATURATED. */
+ * PVID_REJECTED_SATURATED. (A window that the gate keeps out: PVID_REJECTED_OUTLIER.) */
 pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y);
 
 /* What is published: the last estimate that could be trusted, the start until there is one (then

@@ -67,6 +67,14 @@ class TrustConfigQ31:
 
 
 @dataclass(frozen=True)
+class GateConfigQ31:
+    """Which rows or windows are kept out, as in gate_q31.h: sigmas in Q16, 0: none."""
+
+    sigmas: int = 0
+    patience_groups: int = 0
+
+
+@dataclass(frozen=True)
 class WeakConfigQ31:
     """Settings of the fixed-point weak-form identifier, as in weak_q31.h; offsets in counts, drive_min in U's unit."""
 
@@ -79,6 +87,7 @@ class WeakConfigQ31:
     iterations: int = 3
     pivot_noise: tuple[int, int] = (0, 0)
     trust: TrustConfigQ31 = TrustConfigQ31()
+    gate: GateConfigQ31 = GateConfigQ31()
 
     @property
     def hop(self) -> int:
@@ -96,6 +105,7 @@ class StrongConfigQ31:
     phi_offset: int = 0
     y_offset: int = 0
     drive_min: int = 0
+    gate: GateConfigQ31 = GateConfigQ31()
 
 
 class EstimatorConfigStruct(ctypes.Structure):
@@ -138,6 +148,12 @@ class TrustConfigStruct(ctypes.Structure):
         ("groups_min", ctypes.c_uint16),
         ("shut_max", ctypes.c_uint16),
     ]
+
+
+class GateConfigStruct(ctypes.Structure):
+    """pvid_gate_config_q31."""
+
+    _fields_ = [("sigmas", ctypes.c_uint32), ("patience_groups", ctypes.c_uint32)]
 
 
 class WeakDesignStruct(ctypes.Structure):
@@ -183,6 +199,7 @@ class WeakConfigStruct(ctypes.Structure):
         ("pivot_noise", ScaledStruct),
         ("estimator", EstimatorConfigStruct),
         ("trust", TrustConfigStruct),
+        ("gate", GateConfigStruct),
     ]
 
 
@@ -226,6 +243,7 @@ class StrongConfigStruct(ctypes.Structure):
         ("y_offset", ctypes.c_int32),
         ("drive_min", ctypes.c_int32),
         ("drive_ticks", ctypes.c_uint32),
+        ("gate", GateConfigStruct),
         ("estimator", EstimatorConfigStruct),
     ]
 
@@ -334,12 +352,14 @@ def _checked_layout(native: Native) -> _Layout:
         WeakConfigStruct.zero_unknown.offset,
         WeakConfigStruct.estimator.offset,
         WeakConfigStruct.trust.offset,
+        WeakConfigStruct.gate.offset,
         ctypes.sizeof(FirBankStruct),
         FirBankStruct.phi_shift.offset,
         FirBankStruct.weights.offset,
         ctypes.sizeof(StrongConfigStruct),
         StrongConfigStruct.u_multiplier.offset,
         StrongConfigStruct.drive_ticks.offset,
+        StrongConfigStruct.gate.offset,
         StrongConfigStruct.estimator.offset,
         ESTIMATE_DTYPE.itemsize,
         int(ESTIMATE_DTYPE.fields["kappa"][1]) if ESTIMATE_DTYPE.fields else 0,
@@ -411,6 +431,10 @@ def _fill(struct: ctypes.Structure, values: object, pointers: Mapping[str, objec
             setattr(struct, name, value)
 
 
+def _gate_struct(config: GateConfigQ31) -> GateConfigStruct:
+    return GateConfigStruct(config.sigmas, config.patience_groups)
+
+
 class WeakIdentifierQ31(_IntegerStepper):
     """pvid_weak_q31: phi, y in counts."""
 
@@ -433,6 +457,7 @@ class WeakIdentifierQ31(_IntegerStepper):
             iterations=config.iterations,
             pivot_noise=ScaledStruct(*config.pivot_noise),
             estimator=estimator_struct(config.estimator),
+            gate=_gate_struct(config.gate),
         )
         _fill(struct.trust, config.trust, {})
         self._layout = layout
@@ -492,6 +517,7 @@ class StrongIdentifierQ31(_IntegerStepper):
             y_offset=config.y_offset,
             drive_min=config.drive_min,
             drive_ticks=config.drive_ticks,
+            gate=_gate_struct(config.gate),
             estimator=estimator_struct(config.estimator),
         )
         size, at = layout.strong_size, layout.strong_estimator_at

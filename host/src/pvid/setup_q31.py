@@ -10,8 +10,15 @@ import numpy.typing as npt
 
 from pvid.capture import Run
 from pvid.errors import PvidError
-from pvid.native import EstimatorConfig, Law
-from pvid.native_q31 import EstimatorConfigQ31, ScaleQ31, StrongConfigQ31, TrustConfigQ31, WeakConfigQ31
+from pvid.native import EstimatorConfig, GateConfig, Law
+from pvid.native_q31 import (
+    EstimatorConfigQ31,
+    GateConfigQ31,
+    ScaleQ31,
+    StrongConfigQ31,
+    TrustConfigQ31,
+    WeakConfigQ31,
+)
 from pvid.rigfile import RigFile, Sensor
 from pvid.setup import bank_of, nominal_start, strong_config, weak_config, weak_design_of
 from pvid.strong_design_q31 import StrongDesignQ31, strong_design_q31
@@ -20,6 +27,8 @@ from pvid.weak_design_q31 import WeakTablesQ31, weak_tables_q31
 Float = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 ConfigQ31 = WeakConfigQ31 | StrongConfigQ31
+
+PATIENCE_MAX = 2**30  # groups of rows, of gate_q31.h
 
 
 def format_of(largest: float) -> int:
@@ -92,8 +101,6 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
     In the weak form a run's first sample is taken for rest where that is nearer than 0; the strong form takes the
     encoder's zero for the equilibrium, and of the pivot only what changes counts.
     """
-    if rig.identifier.outlier_gate > 0.0:
-        raise PvidError("core q31 has no outlier_gate: use --core f32")
     if rig.identifier.form == "strong":
         strong = strong_config_q31(rig, run.sample_rate, start)
         return replace(strong, y_offset=_first(counts_of(rig, run)[1], strong.design.bank.y_max // 2))
@@ -162,10 +169,22 @@ def _estimator_q31(
     )
 
 
+def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
+    """The gate of the float core in integers, for rows or windows that come at groups_hz."""
+    patience = gate.patience_s * groups_hz
+    if patience > PATIENCE_MAX:
+        raise PvidError(
+            f"[identifier] outlier_patience_s = {gate.patience_s:g} is too long for core q31, which counts up to 2^30 "
+            f"rows or windows ({PATIENCE_MAX / groups_hz:.4g} s here); 0 is for ever"
+        )
+    return GateConfigQ31(round(gate.sigmas * 2**16), max(round(patience), 1) if patience > 0 else 0)
+
+
 def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
     """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p."""
     tables = tables_of(rig, sample_rate)
     float_config = weak_config(rig, sample_rate, start)
+    windows_hz = sample_rate / (tables.decimation * float_config.hop)
     e = float_config.estimator
     n_p = 4 if float_config.zero_unknown else 3
     functions = tables.functions
@@ -176,7 +195,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
         tables.column_bits[: 8 if n_p == 4 else 5],
         tables.column_bits[8],
         tables.f_unit,
-        forgetting_groups=round(e.forgetting_s * sample_rate / (tables.decimation * float_config.hop)),
+        forgetting_groups=round(e.forgetting_s * windows_hz),
         gain=0 if e.law is Law.PSEUDOVELOCITY else 2**30,
         correlation=round(tables.overlap * 2**16),
         row_weight=round((functions - 2) / functions * 2**16),
@@ -197,6 +216,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
             groups_min=float_config.trust.groups_min,
             shut_max=float_config.trust.shut_max,
         ),
+        gate=gate_config_q31(float_config.gate, windows_hz),
     )
 
 
@@ -227,6 +247,7 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
         design=design,
         estimator=estimator,
         drive_ticks=min(max(round(sample_rate), 1), 2**30),
+        gate=gate_config_q31(config.gate, sample_rate),
         drive_min=min(round(config.drive_min * design.dt**2 * 2.0**design.u_bits), 2**30),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pvid.native_q31 import StrongConfigQ31
-from pvid.weak_header_q31 import estimator_lines, integer_array, integer_list, scale_lines, unit_lines
+from pvid.weak_header_q31 import estimator_lines, gate_line, integer_array, integer_list, scale_lines, unit_lines
 
 
 def strong_header_q31(config: StrongConfigQ31, l1: float, name: str, made_by: str) -> str:
@@ -63,6 +63,7 @@ def strong_header_q31(config: StrongConfigQ31, l1: float, name: str, made_by: st
             f"    .y_offset = {config.y_offset},",
             f"    .drive_min = {config.drive_min},",
             f"    .drive_ticks = {config.drive_ticks}u,",
+            gate_line(config.gate),
             *estimator_lines(config.estimator),
             "};",
             "",

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 import numpy.typing as npt
 
-from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31
+from pvid.native_q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
 from pvid.setup_q31 import ConfigQ31, scale_of, units_of
 
 _P_UNITS = ("1/s^2", "", "", "rad")
@@ -51,6 +51,11 @@ def estimator_lines(settings: EstimatorConfigQ31) -> list[str]:
         *(f"        .{field} = {getattr(settings, field)}{'u' if field in _UNSIGNED else ''}," for field in _SETTINGS),
         "    },",
     ]
+
+
+def gate_line(gate: GateConfigQ31) -> str:
+    """The member `.gate` of a configuration."""
+    return f"    .gate = {{{gate.sigmas}u, {gate.patience_groups}u}},"
 
 
 def unit_lines(config: ConfigQ31) -> list[str]:
@@ -142,6 +147,7 @@ def to_c_header_q31(config: WeakConfigQ31, l1: float, name: str, made_by: str) -
             "    .trust = {",
             *(f"        .{field.name} = {getattr(config.trust, field.name)}," for field in fields(config.trust)),
             "    },",
+            gate_line(config.gate),
             "};",
             "",
             *scale_lines(config, l1, name),

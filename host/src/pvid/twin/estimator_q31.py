@@ -174,12 +174,21 @@ class EstimatorQ31:
         self.p[index] = np.clip(value, self.lower[index], self.upper[index])
         self.theta = self.model.theta(self.p)
 
-    def add(self, n: Int, y: Int) -> Reasons:
-        """One row of a group: N [n_theta, lanes], Y [lanes]."""
+    def innovation(self, n: Int, y: Int) -> tuple[Int, Mask]:
+        """e = Y - N^T theta of a row [lanes], and where the row fits; shapes as in `add`."""
         m, h = self.mantissas(self.theta)
         terms = clamp(scale(clamp(n, ROW_LIMIT) * m, integers(self.align)[:, None] - h), TERM_MAX)
         e = y - terms.sum(axis=0)
-        fits = (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
+        return e, (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
+
+    @property
+    def expected_variance(self) -> Scaled:
+        """row_sd^2 [lanes], in units of the sums."""
+        return scaled(self.row_sd * self.row_sd, -2 * (8 + self.exponent))
+
+    def add(self, n: Int, y: Int) -> Reasons:
+        """One row of a group: N [n_theta, lanes], Y [lanes]."""
+        e, fits = self.innovation(n, y)
         e = np.where(fits, e, 0)
         self.energy = clamp(self.energy + e * e, WIDE)
         e = round_shift(e, self.exponent)
@@ -343,16 +352,12 @@ class EstimatorQ31:
                 rest[a, b] = rest[a, b] - (rows[0, b] * t[0] + rows[1, b] * t[1])
         return np.asarray((self.noise_margin == 0) | cholesky.factor(self._equilibrated_system(rest)[0]).ok)
 
-    def _expected_variance(self) -> Scaled:
-        """row_sd^2, divided by 4^exponent as the sums are."""
-        return scaled(self.row_sd * self.row_sd, -2 * (8 + self.exponent))
-
     def _commit(self, refuge: tuple[Mask, Int] | None) -> Reasons:
         model = self.model
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        informed = self._informed(s, c, h, self._expected_variance())
+        informed = self._informed(s, c, h, self.expected_variance)
         prior = self._in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
         for a in range(model.n_p):
             s[a, a] = s[a, a] + prior[a]
@@ -434,7 +439,7 @@ class EstimatorQ31:
         """s^2 of a row, divided by 4^exponent as the sums are."""
         freedom = self.sums[-1] - (self.model.n_p << 16)
         from_rows = scaled(self.sums[-2], 0).over(scaled(np.maximum(freedom, 1 << 16), -16))
-        return pick(freedom < (1 << 16), self._expected_variance(), from_rows)
+        return pick(freedom < (1 << 16), self.expected_variance, from_rows)
 
     def assess(self) -> npt.NDArray[np.void]:
         """pvid_estimator_assess_q31 of every lane, dtype ESTIMATE_DTYPE [lanes]."""

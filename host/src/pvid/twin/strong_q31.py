@@ -13,7 +13,9 @@ from pvid.native_q31 import EstimatorConfigQ31, StrongConfigQ31
 from pvid.twin import kapitza_strong_q31 as model
 from pvid.twin.differentiator_q31 import derivatives
 from pvid.twin.estimator_q31 import EstimatorQ31
+from pvid.twin.gate_q31 import GateQ31
 from pvid.twin.integer_q31 import Int, integers, times_q31
+from pvid.twin.scaled_q31 import scaled
 from pvid.twin.weak_q31 import TwinRecordQ31
 
 Mask = npt.NDArray[np.bool_]
@@ -28,6 +30,8 @@ class StrongTwinQ31:
     def __init__(self, config: StrongConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
         self.config = config
         self.estimator = EstimatorQ31(estimators or [config.estimator], model.STRONG)
+        floor = self.estimator.expected_variance.shifted(-20).plus(scaled(1, 0))
+        self.gate = GateQ31(config.gate, config.drive_ticks // 4, floor)
 
     def rows(self, phi: Int, y: Int) -> tuple[Int, Int, Reasons]:
         """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
@@ -65,13 +69,13 @@ class StrongTwinQ31:
 
         Returns what every tick told, [ticks, lanes].
         """
-        return follow_rows(self.estimator, *self.rows(phi, y), after)
+        return follow_rows(self.estimator, *self.rows(phi, y), after, self.gate)
 
     def run(
         self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
     ) -> TwinRecordQ31:
         """Steps all lanes through a run from its first sample: counts phi, y, both int64 [ticks]."""
-        return run_rows(self.estimator, *self.rows(phi, y), sums=sums, progress=progress)
+        return run_rows(self.estimator, *self.rows(phi, y), sums=sums, progress=progress, gate=self.gate)
 
 
 def run_rows(
@@ -82,6 +86,7 @@ def run_rows(
     *,
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
+    gate: GateQ31 | None = None,
 ) -> TwinRecordQ31:
     """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share, each a group of its own.
 
@@ -101,12 +106,17 @@ def run_rows(
         if progress is not None and tick % 512 == 0:
             progress(tick)
 
-    reason = follow_rows(estimator, n, y, fate, record)
+    reason = follow_rows(estimator, n, y, fate, record, gate)
     return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)
 
 
 def follow_rows(
-    estimator: EstimatorQ31, n: Int, y: Int, fate: Reasons, after: Callable[[int, Reasons], None]
+    estimator: EstimatorQ31,
+    n: Int,
+    y: Int,
+    fate: Reasons,
+    after: Callable[[int, Reasons], None],
+    gate: GateQ31 | None = None,
 ) -> Reasons:
     """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
 
@@ -119,7 +129,7 @@ def follow_rows(
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
         if fate[tick] == Reason.ACCUMULATED:
-            reason[tick] = _step(estimator, wide_n[tick], wide_y[tick])
+            reason[tick] = _step(estimator, wide_n[tick], wide_y[tick], gate)
         else:
             reason[tick] = fate[tick]
             if fate[tick] != Reason.WARMING_UP:
@@ -128,8 +138,17 @@ def follow_rows(
     return reason
 
 
-def _step(estimator: EstimatorQ31, n: Int, y: Int) -> Reasons:
-    """A row and the solve it may lead to."""
+def _step(estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None) -> Reasons:
+    """A row and the solve it may lead to; all lanes must let the same rows in."""
+    if gate is not None and gate.is_on:
+        e, fits = estimator.innovation(n, y)
+        held = np.where(fits, e, 0)
+        passes = gate.passes(scaled(held * held, 0), fits)
+        if passes.any() != passes.all():
+            raise PvidError("lanes of one twin must let the same rows in: their estimates differ too much")
+        if not passes.all():
+            estimator.counters["rejected_outlier"] += 1
+            return np.full(estimator.lanes, Reason.REJECTED_OUTLIER, np.uint8)
     reason = estimator.add(n, y)
     taken = reason == Reason.ACCUMULATED
     if not taken.any():

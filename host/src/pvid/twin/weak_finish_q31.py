@@ -6,10 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pvid.errors import PvidError
 from pvid.native import Reason
 from pvid.twin import cholesky_q31 as cholesky
 from pvid.twin.estimator_q31 import EstimatorQ31, length
+from pvid.twin.gate_q31 import GateQ31
 from pvid.twin.integer_q31 import (
+    WIDE,
     Int,
     clamp,
     integers,
@@ -216,8 +219,33 @@ def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: Estimato
     return _stages_before_add(design) + design.functions + solves + estimator.assessment_stages + 1
 
 
+def _surplus(energy: Int, design: WeakTablesQ31, expected: Scaled) -> Scaled:
+    """Variance of a window's residuals over what is expected of it [lanes]."""
+    return scaled(energy, 0).over(scaled(design.functions - 2, 0).times(expected))
+
+
+def _passes(
+    gate: GateQ31, x: Int, saturated: Mask, design: WeakTablesQ31, estimator: EstimatorQ31, expected: Scaled
+) -> bool:
+    """Whether the gate lets the rows in; all lanes must agree."""
+    energy = np.zeros(estimator.lanes, np.int64)
+    for k in range(design.functions):
+        e = clamp(estimator.innovation(x[: estimator.model.n_theta, k], x[_Y, k])[0], COLUMN_LIMIT)
+        energy = clamp(energy + e * e, WIDE)
+    passes = gate.passes(_surplus(energy, design, expected), ~saturated)
+    if passes.any() != passes.all():
+        raise PvidError("lanes of one twin must let the same windows in: their estimates differ too much")
+    return bool(passes.all())
+
+
 def stages(
-    window: Window, design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31, trust: TrustQ31, pivot: Scaled
+    window: Window,
+    design: WeakTablesQ31,
+    iterations: int,
+    estimator: EstimatorQ31,
+    trust: TrustQ31,
+    pivot: Scaled,
+    gate: GateQ31,
 ) -> Work:
     """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None.
 
@@ -227,8 +255,14 @@ def stages(
     expected = scaled(estimator.row_sd * estimator.row_sd, -16).plus(pivot.times(window.bend))
     by = whitening(design, estimator)
     x, saturated = rows(window.sums, by, design)
-    for _ in range(_stages_before_add(design)):
+    for _ in range(_stages_before_add(design) - 1):
         yield None
+    # the last of these stages asks the gate, and tells what noise there is in the rows
+    if gate.is_on and not _passes(gate, x, saturated, design, estimator, expected):
+        estimator.counters["rejected_outlier"] += 1
+        yield np.full(estimator.lanes, Reason.REJECTED_OUTLIER, np.uint8)
+        return
+    yield None
     estimator.noise = noise_of(design, by, estimator)
     for k in range(design.functions):
         y = np.where(saturated, 2**31 - 1, x[_Y, k])
@@ -247,5 +281,5 @@ def stages(
     for _ in range(estimator.assessment_stages):
         yield None
     candidate, informed = estimator.judged()
-    surplus = scaled(estimator.group_energy, 0).over(scaled(design.functions - 2, 0).times(expected))
+    surplus = _surplus(estimator.group_energy, design, expected)
     yield trust.judge(reason, size, informed, surplus.fixed(SURPLUS_BITS), candidate)

@@ -13,8 +13,9 @@ from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31
 from pvid.twin import kapitza_weak_q31, weak_finish_q31, weak_front_q31, weak_window_q31
 from pvid.twin.differentiator import segments
 from pvid.twin.estimator_q31 import EstimatorQ31
+from pvid.twin.gate_q31 import GateQ31
 from pvid.twin.integer_q31 import Int, integers, scale
-from pvid.twin.scaled_q31 import Scaled
+from pvid.twin.scaled_q31 import Scaled, scaled
 from pvid.twin.trust_q31 import TrustQ31
 from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
 from pvid.twin.weak_window_q31 import Window
@@ -42,6 +43,7 @@ class WeakTwinQ31:
         model = kapitza_weak_q31.WEAK if config.zero_unknown else kapitza_weak_q31.ZEROED
         self.estimator = EstimatorQ31(estimators or [config.estimator], model)
         self.trust = TrustQ31(config.trust, self.estimator)
+        self.gate = GateQ31(config.gate, 4, scaled(np.ones(self.estimator.lanes, np.int64), 0))
         self.pivot_noise = Scaled(*map(integers, config.pivot_noise))
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.schedule = Schedule.of(config.design)
@@ -111,7 +113,7 @@ class WeakTwinQ31:
             return np.full(self.estimator.lanes, Reason.HELD_NOT_EXCITED, np.uint8)
         self._place_zero(window)
         return weak_finish_q31.stages(
-            window, self.config.design, self.iterations, self.estimator, self.trust, self.pivot_noise
+            window, self.config.design, self.iterations, self.estimator, self.trust, self.pivot_noise, self.gate
         )
 
     def _reject(self) -> Reason:
