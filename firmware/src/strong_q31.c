@@ -76,6 +76,11 @@ void pvid_strong_gap_q31(pvid_strong_q31 *self)
     pvid_differentiator_reset_q31(&self->differentiator);
 }
 
+void pvid_strong_freeze_q31(pvid_strong_q31 *self, bool frozen)
+{
+    self->frozen = frozen;
+}
+
 static bool is_within(int64_t x, int32_t limit)
 {
     return (x >= -(int64_t)limit) && (x <= limit);
@@ -126,6 +131,9 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
         return refuse(self);
     }
     self->drive += pvid_times_q31(pvid_product_q31(u[0], u[0]) - self->drive, self->drive_forgetting);
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
     if (self->drive < self->drive_min) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;

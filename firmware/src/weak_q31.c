@@ -174,15 +174,23 @@ static void place_zero(pvid_weak_q31 *self, const pvid_weak_window_q31 *window)
     pvid_trust_place_q31(&self->trust, &self->estimator);
 }
 
+void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen)
+{
+    self->frozen = frozen;
+}
+
 /* A window that has come round hands its sums over and goes on in the buffer that is free. Its last sample, which has
- * no weight, is the first one of the next. Returns false if the window is dropped: its sums are cleared where they
- * are. */
-static bool turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
+ * no weight, is the first one of the next. Returns why the window is dropped, if it is, or PVID_ACCUMULATED: its sums are
+ * cleared where they are. */
+static pvid_reason turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 {
     self->warm = true;
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
     if (pvid_weak_window_drive_q31(window, self->design->window) < self->drive_min) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
-        return false;
+        return PVID_HELD_NOT_EXCITED;
     }
     const uint8_t full = window->buffer;
     window->buffer = self->finish.buffer;
@@ -190,13 +198,13 @@ static bool turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
     place_zero(self, window);
     const pvid_scaled_q31 pivot = pvid_scaled_times_q31(self->pivot_noise, pvid_weak_window_bend_q31(window));
     pvid_weak_finish_begin_q31(&self->finish, self->design, &self->estimator, pivot);
-    return true;
+    return PVID_ACCUMULATED;
 }
 
-/* Returns false if this sample completes a window that is dropped. */
-static bool next_sample(pvid_weak_q31 *self)
+/* Returns why a window that this sample completes is dropped, if it is. */
+static pvid_reason next_sample(pvid_weak_q31 *self)
 {
-    bool kept = true;
+    pvid_reason reason = PVID_ACCUMULATED;
     next_bend(&self->bend, self->design->lag, self->f);
     for (size_t i = 0; i < 2u; i++) {
         pvid_weak_window_q31 *window = &self->window[i];
@@ -204,14 +212,14 @@ static bool next_sample(pvid_weak_q31 *self)
         if (window->index == self->design->window - 1u) {
             window->index = 0;
             if (window->whole) {
-                kept = turn_over(self, window);
+                reason = turn_over(self, window);
             }
             window->whole = true;
         }
     }
     self->turn = 0;
     self->function = 0;
-    return kept;
+    return reason;
 }
 
 /* Adds the present sample to the next few functions: first all of one window, then all of the other. */
@@ -261,7 +269,7 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
     if (!is_within(angle, design->phi_max) || !is_within(height, design->y_max)) {
         return reject(self);
     }
-    bool kept = true;
+    pvid_reason dropped = PVID_ACCUMULATED;
     bool adding = false;
     int64_t u = 0;
     if (pvid_weak_front_step_q31(&self->front, design, (int32_t)angle, (int32_t)height, &self->f, &u)) {
@@ -269,7 +277,7 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
             return reject(self);
         }
         self->u = (int32_t)u;
-        kept = next_sample(self);
+        dropped = next_sample(self);
         if (design->decimation == 1u) {
             add_slice(self);
             add_slice(self);
@@ -282,8 +290,8 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
         }
     }
     pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    if (!kept) {
-        reason = PVID_HELD_NOT_EXCITED;
+    if (dropped != PVID_ACCUMULATED) {
+        reason = dropped;
     } else if (!adding) {
         work_on(self, &reason);
     }

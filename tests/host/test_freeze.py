@@ -9,12 +9,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid import snapshot
+from pvid import compare_q31, snapshot
 from pvid.compare import first_difference
+from pvid.compare_q31 import identifier_q31, twin_q31
 from pvid.native import Native, Reason
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
 from pvid.setup import strong_config, weak_config
+from pvid.setup_q31 import config_of_q31, p_of
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
@@ -46,32 +48,75 @@ def joined(records: Any, name: str) -> npt.NDArray[Any]:
     return np.concatenate([getattr(record, name) for record in records])
 
 
+def identifier_of(native: Native, form: str, core: str) -> Any:
+    """The identifier of a form and core that forgets."""
+    rig = rig_with(form=form, stride=8, forgetting_s=5.0)
+    if core == "q31":
+        return identifier_q31(native, config_of_q31(rig, 1000.0))
+    return native.weak(weak_config(rig, 1000.0)) if form == "weak" else native.strong(strong_config(rig, 1000.0))
+
+
+def as_counted(samples: Any, core: str) -> Any:
+    """What the core gets of phi and y."""
+    if core == "f32":
+        return samples
+    sensor = RigFile.standard().sensor
+    return tuple(
+        np.rint(x / lsb).astype(np.int64) for x, lsb in zip(samples, (sensor.phi_lsb, sensor.y_lsb), strict=True)
+    )
+
+
 @pytest.mark.parametrize("form", ["weak", "strong"])
 def test_a_frozen_run_equals_the_twin(form: str, native: Native, samples: Any) -> None:
     phi, y = samples if form == "weak" else (samples[0][4_000:15_000], samples[1][4_000:15_000])
     rig = rig_with(form=form, stride=8, forgetting_s=5.0)
-    mask = np.zeros(len(phi), bool)
-    mask[FROM:TO] = True
     twin: Any
-    core: Any
     if form == "weak":
-        twin, core = WeakTwin(weak_config(rig, 1000.0)), native.weak(weak_config(rig, 1000.0))
+        twin = WeakTwin(weak_config(rig, 1000.0))
     else:
-        twin, core = StrongTwin(strong_config(rig, 1000.0)), native.strong(strong_config(rig, 1000.0))
+        twin = StrongTwin(strong_config(rig, 1000.0))
         assert len(phi) < TO  # it ends frozen
-    twin.frozen = mask
+    twin.frozen = mask_of(phi)
     expected = twin.run(phi, y)
-    records = frozen_run(core, phi, y)
+    records = frozen_run(identifier_of(native, form, "f32"), phi, y)
     whole = replace(records[0], **{name: joined(records, name) for name in ("p", "published", "sums", "reason")})
     theirs = [expected.p[:, :, 0], expected.sums[:, :, 0], expected.reason[:, 0]]
     assert first_difference(whole, *theirs, *([expected.published[:, :, 0]] if form == "weak" else [])) is None
-    assert (whole.reason[FROM:TO] == Reason.HELD_FROZEN).any()
-    assert not (whole.reason[:FROM] == Reason.HELD_FROZEN).any()
+    assert_frozen_in_between(whole.reason)
 
 
-def test_nothing_moves_while_the_weak_form_is_frozen(native: Native, samples: Any) -> None:
-    core = native.weak(weak_config(rig_with(forgetting_s=5.0), 1000.0))
-    _, during, after = frozen_run(core, *samples)
+@pytest.mark.parametrize("form", ["weak", "strong"])
+def test_a_frozen_run_equals_the_fixed_point_twin(form: str, native: Native, samples: Any) -> None:
+    counts = as_counted(samples, "q31")
+    phi, y = counts if form == "weak" else (counts[0][4_000:15_000], counts[1][4_000:15_000])
+    twin = twin_q31(config_of_q31(rig_with(form=form, stride=8, forgetting_s=5.0), 1000.0))
+    twin.frozen = mask_of(phi)
+    expected = twin.run(phi, y)
+    core = identifier_of(native, form, "q31")
+    records = frozen_run(core, phi, y)
+    names = ("p", "published", "sums", "exponent", "reason")
+    whole = replace(records[0], **{name: joined(records, name) for name in names})
+    assert compare_q31.first_difference(whole, expected) is None
+    assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+    assert_frozen_in_between(whole.reason)
+
+
+def mask_of(phi: Any) -> npt.NDArray[np.bool_]:
+    mask = np.zeros(len(phi), np.bool_)
+    mask[FROM:TO] = True
+    return mask
+
+
+def assert_frozen_in_between(reason: npt.NDArray[np.uint8]) -> None:
+    assert (reason[FROM:TO] == Reason.HELD_FROZEN).any()
+    assert not (reason[:FROM] == Reason.HELD_FROZEN).any()
+    assert not (reason[TO:] == Reason.HELD_FROZEN).any()
+
+
+@pytest.mark.parametrize("core_name", ["f32", "q31"])
+def test_nothing_moves_while_the_weak_form_is_frozen(core_name: str, native: Native, samples: Any) -> None:
+    core = identifier_of(native, "weak", core_name)
+    _, during, after = frozen_run(core, *as_counted(samples, core_name))
     # the window that was being worked off is finished first
     assert (during.p[HALF_A_WINDOW:] == during.p[HALF_A_WINDOW]).all()
     assert (during.sums[HALF_A_WINDOW:] == during.sums[HALF_A_WINDOW]).all()
@@ -82,24 +127,26 @@ def test_nothing_moves_while_the_weak_form_is_frozen(native: Native, samples: An
     first = np.flatnonzero(np.isin(after.reason, (Reason.UPDATED, Reason.MISFIT)))[0]
     assert first < 2 * HALF_A_WINDOW
     assert after.p[first, :3] == pytest.approx(during.p[-1, :3], rel=2e-3)
-    assert after.p[-1, :3] == pytest.approx(STANDARD_PENDULUM.linear, rel=2e-3)
+    last = after.p[-1] if core_name == "f32" else p_of(config_of_q31(rig_with(), 1000.0), after.p[-1])
+    assert last[:3] == pytest.approx(STANDARD_PENDULUM.linear, rel=2e-3)
 
 
-def test_nothing_moves_while_the_strong_form_is_frozen(native: Native, samples: Any) -> None:
-    core = native.strong(strong_config(rig_with(form="strong", stride=8), 1000.0))
-    before, during, after = frozen_run(core, *samples)
+@pytest.mark.parametrize("core_name", ["f32", "q31"])
+def test_nothing_moves_while_the_strong_form_is_frozen(core_name: str, native: Native, samples: Any) -> None:
+    core = identifier_of(native, "strong", core_name)
+    before, during, after = frozen_run(core, *as_counted(samples, core_name))
     assert (during.p == before.p[-1]).all()
     assert (during.sums == before.sums[-1]).all()
     assert (during.reason == Reason.HELD_FROZEN).all()
     assert (after.reason != Reason.WARMING_UP).all()
 
 
-def test_a_frozen_state_is_saved_and_restored(native: Native, samples: Any) -> None:
-    config = weak_config(rig_with(), 1000.0)
-    core = native.weak(config)
-    core.run(samples[0][:FROM], samples[1][:FROM], hashes=False)
+@pytest.mark.parametrize("core_name", ["f32", "q31"])
+def test_a_frozen_state_is_saved_and_restored(core_name: str, native: Native, samples: Any) -> None:
+    phi, y = as_counted(samples, core_name)
+    core, restored = (identifier_of(native, "weak", core_name) for _ in range(2))
+    core.run(phi[:FROM], y[:FROM], hashes=False)
     core.freeze(True)
-    restored = native.weak(config)
     assert snapshot.restore(restored, snapshot.save(core)) is snapshot.SnapshotStatus.RESTORED
-    record = restored.run(samples[0][FROM:TO], samples[1][FROM:TO], hashes=False)
+    record = restored.run(phi[FROM:TO], y[FROM:TO], hashes=False)
     assert (record.reason == Reason.HELD_FROZEN).any()

@@ -111,7 +111,7 @@ def test_the_weak_form_equals_its_twin(patience_s: float, zero: bool, matrix: di
 def test_the_strong_form_equals_its_twin(patience_s: float, matrix: dict[str, Native], jolted: Run) -> None:
     rig = rig_with(form="strong", stride=8, outlier_gate=6.0, outlier_patience_s=patience_s, forgetting_s=2.0)
     config = strong_config_q31(rig, 1000.0)
-    phi, y = (c[24_000:27_000] for c in counts_of(rig, jolted))
+    phi, y = (c[28_500:31_000] for c in counts_of(rig, jolted))
     twin = StrongTwinQ31(config)
     expected = twin.run(phi, y)
     for native in matrix.values():

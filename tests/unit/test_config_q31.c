@@ -233,6 +233,8 @@ static const bound strong_fields[] = {
     /* the fourth derivative's outermost products are 48 times four full scales, and fit 32 bits */
     FIELD(pvid_strong_config_q31, , bank.phi_max, KIND_INT32, 1.0, 2147483647 / (48 * 4), PVID_BAD_BANK),
     FIELD(pvid_strong_config_q31, , bank.y_max, KIND_INT32, 1.0, 2147483647 / (48 * 4), PVID_BAD_BANK),
+    FIELD(pvid_strong_config_q31, , gate.sigmas, KIND_UINT32, 131072.0, 65536000.0, PVID_BAD_GATE_SIGMAS),
+    FIELD(pvid_strong_config_q31, , gate.patience_groups, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_GATE_PATIENCE),
     OF_ESTIMATOR(pvid_strong_config_q31, estimator.),
 };
 
@@ -300,6 +302,8 @@ static const bound weak_fields[] = {
     FIELD(pvid_weak_config_q31, , trust.misfit_max, KIND_UINT32, 65536.0, 4294967295.0, PVID_BAD_MISFIT_MAX),
     FIELD(pvid_weak_config_q31, , trust.groups_min, KIND_UINT16, 0.0, 65535.0, PVID_OK),
     FIELD(pvid_weak_config_q31, , trust.shut_max, KIND_UINT16, 0.0, 65535.0, PVID_OK),
+    FIELD(pvid_weak_config_q31, , gate.sigmas, KIND_UINT32, 131072.0, 65536000.0, PVID_BAD_GATE_SIGMAS),
+    FIELD(pvid_weak_config_q31, , gate.patience_groups, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_GATE_PATIENCE),
     OF_ESTIMATOR(pvid_weak_config_q31, estimator.),
     FIELD(pvid_weak_config_q31, estimator., start_sd[3], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),
     FORMAT(pvid_weak_config_q31, estimator., p_bits[3]),

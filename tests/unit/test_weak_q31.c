@@ -238,6 +238,58 @@ static void laws_and_forgetting_take_their_settings(void **state)
     }
 }
 
+/* While it is frozen every whole window is dropped and nothing moves; then it goes on without warming up again. */
+static void what_is_frozen_moves_no_sum_and_goes_on_without_a_bump(void **state)
+{
+    (void)state;
+    config.estimator.forgetting_groups = 8;
+    start();
+    plant_state plant = released_plant();
+    run(&plant, 9000, 0, NULL);
+    pvid_weak_freeze_q31(&identifier, true);
+    run(&plant, HOP_TICKS, 0, NULL); /* the window in work is finished */
+    const pvid_information_q31 sums = identifier.estimator.information;
+    const pvid_counters counters = identifier.estimator.counters;
+    const pvid_trust_q31 trust = identifier.trust;
+    int reasons[16] = {0};
+    run(&plant, 10 * HOP_TICKS, 0, reasons);
+    assert_int_equal(reasons[PVID_HELD_FROZEN], 10);
+    assert_int_equal(reasons[PVID_ACCUMULATED], (10 * HOP_TICKS) - 10);
+    assert_memory_equal(&identifier.estimator.information, &sums, sizeof sums);
+    assert_memory_equal(&identifier.estimator.counters, &counters, sizeof counters);
+    assert_memory_equal(&identifier.trust, &trust, sizeof trust);
+    pvid_weak_freeze_q31(&identifier, false);
+    int after[16] = {0};
+    run(&plant, 2 * HOP_TICKS, 0, after);
+    assert_int_equal(after[PVID_HELD_FROZEN] + after[PVID_WARMING_UP], 0);
+    assert_true((identifier.estimator.counters.rows - counters.rows) >= FUNCTIONS);
+    assert_in_range(after[PVID_UPDATED] + after[PVID_MISFIT] + after[PVID_HELD_UNCERTAIN], 1, 2);
+}
+
+/* Somebody holds the pendulum back for a moment: the windows that hold it are left out, by name, and without the gate they are taken in. */
+static void the_gate_keeps_a_jolt_out(void **state)
+{
+    (void)state;
+    for (int gated = 0; gated < 2; gated++) {
+        start_again(NULL);
+        config.gate.sigmas = (gated == 1) ? (4u << 16) : 0u;
+        start();
+        plant_state plant = released_plant();
+        int reasons[16] = {0};
+        run(&plant, 15000, 0, reasons);
+        assert_int_equal(reasons[PVID_REJECTED_OUTLIER], 0);
+        const uint32_t rows = identifier.estimator.counters.rows;
+        for (int i = 0; i < 4 * HOP_TICKS; i++) {
+            const int32_t shaken = (i < 300) ? (i / 6) : ((i < 600) ? ((600 - i) / 6) : 0);
+            reasons[tick(&identifier, &plant, shaken)]++;
+        }
+        const int refused = reasons[PVID_REJECTED_OUTLIER];
+        assert_in_range(refused, (gated == 1) ? 2 : 0, (gated == 1) ? 3 : 0);
+        assert_int_equal(identifier.estimator.counters.rejected_outlier, refused);
+        assert_int_equal(identifier.estimator.counters.rows - rows, FUNCTIONS * (4 - refused));
+    }
+}
+
 static void random_counts_keep_every_bound(void **state)
 {
     (void)state;
@@ -326,6 +378,8 @@ int main(void)
         cmocka_unit_test_setup(an_acceleration_beyond_its_range_is_refused, start_again),
         cmocka_unit_test_setup(without_drive_the_start_is_held_and_the_reason_says_so, start_again),
         cmocka_unit_test_setup(laws_and_forgetting_take_their_settings, start_again),
+        cmocka_unit_test_setup(what_is_frozen_moves_no_sum_and_goes_on_without_a_bump, start_again),
+        cmocka_unit_test_setup(the_gate_keeps_a_jolt_out, start_again),
         cmocka_unit_test_setup(random_counts_keep_every_bound, start_again),
         cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
         cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),

@@ -18,6 +18,7 @@
 #ifndef PVID_STRONG_Q31_H
 #define PVID_STRONG_Q31_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "pvid/differentiator_q31.h"
@@ -54,6 +55,7 @@ typedef struct {
     int64_t drive;            /* mean square of u over about drive_ticks */
     int64_t drive_min;        /* mean square below which no row is taken in */
     int32_t drive_forgetting; /* part of it that a tick replaces, Q31 */
+    bool frozen;
     pvid_gate_q31 gate;
     pvid_estimator_q31 estimator;
 } pvid_strong_q31;
@@ -69,6 +71,10 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y);
 
 /* Tells the identifier that samples are missing: the window starts again, nothing else is lost. */
 void pvid_strong_gap_q31(pvid_strong_q31 *self);
+
+/* Freezes the identifier, or lets it go on, as pvid_strong_freeze_f32: ticks that would have given a row return
+ * PVID_HELD_FROZEN while it is frozen, and p and the sums stay. */
+void pvid_strong_freeze_q31(pvid_strong_q31 *self, bool frozen);
 
 #ifdef __cplusplus
 }

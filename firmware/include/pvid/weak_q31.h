@@ -159,6 +159,7 @@ typedef struct {
     uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
     uint8_t function;      /* functions of that window that have, 0..K-1 */
     bool warm;             /* a window has been completed since the restart */
+    bool frozen;           /* windows are gathered and dropped */
     int32_t f;             /* the present decimated sample */
     int32_t u;
     pvid_scaled_q31 pivot_noise;
@@ -188,6 +189,10 @@ const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self);
+
+/* Freezes the identifier, or lets it go on, as pvid_weak_freeze_f32: while it is frozen every window that is completed is
+ * dropped with PVID_HELD_FROZEN, and p and the sums stay. */
+void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen);
 
 #ifdef __cplusplus
 }

@@ -693,6 +693,16 @@ class Stepper(ABC, Generic[RecordT]):
         return out
 
 
+class Freezable(Stepper[RecordT]):
+    """With a function that freezes it."""
+
+    FREEZE: ClassVar[str]
+
+    def freeze(self, frozen: bool) -> None:
+        """Takes nothing in, or goes on."""
+        getattr(self.native.library, self.FREEZE)(self._state, ctypes.c_bool(frozen))
+
+
 class _FloatStepper(Stepper[Record]):
     """With records of float32."""
 
@@ -727,17 +737,7 @@ class _FloatStepper(Stepper[Record]):
         return record, struct
 
 
-class _Freezable(_FloatStepper):
-    """With a function that freezes it."""
-
-    FREEZE: ClassVar[str]
-
-    def freeze(self, frozen: bool) -> None:
-        """Takes nothing in, or goes on."""
-        getattr(self.native.library, self.FREEZE)(self._state, ctypes.c_bool(frozen))
-
-
-class StrongIdentifier(_Freezable):
+class StrongIdentifier(_FloatStepper, Freezable[Record]):
     """pvid_strong_f32: phi [rad], y [m]."""
 
     REPLAY = "pvid_replay_strong_f32"
@@ -749,7 +749,7 @@ class StrongIdentifier(_Freezable):
         super().__init__(native, "pvid_strong_init_f32", struct, size, at, native._counters_at)
 
 
-class WeakIdentifier(_Freezable):
+class WeakIdentifier(_FloatStepper, Freezable[Record]):
     """pvid_weak_f32: phi [rad], y [m]."""
 
     REPLAY = "pvid_replay_weak_f32"

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from pvid.differentiation_q31 import FirBankQ31
 from pvid.errors import PvidError
-from pvid.native import MAX_P, Native, Status, Stepper
+from pvid.native import MAX_P, Freezable, Native, Status, Stepper
 from pvid.strong_design_q31 import RowShiftsQ31, StrongDesignQ31
 from pvid.weak_design_q31 import TERMS, WeakTablesQ31
 
@@ -435,10 +435,11 @@ def _gate_struct(config: GateConfigQ31) -> GateConfigStruct:
     return GateConfigStruct(config.sigmas, config.patience_groups)
 
 
-class WeakIdentifierQ31(_IntegerStepper):
+class WeakIdentifierQ31(_IntegerStepper, Freezable[RecordQ31]):
     """pvid_weak_q31: phi, y in counts."""
 
     REPLAY = "pvid_replay_weak_q31"
+    FREEZE = "pvid_weak_freeze_q31"
     publishes = True
 
     def __init__(self, native: Native, config: WeakConfigQ31) -> None:
@@ -499,10 +500,11 @@ def _row_struct(shifts: RowShiftsQ31) -> RowShiftsStruct:
     return struct
 
 
-class StrongIdentifierQ31(_IntegerStepper):
+class StrongIdentifierQ31(_IntegerStepper, Freezable[RecordQ31]):
     """pvid_strong_q31: phi, y in counts."""
 
     REPLAY = "pvid_replay_strong_q31"
+    FREEZE = "pvid_strong_freeze_q31"
     n_p, n_theta = 3, 11
 
     def __init__(self, native: Native, config: StrongConfigQ31) -> None:

@@ -29,6 +29,7 @@ class StrongTwinQ31:
 
     def __init__(self, config: StrongConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
         self.config = config
+        self.frozen: Mask | None = None  # [ticks], to be set before a run
         self.estimator = EstimatorQ31(estimators or [config.estimator], model.STRONG)
         floor = self.estimator.expected_variance.shifted(-20).plus(scaled(1, 0))
         self.gate = GateQ31(config.gate, config.drive_ticks // 4, floor)
@@ -48,6 +49,8 @@ class StrongTwinQ31:
         fate = np.full(len(phi), Reason.ACCUMULATED, np.uint8)
         fate[~fits] = Reason.REJECTED_SATURATED
         fate[~driven] = Reason.HELD_NOT_EXCITED
+        if self.frozen is not None:
+            fate[self.frozen] = Reason.HELD_FROZEN
         fate[~usable] = Reason.REJECTED_SATURATED
         fate[~ready] = Reason.WARMING_UP
         fate[~within] = Reason.REJECTED_SATURATED
@@ -132,7 +135,7 @@ def follow_rows(
             reason[tick] = _step(estimator, wide_n[tick], wide_y[tick], gate)
         else:
             reason[tick] = fate[tick]
-            if fate[tick] != Reason.WARMING_UP:
+            if fate[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
                 estimator.counters[Reason(fate[tick]).name.lower()] += 1
         after(tick, reason[tick])
     return reason

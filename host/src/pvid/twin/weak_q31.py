@@ -40,6 +40,7 @@ class WeakTwinQ31:
 
     def __init__(self, config: WeakConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
         self.config = config
+        self.frozen: Mask | None = None  # [ticks], to be set before a run
         model = kapitza_weak_q31.WEAK if config.zero_unknown else kapitza_weak_q31.ZEROED
         self.estimator = EstimatorQ31(estimators or [config.estimator], model)
         self.trust = TrustQ31(config.trust, self.estimator)
@@ -51,8 +52,8 @@ class WeakTwinQ31:
             weak_finish_q31.number_of_stages(config.design, self.iterations, self.estimator)
         )
 
-    def window_sums(self, phi: Int, y: Int) -> tuple[dict[int, Window | None], Mask, Mask]:
-        """Every whole window, None if it is dropped, by the tick of its handing over.
+    def window_sums(self, phi: Int, y: Int) -> tuple[dict[int, Window | Reason], Mask, Mask]:
+        """Every whole window, or why it is dropped, by the tick of its handing over.
 
         Also which samples were within full scale, and which ticks are free for the stages of a window.
         """
@@ -61,7 +62,7 @@ class WeakTwinQ31:
         y = y - config.y_offset
         within = (np.abs(phi) <= design.phi_max) & (np.abs(y) <= design.y_max)
         threshold = (config.drive_min * (design.window - 1)) ** 2
-        complete: dict[int, Window | None] = {}
+        complete: dict[int, Window | Reason] = {}
         free = within.copy()
         for first, last in segments(within):
             while first < last:
@@ -74,7 +75,7 @@ class WeakTwinQ31:
         y: Int,
         first: int,
         last: int,
-        complete: dict[int, Window | None],
+        complete: dict[int, Window | Reason],
         within: Mask,
         free: Mask,
         threshold: int,
@@ -93,7 +94,12 @@ class WeakTwinQ31:
         for m, sums in enumerate(weak_window_q31.sums(f, u, design)):
             tick = first + self.schedule.tick_of_window(m)
             bend = Scaled(bends.m[m], bends.e[m])
-            complete[tick] = Window(sums, int(angles[m]), bend) if driven[m] else None
+            if self.frozen is not None and self.frozen[tick]:
+                complete[tick] = Reason.HELD_FROZEN
+            elif not driven[m]:
+                complete[tick] = Reason.HELD_NOT_EXCITED
+            else:
+                complete[tick] = Window(sums, int(angles[m]), bend)
         self.schedule.occupy(free, first, last, len(f))
         return last + 1
 
@@ -106,11 +112,11 @@ class WeakTwinQ31:
         self.estimator.place(3, -mean if window.angle_sum < 0 else mean)
         self.trust.place()
 
-    def _take(self, window: Window | None) -> Reasons | Work:
+    def _take(self, window: Window | Reason) -> Reasons | Work:
         """Why a window is dropped, or its stages."""
-        if window is None:
-            self.estimator.counters["held_not_excited"] += 1
-            return np.full(self.estimator.lanes, Reason.HELD_NOT_EXCITED, np.uint8)
+        if isinstance(window, Reason):
+            self.estimator.counters["held_not_excited"] += window is Reason.HELD_NOT_EXCITED
+            return np.full(self.estimator.lanes, window, np.uint8)
         self._place_zero(window)
         return weak_finish_q31.stages(
             window, self.config.design, self.iterations, self.estimator, self.trust, self.pivot_noise, self.gate
