@@ -407,8 +407,8 @@ static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *
     for (size_t k = first; k < last; k++) {
         int64_t e;
         (void)pvid_estimator_innovation_q31(estimator, &sums[k][COLUMN_N], sums[k][COLUMN_Y], &e);
-        const int64_t held = pvid_clamp_q31(e, COLUMN_LIMIT);
-        self->energy = pvid_clamp_q31(self->energy + (held * held), PVID_WIDE);
+        const int64_t within = pvid_clamp_q31(e, COLUMN_LIMIT);
+        self->energy = pvid_clamp_q31(self->energy + (within * within), PVID_WIDE);
     }
 }
 
