@@ -109,6 +109,37 @@ static uint32_t gate_of(uint32_t hash, const pvid_gate_config_q31 *config)
     return pvid_fnv_word(pvid_fnv_word(hash, config->sigmas), config->patience_groups);
 }
 
+static uint32_t bank_of(uint32_t hash, const pvid_fir_bank_q31 *bank)
+{
+    const int32_t limits[] = {bank->phi_max, bank->y_max, bank->centre};
+    uint32_t running = pvid_fnv_word(hash, bank->half);
+    running = pvid_fnv_word(running, bank->stride);
+    running = words(running, limits, sizeof limits / sizeof limits[0]);
+    running = shifts(running, bank->phi_shift, sizeof bank->phi_shift);
+    running = shifts(running, bank->y_shift, sizeof bank->y_shift);
+    return table(running, bank->weights, (size_t)PVID_ORDERS * bank->half);
+}
+
+static uint32_t row_of(uint32_t hash, const pvid_strong_row_q31 *row)
+{
+    const uint8_t single[] = {row->n_a, row->n_e, row->part, row->y};
+    uint32_t running = shifts(hash, single, sizeof single);
+    running = shifts(running, row->n_phi2, sizeof row->n_phi2);
+    return shifts(running, row->n_phi0, sizeof row->n_phi0);
+}
+
+uint32_t pvid_fingerprint_strong_q31(const pvid_strong_config_q31 *config)
+{
+    const int32_t scalars[] = {config->u_multiplier, config->phi_offset, config->y_offset, config->drive_min};
+    uint32_t hash = words(PVID_FNV_START, scalars, sizeof scalars / sizeof scalars[0]);
+    hash = bank_of(hash, &config->bank);
+    hash = row_of(hash, &config->row);
+    hash = pvid_fnv_word(hash, config->u_shift);
+    hash = pvid_fnv_word(hash, config->drive_ticks);
+    hash = gate_of(hash, &config->gate);
+    return estimator_of(hash, &config->estimator, PVID_KAPITZA_STRONG_THETA, PVID_KAPITZA_P);
+}
+
 uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)
 {
     const pvid_model_q31 *model = config->zero_unknown ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;

@@ -1,5 +1,7 @@
 #include "snapshot.h"
 
+#include <string.h>
+
 #include "pvid/crc32.h"
 #include "pvid/fnv.h"
 #include "pvid/little_endian.h"
@@ -22,20 +24,6 @@ enum {
     AT_GENERATION = 24
 };
 
-size_t pvid_snapshot_seal(uint8_t image[], const pvid_snapshot_identity *identity, uint32_t generation)
-{
-    const size_t sealed = PVID_SNAPSHOT_HEADER + identity->bytes;
-    pvid_put_u32(&image[AT_MAGIC], MAGIC);
-    pvid_put_u32(&image[AT_LENGTH], (uint32_t)(sealed + CRC_BYTES));
-    pvid_put_u32(&image[AT_VERSION], VERSION);
-    pvid_put_u32(&image[AT_KIND], (uint32_t)identity->kind);
-    pvid_put_u32(&image[AT_LAYOUT], identity->layout);
-    pvid_put_u32(&image[AT_CONFIG], identity->config);
-    pvid_put_u32(&image[AT_GENERATION], generation);
-    pvid_put_u32(&image[sealed], pvid_crc32(0u, image, sealed));
-    return sealed + CRC_BYTES;
-}
-
 /* Whole and undamaged, whatever it is of. */
 static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
 {
@@ -54,8 +42,8 @@ static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
                                                                           : PVID_SNAPSHOT_DAMAGED;
 }
 
-pvid_snapshot_status pvid_snapshot_inspect(const uint8_t image[], size_t length,
-                                           const pvid_snapshot_identity *identity)
+/* Whether image[] holds an undamaged snapshot of this identity. */
+static pvid_snapshot_status inspect(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity)
 {
     const pvid_snapshot_status sound = soundness(image, length);
     if (sound != PVID_SNAPSHOT_RESTORED) {
@@ -75,6 +63,80 @@ pvid_snapshot_status pvid_snapshot_inspect(const uint8_t image[], size_t length,
         return PVID_SNAPSHOT_OTHER_CONFIG;
     }
     return PVID_SNAPSHOT_RESTORED;
+}
+
+/* ---- the object, its pointers and what stands behind it ---- */
+
+/* In the place of a pointer, so that equal states have equal snapshots and no address gets into flash. */
+static void put_pointers(uint8_t copy[], const pvid_snapshot_shape *shape)
+{
+    for (size_t i = 0; i < shape->n_pointers; i++) {
+        const void *pointer;
+        uint8_t *place = &copy[shape->pointers[i]];
+        memcpy(&pointer, place, sizeof pointer);
+        memset(place, 0, sizeof pointer);
+        place[0] = (pointer != NULL) ? 1u : 0u;
+    }
+}
+
+static void take_all_but_pointers(uint8_t object[], const uint8_t copy[], const pvid_snapshot_shape *shape)
+{
+    size_t from = 0;
+    for (size_t i = 0; i < shape->n_pointers; i++) {
+        memcpy(&object[from], &copy[from], shape->pointers[i] - from);
+        from = shape->pointers[i] + sizeof(void *);
+    }
+    memcpy(&object[from], &copy[from], shape->bytes - from);
+}
+
+/* Seals what stands at PVID_SNAPSHOT_HEADER; returns the length of the whole. */
+static size_t seal(uint8_t image[], const pvid_snapshot_identity *identity, uint32_t generation)
+{
+    const size_t sealed = PVID_SNAPSHOT_HEADER + identity->bytes;
+    pvid_put_u32(&image[AT_MAGIC], MAGIC);
+    pvid_put_u32(&image[AT_LENGTH], (uint32_t)(sealed + CRC_BYTES));
+    pvid_put_u32(&image[AT_VERSION], VERSION);
+    pvid_put_u32(&image[AT_KIND], (uint32_t)identity->kind);
+    pvid_put_u32(&image[AT_LAYOUT], identity->layout);
+    pvid_put_u32(&image[AT_CONFIG], identity->config);
+    pvid_put_u32(&image[AT_GENERATION], generation);
+    pvid_put_u32(&image[sealed], pvid_crc32(0u, image, sealed));
+    return sealed + CRC_BYTES;
+}
+
+size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_identity *identity, uint32_t generation,
+                          const void *object, const pvid_snapshot_shape *shape, const void *behind)
+{
+    if (room < PVID_SNAPSHOT_BYTES(identity->bytes)) {
+        return 0;
+    }
+    uint8_t *copy = &image[PVID_SNAPSHOT_HEADER];
+    memcpy(copy, object, shape->bytes);
+    put_pointers(copy, shape);
+    if (behind != NULL) {
+        memcpy(&copy[shape->bytes], behind, identity->bytes - shape->bytes);
+    }
+    return seal(image, identity, generation);
+}
+
+pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length,
+                                           const pvid_snapshot_identity *identity, void *object,
+                                           const pvid_snapshot_shape *shape, void *behind)
+{
+    const pvid_snapshot_status status = inspect(image, length, identity);
+    if (status == PVID_SNAPSHOT_RESTORED) {
+        const uint8_t *copy = &image[PVID_SNAPSHOT_HEADER];
+        take_all_but_pointers((uint8_t *)object, copy, shape);
+        if (behind != NULL) {
+            memcpy(behind, &copy[shape->bytes], identity->bytes - shape->bytes);
+        }
+    }
+    return status;
+}
+
+bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place)
+{
+    return image[PVID_SNAPSHOT_HEADER + place] != 0u;
 }
 
 uint32_t pvid_snapshot_layout(const uint32_t words[], size_t n)

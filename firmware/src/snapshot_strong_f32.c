@@ -1,5 +1,4 @@
 #include <stddef.h>
-#include <string.h>
 
 #include "fingerprint_f32.h"
 #include "snapshot.h"
@@ -17,6 +16,9 @@ static const uint32_t layout[] = {
     PVID_MAX_THETA,          PVID_MAX_MOMENTS,
 };
 
+static const uint32_t pointers[] = {PLACE(phi.bank.weights), PLACE(y.bank.weights), PLACE(estimator.model)};
+static const pvid_snapshot_shape shape = {sizeof(pvid_strong_f32), pointers, sizeof pointers / sizeof pointers[0]};
+
 static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)
 {
     const pvid_snapshot_identity identity = {
@@ -32,16 +34,8 @@ size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_str
                                      uint32_t generation, uint8_t image[], size_t room)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL));
-    if (room < PVID_SNAPSHOT_STRONG_F32) {
-        return 0;
-    }
-    uint8_t *object = &image[PVID_SNAPSHOT_HEADER];
-    memcpy(object, self, sizeof *self);
-    pvid_snapshot_put_pointer(object, PLACE(phi.bank.weights), self->phi.bank.weights);
-    pvid_snapshot_put_pointer(object, PLACE(y.bank.weights), self->y.bank.weights);
-    pvid_snapshot_put_pointer(object, PLACE(estimator.model), self->estimator.model);
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_seal(image, &identity, generation);
+    return pvid_snapshot_save(image, room, &identity, generation, self, &shape, NULL);
 }
 
 pvid_snapshot_status pvid_snapshot_restore_strong_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
@@ -49,14 +43,5 @@ pvid_snapshot_status pvid_snapshot_restore_strong_f32(pvid_strong_f32 *self, con
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL));
     const pvid_snapshot_identity identity = identity_of(config);
-    const pvid_snapshot_status status = pvid_snapshot_inspect(image, length, &identity);
-    if (status == PVID_SNAPSHOT_RESTORED) {
-        const float *weights = self->phi.bank.weights;
-        const pvid_model_f32 *model = self->estimator.model;
-        memcpy(self, &image[PVID_SNAPSHOT_HEADER], sizeof *self);
-        self->phi.bank.weights = weights;
-        self->y.bank.weights = weights;
-        self->estimator.model = model;
-    }
-    return status;
+    return pvid_snapshot_restore(image, length, &identity, self, &shape, NULL);
 }

@@ -1,5 +1,4 @@
 #include <stddef.h>
-#include <string.h>
 
 #include "fingerprint_f32.h"
 #include "snapshot.h"
@@ -49,6 +48,18 @@ static bool has_angle(const pvid_weak_config_f32 *config)
     return config->full_angle || config->friction;
 }
 
+static const uint32_t pointers[] = {
+    PLACE(design),
+    PLACE(angle),
+    PLACE(front.smooth),
+    PLACE(front.second),
+    PLACE(finish.angle),
+    PLACE(finish.solve.refuge),
+    PLACE(finish.solve.estimate),
+    PLACE(estimator.model),
+};
+static const pvid_snapshot_shape shape = {sizeof(pvid_weak_f32), pointers, sizeof pointers / sizeof pointers[0]};
+
 static pvid_snapshot_identity identity_of(const pvid_weak_config_f32 *config)
 {
     const pvid_snapshot_identity identity = {
@@ -64,43 +75,9 @@ size_t pvid_snapshot_save_weak_f32(const pvid_weak_f32 *self, const pvid_weak_co
                                    uint8_t image[], size_t room)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
-    if (room < (has_angle(config) ? PVID_SNAPSHOT_WEAK_ANGLE_F32 : PVID_SNAPSHOT_WEAK_F32)) {
-        return 0;
-    }
-    uint8_t *object = &image[PVID_SNAPSHOT_HEADER];
-    memcpy(object, self, sizeof *self);
-    pvid_snapshot_put_pointer(object, PLACE(design), self->design);
-    pvid_snapshot_put_pointer(object, PLACE(angle), self->angle);
-    pvid_snapshot_put_pointer(object, PLACE(front.smooth), self->front.smooth);
-    pvid_snapshot_put_pointer(object, PLACE(front.second), self->front.second);
-    pvid_snapshot_put_pointer(object, PLACE(finish.angle), self->finish.angle);
-    pvid_snapshot_put_pointer(object, PLACE(finish.solve.refuge), self->finish.solve.refuge);
-    pvid_snapshot_put_pointer(object, PLACE(finish.solve.estimate), self->finish.solve.estimate);
-    pvid_snapshot_put_pointer(object, PLACE(estimator.model), self->estimator.model);
-    if (has_angle(config)) {
-        memcpy(&object[sizeof *self], self->angle, sizeof *self->angle);
-    }
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_seal(image, &identity, generation);
-}
-
-/* The object's bytes, and what init had bound it to; what pointed into the object points into it again. */
-static void put_back(pvid_weak_f32 *self, const uint8_t object[])
-{
-    const pvid_weak_design_f32 *design = self->design;
-    pvid_weak_angle_f32 *angle = self->angle;
-    const pvid_model_f32 *model = self->estimator.model;
-    memcpy(self, object, sizeof *self);
-    self->design = design;
-    self->angle = angle;
-    self->front.smooth = design->smooth;
-    self->front.second = design->second;
-    self->finish.angle = pvid_snapshot_had_pointer(object, PLACE(finish.angle)) ? angle : NULL;
-    self->finish.solve.refuge =
-        pvid_snapshot_had_pointer(object, PLACE(finish.solve.refuge)) ? self->trust.estimate.p : NULL;
-    self->finish.solve.estimate =
-        pvid_snapshot_had_pointer(object, PLACE(finish.solve.estimate)) ? &self->finish.candidate : NULL;
-    self->estimator.model = model;
+    const pvid_weak_angle_f32 *behind = has_angle(config) ? self->angle : NULL;
+    return pvid_snapshot_save(image, room, &identity, generation, self, &shape, behind);
 }
 
 pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,
@@ -108,13 +85,15 @@ pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const p
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
     const pvid_snapshot_identity identity = identity_of(config);
-    const pvid_snapshot_status status = pvid_snapshot_inspect(image, length, &identity);
-    if (status == PVID_SNAPSHOT_RESTORED) {
-        const uint8_t *object = &image[PVID_SNAPSHOT_HEADER];
-        put_back(self, object);
-        if (has_angle(config)) {
-            memcpy(self->angle, &object[sizeof *self], sizeof *self->angle);
-        }
+    pvid_weak_angle_f32 *behind = has_angle(config) ? self->angle : NULL;
+    const pvid_snapshot_status status = pvid_snapshot_restore(image, length, &identity, self, &shape, behind);
+    if (status == PVID_SNAPSHOT_RESTORED) { /* what pointed into the object points into it again */
+        pvid_weak_finish_f32 *finish = &self->finish;
+        finish->angle = pvid_snapshot_had_pointer(image, PLACE(finish.angle)) ? self->angle : NULL;
+        finish->solve.refuge =
+            pvid_snapshot_had_pointer(image, PLACE(finish.solve.refuge)) ? self->trust.estimate.p : NULL;
+        finish->solve.estimate =
+            pvid_snapshot_had_pointer(image, PLACE(finish.solve.estimate)) ? &finish->candidate : NULL;
     }
     return status;
 }

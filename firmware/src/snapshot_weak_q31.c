@@ -1,5 +1,4 @@
 #include <stddef.h>
-#include <string.h>
 
 #include "fingerprint_q31.h"
 #include "snapshot.h"
@@ -35,6 +34,9 @@ static const uint32_t layout[] = {
     PVID_MAX_FUNCTIONS,
 };
 
+static const uint32_t pointers[] = {PLACE(design), PLACE(estimator.model)};
+static const pvid_snapshot_shape shape = {sizeof(pvid_weak_q31), pointers, sizeof pointers / sizeof pointers[0]};
+
 static pvid_snapshot_identity identity_of(const pvid_weak_config_q31 *config)
 {
     const pvid_snapshot_identity identity = {
@@ -50,15 +52,8 @@ size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_co
                                    uint8_t image[], size_t room)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
-    if (room < PVID_SNAPSHOT_WEAK_Q31) {
-        return 0;
-    }
-    uint8_t *object = &image[PVID_SNAPSHOT_HEADER];
-    memcpy(object, self, sizeof *self);
-    pvid_snapshot_put_pointer(object, PLACE(design), self->design);
-    pvid_snapshot_put_pointer(object, PLACE(estimator.model), self->estimator.model);
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_seal(image, &identity, generation);
+    return pvid_snapshot_save(image, room, &identity, generation, self, &shape, NULL);
 }
 
 pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config,
@@ -66,13 +61,5 @@ pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const p
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
     const pvid_snapshot_identity identity = identity_of(config);
-    const pvid_snapshot_status status = pvid_snapshot_inspect(image, length, &identity);
-    if (status == PVID_SNAPSHOT_RESTORED) {
-        const pvid_weak_design_q31 *design = self->design;
-        const pvid_model_q31 *model = self->estimator.model;
-        memcpy(self, &image[PVID_SNAPSHOT_HEADER], sizeof *self);
-        self->design = design;
-        self->estimator.model = model;
-    }
-    return status;
+    return pvid_snapshot_restore(image, length, &identity, self, &shape, NULL);
 }

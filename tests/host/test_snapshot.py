@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -16,11 +17,11 @@ from struct_fields import Field, fields_of
 
 from pvid import snapshot
 from pvid.native import Native
-from pvid.native_q31 import WeakIdentifierQ31
+from pvid.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
 from pvid.rig import Simulation
 from pvid.rigfile import RigFile
 from pvid.setup import strong_config, weak_config
-from pvid.setup_q31 import weak_config_q31
+from pvid.setup_q31 import strong_config_q31, weak_config_q31
 from pvid.snapshot import Identifier, SnapshotStatus
 
 TICKS = 20_000
@@ -59,13 +60,19 @@ def fixed_point_of(native: Native) -> Identifier:
     return WeakIdentifierQ31(native, weak_config_q31(RIG, 1000.0))
 
 
-KINDS = (strong_of, savitzky_golay_of, weak_of, forgetting_of, corrected_of, fixed_point_of)
+def strong_fixed_point_of(native: Native) -> Identifier:
+    rig = rig_with(form="strong", forgetting_s=3.0, outlier_gate=6.0)
+    return StrongIdentifierQ31(native, strong_config_q31(rig, 1000.0))
+
+
+FOUR = (strong_of, weak_of, strong_fixed_point_of, fixed_point_of)  # every form and core
+KINDS = (*FOUR, savitzky_golay_of, forgetting_of, corrected_of)
 Maker = Callable[[Native], Identifier]
 
 
 def samples_for(identifier: Identifier, simulation: Simulation) -> tuple[Samples, Samples]:
     phi, y = simulation.run.phi[:TICKS], simulation.run.y[:TICKS]
-    if isinstance(identifier, WeakIdentifierQ31):
+    if isinstance(identifier, WeakIdentifierQ31 | StrongIdentifierQ31):
         return np.rint(phi / RIG.sensor.phi_lsb).astype(np.int64), np.rint(y / RIG.sensor.y_lsb).astype(np.int64)
     return phi, y
 
@@ -91,7 +98,7 @@ def test_a_restored_run_continues_bit_for_bit(maker: Maker, native: Native, stan
 def test_every_build_of_a_machine_restores_what_another_saved(
     matrix: dict[str, Native], standard_20_bits: Simulation
 ) -> None:
-    for maker in (strong_of, weak_of, fixed_point_of):
+    for maker in FOUR:
         images = set()
         for native in matrix.values():
             identifier = maker(native)
@@ -103,9 +110,9 @@ def test_every_build_of_a_machine_restores_what_another_saved(
                 assert snapshot.restore(maker(native), image) is SnapshotStatus.RESTORED
 
 
-@pytest.mark.parametrize("maker", (strong_of, weak_of, fixed_point_of), ids=lambda maker: maker.__name__)
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
 def test_another_form_or_core_is_refused(maker: Maker, native: Native) -> None:
-    for other in (strong_of, weak_of, fixed_point_of):
+    for other in FOUR:
         status = SnapshotStatus.RESTORED if other is maker else SnapshotStatus.OTHER_KIND
         assert snapshot.restore(maker(native), snapshot.save(other(native))) is status
 
@@ -119,6 +126,7 @@ NOT_SETTINGS: dict[Maker, set[str]] = {
         "angle",
         "passes",  # of a correction that is not asked for
     },
+    strong_fixed_point_of: {"estimator.model", "bank.weights"},
     fixed_point_of: {
         "estimator.model",
         *(f"design.{name}" for name in ("smooth", "second", "chi", "gram", "multiplier")),
@@ -143,14 +151,16 @@ def is_unused(field: Field, n_p: int, n_theta: int) -> bool:
     return name == "n_bits" and field.place >= n_theta
 
 
-@pytest.mark.parametrize("maker", (strong_of, weak_of, fixed_point_of), ids=lambda maker: maker.__name__)
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
 def test_every_setting_that_differs_is_seen(maker: Maker, native: Native) -> None:
     identifier = maker(native)
     image = snapshot.save(identifier)
     before = bytes(identifier.state)
     tried = 0
     for field in fields_of(identifier.config_struct):
-        if field.name in NOT_SETTINGS[maker] or is_unused(field, identifier.n_p, 8):
+        if field.name in NOT_SETTINGS[maker] or is_unused(
+            field, identifier.n_p, 11 if maker is strong_fixed_point_of else 8
+        ):
             continue
         kept = field.value
         field.value = changed(kept)
@@ -163,9 +173,10 @@ def test_every_setting_that_differs_is_seen(maker: Maker, native: Native) -> Non
 
 
 def test_every_table_that_differs_is_seen(native: Native) -> None:
-    for maker in (strong_of, weak_of, fixed_point_of):
+    for maker in FOUR:
         identifier = maker(native)
         image = snapshot.save(identifier)
+        assert identifier._tables
         for table in identifier._tables.values():
             # the arrays are read-only for Python, as the tables are for the core
             raw = (ctypes.c_uint8 * table.nbytes).from_address(table.ctypes.data)
@@ -180,6 +191,47 @@ def test_a_correction_that_is_not_asked_for_has_no_passes(native: Native) -> Non
     identifier = weak_of(native)
     identifier.config_struct.passes += 1
     assert snapshot.restore(identifier, image) is SnapshotStatus.RESTORED
+
+
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
+def test_what_is_damaged_cut_short_or_of_another_version_changes_nothing(maker: Maker, native: Native) -> None:
+    identifier = maker(native)
+    image = snapshot.save(identifier)
+    before = bytes(identifier.state)
+    for place in (*range(0, 28, 4), 28, len(image) // 2, len(image) - 5, len(image) - 1):
+        for bit in (1, 128):
+            damaged = image[:place] + bytes([image[place] ^ bit]) + image[place + 1 :]
+            assert snapshot.restore(identifier, damaged) is not SnapshotStatus.RESTORED, place
+    for length in (0, 3, 27, 31, 32, len(image) // 2, len(image) - 1):
+        status = SnapshotStatus.NONE if length < 32 else SnapshotStatus.CUT_SHORT
+        assert snapshot.restore(identifier, image[:length]) is status
+    sealed = image[:8] + b"\x00\x00\x00\x7f" + image[12:-4]
+    other = sealed + zlib.crc32(sealed).to_bytes(4, "little")
+    assert snapshot.restore(identifier, other) is SnapshotStatus.OTHER_VERSION
+    assert bytes(identifier.state) == before
+    assert snapshot.restore(identifier, image + b"and what follows") is SnapshotStatus.RESTORED
+
+
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
+def test_power_that_fails_at_any_byte_leaves_the_older_slot(
+    maker: Maker, native: Native, standard_20_bits: Simulation
+) -> None:
+    identifier = maker(native)
+    phi, y = samples_for(identifier, standard_20_bits)
+    identifier.run(phi[:1500], y[:1500], sums=False)
+    older = snapshot.save(identifier, 1)
+    identifier.run(phi[1500:2000], y[1500:2000], sums=False)
+    newer = snapshot.save(identifier, 2)
+    slot = snapshot.save(identifier, 0)  # what the slot held before
+    for cut in range(len(newer)):
+        torn = newer[:cut] + slot[cut:]
+        if torn != newer:
+            assert snapshot.choose(native, older, torn) == snapshot.Choice(0, 1, 2), cut
+    assert snapshot.choose(native, older, newer) == snapshot.Choice(1, 0, 3)
+    restored = maker(native)
+    assert snapshot.restore(restored, older) is SnapshotStatus.RESTORED
+    restored.run(phi[1500:2000], y[1500:2000], sums=False)
+    assert snapshot.save(restored, 2) == newer
 
 
 @given(noise=st.binary(max_size=200))

@@ -238,6 +238,32 @@ static const bound strong_fields[] = {
     OF_ESTIMATOR(pvid_strong_config_q31, estimator.),
 };
 
+static uint32_t strong_fingerprint(void)
+{
+    return pvid_fingerprint_strong_q31(&strong_settings);
+}
+
+static void every_field_of_the_strong_form_is_in_its_fingerprint(void **state)
+{
+    (void)state;
+    check_fingerprints(strong_fields, LENGTH(strong_fields), &strong_settings, sizeof strong_settings,
+                       strong_fingerprint);
+    static int32_t weights[2 * PVID_ORDERS];
+    memcpy(weights, pvid_five_points_q31, sizeof weights);
+    strong_settings.bank.weights = weights;
+    const uint32_t before = strong_fingerprint();
+    for (size_t i = 0; i < LENGTH(weights); i++) {
+        weights[i]++;
+        assert_int_not_equal(strong_fingerprint(), before);
+        weights[i]--;
+    }
+    strong_settings.bank.centre++;
+    assert_int_not_equal(strong_fingerprint(), before);
+    strong_settings.bank.centre--;
+    strong_settings.bank.half = 1;
+    assert_int_not_equal(strong_fingerprint(), before);
+}
+
 static void the_strong_forms_fields_end_where_they_say(void **state)
 {
     (void)state;
@@ -482,6 +508,7 @@ int main(void)
         cmocka_unit_test(start_and_bounds_agree_or_are_refused),
         cmocka_unit_test(a_model_fits_or_is_refused),
         cmocka_unit_test_setup(the_strong_forms_fields_end_where_they_say, start_strong),
+        cmocka_unit_test_setup(every_field_of_the_strong_form_is_in_its_fingerprint, start_strong),
         cmocka_unit_test_setup(the_weak_forms_fields_end_where_they_say, start_weak),
         cmocka_unit_test(a_design_without_a_table_is_refused),
         cmocka_unit_test_setup(a_window_that_cannot_be_worked_off_is_refused, start_weak),

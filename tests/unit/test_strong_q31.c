@@ -194,6 +194,61 @@ static void a_still_pivot_is_no_drive(void **state)
     assert_memory_equal(self.estimator.p, config.estimator.start, 3 * sizeof(int32_t));
 }
 
+/* Frozen, it takes no row in but keeps its window filled; then it goes on with the next sample. */
+static void what_is_frozen_takes_no_row_in(void **state)
+{
+    (void)state;
+    const pvid_strong_config_q31 config = settings();
+    static pvid_strong_q31 self;
+    assert_int_equal(pvid_strong_init_q31(&self, &config), PVID_OK);
+    for (int32_t i = 0; i < 50; i++) {
+        (void)pvid_strong_step_q31(&self, (i * 37) % 900, i % 40);
+    }
+    const uint32_t rows = self.estimator.counters.rows;
+    assert_true(rows > 0u);
+    const pvid_estimator_q31 before = self.estimator;
+    pvid_strong_freeze_q31(&self, true);
+    for (int32_t i = 50; i < 100; i++) {
+        assert_int_equal(pvid_strong_step_q31(&self, (i * 37) % 900, i % 40), PVID_HELD_FROZEN);
+    }
+    assert_memory_equal(&self.estimator, &before, sizeof before);
+    pvid_strong_freeze_q31(&self, false);
+    for (int32_t i = 100; i < 150; i++) {
+        assert_int_not_equal(pvid_strong_step_q31(&self, (i * 37) % 900, i % 40), PVID_WARMING_UP);
+    }
+    assert_true(self.estimator.counters.rows > rows);
+}
+
+/* A snapshot at every tick, from before the window is full: both go on alike. One of the weak form is none of its own. */
+static void a_restored_run_continues_bit_for_bit(void **state)
+{
+    (void)state;
+    pvid_strong_config_q31 config = settings();
+    config.gate.sigmas = 4u << 16;
+    static pvid_strong_q31 self;
+    static pvid_strong_q31 restored;
+    static uint8_t image[PVID_SNAPSHOT_STRONG_Q31];
+    assert_int_equal(pvid_strong_init_q31(&self, &config), PVID_OK);
+    for (int32_t i = 0; i < 300; i++) {
+        assert_int_equal(pvid_snapshot_save_strong_q31(&self, &config, 1, image, sizeof image), sizeof image);
+        assert_int_equal(pvid_strong_init_q31(&restored, &config), PVID_OK);
+        assert_int_equal(pvid_snapshot_restore_strong_q31(&restored, &config, image, sizeof image),
+                         PVID_SNAPSHOT_RESTORED);
+        assert_memory_equal(&restored, &self, sizeof self);
+        const pvid_reason reason = pvid_strong_step_q31(&self, (i * 37) % 900, i % 40);
+        assert_int_equal(pvid_strong_step_q31(&restored, (i * 37) % 900, i % 40), reason);
+        assert_memory_equal(&restored, &self, sizeof self);
+    }
+    assert_int_equal(pvid_snapshot_save_strong_q31(&self, &config, 1, image, sizeof image - 1u), 0);
+    config.row.part++;
+    assert_int_equal(pvid_snapshot_restore_strong_q31(&restored, &config, image, sizeof image),
+                     PVID_SNAPSHOT_OTHER_CONFIG);
+    config.row.part--;
+    image[100] ^= 4u;
+    assert_int_equal(pvid_snapshot_restore_strong_q31(&restored, &config, image, sizeof image), PVID_SNAPSHOT_DAMAGED);
+    assert_memory_equal(&restored, &self, sizeof self);
+}
+
 static void what_is_out_of_range_is_refused_by_name(void **state)
 {
     (void)state;
@@ -236,6 +291,8 @@ int main(void)
         cmocka_unit_test(theta_and_its_jacobian_are_those_of_the_model),
         cmocka_unit_test(the_edges_of_a_run_are_told),
         cmocka_unit_test(a_still_pivot_is_no_drive),
+        cmocka_unit_test(what_is_frozen_takes_no_row_in),
+        cmocka_unit_test(a_restored_run_continues_bit_for_bit),
         cmocka_unit_test(what_is_out_of_range_is_refused_by_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

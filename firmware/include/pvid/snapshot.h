@@ -33,6 +33,7 @@
 #include <stdint.h>
 
 #include "pvid/strong.h"
+#include "pvid/strong_q31.h"
 #include "pvid/weak.h"
 #include "pvid/weak_q31.h"
 
@@ -57,6 +58,7 @@ typedef enum {
 /* Bytes of a snapshot: room that is always enough for one of that kind. */
 #define PVID_SNAPSHOT_BYTES(object) (PVID_SNAPSHOT_HEADER + (object) + 4u)
 #define PVID_SNAPSHOT_STRONG_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_f32))
+#define PVID_SNAPSHOT_STRONG_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_q31))
 #define PVID_SNAPSHOT_WEAK_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32))
 #define PVID_SNAPSHOT_WEAK_ANGLE_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32) + sizeof(pvid_weak_angle_f32))
 #define PVID_SNAPSHOT_WEAK_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_q31))
@@ -77,6 +79,8 @@ pvid_snapshot_choice pvid_snapshot_choose(const uint8_t slot_0[], const uint8_t 
  * the configuration's tables: some ticks, so do it where a tick can wait. */
 size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                      uint32_t generation, uint8_t image[], size_t room);
+size_t pvid_snapshot_save_strong_q31(const pvid_strong_q31 *self, const pvid_strong_config_q31 *config,
+                                     uint32_t generation, uint8_t image[], size_t room);
 /* PVID_SNAPSHOT_WEAK_ANGLE_F32 where the angle's storage is in use, else PVID_SNAPSHOT_WEAK_F32. */
 size_t pvid_snapshot_save_weak_f32(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t generation,
                                    uint8_t image[], size_t room);
@@ -86,6 +90,8 @@ size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_co
 /* Restores `self`, which has been initialised with config, from the snapshot at image[0 .. length - 1] (it may be
  * followed by anything). Whatever the answer but PVID_SNAPSHOT_RESTORED, `self` is left as it was. */
 pvid_snapshot_status pvid_snapshot_restore_strong_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
+                                                      const uint8_t image[], size_t length);
+pvid_snapshot_status pvid_snapshot_restore_strong_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config,
                                                       const uint8_t image[], size_t length);
 pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,
                                                     const uint8_t image[], size_t length);

@@ -509,7 +509,8 @@ class StrongIdentifierQ31(_IntegerStepper, Freezable[RecordQ31]):
 
     def __init__(self, native: Native, config: StrongConfigQ31) -> None:
         layout = _checked_layout(native)
-        bank, self._weights = _bank_struct(config.design.bank)
+        bank, weights = _bank_struct(config.design.bank)
+        self._tables = {"weights": weights}
         struct = StrongConfigStruct(
             bank=bank,
             row=_row_struct(config.design.row),

@@ -7,9 +7,16 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from pvid.native import Native, StrongIdentifier, WeakIdentifier
-from pvid.native_q31 import WeakIdentifierQ31
+from pvid.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
 
-Identifier = StrongIdentifier | WeakIdentifier | WeakIdentifierQ31
+Identifier = StrongIdentifier | WeakIdentifier | StrongIdentifierQ31 | WeakIdentifierQ31
+
+_SUFFIXES = {
+    StrongIdentifier: "strong_f32",
+    WeakIdentifier: "weak_f32",
+    StrongIdentifierQ31: "strong_q31",
+    WeakIdentifierQ31: "weak_q31",
+}
 
 # Header, checksum, and the storage of the angle's correction, which stands behind the object.
 ROOM_BESIDE_THE_OBJECT = 32 + 8192
@@ -41,17 +48,11 @@ class Choice:
     generation: int
 
 
-def _suffix(identifier: Identifier) -> str:
-    if isinstance(identifier, StrongIdentifier):
-        return "strong_f32"
-    return "weak_f32" if isinstance(identifier, WeakIdentifier) else "weak_q31"
-
-
 def save(identifier: Identifier, generation: int = 1) -> bytes:
     """A snapshot of the identifier as it stands."""
     room = ctypes.sizeof(identifier.state) + ROOM_BESIDE_THE_OBJECT
     image = ctypes.create_string_buffer(room)
-    function = getattr(identifier.native.library, f"pvid_snapshot_save_{_suffix(identifier)}")
+    function = getattr(identifier.native.library, f"pvid_snapshot_save_{_SUFFIXES[type(identifier)]}")
     function.restype = ctypes.c_size_t
     config = ctypes.byref(identifier.config_struct)
     n = function(identifier.state, config, ctypes.c_uint32(generation), image, ctypes.c_size_t(room))
@@ -60,7 +61,7 @@ def save(identifier: Identifier, generation: int = 1) -> bytes:
 
 def restore(identifier: Identifier, image: bytes) -> SnapshotStatus:
     """Restores a freshly made identifier of the same configuration; unless RESTORED, it is left as it was."""
-    function = getattr(identifier.native.library, f"pvid_snapshot_restore_{_suffix(identifier)}")
+    function = getattr(identifier.native.library, f"pvid_snapshot_restore_{_SUFFIXES[type(identifier)]}")
     config = ctypes.byref(identifier.config_struct)
     return SnapshotStatus(function(identifier.state, config, image, ctypes.c_size_t(len(image))))
 
