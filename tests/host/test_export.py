@@ -137,6 +137,34 @@ def test_mcap_reads_back_with_its_library(tmp_path: Path, log: Path, sent: list[
     assert next(one for one in estimates if one["tick"] == tick)["w"] == message.p[0]
 
 
+_JSON_KINDS = {"number": (int, float), "integer": (int,), "string": (str,)}
+
+
+def test_mcap_has_what_foxglove_and_plotjuggler_ask_for(tmp_path: Path, log: Path) -> None:
+    """By Foxglove's page on custom schema encodings: schema "jsonschema" of an object, messages "json", UTF-8, each an
+    object; a plot's axis is the log time. Both programs read the summary first, and the chunks by their index."""
+    (path,) = export_log(log, "mcap", tmp_path / "out", L1)
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None and summary.statistics is not None
+        statistics = summary.statistics
+        schemas = {number: json.loads(one.data) for number, one in summary.schemas.items()}
+        assert all(one["type"] == "object" and one["properties"] for one in schemas.values())
+        assert all(one.message_encoding == "json" for one in summary.channels.values())
+        assert (statistics.channel_count, statistics.schema_count) == (len(TABLES), len(TABLES))
+        assert statistics.chunk_count == len(summary.chunk_indexes) > 0
+        messages = [(channel, one) for _, channel, one in make_reader(file).iter_messages()]
+    assert len(messages) == statistics.message_count == sum(statistics.channel_message_counts.values())
+    times = [one.log_time for _, one in messages]
+    assert (statistics.message_start_time, statistics.message_end_time) == (min(times), max(times))
+    assert all(index.message_start_time <= index.message_end_time for index in summary.chunk_indexes)
+    assert 1e18 < min(times) < 4e18  # nanoseconds since 1970, from 2001 to 2096
+    for channel, one in messages:
+        properties = schemas[channel.schema_id]["properties"]
+        for name, value in json.loads(one.data).items():
+            assert isinstance(value, _JSON_KINDS[properties[name]["type"]]), (channel.topic, name)
+
+
 def test_an_export_that_fails_leaves_nothing(tmp_path: Path, log: Path) -> None:
     (tmp_path / "noise").write_bytes(b"noise")
     for form in FORMATS:

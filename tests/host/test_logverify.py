@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -251,6 +252,7 @@ def _wrong_sample(message: link.Message) -> link.Message | None:
         (HOST_TARGET, {"form": "weak", "core": "f32", "full_angle": True, "damping": True}, 3000, _wrong_hash),
         (HOST_TARGET, {"form": "weak", "core": "f32", "outlier_gate": 4.0, "forgetting_s": 10.0}, 3000, _wrong_hash),
         (HOST_TARGET, {"form": "weak", "core": "q31"}, 3000, _wrong_d1),
+        (HOST_TARGET, {"form": "weak", "core": "q31", "outlier_gate": 4.0}, 3000, _wrong_hash),
         (HOST_TARGET, {"form": "strong", "core": "f32"}, 1000, _wrong_d1),
         (HOST_TARGET, {"form": "strong", "core": "f32", "law": "pseudovelocity"}, 1000, _wrong_hash),
         (HOST_TARGET, {"form": "strong", "core": "q31"}, 1000, _wrong_sample),
@@ -284,6 +286,25 @@ def test_a_field_log_of_the_firmware_verifies_and_an_altered_bit_is_named(
     else:
         assert (found.tick, found.variable) == (tick, "hash" if change is _wrong_hash else "d1")
         assert (found.core_word ^ found.twin_word) == (0x100 if change is _wrong_hash else 1)
+
+
+@pytest.mark.parametrize("core", ["f32", "q31"])
+def test_a_field_log_is_drawn_and_identified_with_its_own_settings(tmp_path: Path, core: str) -> None:
+    """The settings that a log is drawn and identified with are those of the rig file in it."""
+    rig = RigFile.standard()
+    own = {"full_angle": True, "damping": True} if core == "f32" else {"forgetting_s": 20.0}
+    asked: dict[str, Any] = {"core": core, **own}
+    replace(rig, identifier=replace(rig.identifier, **asked)).write(tmp_path / "rig.toml")
+    done = pvid(tmp_path, "log", HOST_TARGET, "a.pvlog", "--rig", "rig.toml", "--samples", "12000", "--paced")
+    assert done.returncode == 0, done.stderr
+    drawn = pvid(tmp_path, "plot", "a.pvlog", "-o", "a.svg")
+    assert drawn.returncode == 0, drawn.stderr
+    assert "weak form, 1000 samples per second" in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    found = json.loads(pvid(tmp_path, "identify", "a.pvlog", "--json").stdout)
+    stream = LogReader(tmp_path / "a.pvlog")
+    ticks = sum(record.item.count for record in stream if isinstance(record.item, link.Raw | link.RawCount))
+    assert (found["core"], found["ticks"]) == (core, ticks)
+    assert found["w"]["value"] == pytest.approx(31.67, rel=0.01)  # the rig is linear: correcting it errs by 0.4 %
 
 
 def test_verify_tells_by_its_exit_code(tmp_path: Path, sent: Sent) -> None:
