@@ -36,7 +36,13 @@ from pvid.tee import Tee
 @click.option("--paced", is_flag=True, help="A board that is started samples as fast as the line goes, not in time.")
 @click.option("--duration", type=click.FloatRange(min=0), help="Ends after so many seconds.  [default: at Ctrl-C]")
 @click.option("--samples", type=click.IntRange(min=1), help="Ends when so many have come.")
-@click.option("--tee", "tees", metavar="URL", multiple=True, help="Also to udp://host:port (JSON) or teleplot://...")
+@click.option(
+    "--tee",
+    "tees",
+    metavar="URL",
+    multiple=True,
+    help="Also to udp://host:9870 (JSON: PlotJuggler) or teleplot://host:47269.",
+)
 @click.option(
     "--allow-loss",
     default=0.001,
