@@ -12,10 +12,10 @@ from conftest import ROOT
 
 MUTANTS = {
     "estimator_f32.c": (
-        "    s[a][a] += self->prior[a];\n        rhs[a] = (gain",
-        "    s[a][a] += 1.0000001f * self->prior[a];\n        rhs[a] = (gain",
+        "    s[a][a] += self->prior[a];\n",
+        "    s[a][a] += 1.0000001f * self->prior[a];\n",
     ),
-    "kapitza_strong_f32.c": ("c->r4[1] = 6.0f * w2;", "c->r4[1] = 6.0000005f * w2;"),
+    "kapitza_strong_f32.c": ("four_d2 = 4.0f * d2;", "four_d2 = 4.0000005f * d2;"),
     "information_f32.c": (
         "*low = (kept_high - (total - part)) + (kept_low - part);",
         "*low = 0.0f * part;",

@@ -13,8 +13,8 @@ static volatile uint32_t taken; /* of them; the program alone writes it */
 void pvid_uart_interrupt(void)
 {
     uint8_t byte;
-    pvid_uart_acknowledge();
     while ((put - taken) < PVID_RECEIVER_BYTES) {
+        pvid_uart_acknowledge(); /* only where the byte is then taken: a UART may call for it no second time */
         if (!pvid_uart_get(&byte)) {
             return;
         }
@@ -28,6 +28,10 @@ void pvid_receiver_init(void)
 {
     pvid_uart_listen();
     pvid_interrupts_init();
+    /* A byte that came before that holds up all that follow, where the UART calls for a byte only as it arrives. */
+    pvid_interrupts_mask();
+    pvid_uart_interrupt();
+    pvid_interrupts_unmask();
 }
 
 size_t pvid_receiver_take(uint8_t bytes[], size_t room)

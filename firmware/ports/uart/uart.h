@@ -20,7 +20,7 @@ bool pvid_uart_put(uint8_t byte);
 /* Has the UART interrupt when a byte arrives, which pvid_uart_interrupt then serves. */
 void pvid_uart_listen(void);
 
-/* Takes the interrupt back, before the bytes are taken. */
+/* Takes the interrupt back, before a byte is taken. */
 void pvid_uart_acknowledge(void);
 
 /* ports/uart/receiver.c; weak in the start-up, which calls it. */

@@ -145,21 +145,24 @@ def collect(
     decoder = Decoder(record.received)
     configure = None if begin is None else begin.configure(settings_number(begin), hash_every, estimate_every, source)
     session = None if configure is None else configure.session
-    heard = time.monotonic()
-    # an emulator that is written to before its image is up may block for good: its first word is waited for
-    asked = heard - RESEND_S + (COMING_UP_S if target.process is not None else 0.0)
+    now = time.monotonic()
+    # an emulator loses what it is sent before its image is up: its first word is waited for
+    ask_at = now if target.process is None else now + COMING_UP_S
+    silent_at = ask_at + patience_s
     sequence = 0
     while record.ticks - record.first < ticks:
         now = time.monotonic()
         try:
-            if configure is not None and record.status is None and now - asked >= RESEND_S:
+            if configure is not None and record.status is None and now >= ask_at:
                 target.port.write(encode(configure, sequence))
-                asked, sequence = now, sequence + 1
+                ask_at, sequence = now + RESEND_S, sequence + 1
             data = target.port.read(4096)
         except (serial.SerialException, OSError) as error:
             raise PvidError(f"the port of {target.name} is gone: {error}") from error
-        heard = now if data else heard
-        if now - heard > patience_s:
+        if data:
+            silent_at = now + patience_s
+            ask_at = ask_at if sequence else now
+        elif now > silent_at:
             raise PvidError(f"{target.name} has said nothing for {patience_s:g} s")
         for item in decoder.feed(data):
             if not isinstance(item, Frame):

@@ -132,7 +132,7 @@ class Recorder(threading.Thread):
     """Reads a source into a log until `stop` is set; then it takes in what is still under way and ends.
 
     `error` is what ended it before that, if anything did. Whenever the link has come up the board is asked who it is;
-    an emulator only after its first word or COMING_UP_S, for it may block for good when it is written to before.
+    an emulator only after its first word or COMING_UP_S, for what it is sent before is lost.
     """
 
     def __init__(self, source: Source, writer: LogWriter) -> None:

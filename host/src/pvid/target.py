@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import select
+import socket
 import subprocess
 import time
 from collections.abc import Callable
@@ -64,8 +65,6 @@ class Target:
         if self.process is not None:
             self.process.kill()
             self.process.wait()
-            if self.process.stdout is not None:
-                self.process.stdout.close()
 
 
 def open_target(name: str, rig: StreamRig, wrap: Callable[[Port], Port] = lambda port: port) -> Target:
@@ -82,45 +81,56 @@ def open_target(name: str, rig: StreamRig, wrap: Callable[[Port], Port] = lambda
         When there is no such target, or something that it needs is missing.
     """
     if name == HOST_TARGET:
-        return _start([str(build_image(rig, None))], name, "this machine", wrap)
+        return _start_host(str(build_image(rig, None)), wrap)
     if name in EMULATORS:
         board = BOARDS[name]
         if board.missing:
             raise PvidError(f"{name} needs {' and '.join(board.missing)}: ./tools/test installs them")
-        return _start(_emulator(board, str(build_image(rig, board))), name, board.core, wrap)
+        return _start_emulator(board, str(build_image(rig, board)), wrap)
     if "/" not in name and not name.upper().startswith("COM"):
         raise PvidError(f"there is no target {name}; there are {', '.join((HOST_TARGET, *EMULATORS))} and ports")
     return Target(name, "unknown", wrap(open_port(name)))
 
 
-def _emulator(board: Board, image: str) -> list[str]:
-    command = [board.emulator, "-machine", board.machine, "-display", "none", "-monitor", "none", "-nodefaults"]
-    command += ["-nic", "none", "-serial", "pty", "-kernel", image]
-    if board.toolchain == "riscv":
-        return [*command, "-bios", "none"]
-    return [*command, "-semihosting-config", "enable=on,target=native"]
+def _start_emulator(board: Board, image: str, wrap: Callable[[Port], Port]) -> Target:
+    """QEMU with the board's UART at a socket, the processor held back until we have connected.
+
+    Not at a pseudo-terminal: QEMU drops what a board says to one before it has noticed, by a look a second, that
+    somebody has opened it.
+    """
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        command = [board.emulator, "-machine", board.machine, "-display", "none", "-monitor", "none", "-nodefaults"]
+        command += ["-nic", "none", "-kernel", image, "-serial", "chardev:uart"]
+        command += ["-chardev", f"socket,id=uart,fd={listener.fileno()},server=on,wait=on"]
+        if board.toolchain == "riscv":
+            command += ["-bios", "none"]
+        else:
+            command += ["-semihosting-config", "enable=on,target=native"]
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=[listener.fileno()],
+        )
+        place = f"socket://127.0.0.1:{listener.getsockname()[1]}"
+        return Target(board.name, board.core, wrap(open_port(place)), process)
 
 
-def _start(command: list[str], name: str, core: str, wrap: Callable[[Port], Port], patience_s: float = 20.0) -> Target:
-    process = subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, bufsize=0
-    )
+def _start_host(image: str, wrap: Callable[[Port], Port], patience_s: float = 20.0) -> Target:
+    """The host's build, which says the name of its pseudo-terminal."""
+    process = subprocess.Popen([image], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0)
     assert process.stdout is not None
     heard = b""
-    limit = time.monotonic() + patience_s
-    while time.monotonic() < limit:
-        if select.select([process.stdout], [], [], 0.1)[0]:
-            piece = process.stdout.read(4096)
-            heard += piece
-            found = re.search(rb"(/dev/\S+)[ \n]", heard)
-            if found:
-                return Target(name, core, wrap(open_port(found.group(1).decode())), process)
-            if not piece:
-                break
-    process.kill()
-    process.wait()
+    if select.select([process.stdout], [], [], patience_s)[0]:
+        heard = process.stdout.read(4096)
     process.stdout.close()
-    raise PvidError(f"{name} did not start: {heard.decode('utf-8', 'replace').strip()[:200] or 'no word from it'}")
+    found = re.search(rb"/dev/\S+", heard)
+    if found is None:
+        process.kill()
+        process.wait()
+        raise PvidError(f"{HOST_TARGET} did not start")
+    return Target(HOST_TARGET, "this machine", wrap(open_port(found.group().decode())), process)
 
 
 @dataclass
@@ -308,7 +318,7 @@ class Player:
         self._start_session()
 
     def _await_hello(self) -> None:
-        """Lets an emulator come up: what it is sent before its UART is ready is lost, or blocks QEMU's for good."""
+        """Lets an emulator come up: what it is sent before its UART is ready is lost."""
         self.account.hello, self.running = None, False
         limit = time.monotonic() + COMING_UP_S
         while self.target.process is not None and self.account.hello is None and time.monotonic() < limit:

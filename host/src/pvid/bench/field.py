@@ -17,9 +17,10 @@ import numpy as np
 import serial
 
 from pvid.errors import PvidError
-from pvid.link import Raw, Source, encode_raw
+from pvid.link import Raw, Source, Status, encode_raw
+from pvid.logfile import Segment
 from pvid.logger import Logger
-from pvid.logreader import Account, LogReader
+from pvid.logreader import Account, LogReader, Record
 from pvid.logverify import Stretch, Verifier
 from pvid.port import Port, open_port
 from pvid.rigfile import RigFile
@@ -28,7 +29,6 @@ from pvid.stream_rig import StreamRig, stream_rig
 from pvid.target import Target, open_target
 
 _SAMPLES_A_FRAME = 16
-_BYTES_A_SAMPLE = 10.0  # about, with all that goes with it
 
 
 # ---- how many frames, at what price
@@ -116,19 +116,16 @@ def _resident_kb(pid: int) -> int:
 
 @dataclass
 class _Shaky:
-    """A port at which accidents happen when so many bytes have been read."""
+    """A port at which an accident happens as soon as one is put into `due`, read by another thread."""
 
     port: Port
-    accidents: list[tuple[float, Callable[[], None]]]
-    received: list[int]
+    due: list[Callable[[], None]]
 
     def read(self, size: int = 1, /) -> bytes:
         """Of the port; the accident first."""
-        if self.accidents and self.received[0] >= self.accidents[0][0]:
-            self.accidents.pop(0)[1]()
-        data = self.port.read(size)
-        self.received[0] += len(data)
-        return data
+        if self.due:
+            self.due.pop()()
+        return self.port.read(size)
 
     def write(self, data: bytes, /) -> int | None:
         """Of the port."""
@@ -149,20 +146,22 @@ class _Kept(Target):
 
 @dataclass
 class ShakyEmulator:
-    """A source (pvid.logger): an emulator that is killed twice, and whose terminal is closed once, on the way."""
+    """A source (pvid.logger): an emulator that can be killed, and its line closed, while it is read."""
 
     name: str
     rig: StreamRig
-    bytes: float  # that are expected in all
     usb: None = None
     _target: Target | None = None
     _place: str = ""
-    _received: list[int] = field(default_factory=lambda: [0])
-    _accidents: list[tuple[float, Callable[[], None]]] = field(default_factory=list)
+    _due: list[Callable[[], None]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        shares = ((0.25, self._kill), (0.5, self._close), (0.75, self._kill))
-        self._accidents = [(share * self.bytes, accident) for share, accident in shares]
+    def kill(self) -> None:
+        """At the next read."""
+        self._due.append(self._kill)
+
+    def close_line(self) -> None:
+        """At the next read."""
+        self._due.append(self._close)
 
     def _kill(self) -> None:
         assert self._target is not None and self._target.process is not None
@@ -172,10 +171,10 @@ class ShakyEmulator:
     def _close(self) -> None:
         assert self._target is not None
         self._target.port.close()
-        raise serial.SerialException("the terminal was closed")
+        raise serial.SerialException("the line was closed")
 
     def _wrapped(self, port: Port) -> Port:
-        return _Shaky(port, self._accidents, self._received)
+        return _Shaky(port, self._due)
 
     def open(self) -> Target:
         """See pvid.logger.Source."""
@@ -196,28 +195,69 @@ class ShakyEmulator:
             Target.close(self._target)
 
 
+class _Accidents:
+    """An observer that lets the next accident happen when so many samples of a new session have come, and then ends."""
+
+    def __init__(self, logger: Logger, accidents: list[Callable[[], None]], samples: int) -> None:
+        self._logger = logger
+        self._accidents = accidents
+        self._samples = samples
+        self._sessions: set[int] = set()
+        self._left: int | None = None  # of the session; None: it has not begun in this segment
+
+    def take(self, record: Record, account: Account) -> None:
+        """See logreader.Observer."""
+        match record.item:
+            case Segment():
+                self._left = None
+            case Status() as status if status.session not in self._sessions:
+                self._sessions.add(status.session)
+                self._left = self._samples
+            case Raw() as raw if self._left is not None:
+                self._left -= len(raw.values)
+                if self._left <= 0:
+                    self._left = None
+                    self._end_segment(account)
+            case _:
+                pass
+
+    def _end_segment(self, account: Account) -> None:
+        if self._accidents:
+            self._accidents.pop(0)()
+        else:
+            self._logger.samples = account.samples
+
+    def idle(self, account: Account) -> None:
+        """See logreader.Observer."""
+
+    def close(self, account: Account) -> None:
+        """See logreader.Observer."""
+
+
 def field_log(
     name: str, samples: int, log: Path, progress: Callable[[int], None] | None = None
 ) -> tuple[Account, list[Stretch]]:
-    """Records `samples` of a board that samples as fast as the line goes, with three accidents, and verifies the log.
+    """Records a board that samples as fast as the line goes, with three accidents, and verifies the log.
 
-    The board starts over whenever the link comes up, so that every segment can be verified.
+    The board starts over whenever the link comes up, so that every segment can be verified; a quarter of `samples`, at
+    least, is recorded before and after each accident: it is killed, its line is closed, it is killed again.
     """
     rig = RigFile.standard()
     assert rig.sample_rate is not None
     board = stream_rig(rig, rig.sample_rate)
     settings = settings_number(board)
     every = round(rig.sample_rate)
-    source = ShakyEmulator(name, board, _BYTES_A_SAMPLE * samples)
+    source = ShakyEmulator(name, board)
+    logger = Logger(
+        source=source,
+        out=log,
+        rig=rig.text(),
+        begin=lambda: board.configure(settings, every, every, Source.SENSOR_PACED),
+        anew=True,
+    )
+    logger.observers = [_Accidents(logger, [source.kill, source.close_line, source.kill], samples // 4)]
     try:
-        Logger(
-            source=source,
-            out=log,
-            rig=rig.text(),
-            samples=samples,
-            begin=lambda: board.configure(settings, every, every, Source.SENSOR_PACED),
-            anew=True,
-        ).run()
+        logger.run()
     finally:
         source.end()
     reader = LogReader(log)
