@@ -37,7 +37,7 @@ from pvid.link import (
 )
 from pvid.stream_image import settings_number
 from pvid.stream_rig import Samples, StreamRig
-from pvid.target import COMING_UP_S, Target, refusal
+from pvid.target import Target, refusal
 
 RESEND_S = 1.0  # without an answer a Configure is sent again
 
@@ -146,8 +146,7 @@ def collect(
     configure = None if begin is None else begin.configure(settings_number(begin), hash_every, estimate_every, source)
     session = None if configure is None else configure.session
     now = time.monotonic()
-    # an emulator loses what it is sent before its image is up: its first word is waited for
-    ask_at = now if target.process is None else now + COMING_UP_S
+    ask_at = now + target.coming_up_s
     silent_at = ask_at + patience_s
     sequence = 0
     while record.ticks - record.first < ticks:

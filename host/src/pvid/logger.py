@@ -24,7 +24,7 @@ from pvid.link import Code, Configuration, Credit, Hello, Message, Status, encod
 from pvid.logfile import LogWriter, Segment
 from pvid.logreader import Account, LogStream, Observer, Record
 from pvid.port import Port, open_port, why_gone
-from pvid.target import COMING_UP_S, Target, refusal
+from pvid.target import Target, refusal
 
 _CHUNK = 1 << 14
 _RETRY_S = 0.25
@@ -132,7 +132,7 @@ class Recorder(threading.Thread):
     """Reads a source into a log until `stop` is set; then it takes in what is still under way and ends.
 
     `error` is what ended it before that, if anything did. Whenever the link has come up the board is asked who it is;
-    an emulator only after its first word or COMING_UP_S, for what it is sent before is lost.
+    an emulator only after its first word (Target.coming_up_s), for what it is sent before is lost.
     """
 
     def __init__(self, source: Source, writer: LogWriter) -> None:
@@ -175,7 +175,7 @@ class Recorder(threading.Thread):
         self.writer.begin(self.source.name, self.source.usb)
         self._target, self.connected = target, True
         try:
-            why = self._read(target.port, 0.0 if target.process is None else COMING_UP_S)
+            why = self._read(target.port, target.coming_up_s)
         finally:
             self._target, self.connected = None, False
             with contextlib.suppress(serial.SerialException, OSError):

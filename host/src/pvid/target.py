@@ -43,7 +43,7 @@ from pvid.stream_rig import StreamRig
 SAMPLES_A_FRAME = 64
 HOST_TARGET = "stream-host"
 EMULATORS = tuple(name for name, board in BOARDS.items() if board.toolchain != "avr")
-COMING_UP_S = 20.0  # longest wait for an emulator's first word: it always has one, however busy the machine
+_COMING_UP_S = 20.0  # longest wait for an emulator's first word: it always has one, however busy the machine
 
 
 class PortGoneError(Exception):
@@ -52,12 +52,16 @@ class PortGoneError(Exception):
 
 @dataclass
 class Target:
-    """A port and, for an emulator, the process behind it."""
+    """A port and, for an emulator, the process behind it.
+
+    What is sent to an emulator before its first word may be lost: it is waited for up to `coming_up_s`.
+    """
 
     name: str
     core: str
     port: Port
     process: subprocess.Popen[bytes] | None = None
+    coming_up_s: float = 0.0
 
     def close(self) -> None:
         """Closes the port and ends the emulator."""
@@ -114,7 +118,7 @@ def _start_emulator(board: Board, image: str, wrap: Callable[[Port], Port]) -> T
             pass_fds=[listener.fileno()],
         )
         place = f"socket://127.0.0.1:{listener.getsockname()[1]}"
-        return Target(board.name, board.core, wrap(open_port(place)), process)
+        return Target(board.name, board.core, wrap(_open_or_kill(place, process)), process, _COMING_UP_S)
 
 
 def _start_host(image: str, wrap: Callable[[Port], Port], patience_s: float = 20.0) -> Target:
@@ -130,7 +134,16 @@ def _start_host(image: str, wrap: Callable[[Port], Port], patience_s: float = 20
         process.kill()
         process.wait()
         raise PvidError(f"{HOST_TARGET} did not start")
-    return Target(HOST_TARGET, "this machine", wrap(open_port(found.group().decode())), process)
+    return Target(HOST_TARGET, "this machine", wrap(_open_or_kill(found.group().decode(), process)), process)
+
+
+def _open_or_kill(place: str, process: subprocess.Popen[bytes]) -> Port:
+    try:
+        return open_port(place)
+    except PvidError:
+        process.kill()
+        process.wait()
+        raise
 
 
 @dataclass
@@ -320,8 +333,8 @@ class Player:
     def _await_hello(self) -> None:
         """Lets an emulator come up: what it is sent before its UART is ready is lost."""
         self.account.hello, self.running = None, False
-        limit = time.monotonic() + COMING_UP_S
-        while self.target.process is not None and self.account.hello is None and time.monotonic() < limit:
+        limit = time.monotonic() + self.target.coming_up_s
+        while self.account.hello is None and time.monotonic() < limit:
             self._hear()
 
     @property

@@ -180,13 +180,14 @@ class ShakyEmulator:
         """See pvid.logger.Source."""
         running = self._target
         if running is not None and running.process is not None and running.process.poll() is None:
-            running.port = self._wrapped(open_port(self._place))
+            running.port, running.coming_up_s = self._wrapped(open_port(self._place)), 0.0
             return running
         if running is not None:
             Target.close(running)
         started = open_target(self.name, self.rig)
         self._place = str(getattr(started.port, "port", ""))
-        self._target = _Kept(started.name, started.core, self._wrapped(started.port), started.process)
+        port = self._wrapped(started.port)
+        self._target = _Kept(started.name, started.core, port, started.process, started.coming_up_s)
         return self._target
 
     def end(self) -> None:
