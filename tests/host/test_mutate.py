@@ -55,6 +55,35 @@ def test_operators_signs_and_constants_of_the_code_alone(
         assert differs.count(True) == 1 and differs.index(True) == mutant.line()[0] - 1
 
 
-def test_a_sample_is_the_same_again(mutate: ModuleType) -> None:
-    assert mutate.drawn(20, seed=1) == mutate.drawn(20, seed=1)
-    assert mutate.drawn(20, seed=1) != mutate.drawn(20, seed=2)
+def test_a_draw_is_the_same_again_and_an_edit_elsewhere_leaves_it(
+    mutate: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "f.c").write_text(CODE, encoding="utf-8")
+    monkeypatch.setattr(mutate, "SOURCES", tmp_path)
+    before = [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
+    assert before == [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
+    assert before != [(m.old, m.new, m.line()[1]) for m in mutate.ranked(2)["f.c"]]
+    (tmp_path / "f.c").write_text("static int g;\n\n" + CODE, encoding="utf-8")
+    assert before == [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
+
+
+def test_every_file_has_its_share(mutate: ModuleType) -> None:
+    assert mutate.shares({"large": 90, "small": 9, "tiny": 1}, 20) == {"large": 18, "small": 1, "tiny": 1}
+    assert mutate.shares({"large": 3, "small": 1}, 20) == {"large": 3, "small": 1}
+
+
+def test_reasons_speak_of_lines_that_stand_there(mutate: ModuleType) -> None:
+    known = [mutant for mutants in mutate.ranked(1).values() for mutant in mutants]
+    for reason in mutate.reasons():
+        assert len(reason.why) >= 20
+        assert any(reason.is_of(mutant) for mutant in known), f"{reason.file}: {reason.line}"
+
+
+def test_of_ten_mutants_the_quick_tests_kill_eight(
+    mutate: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The whole campaign asks for 95 %: less than eight of ten are then killed in one draw of a hundred."""
+    monkeypatch.setattr(mutate, "BUILD", tmp_path)
+    results = mutate.campaign(10, seed=1, sanitizers=())
+    assert len(results) == 10
+    assert sum(by is not None for _, by in results) >= 8, results

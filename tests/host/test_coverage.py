@@ -1,0 +1,15 @@
+"""The quick tests take 95 % of the core's branches."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_quick_tests_take_95_per_cent_of_the_branches() -> None:
+    command = [sys.executable, "-P", str(ROOT / "tools" / "coverage.py")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=1500)
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]

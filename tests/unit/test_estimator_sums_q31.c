@@ -1,0 +1,349 @@
+/* The fixed-point estimator where its sums no longer fit, at its limits, and with as many entries as there is room for:
+ * the same parameters as from rows that are small. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "count.h"
+#include "estimator_q31.h"
+#include "plant.h"
+#include "pvid/pvid.h"
+#include "strong_table_q31.h"
+
+/* ---- y = N^T p with as many entries as there may be parameters ---- */
+
+static void theta_of(const int32_t p[], int64_t theta[])
+{
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        theta[i] = p[i];
+    }
+}
+
+static void jacobian_of(const int32_t p[], int64_t c[])
+{
+    (void)p;
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        c[i] = 1 << 20;
+    }
+}
+
+static void formats_of(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
+{
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        theta_bits[i] = p_bits[i];
+        c_bits[i] = 20;
+    }
+}
+
+static const uint8_t places[PVID_MAX_P] = {0, 1, 2, 3};
+static const pvid_model_q31 model = {
+    .n_theta = PVID_MAX_P,
+    .n_p = PVID_MAX_P,
+    .n_c = PVID_MAX_P,
+    .c_row = places,
+    .c_column = places,
+    .theta = theta_of,
+    .jacobian = jacobian_of,
+    .formats = formats_of,
+};
+static const double truth[PVID_MAX_P] = {0.75, -0.5, 0.25, 0.6};
+#define P_ONE (1 << 24)
+
+static pvid_estimator_config_q31 config;
+static uint32_t generator;
+
+static int start_again(void **state)
+{
+    (void)state;
+    memset(&config, 0, sizeof config);
+    config.model = &model;
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        config.start[i] = P_ONE / 2;
+        config.start_sd[i] = 4 * P_ONE;
+        config.lower[i] = -16 * P_ONE;
+        config.upper[i] = 16 * P_ONE;
+        config.p_bits[i] = 24;
+        config.n_bits[i] = 20;
+    }
+    config.y_bits = 20;
+    config.row_sd = 256 * 64; /* 64 of Y's integer */
+    config.gain = 1 << 30;
+    config.correlation = 1u << 16;
+    config.row_weight = 1u << 16;
+    config.step_limit = 58982;
+    config.divider = 1;
+    generator = 9u;
+    return 0;
+}
+
+static int32_t random_within(int32_t limit)
+{
+    generator = (generator * 1664525u) + 1013904223u;
+    return (int32_t)((generator >> 4) % (2u * (uint32_t)limit + 1u)) - limit;
+}
+
+/* A row of entries within 2^16 with noise of +-100 in Y, all of it 2^up times larger. */
+static void add_row(pvid_estimator_q31 *estimator, int32_t up)
+{
+    int32_t n[PVID_MAX_P];
+    double y = random_within(100);
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        n[i] = random_within(1 << 16);
+        y += truth[i] * n[i];
+        n[i] *= 1 << up;
+    }
+    assert_int_equal(pvid_estimator_add_q31(estimator, n, (int32_t)floor(y + 0.5) * (1 << up)), PVID_ACCUMULATED);
+}
+
+static double p_of(const pvid_estimator_q31 *estimator, size_t i)
+{
+    return (double)estimator->p[i] / P_ONE;
+}
+
+/* The same data in other units: p and what is known of it are the same, though the sums of one are 4^exponent times
+ * smaller than they would be. */
+static void rows_of_any_size_say_the_same(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 small;
+    static pvid_estimator_q31 large;
+    static pvid_estimate_q31 estimate[2];
+    const int32_t gains[3] = {1 << 30, 1 << 29, 1 << 28};
+    for (int k = 0; k < 3; k++) {
+        start_again(NULL);
+        config.gain = gains[k];
+        assert_int_equal(pvid_estimator_init_q31(&small, &config), PVID_OK);
+        config.row_sd <<= 10;
+        assert_int_equal(pvid_estimator_init_q31(&large, &config), PVID_OK);
+        for (int i = 0; i < 1000; i++) {
+            const uint32_t seed = generator;
+            add_row(&small, 0);
+            generator = seed;
+            add_row(&large, 10);
+            const pvid_reason reason = pvid_estimator_update_q31(&small);
+            assert_int_equal(pvid_estimator_update_q31(&large), reason);
+            assert_true((reason == PVID_UPDATED) || ((reason == PVID_HELD_PIVOT) && (i < 20)));
+            for (size_t a = 0; a < PVID_MAX_P; a++) {
+                /* the smaller rows' innovations are rounded: 0.3 of some 40 000, over the root of so many rows; the rates
+                 * keep something of their first steps */
+                assert_true((i < 20) || (fabs(p_of(&small, a) - p_of(&large, a)) < ((k == 0) ? 5.0e-6 : 2.0e-3)));
+            }
+        }
+        assert_int_equal(small.information.exponent, 0);
+        assert_true(large.information.exponent >= 1);
+        pvid_estimator_assess_q31(&small, &estimate[0]);
+        pvid_estimator_assess_q31(&large, &estimate[1]);
+        for (size_t a = 0; a < PVID_MAX_P; a++) {
+            assert_true(fabs(p_of(&small, a) - truth[a]) < 2.0e-4);
+            assert_true(fabs(p_of(&small, a) - p_of(&large, a)) < 5.0e-6);
+            assert_true(fabs((double)estimate[0].se[a] - (double)estimate[1].se[a]) <= 2.0 + 1.0e-3 * estimate[0].se[a]);
+            assert_int_equal(estimate[0].correlation[a][a], 1 << 30);
+            for (size_t b = 0; b < a; b++) {
+                assert_true(abs(estimate[0].correlation[a][b] - estimate[1].correlation[a][b]) < (1 << 12));
+                assert_int_equal(estimate[0].correlation[a][b], estimate[0].correlation[b][a]);
+            }
+        }
+        assert_true(abs(estimate[0].kappa - estimate[1].kappa) < (1 << 8));
+        assert_true(abs(estimate[0].least_pivot - estimate[1].least_pivot) < (1 << 8));
+        assert_int_equal(estimate[0].weight, 1000);
+        assert_int_equal(estimate[1].weight, 1000);
+        const double ratio = (double)estimate[1].residual_sd / (double)estimate[0].residual_sd;
+        assert_true(fabs((ratio / 1024.0) - 1.0) < 1.0e-3);
+        /* uniform noise of +-100 has a standard deviation of 58, in 2^-8 of Y's integer */
+        assert_true(fabs(((double)estimate[0].residual_sd / 256.0) - 58.0) < 6.0);
+    }
+}
+
+/* What is expected of the noise, before there are rows to tell, is in the sums' unit as well. */
+static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 estimator;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    for (uint8_t exponent = 0; exponent < 4u; exponent++) {
+        estimator.information.exponent = exponent;
+        const pvid_scaled_q31 expected = pvid_estimator_expected_variance_q31(&estimator);
+        assert_true(ldexp((double)expected.m, expected.e) == ldexp(4096.0, -2 * exponent));
+        const pvid_scaled_q31 without_rows = pvid_estimator_variance_q31(&estimator);
+        assert_memory_equal(&expected, &without_rows, sizeof expected);
+    }
+    /* one degree of freedom is enough, less is not: five rows of weight one for four parameters */
+    estimator.information.exponent = 0;
+    int64_t *tail = &estimator.information.sums[estimator.information.n_sums - 2u];
+    tail[0] = 1000000;
+    tail[1] = (int64_t)(PVID_MAX_P + 1) << 16;
+    const pvid_scaled_q31 found = pvid_estimator_variance_q31(&estimator);
+    assert_true(ldexp((double)found.m, found.e) == 1000000.0);
+    tail[1]--;
+    const pvid_scaled_q31 not_found = pvid_estimator_variance_q31(&estimator);
+    assert_true(ldexp((double)not_found.m, not_found.e) == 4096.0);
+}
+
+/* ---- limits ---- */
+
+static void a_row_at_its_limit_fits(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 estimator;
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        config.start[i] = 0;
+    }
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const int32_t limit = sign * PVID_ROW_LIMIT_Q31;
+        int32_t n[PVID_MAX_P] = {limit, limit, limit, limit};
+        assert_int_equal(pvid_estimator_add_q31(&estimator, n, limit), PVID_ACCUMULATED);
+        assert_int_equal(pvid_estimator_add_q31(&estimator, n, limit + sign), PVID_REJECTED_SATURATED);
+        n[PVID_MAX_P - 1] = limit + sign;
+        assert_int_equal(pvid_estimator_add_q31(&estimator, n, limit), PVID_REJECTED_SATURATED);
+    }
+    assert_int_equal(estimator.counters.rows, 2);
+    assert_int_equal(estimator.counters.rejected_saturated, 4);
+    assert_int_equal(estimator.energy, (int64_t)2 << 56);
+    /* what a row says that is already known may be as large, and one more */
+    config.start[0] = P_ONE;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    int32_t n[PVID_MAX_P] = {-1, 0, 0, 0};
+    assert_int_equal(pvid_estimator_add_q31(&estimator, n, PVID_ROW_LIMIT_Q31), PVID_REJECTED_SATURATED);
+    n[0] = 1;
+    assert_int_equal(pvid_estimator_add_q31(&estimator, n, -PVID_ROW_LIMIT_Q31), PVID_REJECTED_SATURATED);
+    assert_int_equal(pvid_estimator_add_q31(&estimator, n, PVID_ROW_LIMIT_Q31), PVID_ACCUMULATED);
+    assert_int_equal(estimator.energy, ((int64_t)PVID_ROW_LIMIT_Q31 - 1) * (PVID_ROW_LIMIT_Q31 - 1));
+}
+
+static void a_place_is_held_within_the_bounds(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 estimator;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    const int64_t values[5] = {5, -5, ((int64_t)1 << 40), -((int64_t)1 << 40), 16 * P_ONE};
+    const int32_t placed[5] = {5, -5, 16 * P_ONE, -16 * P_ONE, 16 * P_ONE};
+    for (int i = 0; i < 5; i++) {
+        pvid_estimator_place_q31(&estimator, 3, values[i]);
+        assert_int_equal(estimator.p[3], placed[i]);
+        assert_int_equal(estimator.theta[3], placed[i]);
+        assert_int_equal(estimator.p[2], config.start[2]);
+    }
+}
+
+/* The last parameter runs into its bound, and every longer step is cut short. */
+static void steps_are_limited_and_bounded(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 estimator;
+    config.upper[3] = 36 * (P_ONE / 64); /* the truth is 0.6, 38.4 of these */
+    config.lower[1] = -P_ONE / 4;        /* -0.5 */
+    config.step_limit = 1311;            /* a fiftieth of the start's standard deviation, 0.08 */
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    for (int i = 0; i < 30; i++) {
+        add_row(&estimator, 0);
+    }
+    int32_t before[PVID_MAX_P];
+    uint32_t cut = 0;
+    for (int i = 0; i < 30; i++) {
+        memcpy(before, estimator.p, sizeof before);
+        assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
+        int32_t largest = 0;
+        for (size_t a = 0; a < PVID_MAX_P; a++) {
+            const int32_t step = abs(estimator.p[a] - before[a]);
+            largest = (step > largest) ? step : largest;
+            assert_true((estimator.p[a] >= config.lower[a]) && (estimator.p[a] <= config.upper[a]));
+        }
+        assert_true(largest <= 1342464 + 4); /* 0.08 in 2^-24 and Q16, and its rounding */
+        cut += (largest > 1342464 - 64) ? 1u : 0u;
+    }
+    assert_true(cut >= 2u);
+    assert_true(estimator.counters.limited >= cut);
+    assert_int_equal(estimator.p[3], config.upper[3]);
+    assert_int_equal(estimator.p[1], config.lower[1]);
+    assert_true(estimator.counters.bounded >= 20u);
+}
+
+static void counters_stop_at_their_end(void **state)
+{
+    (void)state;
+    uint32_t wide = UINT32_MAX - 2u;
+    uint16_t narrow = UINT16_MAX - 2u;
+    for (uint32_t i = 0; i < 4u; i++) {
+        assert_int_equal(wide, (i < 2u) ? (UINT32_MAX - 2u + i) : UINT32_MAX);
+        assert_int_equal(narrow, (i < 2u) ? (UINT16_MAX - 2u + i) : UINT16_MAX);
+        pvid_count_up(&wide);
+        pvid_count_up_16(&narrow);
+    }
+}
+
+/* ---- the strong form's eleven entries ---- */
+
+/* The same samples through the float core: what it makes of them, biased as five points are by fast motion. */
+static void the_strong_form_agrees_with_the_float_core(void **state)
+{
+    (void)state;
+    static pvid_strong_q31 self;
+    static pvid_strong_f32 other;
+    static const double unit[3] = {5.8207660913467407e-07, 5.9604644775390625e-08, 2.9802322387695312e-08};
+    const int32_t gains[3] = {strong_unit.estimator.gain, 1 << 30, 0};
+    for (int k = 0; k < 3; k++) {
+        pvid_strong_config_q31 settings = strong_unit;
+        settings.phi_offset = -321;
+        settings.y_offset = 45;
+        settings.estimator.gain = gains[k];
+        settings.estimator.divider = (k == 1) ? 3 : 1;
+        pvid_strong_config_f32 in_float = {
+            .sample_rate_hz = 1000.0f,
+            .l1 = 0.3f,
+            .bank = {.half = 2, .stride = 20, .weights = pvid_five_points_f32},
+            .estimator = pvid_estimator_defaults_f32,
+        };
+        for (int i = 0; i < 3; i++) {
+            in_float.estimator.start[i] = (float)(unit[i] * settings.estimator.start[i]);
+            in_float.estimator.start_sd[i] = (float)(unit[i] * settings.estimator.start_sd[i]);
+            in_float.estimator.lower[i] = (float)(unit[i] * settings.estimator.lower[i]);
+            in_float.estimator.upper[i] = (float)(unit[i] * settings.estimator.upper[i]);
+        }
+        in_float.estimator.row_sd = 1.0e3f;
+        assert_int_equal(pvid_strong_init_q31(&self, &settings), PVID_OK);
+        assert_int_equal(pvid_strong_init_f32(&other, &in_float), PVID_OK);
+        plant_state plant = released_plant();
+        int reasons[16] = {0};
+        for (int i = 0; i < 12000; i++) {
+            double phi;
+            double y;
+            plant_step(&plant, &phi, &y);
+            const int32_t angle = (int32_t)floor((phi / 5.992112452678286e-06) + 0.5);
+            const int32_t height = (int32_t)floor((y / 5.0e-06) + 0.5);
+            reasons[pvid_strong_step_q31(&self, angle - 321, height + 45)]++;
+            (void)pvid_strong_step_f32(&other, (float)(angle * 5.992112452678286e-06), (float)(height * 5.0e-06));
+        }
+        assert_int_equal(reasons[PVID_WARMING_UP], 80);
+        const int solved = reasons[PVID_UPDATED] + reasons[PVID_ACCUMULATED] + reasons[PVID_HELD_PIVOT];
+        assert_int_equal(solved + reasons[PVID_HELD_NOT_EXCITED], 12000 - 80);
+        assert_in_range(self.estimator.counters.rows, 11800, 11920);
+        assert_in_range(reasons[PVID_ACCUMULATED], (k == 1) ? 7800 : 0, (k == 1) ? 7947 : 0);
+        for (int i = 0; i < 3; i++) {
+            /* the paper's law keeps something of its first steps, which differ */
+            const double ratio = (unit[i] * (double)self.estimator.p[i]) / (double)other.estimator.p[i];
+            assert_true(fabs(ratio - 1.0) < ((k == 2) ? 0.05 : 0.01));
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rows_of_any_size_say_the_same),
+        cmocka_unit_test_setup(the_expected_noise_is_in_the_unit_of_the_sums, start_again),
+        cmocka_unit_test_setup(a_row_at_its_limit_fits, start_again),
+        cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),
+        cmocka_unit_test_setup(steps_are_limited_and_bounded, start_again),
+        cmocka_unit_test(counters_stop_at_their_end),
+        cmocka_unit_test(the_strong_form_agrees_with_the_float_core),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
