@@ -167,10 +167,7 @@ def identify(
         if isinstance(config, StrongConfig):
             return _in_float64(run, rig, config, every)
         return _weak_in_float64(run, rig, config)
-    fixed = config_for_run(rig, run, start)
-    if isinstance(fixed, StrongConfigQ31):
-        return _strong_in_q31(run, rig, fixed, every, native)
-    return _weak_in_q31(run, rig, fixed, every, native)
+    return _in_q31(run, rig, config_for_run(rig, run, start), every, native)
 
 
 def _ticks_needed(config: StrongConfig | WeakConfig) -> int:
@@ -335,53 +332,30 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
     )
 
 
-def _strong_in_q31(run: Run, rig: RigFile, config: StrongConfigQ31, every: int, native: Native) -> Identification:
-    identifier = StrongIdentifierQ31(native, config)
-    record = identifier.run(*counts_of(rig, run), sums=False, estimate_every=every)
-    last = identifier.assess()
-    counters = identifier.counters
-    return _identification(
-        rig,
-        p=p_of(config, last["p"][:3]),
-        covariance=covariance_of(config, last),
-        kappa=float(last["kappa"]) / 2**30,
-        trusted_s=None,
-        misfit=None,
-        alarm=False,
-        status=_final_status(record.reason),
-        ticks=len(run.t),
-        updates=counters["updates"],
-        lost=counters["rejected_saturated"],
-        running_hash=identifier.running_hash,
-        trajectory=_trajectory(
-            run.t[::every],
-            p_of(config, record.estimate["p"][:, :3]),
-            covariance_of(config, record.estimate),
-            rig.l1,
-            record.estimate["kappa"] / 2**30,
-        ),
-    )
-
-
-def _weak_in_q31(run: Run, rig: RigFile, config: WeakConfigQ31, every: int, native: Native) -> Identification:
+def _in_q31(
+    run: Run, rig: RigFile, config: StrongConfigQ31 | WeakConfigQ31, every: int, native: Native
+) -> Identification:
     phi, y = counts_of(rig, run)
-    identifier = WeakIdentifierQ31(native, config)
+    identifier = (
+        WeakIdentifierQ31(native, config) if isinstance(config, WeakConfigQ31) else StrongIdentifierQ31(native, config)
+    )
     record = identifier.run(phi, y, sums=False, estimate_every=every)
-    last = identifier.estimate
+    last = identifier.estimate if isinstance(identifier, WeakIdentifierQ31) else identifier.assess()
     n_p = record.p.shape[1]
     p = p_of(config, last["p"][:n_p])
     if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
         p[3] += float(np.mean(run.phi - phi * rig.sensor.phi_lsb))
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
+    gated = isinstance(identifier, WeakIdentifierQ31) and len(trusted) > 0
     counters = identifier.counters
     return _identification(
         rig,
         p=p,
         covariance=covariance_of(config, last),
         kappa=float(last["kappa"]) / 2**30,
-        trusted_s=float(run.t[trusted[-1]]) if len(trusted) else None,
-        misfit=identifier.misfit,
-        alarm=len(trusted) > 0 and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        trusted_s=float(run.t[trusted[-1]]) if gated else None,
+        misfit=identifier.misfit if isinstance(identifier, WeakIdentifierQ31) else None,
+        alarm=gated and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],
