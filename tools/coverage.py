@@ -25,6 +25,10 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "host"))
+
+import playback  # noqa: E402 - of tests/host
+
 BUILD = ROOT / "build" / "coverage"
 PAGE = ROOT / "tests" / "COVERAGE.md"
 REASONS = ROOT / "tests" / "coverage.toml"
@@ -66,7 +70,7 @@ def build() -> list[Path]:
     """The core with counters, as the CMocka programs and the shared library have it; returns the programs."""
     shutil.rmtree(BUILD, ignore_errors=True)
     core = [*sorted((FIRMWARE / "src").glob("*.c")), FIRMWARE / "link" / "link.c"]
-    tests = sorted((ROOT / "tests" / "unit").glob("test_*.c"))
+    tests = playback.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))
     jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, "--coverage"]) for path in core]
     jobs += [(BUILD / "native" / f"{path.stem}.o", path, [*NATIVE, "--coverage"]) for path in core]

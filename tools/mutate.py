@@ -43,7 +43,6 @@ BUILD = ROOT / "build" / "mutate"
 PAGE = ROOT / "tests" / "MUTANTS.md"
 REASONS = ROOT / "tests" / "mutants.toml"
 SOURCES = ROOT / "firmware" / "src"
-UNIT = ROOT / "tests" / "unit"
 INCLUDES = [f"-I{ROOT / 'firmware' / name}" for name in ("include", "link")]
 BESIDES = (  # of the shared library, beside the core
     *(ROOT / "host" / "native").glob("[lr]*.c"),
@@ -179,7 +178,7 @@ class Kit:
     def compiles(self, target: Path, source: Path) -> bool:
         """Compiles a file whose private headers stand beside it, or in firmware/src."""
         target.parent.mkdir(parents=True, exist_ok=True)
-        includes = [*INCLUDES, f"-I{source.parent}", f"-I{SOURCES}", f"-I{UNIT}"]
+        includes = [*INCLUDES, f"-I{source.parent}", f"-I{SOURCES}", f"-I{playback.UNIT}"]
         return ran([self.compiler, *COMMON, *self.options, *self.checks, *includes, "-c", source, "-o", target])
 
     def links(self, target: Path, objects: list[Path]) -> Path:
@@ -226,7 +225,7 @@ def tests_of(kit: Kit) -> dict[str, float]:
     folder = BUILD / kit.name
     kit.links(folder / "libpvidcore.so", made(kit, [*sorted(SOURCES.glob("*.c")), BESIDES[-1]]))
     seconds = {}
-    for test in made(Kit(f"{kit.name}/tests", kit.compiler, kit.options, kit.checks), sorted(UNIT.glob("test_*.c"))):
+    for test in made(Kit(f"{kit.name}/tests", kit.compiler, kit.options, kit.checks), playback.unit_tests()):
         before = time.monotonic()
         if not kit.links_test(test.with_suffix(""), folder) or not passes(test.with_suffix(""), folder):
             raise SystemExit(f"{test.stem} fails with the core as it is ({kit.name})")
@@ -268,7 +267,7 @@ def baseline() -> Baseline:
     core = sorted(SOURCES.glob("*.c"))
     library = NATIVE.links(BUILD / "libbaseline.so", made(NATIVE, [*core, *BESIDES]))
     including: dict[str, set[str]] = defaultdict(set)
-    for path in (*core, *UNIT.glob("test_*.c")):
+    for path in (*core, *playback.unit_tests()):
         for header in headers_of(path):
             including[header].add(path.stem)
     digests = digests_apart(library, None)
@@ -368,7 +367,7 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
         if test in anew:
             program = folder / kit.name / test
             source = folder / f"{test}.c"
-            shutil.copy(UNIT / source.name, source)
+            shutil.copy(playback.UNIT / source.name, source)
             if not kit.compiles(program.with_suffix(".o"), source) or not kit.links_test(program, library[0].parent):
                 raise SystemExit(f"{test} does not compile with {kit.name}: {mutant.told()}")
         if not passes(program, library[0].parent):

@@ -1,8 +1,8 @@
 """All that one build of the core shows of a few seconds of data, under every setting, as one number a variant.
 
-What tools/mutate.py asks first: whether a change of the core shows. What the core as it is shows stands under the tests
-that compare these settings with the numpy twin bit for bit: test_bits, test_weak_bits, test_gate, test_freeze and their
-fixed-point counterparts.
+What tools/mutate.py asks first, beside the CMocka programs: whether a change of the core shows. What the core as it is
+shows stands under the tests that compare these settings with the numpy twin bit for bit: test_bits, test_weak_bits,
+test_gate, test_freeze and their fixed-point counterparts. tools/coverage.py asks the same of its branches.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ Identifier = WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdent
 Config = WeakConfig | StrongConfig | WeakConfigQ31 | StrongConfigQ31
 Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
+UNIT = Path(__file__).resolve().parents[1] / "unit"
 RATE = 1000.0
 RIG = RigFile.standard()
 FINE = replace(RIG, sensor=replace(RIG.sensor, phi_lsb=standard_sensors(20).phi_lsb))
@@ -217,6 +219,12 @@ def strong_variants() -> list[Variant]:
 def variants() -> tuple[Variant, ...]:
     """All of them."""
     return (*weak_variants(), *strong_variants())
+
+
+def unit_tests() -> list[Path]:
+    """The CMocka programs of the core and the link: those that CMake gives no other sources."""
+    listed = (UNIT / "CMakeLists.txt").read_text(encoding="utf-8")
+    return [path for path in sorted(UNIT.glob("test_*.c")) if f"target_sources({path.stem} " not in listed]
 
 
 def started(native: Native, config: Config) -> Identifier:
