@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import serial
 
+from pvid import child
 from pvid.boards import BOARDS, Board
 from pvid.errors import PvidError
 from pvid.link import (
@@ -110,7 +111,7 @@ def _start_emulator(board: Board, image: str, wrap: Callable[[Port], Port]) -> T
             command += ["-bios", "none"]
         else:
             command += ["-semihosting-config", "enable=on,target=native"]
-        process = subprocess.Popen(
+        process = child.start(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -123,7 +124,7 @@ def _start_emulator(board: Board, image: str, wrap: Callable[[Port], Port]) -> T
 
 def _start_host(image: str, wrap: Callable[[Port], Port], patience_s: float = 20.0) -> Target:
     """The host's build, which says the name of its pseudo-terminal."""
-    process = subprocess.Popen([image], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0)
+    process = child.start([image], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0)
     assert process.stdout is not None
     heard = b""
     if select.select([process.stdout], [], [], patience_s)[0]:
