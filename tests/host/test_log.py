@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import json
 import os
@@ -11,6 +12,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
@@ -23,14 +25,19 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import serial
+from click.testing import CliRunner
 from conftest import ROOT
 
 from pvid import link
 from pvid.bench.field import field_log, throughput
+from pvid.cli import commands
 from pvid.errors import PvidError
 from pvid.logfile import LOG_SCHEMA, LOG_SCHEMA_TEXT, Close, LogWriter, Mark, Segment
 from pvid.logger import Logger, PortSource
 from pvid.logreader import Account, Gap, LogReader, LogStream, Record, Restart
+from pvid.logrig import refuse_to_append
+from pvid.logstatus import StatusLine
+from pvid.logwords import link_words
 from pvid.native import Native
 from pvid.port import why_gone
 from pvid.stream_rig import stream_rig
@@ -575,6 +582,63 @@ def test_a_log_that_cannot_be_written_ends_with_its_error(tmp_path: Path, monkey
     assert watching.closed
     _, account = read(tmp_path / "out.pvlog")
     assert account.segments[0].why is None
+
+
+def test_what_is_appended_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -> None:
+    rig = field_board.rig()
+    writer = LogWriter(tmp_path / "a.pvlog", rig=rig.text())
+    writer.begin("a port", None)
+    writer.take(sent[0])
+    writer.close()
+    refuse_to_append(tmp_path / "a.pvlog", rig)
+    refuse_to_append(tmp_path / "a.pvlog", None)
+    refuse_to_append(tmp_path / "none.pvlog", rig)
+    (tmp_path / "empty.pvlog").write_bytes(b"")
+    refuse_to_append(tmp_path / "empty.pvlog", rig)
+    with pytest.raises(PvidError, match="a.pvlog was recorded with another rig file: a log has one"):
+        refuse_to_append(tmp_path / "a.pvlog", replace(rig, l1=0.31))
+    (tmp_path / "run.csv").write_text("t,phi,y\n" + 100 * "0,0,0\n")
+    with pytest.raises(PvidError, match="run.csv is no log of pvid, and nothing is added to it"):
+        refuse_to_append(tmp_path / "run.csv", rig)
+    arguments = ["log", "nowhere", str(tmp_path / "run.csv"), "--append"]
+    with pytest.raises(PvidError, match="is no log of pvid"):
+        CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
+
+
+def test_what_keeps_the_link_down_is_told(tmp_path: Path) -> None:
+    """The port has gone, and then cannot be opened again: the views say why."""
+    line = field_board.PtyLine(tmp_path / "board")
+    place = str(tmp_path / "board")
+
+    class Watching:
+        def __init__(self) -> None:
+            self.told: list[str] = []
+
+        def take(self, record: Record, account: Account) -> None:
+            if isinstance(record.item, link.Raw) and not self.told:
+                (tmp_path / "board").unlink()
+                os.close(line.ours)
+                self.told.append("gone")
+
+        def idle(self, account: Account) -> None:
+            if account.obstacle and len(self.told) == 1:
+                self.told += [link_words(account)[1], StatusLine(io.StringIO()).line(account, 0.0)]
+                os.kill(os.getpid(), signal.SIGINT)
+
+        def close(self, account: Account) -> None: ...
+
+    def listening() -> None:
+        line.await_word()
+        line.write(b"".join(field_board.cheap_frames(20)))
+
+    sender = threading.Thread(target=listening)
+    sender.start()
+    watching = Watching()
+    account = Logger(PortSource(place), tmp_path / "out.pvlog", [watching], duration_s=60).run()
+    sender.join()
+    why = f"there is no port {place}: is the board plugged in?"
+    assert watching.told[1] == f"down: {why}" and f"; waiting for the link ({why})" in watching.told[2]
+    assert account.obstacle == "" and account.samples == 20 * field_board.SAMPLES_A_FRAME
 
 
 def test_a_full_disk_is_told_with_what_the_log_holds(tmp_path: Path, boards: Boards) -> None:

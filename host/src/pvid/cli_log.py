@@ -17,7 +17,7 @@ from pvid.livepage import DEFAULT as LIVE_PAGE
 from pvid.livepage import is_local, page
 from pvid.logger import EmulatorSource, Logger, PortSource
 from pvid.logreader import Account, LogReader, Observer
-from pvid.logrig import rig_of_log
+from pvid.logrig import refuse_to_append, rig_of_log
 from pvid.logstatus import StatusLine
 from pvid.logview import LiveView
 from pvid.rigfile import RigFile, load
@@ -86,6 +86,8 @@ def log_command(
         rig = RigFile.standard()
     if anew and rig is None:
         raise PvidError("--anew needs --rig: the board starts over with its settings")
+    if append:
+        refuse_to_append(out, rig)
     board = None if rig is None else _board(rig)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)

@@ -131,7 +131,8 @@ class EmulatorSource:
 class Recorder(threading.Thread):
     """Reads a source into a log until `stop` is set; then it takes in what is still under way and ends.
 
-    `error` is what ended it before that, if anything did. Whenever the link has come up the board is asked who it is;
+    `error` is what ended it before that, if anything did; `obstacle` why the link cannot be taken up again, while it is
+    tried. Whenever the link has come up the board is asked who it is;
     an emulator only after its first word (Target.coming_up_s), for what it is sent before is lost.
     """
 
@@ -143,6 +144,7 @@ class Recorder(threading.Thread):
         self.why = "ended"
         self.connected = False
         self.error: Exception | None = None
+        self.obstacle = ""
         self._target: Target | None = None
         self._sent = 0
 
@@ -200,10 +202,15 @@ class Recorder(threading.Thread):
         return self.why
 
     def _reopen(self) -> Target | None:
-        while not self.stop.wait(_RETRY_S):
-            with contextlib.suppress(PvidError):
-                return self.source.open()
-        return None
+        try:
+            while not self.stop.wait(_RETRY_S):
+                try:
+                    return self.source.open()
+                except PvidError as error:
+                    self.obstacle = str(error)
+            return None
+        finally:
+            self.obstacle = ""
 
 
 class Starter:
@@ -346,6 +353,7 @@ class Logger:
             ended = not recorder.is_alive()
             if self.duration_s is not None and limit == float("inf") and self.stream.account.segments:
                 limit = time.monotonic() + self.duration_s
+            self.stream.account.obstacle = recorder.obstacle
             if not self._catch_up(file.read(1 << 16)):
                 if ended:
                     return

@@ -100,7 +100,8 @@ class Account:
     of a schema that nobody described;  cut : pieces where the link came up or went down amidst a frame
     samples : that came;  missing_samples : between them;  unheard : that the board took while the link was down, as
     far as the segments before and after it tell
-    lasting : the last message of each kind
+    lasting : the last message of each kind;  obstacle : why the link, being down, is not taken up again, while a logger
+    tries to
     """
 
     frames: int = 0
@@ -117,6 +118,7 @@ class Account:
     unix_ns: int = 0
     segments: list[SegmentAccount] = field(default_factory=list)
     lasting: dict[type[Message], Message] = field(default_factory=dict)
+    obstacle: str = ""
     damaged_since: int = 0  # the last good frame: no sequence number tells of them
 
     @property

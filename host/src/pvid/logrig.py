@@ -10,7 +10,7 @@ import numpy.typing as npt
 from pvid.capture import MIN_ROWS, Run
 from pvid.errors import PvidError
 from pvid.link import Hello
-from pvid.logreader import LogReader
+from pvid.logreader import LogReader, LogStream
 from pvid.logvalues import Values
 from pvid.rigfile import RigFile
 
@@ -32,6 +32,30 @@ def rig_of_log(path: Path) -> RigFile | None:
         if reader.account.frames:
             break  # it stands in front of all that the board said
     return None
+
+
+def refuse_to_append(path: Path, rig: RigFile | None) -> None:
+    """A log has one rig file: verify, identify and export take it for all of its segments.
+
+    Raises
+    ------
+    PvidError
+        When `path` is there and is no log, or one with another rig file.
+    """
+    stream = LogStream()
+    try:
+        with path.open("rb") as file:
+            while stream.rig is None and not stream.account.frames and (data := file.read(1 << 16)):
+                for _ in stream.feed(data):
+                    pass
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise PvidError(f"cannot read {path}: {error.strerror}") from error
+    if stream.account.bytes and not stream.is_log and not stream.account.frames:
+        raise PvidError(f"{path} is no log of pvid, and nothing is added to it")
+    if rig is not None and stream.rig is not None and RigFile.parse(stream.rig) != rig:
+        raise PvidError(f"{path} was recorded with another rig file: a log has one, and what is new needs a new log")
 
 
 def hello_of_log(path: Path) -> Hello | None:

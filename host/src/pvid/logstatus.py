@@ -50,7 +50,7 @@ class StatusLine:
         self._rated, self._samples = now, account.samples
         text = f"{account.samples} samples, {rate:.0f}/s, lost {account.missing_samples}, damaged {account.damaged}"
         if account.segments and account.segments[-1].why is not None:
-            text += f"; waiting for the link ({account.segments[-1].why})"
+            text += f"; waiting for the link ({account.obstacle or account.segments[-1].why})"
         estimate = account.lasting.get(Estimate)
         if isinstance(estimate, Estimate):
             names = {one.value: one.text for one in Reason}

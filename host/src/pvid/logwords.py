@@ -62,7 +62,7 @@ def link_words(account: Account) -> tuple[bool, str]:
     last = account.segments[-1]
     if last.why is None:
         return True, f"up, segment {last.number}"
-    return False, f"down: {last.why}"
+    return False, f"down: {account.obstacle or last.why}"
 
 
 def received_words(account: Account, samples: float, received: float) -> str:
