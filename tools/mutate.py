@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -26,7 +27,7 @@ import sys
 import time
 import tomllib
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -40,6 +41,7 @@ import playback  # noqa: E402 - of tests/host
 from pvid.native import Native  # noqa: E402
 
 BUILD = ROOT / "build" / "mutate"
+MEMORY = ROOT / "build" / "mutants.json"
 PAGE = ROOT / "tests" / "MUTANTS.md"
 REASONS = ROOT / "tests" / "mutants.toml"
 SOURCES = ROOT / "firmware" / "src"
@@ -50,6 +52,7 @@ BESIDES = (  # of the shared library, beside the core
 )
 COUNT = 400
 LONGEST = 60  # seconds of processor time for what takes one
+QUICK = 1.0  # seconds that a test may take to be asked under sanitizers as well
 WANTED = 0.95
 
 SWAPS = {
@@ -363,6 +366,8 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
         raise SystemExit(f"does not compile with {kit.name}: {mutant.told()}")
     _, anew = base.dependents(mutant.file)
     for test in base.nearest_first(mutant.file):
+        if kit is not PLAIN and base.seconds[test] > QUICK:
+            continue
         program = BUILD / kit.name / "tests" / test
         if test in anew:
             program = folder / kit.name / test
@@ -397,18 +402,58 @@ def verdict_under_sanitizers(job: tuple[Mutant, Baseline]) -> str | None:
     return None
 
 
-def campaign(count: int, seed: int, sanitizers: tuple[Kit, ...] = SANITIZERS) -> list[tuple[Mutant, str | None]]:
+Judge = Callable[[tuple[Mutant, Baseline]], str | None]
+
+
+class Memory:
+    """Who was killed before, in a file: asked again is only who lived, or whose source has changed since. Tests are
+    added to, so that a kill stays one."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        kept = path.read_text(encoding="utf-8") if path is not None and path.exists() else "{}"
+        self._killers: dict[str, str] = json.loads(kept)
+
+    @staticmethod
+    def _key(mutant: Mutant) -> str:
+        return hashlib.sha256(f"{mutant.file} {mutant.text()}".encode()).hexdigest()
+
+    def killer(self, mutant: Mutant) -> str | None:
+        """What killed it, or that it is none; None if it is to be asked."""
+        return self._killers.get(self._key(mutant))
+
+    def keep(self, mutant: Mutant, by: str | None) -> None:
+        """A verdict."""
+        if by is not None and self._path is not None:
+            self._killers[self._key(mutant)] = by
+            self._path.write_text(json.dumps(self._killers, indent=0), encoding="utf-8")
+
+
+def campaign(
+    count: int, seed: int, sanitizers: tuple[Kit, ...] = SANITIZERS, memory: Path | None = None
+) -> list[tuple[Mutant, str | None]]:
     """Draws until there are so many mutants, and judges them; prints each."""
     base = baseline()
+    known = Memory(memory)
     waiting = ranked(seed)
     wanted = shares({name: len(mutants) for name, mutants in waiting.items()}, count)
     results: list[tuple[Mutant, str | None]] = []
+
+    def judge(asked: Judge, mutants: list[Mutant]) -> Iterator[str | None]:
+        fresh = [mutant for mutant in mutants if known.killer(mutant) is None]
+        verdicts: dict[Mutant, str | None] = {}
+        for mutant, by in zip(fresh, pool.map(asked, [(one, base) for one in fresh]), strict=True):
+            known.keep(mutant, by)
+            verdicts[mutant] = by
+        for mutant in mutants:
+            yield known.killer(mutant) or verdicts[mutant]
+
     with ProcessPoolExecutor(2) as pool:
         while True:
             drawn = [waiting[name].pop(0) for name, n in wanted.items() for _ in range(min(n, len(waiting[name])))]
             if not drawn:
                 break
-            for mutant, by in zip(drawn, pool.map(verdict, [(one, base) for one in drawn]), strict=True):
+            for mutant, by in zip(drawn, judge(verdict, drawn), strict=True):
                 if by != "no mutant":
                     wanted[mutant.file] -= 1
                     results.append((mutant, by))
@@ -418,7 +463,7 @@ def campaign(count: int, seed: int, sanitizers: tuple[Kit, ...] = SANITIZERS) ->
             return results
         for kit in sanitizers:
             tests_of(kit)
-        second = dict(zip(alive, pool.map(verdict_under_sanitizers, [(one, base) for one in alive]), strict=True))
+        second = dict(zip(alive, judge(verdict_under_sanitizers, alive), strict=True))
     for mutant, by in second.items():
         print(f"{by or 'LIVES':40} {mutant.told()}", flush=True)
     return [(mutant, by or second.get(mutant)) for mutant, by in results]
@@ -526,8 +571,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=0, help=f"mutants; without it {COUNT}, and the page is written")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--anew", action="store_true", help="ask those again, too, that were killed before")
     given = parser.parse_args()
-    results = campaign(given.count or COUNT, given.seed)
+    if given.anew:
+        MEMORY.unlink(missing_ok=True)
+    results = campaign(given.count or COUNT, given.seed, memory=MEMORY)
     told = tally(results)
     if not given.count:
         PAGE.write_text(page_of(results, given.seed), encoding="utf-8")

@@ -24,11 +24,12 @@ from pvid.native_q31 import (
     TrustConfigQ31,
     WeakConfigQ31,
     WeakIdentifierQ31,
+    physical_q31,
 )
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
 from pvid.setup import strong_config, weak_config
-from pvid.setup_q31 import counts_of, strong_config_q31, weak_config_q31
+from pvid.setup_q31 import counts_of, scale_of, strong_config_q31, weak_config_q31
 
 Identifier = WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdentifierQ31
 Config = WeakConfig | StrongConfig | WeakConfigQ31 | StrongConfigQ31
@@ -165,6 +166,12 @@ def weak_variants() -> list[Variant]:
     for full_angle, damping in ((True, False), (True, True), (False, True)):
         config = weak_config(with_settings(full_angle=full_angle, damping=damping), RATE)
         found.append(Variant(f"weak, sines {full_angle}, friction {damping}", config, weak_samples("full")))
+    sines = weak_config(with_settings(full_angle=True), RATE)
+    found.append(Variant("weak, sines, still pivot", replace(sines, drive_min=0.0), weak_samples("full")))
+    for decimation, window_s in ((2, 0.4), (5, 0.75)):
+        quick = with_settings(full_angle=True, decimation=decimation, window_s=window_s, test_functions=4)
+        config = weak_config(with_settings(quick, smoothing_s=0.031), RATE)
+        found.append(Variant(f"weak, sines, {decimation} ticks a sample", config, weak_samples("full")))
     config_q31 = replace(weak_config_q31(RIG, RATE), drive_min=0)
     found.append(Variant("weak q31, full scale", config_q31, full_scale_counts(config_q31)))
     return found
@@ -241,7 +248,7 @@ def started(native: Native, config: Config) -> Identifier:
 # ---- what they show ----
 
 
-def look(core: Identifier, native: Native, into: Any) -> None:
+def look(core: Identifier, native: Native, config: Config, into: Any) -> None:
     """Everything that can be asked of an identifier between two ticks."""
     estimate = core.assess()
     into.update(estimate.tobytes())
@@ -249,7 +256,10 @@ def look(core: Identifier, native: Native, into: Any) -> None:
     if isinstance(core, WeakIdentifier | WeakIdentifierQ31):
         into.update(core.estimate.tobytes())
         into.update(repr(core.misfit).encode())
-    if isinstance(core, WeakIdentifier | StrongIdentifier):
+    if isinstance(config, WeakConfigQ31 | StrongConfigQ31):
+        in_counts = physical_q31(native, estimate, scale_of(config, RIG.l1))
+        into.update(b"" if in_counts is None else b"".join(x.tobytes() for x in in_counts))
+    else:
         physical = native.physical(estimate, RIG.l1)
         into.update(b"" if physical is None else b"".join(x.tobytes() for x in physical))
 
@@ -267,5 +277,5 @@ def digest(native: Native, variant: Variant) -> str:
         for name in ("p", "sums", "exponent", "reason", "published", "hash", "estimate"):
             if hasattr(record, name):
                 told.update(np.ascontiguousarray(getattr(record, name)).tobytes())
-        look(core, native, told)
+        look(core, native, variant.config, told)
     return told.hexdigest()[:16]

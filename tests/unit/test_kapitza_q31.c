@@ -176,6 +176,11 @@ static void what_is_beyond_its_format_has_none(void **state)
     const double slimmer[3] = {31.0, 1.71875, 0.5}; /* l2 = 0.44 l1, rho2 = 0.94 l1 */
     tell(slimmer, errors, 0.0);
     assert_true(physical());
+    const double equal[3] = {31.0, 3.0, 1.0}; /* l2 and rho2 of l1: as long as they may be */
+    tell(equal, errors, 0.0);
+    assert_true(physical());
+    assert_int_equal(value.l2, INT32_MAX);
+    assert_int_equal(value.rho2, INT32_MAX);
     const double slim[3] = {31.0, 1.65625, 0.375}; /* l2 = 0.75 l1, rho2 = 1.41 l1 */
     tell(slim, errors, 0.0);
     assert_false(physical());

@@ -1,0 +1,172 @@
+/* The stages that a window's work takes are those that init counts with: the last one ends it, not one before, and
+ * none is left when the next window comes. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "estimator_f32.h"
+#include "plant.h"
+#include "pvid/pvid.h"
+#include "weak_angle_f32.h"
+#include "weak_finish_f32.h"
+#include "weak_finish_q31.h"
+#include "weak_table.h"
+#include "weak_table_q31.h"
+#include "weak_window_f32.h"
+#include "weak_window_q31.h"
+
+static pvid_weak_f32 identifier;
+static pvid_weak_angle_f32 angle;
+static pvid_weak_config_f32 config;
+
+static int start_again(void **state)
+{
+    (void)state;
+    make_table();
+    const pvid_weak_config_f32 fresh = {
+        .sample_rate_hz = (float)TABLE_RATE,
+        .l1 = 0.3f,
+        .design = &table_design,
+        .zero_unknown = true,
+        .iterations = 3,
+        .passes = 2,
+        .estimator = pvid_estimator_defaults_f32,
+        .trust = pvid_trust_defaults_f32,
+    };
+    config = fresh;
+    const float start[4] = {30.0f, 9.0f, 5.5f, 0.0f};
+    for (int i = 0; i < 4; i++) {
+        config.estimator.start[i] = start[i];
+        config.estimator.start_sd[i] = (i < 3) ? (0.5f * start[i]) : 0.5f;
+        config.estimator.lower[i] = (i < 3) ? (0.05f * start[i]) : -1.0f;
+        config.estimator.upper[i] = (i < 3) ? (20.0f * start[i]) : 1.0f;
+    }
+    config.estimator.row_sd = 1.0e-4f;
+    return 0;
+}
+
+/* Steps until a window is complete `windows` times, and counts what its work takes, on the identifier itself. */
+static uint32_t stages_of_a_window(int windows)
+{
+    plant_state plant = released_plant();
+    assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
+    uint32_t stages = 0;
+    for (int begun = 0; begun < windows;) {
+        double phi;
+        double y;
+        plant_step(&plant, &phi, &y);
+        (void)pvid_weak_step_f32(&identifier, (float)phi, (float)y);
+        if (!pvid_weak_finish_is_busy_f32(&identifier.finish)) {
+            continue;
+        }
+        begun++;
+        stages = identifier.together; /* of the tick that completed it */
+        pvid_reason reason = PVID_ACCUMULATED;
+        while (pvid_weak_finish_is_busy_f32(&identifier.finish)) {
+            stages++;
+            pvid_weak_finish_step_f32(&identifier.finish, config.design, identifier.iterations,
+                                      identifier.sums[identifier.finish.buffer], &identifier.estimator,
+                                      &identifier.trust, &reason);
+        }
+    }
+    return stages;
+}
+
+static void a_window_takes_the_stages_that_init_counts_with(void **state)
+{
+    (void)state;
+    for (uint8_t iterations = 1; iterations <= 3; iterations++) {
+        config.iterations = iterations;
+        const uint32_t stages = stages_of_a_window(6);
+        assert_int_equal(stages, pvid_weak_finish_stages_f32(config.design, iterations, &identifier.estimator, NULL));
+    }
+    config.full_angle = true;
+    config.angle = &angle;
+    const uint32_t stages = stages_of_a_window(16);
+    assert_true(angle.on);
+    assert_int_equal(stages, pvid_weak_finish_stages_f32(config.design, 3, &identifier.estimator, &angle));
+}
+
+static void an_assessment_takes_the_stages_that_it_says(void **state)
+{
+    (void)state;
+    (void)stages_of_a_window(5);
+    for (int zero_unknown = 0; zero_unknown < 2; zero_unknown++) {
+        config.zero_unknown = zero_unknown == 1;
+        assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
+        static pvid_estimator_solve_f32 solve;
+        pvid_estimate_f32 estimate;
+        pvid_estimator_begin_assessment_f32(&identifier.estimator, &solve, &estimate);
+        uint32_t stages = 1;
+        while (!pvid_estimator_assess_on_f32(&identifier.estimator, &solve)) {
+            stages++;
+        }
+        assert_int_equal(stages, pvid_estimator_assessment_stages_f32(&identifier.estimator));
+        assert_true(pvid_estimator_assess_on_f32(&identifier.estimator, &solve)); /* nothing is left to do */
+    }
+}
+
+static void the_fixed_point_window_takes_the_stages_that_init_counts_with(void **state)
+{
+    (void)state;
+    static pvid_weak_q31 fixed;
+    for (uint8_t iterations = 1; iterations <= 3; iterations++) {
+        pvid_weak_config_q31 settings = weak_unit;
+        settings.iterations = iterations;
+        assert_int_equal(pvid_weak_init_q31(&fixed, &settings), PVID_OK);
+        plant_state plant = released_plant();
+        uint32_t stages = 0;
+        for (int begun = 0; begun < 4;) {
+            double phi;
+            double y;
+            plant_step(&plant, &phi, &y);
+            (void)pvid_weak_step_q31(&fixed, (int32_t)floor((phi / 3.834951969714103e-4) + 0.5),
+                                     (int32_t)floor((y / 5.0e-6) + 0.5));
+            if (!pvid_weak_finish_is_busy_q31(&fixed.finish)) {
+                continue;
+            }
+            begun++;
+            stages = fixed.together; /* of the tick that completed it */
+            pvid_reason reason = PVID_ACCUMULATED;
+            while (pvid_weak_finish_is_busy_q31(&fixed.finish)) {
+                stages++;
+                pvid_weak_finish_step_q31(&fixed.finish, fixed.design, iterations, fixed.sums[fixed.finish.buffer],
+                                          &fixed.estimator, &fixed.trust, &reason);
+            }
+        }
+        assert_int_equal(stages,
+                         pvid_weak_finish_stages_q31(fixed.design->functions, iterations, &fixed.estimator));
+    }
+}
+
+/* The curvature of a window: a mean of what fell into it, be it one; none is no curvature. */
+static void one_second_difference_is_a_mean(void **state)
+{
+    (void)state;
+    pvid_weak_window_f32 window = {.bend_square_sum = 6.0f};
+    pvid_weak_window_q31 other = {.bend_square_sum = 6 << 20};
+    const float means[4] = {0.0f, 6.0f, 3.0f, 2.0f};
+    for (uint16_t bends = 0; bends < 4u; bends++) {
+        window.bends = bends;
+        other.bends = bends;
+        assert_true(pvid_weak_window_bend_f32(&window) == means[bends]);
+        const pvid_scaled_q31 mean = pvid_weak_window_bend_q31(&other);
+        assert_true(fabs((ldexp((double)mean.m, mean.e) / 1048576.0) - (double)means[bends]) < 1.0e-6);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(a_window_takes_the_stages_that_init_counts_with, start_again),
+        cmocka_unit_test_setup(an_assessment_takes_the_stages_that_it_says, start_again),
+        cmocka_unit_test_setup(the_fixed_point_window_takes_the_stages_that_init_counts_with, start_again),
+        cmocka_unit_test(one_second_difference_is_a_mean),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
