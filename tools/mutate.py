@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Mutation check: one operator, sign or constant of the core is changed at a time, and the quick tests have to notice.
 
-    build/venv/bin/python tools/mutate.py                  400 mutants; writes tests/MUTANTS.md; a quarter of an hour
+    build/venv/bin/python tools/mutate.py                  240 mutants; writes tests/MUTANTS.md; a quarter of an hour
     build/venv/bin/python tools/mutate.py --count 10       ten of them; writes nothing
 
 The quick tests are two: what tests/host/playback.py plays through the shared library, under every setting of every form
@@ -50,7 +50,7 @@ BESIDES = (  # of the shared library, beside the core
     *(ROOT / "host" / "native").glob("[lr]*.c"),
     ROOT / "firmware" / "link" / "link.c",
 )
-COUNT = 400
+COUNT = 240
 LONGEST = 60  # seconds of processor time for what takes one
 QUICK = 1.0  # seconds that a test may take to be asked under sanitizers as well
 WANTED = 0.95
