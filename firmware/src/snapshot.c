@@ -83,8 +83,9 @@ static void take_all_but_pointers(uint8_t object[], const uint8_t copy[], const 
 {
     size_t from = 0;
     for (size_t i = 0; i < shape->n_pointers; i++) {
-        memcpy(&object[from], &copy[from], shape->pointers[i] - from);
-        from = shape->pointers[i] + sizeof(void *);
+        const size_t place = (size_t)shape->pointers[i];
+        memcpy(&object[from], &copy[from], place - from);
+        from = place + sizeof(void *);
     }
     memcpy(&object[from], &copy[from], shape->bytes - from);
 }
