@@ -641,6 +641,24 @@ def test_what_keeps_the_link_down_is_told(tmp_path: Path) -> None:
     assert account.obstacle == "" and account.samples == 20 * field_board.SAMPLES_A_FRAME
 
 
+def test_the_status_line_shows_the_estimate_of_either_core(tmp_path: Path) -> None:
+    p_unit = (2**-10, 2**-20, 2**-20, 2**-24, 0.0, 0.0)
+    hello = link.Hello(1, 1, 4, 0, 0, 7, 1000.0, 2**-12, 2**-16, p_unit, "x")
+    fixed = link.EstimateQ31(7, 9, (32440, 9305000, 5898000, 64, 0, 0), (1,) * 6, (0,) * 21, 2**23, 512, 5, 0)
+    p = tuple(count * unit for count, unit in zip(fixed.p, p_unit, strict=True))
+    floating = link.Estimate(7, 9, p, (0.0,) * 21, 0.01, 1.0, 5.0, 0)
+    assert StatusLine(io.StringIO()).line(Account(), 0.0) == "the link is not up yet"
+    for number, estimate in enumerate((fixed, floating)):
+        frames = list(field_board.frames([(0, hello), (0, link.Raw.of_values([1.0], [2.0])), (160, estimate)]))
+        status = StatusLine(io.StringIO())
+        stream = LogStream()
+        for record in stream.feed(written(tmp_path / f"{number}.pvlog", frames).read_bytes()):
+            status.take(record, stream.account)
+        told = status.line(stream.account, 1e9)
+        assert told.startswith("1 samples, 0/s, lost 0, damaged 0; waiting for the link (the end); tick 160: ")
+        assert told.endswith("w 31.68 1/s^2, d1 8.8739, d2 5.6248, updated")
+
+
 def test_a_full_disk_is_told_with_what_the_log_holds(tmp_path: Path, boards: Boards) -> None:
     """A limit of the shell's on the size of files stands for the disk."""
     boards(ticks=20 * TICKS)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from typing import TextIO
 
-from pvid.link import Estimate
+from pvid.link import Estimate, EstimateQ31, Hello
 from pvid.logreader import Account, Record
+from pvid.logvalues import in_si
 from pvid.native import Reason
 
 _ON_TERMINAL_S = 0.25
@@ -22,12 +23,13 @@ class StatusLine:
         self._period = _ON_TERMINAL_S if self._terminal else _ELSEWHERE_S
         self._written = self._rated = time.monotonic()
         self._samples = 0
+        self._estimate: Estimate | EstimateQ31 | None = None
         self._tick = 0
 
     def take(self, record: Record, account: Account) -> None:
         """See logreader.Observer."""
-        if isinstance(record.item, Estimate):
-            self._tick = record.tick
+        if isinstance(record.item, Estimate | EstimateQ31):
+            self._estimate, self._tick = record.item, record.tick
 
     def idle(self, account: Account) -> None:
         """See logreader.Observer."""
@@ -45,16 +47,17 @@ class StatusLine:
             self._to.flush()
 
     def line(self, account: Account, now: float) -> str:
-        """Rate since the last line, losses, the last estimate."""
+        """Rate since the last line, losses, the last estimate; before the link is up that it is not."""
+        if not account.segments:
+            return "the link is not up yet"
         rate = (account.samples - self._samples) / max(now - self._rated, 1e-9)
         self._rated, self._samples = now, account.samples
         text = f"{account.samples} samples, {rate:.0f}/s, lost {account.missing_samples}, damaged {account.damaged}"
-        if account.segments and account.segments[-1].why is not None:
+        if account.segments[-1].why is not None:
             text += f"; waiting for the link ({account.obstacle or account.segments[-1].why})"
-        estimate = account.lasting.get(Estimate)
-        if isinstance(estimate, Estimate):
-            names = {one.value: one.text for one in Reason}
-            w, d1, d2 = estimate.p[:3]
-            reason = names.get(estimate.reason, str(estimate.reason))
+        hello, estimate = account.lasting.get(Hello), self._estimate
+        if isinstance(hello, Hello) and estimate is not None:
+            w, d1, d2 = in_si(estimate, hello)[0][:3]
+            reason = Reason(estimate.reason).text if estimate.reason in list(Reason) else str(estimate.reason)
             text += f"; tick {self._tick}: w {w:.5g} 1/s^2, d1 {d1:.5g}, d2 {d2:.5g}, {reason}"
         return text
