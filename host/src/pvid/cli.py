@@ -785,14 +785,18 @@ def bench_log(frames: int) -> int:
 def bench_field_log(target: str, samples: int, out: Path) -> int:
     """An hour in the field, shortened in time: the board killed twice, its line closed once, every segment verified."""
     from pvid.bench.field import field_log
+    from pvid.logverify import Verdict
 
     with progress_bar("verifying", samples) as advance:
         account, stretches = field_log(target, samples, out, advance)
+    verdict = Verdict()
     for stretch in stretches:
         click.echo(stretch.text)
+        verdict.add(stretch)
+    click.echo(verdict.text)
     click.echo(account.text)
-    good = sum(stretch.verified and stretch.difference is None for stretch in stretches)
-    return DONE if good == len(account.segments) and not account.missing_samples else DIFFERENT
+    whole = len(verdict.good) == len(account.segments) and not verdict.different and not account.missing_samples
+    return DONE if whole else DIFFERENT
 
 
 @bench.command(name="side-by-side")
