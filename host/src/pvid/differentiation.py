@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +28,30 @@ ORDERS = 5
 MAX_DEGREE = 12
 
 
+class Folded:
+    """What folded tables [5, half], whose points are `stride` samples apart, span."""
+
+    weights: npt.NDArray[Any]
+    stride: int
+
+    @property
+    def half(self) -> int:
+        """Points on each side of the centre."""
+        return int(self.weights.shape[1])
+
+    @property
+    def window(self) -> int:
+        """Samples from the first point to the last, both included."""
+        return 2 * self.delay + 1
+
+    @property
+    def delay(self) -> int:
+        """Samples from the newest one back to the instant the derivatives refer to."""
+        return self.half * self.stride
+
+
 @dataclass(frozen=True, eq=False)
-class FirBank:
+class FirBank(Folded):
     """Five symmetric FIR filters over one window, all for the instant of its centre.
 
     Attributes
@@ -49,21 +71,6 @@ class FirBank:
     def weights32(self) -> npt.NDArray[np.float32]:
         """The tables as the float32 core takes them, [5, half]."""
         return self.weights.astype(np.float32)
-
-    @property
-    def half(self) -> int:
-        """Points on each side of the centre."""
-        return int(self.weights.shape[1])
-
-    @property
-    def window(self) -> int:
-        """Samples from the first point to the last, both included."""
-        return 2 * self.delay + 1
-
-    @property
-    def delay(self) -> int:
-        """Samples from the newest one back to the instant the derivatives refer to."""
-        return self.half * self.stride
 
     def apply(self, x: npt.ArrayLike, sample_rate: float) -> Float:
         """Orders 0..4 [unit/s^k] of the samples x [n] taken at sample_rate [Hz].

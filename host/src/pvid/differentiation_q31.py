@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.differentiation import ORDERS, FirBank
+from pvid.differentiation import ORDERS, FirBank, Folded
 from pvid.errors import PvidError
 from pvid.shaped_rounding import bits_for, shaped
 
@@ -30,7 +30,7 @@ _OWN_WEIGHT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class FirBankQ31:
+class FirBankQ31(Folded):
     """pvid_fir_bank_q31 and its formats.
 
     Attributes
@@ -58,21 +58,6 @@ class FirBankQ31:
     y_bits: int
     tau_bits: int
     margins: dict[str, float]
-
-    @property
-    def half(self) -> int:
-        """Points on each side of the centre."""
-        return int(self.weights.shape[1])
-
-    @property
-    def window(self) -> int:
-        """Samples from the first point to the last, both included."""
-        return 2 * self.delay + 1
-
-    @property
-    def delay(self) -> int:
-        """Samples from the newest one back to the instant the derivatives refer to."""
-        return self.half * self.stride
 
 
 def largest_sums(weights: Int32, centre: int, full_scale: int) -> list[int]:

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from pvid.differentiation import Folded
 from pvid.errors import PvidError
 
 Float32 = npt.NDArray[np.float32]
@@ -290,7 +291,7 @@ class GateConfig:
 
 
 @dataclass(frozen=True)
-class StrongConfig:
+class StrongConfig(Folded):
     """Settings of the strong-form identifier, as in strong.h.
 
     `weights` is the folded bank, float32 [5, half]; see pvid.differentiation.
@@ -303,16 +304,6 @@ class StrongConfig:
     estimator: EstimatorConfig
     drive_min: float = 0.0
     gate: GateConfig = field(default_factory=GateConfig)
-
-    @property
-    def half(self) -> int:
-        """Points on each side of the window's centre."""
-        return int(self.weights.shape[1])
-
-    @property
-    def delay(self) -> int:
-        """Ticks between a sample and the derivatives that refer to its instant."""
-        return self.half * self.stride
 
 
 class WeakTables(Protocol):

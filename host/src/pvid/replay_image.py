@@ -288,11 +288,13 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
     keep_header(folder, "replay_run.h", text)
     options = {"PVID_REPLAY_RUN": str(folder)}
     if isinstance(run.config, StrongConfig):
-        options["PVID_MAX_WINDOW"] = str(2 * run.config.half * run.config.stride + 1)
+        options["PVID_MAX_WINDOW"] = str(run.config.window)
     elif target.toolchain == "avr":
         design = run.config.design
         options |= {"PVID_MAX_TAPS": str(design.taps), "PVID_MAX_DECIMATION": str(design.decimation)}
-        options |= {"PVID_MAX_FUNCTIONS": str(design.functions), "PVID_MAX_THETA_Q31": "8"}
+        options |= {"PVID_MAX_FUNCTIONS": str(design.functions)}
+        if run.fixed is not None:
+            options |= {"PVID_MAX_THETA_Q31": str(len(run.fixed.estimator.n_bits))}
     options |= macros or {}
     suffix = "".join(f"-{macro}-{value}" for macro, value in (macros or {}).items())
     tree = build(target, BUILD / f"{target.name}-{name}{suffix}", options)

@@ -126,7 +126,7 @@ def _sizes(config: FloatConfig | FixedConfig) -> dict[str, str]:
     """Macros of pvid/config.h without which the settings would not fit, or take more room than they need."""
     match config:
         case StrongConfig():
-            return {"PVID_MAX_WINDOW": str(max(2 * config.half * config.stride + 1, 5))}
+            return {"PVID_MAX_WINDOW": str(max(config.window, 5))}
         case StrongConfigQ31():
             return {"PVID_MAX_WINDOW": str(config.design.bank.window)}
         case WeakConfig(friction=True):

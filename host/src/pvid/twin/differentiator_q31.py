@@ -33,7 +33,7 @@ def derivatives(phi: Int, y: Int, within: Mask, bank: FirBankQ31) -> tuple[Int, 
     out_phi = np.zeros((len(phi), ORDERS), np.int64)
     out_y = np.zeros((len(phi), ORDERS - Y_LOWEST), np.int64)
     ready = np.zeros(len(phi), np.bool_)
-    delay = bank.half * bank.stride
+    delay = bank.delay
     for first, last in segments(within):
         count = last - first - 2 * delay
         if count <= 0:
@@ -49,7 +49,7 @@ def derivatives(phi: Int, y: Int, within: Mask, bank: FirBankQ31) -> tuple[Int, 
 
 def _sum(x: Int, count: int, bank: FirBankQ31, order: int) -> Int:
     """The exact sum of one order in each of the `count` full windows."""
-    delay = bank.half * bank.stride
+    delay = bank.delay
     middle = x[delay : delay + count]
     total = middle * bank.centre if order == 0 else np.zeros(count, np.int64)
     for i in range(bank.half):
