@@ -318,7 +318,7 @@ static void refuse(const uint8_t payload[])
 static void take(const pvid_link_frame *frame)
 {
     const uint32_t n = (uint32_t)(frame->length / SAMPLE_BYTES);
-    const uint32_t known = stream.ticks - frame->tick;
+    const uint32_t known = (frame->tick < stream.ticks) ? (stream.ticks - frame->tick) : 0u;
     if (!running() || sampling()) {
         answer_status();
     } else if (frame->tick > stream.ticks) {
