@@ -38,12 +38,10 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"form": "strong"},
     {"form": "strong", "differentiator": "finite-difference", "stride": 20, "law": "pseudovelocity"},
     {"form": "strong", "differentiator": "finite-difference", "stride": 1, "forgetting_s": 0.1, "divider": 4},
-)
-FLOAT_ALONE: tuple[dict[str, Any], ...] = (
-    {"form": "weak", "full_angle": True, "damping": True},
     {"form": "weak", "outlier_gate": 6.0},
     {"form": "strong", "outlier_gate": 6.0, "outlier_patience_s": 0.5},
 )
+FLOAT_ALONE: tuple[dict[str, Any], ...] = ({"form": "weak", "full_angle": True, "damping": True},)
 
 
 def rig_of(**identifier: Any) -> RigFile:
@@ -91,10 +89,9 @@ def play(identifier: Identifier, samples: Iterator[tuple[Samples, Samples]]) -> 
     for phi, y in samples:
         identifier.run(phi, y)
         identifier.assess()
-        if not isinstance(identifier, StrongIdentifierQ31):
-            image = snapshot.save(identifier)
-            snapshot.restore(identifier, image[:-1])
-            snapshot.restore(identifier, image)
+        image = snapshot.save(identifier)
+        snapshot.restore(identifier, image[:-1])
+        snapshot.restore(identifier, image)
         if not isinstance(identifier, StrongIdentifier):
             identifier.gap()
         done += len(phi)
