@@ -226,15 +226,14 @@ static inline pvid_reason add_relative_row(pvid_estimator_f32 *self, const float
 }
 
 /* What comes before a row of a model with functions of its own is added to the sums. */
-static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y)
+static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                    const float gradient[])
 {
     const pvid_reason reason = admit(self, n, y);
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
     if (self->gain < 1.0f) {
-        float gradient[PVID_MAX_P];
-        const float e = self->model->innovate(self->p, n, y, gradient);
         listen(self, gradient, e);
     }
     pvid_count_up(&self->counters.rows);
@@ -246,7 +245,9 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
     if (pvid_relative_f32(self->model)) {
         return add_relative_row(self, n, y);
     }
-    const pvid_reason reason = begin_row(self, n, y);
+    float gradient[PVID_MAX_P];
+    const float e = self->model->innovate(self->p, n, y, gradient);
+    const pvid_reason reason = begin_row(self, n, y, e, gradient);
     if (reason == PVID_ACCUMULATED) {
         float sums[PVID_MAX_SUMS];
         pvid_information_add_f32(&self->information, self->model, n, y, sums);
@@ -383,9 +384,10 @@ static inline pvid_reason add_and_solve(pvid_estimator_f32 *self, const float n[
 }
 
 /* As pvid_estimator_add_f32 and the end of a group, without reading the sums back in between. */
-static inline pvid_reason step_with_row(pvid_estimator_f32 *self, const float n[], float y)
+pvid_reason pvid_estimator_step_known_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                          const float gradient[])
 {
-    pvid_reason reason = begin_row(self, n, y);
+    pvid_reason reason = begin_row(self, n, y, e, gradient);
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
@@ -402,7 +404,9 @@ static inline pvid_reason step_with_row(pvid_estimator_f32 *self, const float n[
 pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     if (!pvid_relative_f32(self->model)) {
-        return step_with_row(self, n, y);
+        float gradient[PVID_MAX_P];
+        const float e = self->model->innovate(self->p, n, y, gradient);
+        return pvid_estimator_step_known_f32(self, n, y, e, gradient);
     }
     const pvid_reason added = add_relative_row(self, n, y);
     return (added == PVID_ACCUMULATED) ? pvid_estimator_update_f32(self) : added;

@@ -105,6 +105,10 @@ static inline bool pvid_estimator_is_due_f32(pvid_estimator_f32 *self)
     return true;
 }
 
+/* pvid_estimator_step_f32 for a model with functions of its own, of which innovate's answers at p are known. */
+pvid_reason pvid_estimator_step_known_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                          const float gradient[]);
+
 /* A solve of a model that projects its sums by itself: at the end of a group, or once more. */
 pvid_reason pvid_estimator_solve_sums_f32(pvid_estimator_f32 *self, bool ends_group);
 

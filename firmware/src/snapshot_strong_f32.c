@@ -9,6 +9,7 @@ static const uint32_t layout[] = {
     sizeof(pvid_strong_f32), sizeof(void *),
     PLACE(phi.rate_power),   PLACE(phi.history),
     PLACE(y),                PLACE(drive),
+    PLACE(misfit),           PLACE(misfit.block),
     PLACE(estimator),        PLACE(estimator.information.low),
     PLACE(estimator.p),      PLACE(estimator.innovation),
     PLACE(estimator.gain),   PLACE(estimator.counters),

@@ -5,8 +5,10 @@
 
 #include "count.h"
 #include "differentiator_f32.h"
+#include "estimator_f32.h"
 #include "finite_f32.h"
 #include "kapitza_row_f32.h"
+#include "misfit_f32.h"
 
 /* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
 #define GATE_MEMORY_S 0.25f
@@ -40,6 +42,7 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
     if (status != PVID_OK) {
         return status;
     }
+    pvid_misfit_init_f32(&self->misfit, config->sample_rate_hz, config->estimator.forgetting_s);
     return pvid_gate_init_f32(&self->gate, &config->gate, config->sample_rate_hz,
                               GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
 }
@@ -84,13 +87,25 @@ static inline bool differentiate(pvid_strong_f32 *self, float phi, float y, floa
     return true;
 }
 
-/* Whether the row fits the estimate as well as rows usually do. */
-static bool passes(pvid_strong_f32 *self, const float n[PVID_KAPITZA_STRONG_THETA], float y)
+/* A row: judged, let in or not, and solved with. */
+static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAPITZA_STRONG_THETA], float y)
 {
     pvid_estimator_f32 *estimator = &self->estimator;
     float gradient[PVID_MAX_P];
     const float e = estimator->model->innovate(estimator->p, n, y, gradient);
-    return pvid_gate_passes_f32(&self->gate, e * e);
+    if (pvid_misfit_take_f32(&self->misfit, e, gradient[PVID_KAPITZA_W] * estimator->p[PVID_KAPITZA_W])) {
+        self->alarm = pvid_misfit_judge_f32(&self->misfit);
+    }
+    if (!pvid_gate_passes_f32(&self->gate, e * e)) {
+        pvid_count_up(&estimator->counters.rejected_outlier);
+        return PVID_REJECTED_OUTLIER;
+    }
+    const pvid_reason reason = pvid_estimator_step_known_f32(estimator, n, y, e, gradient);
+    if ((reason != PVID_UPDATED) || !self->alarm) {
+        return reason;
+    }
+    pvid_count_up(&estimator->counters.misfits);
+    return PVID_MISFIT;
 }
 
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
@@ -118,9 +133,5 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
     float n[PVID_KAPITZA_STRONG_THETA];
     float row_y;
     pvid_kapitza_row_f32(d_phi, u, &row_y, n);
-    if ((self->gate.limit > 0.0f) && !passes(self, n, row_y)) {
-        pvid_count_up(&self->estimator.counters.rejected_outlier);
-        return PVID_REJECTED_OUTLIER;
-    }
-    return pvid_estimator_step_f32(&self->estimator, n, row_y);
+    return take_row(self, n, row_y);
 }

@@ -24,6 +24,7 @@ enum {
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
+    STAGE_FIT,    /* what the rows leave unexplained, where the gate asks: a few functions at a time */
     STAGE_ADD,    /* K times: a row to the estimator */
     STAGE_SOLVE,  /* `iterations` solves of several stages each */
     STAGE_ASSESS, /* several stages; the last one publishes or not */
@@ -270,7 +271,10 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
     case STAGE_REMOVE_A:
     case STAGE_REMOVE_B:
         remove_components(self, row, few, sums);
-        if ((self->stage == STAGE_REMOVE_B) && (self->gate.limit > 0.0f)) {
+        done = few;
+        break;
+    case STAGE_FIT:
+        if (self->gate.limit > 0.0f) {
             add_residuals(self, estimator, row, few, fixed);
         }
         done = few;
@@ -321,7 +325,7 @@ uint32_t pvid_weak_finish_stages_f32(const pvid_weak_design_f32 *design, uint8_t
     const uint32_t functions = design->functions;
     const uint32_t lack = pvid_weak_angle_is_asked_f32(angle) ? pvid_weak_angle_stages_f32(angle, design) : 1u;
     const uint32_t parts = (functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
-    const uint32_t rows = ((4u + TRACE_STAGES) * functions) + 2u + (4u * parts) + lack;
+    const uint32_t rows = ((4u + TRACE_STAGES) * functions) + 2u + (5u * parts) + lack;
     const uint32_t first = pvid_estimator_stages_f32(estimator, true);
     const uint32_t more = pvid_estimator_stages_f32(estimator, false);
     return rows + first + ((iterations - 1u) * more) + pvid_estimator_assessment_stages_f32(estimator);

@@ -1,4 +1,4 @@
-"""The outlier gate: its bits, what it keeps out, what it lets in again, and that it is off unless asked for."""
+"""The outlier gate: its bits, what it keeps out, what it lets in again, and where it is on."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pvid.capture import Run
 from pvid.compare import first_difference
 from pvid.errors import PvidError
 from pvid.native import GateConfig, Native, Reason, Status
-from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
 from pvid.setup import strong_config, weak_config
 from pvid.twin.gate import Gate
@@ -163,11 +163,28 @@ def test_a_refused_window_changes_nothing_but_its_counter(native: Native, jolted
         assert np.array_equal(record.sums[tick - 300], record.sums[tick])
 
 
-def test_it_is_off_unless_asked_for(native: Native, jolted: Run) -> None:
-    for form in ("weak", "strong"):
-        config = (weak_config if form == "weak" else strong_config)(rig_with(form=form, stride=8), 1000.0)
-        assert config.gate == GateConfig(0.0, 0.0)
-    assert not (native.weak(weak_config(RIG, 1000.0)).run(jolted.phi, jolted.y).reason == OUTLIER).any()
+def test_it_is_on_in_the_stationary_law_and_off_where_it_is_not_wanted(native: Native, jolted: Run) -> None:
+    for form, sigmas in (("weak", 4.0), ("strong", 6.0)):
+        of = weak_config if form == "weak" else strong_config
+        assert of(rig_with(form=form, stride=8), 1000.0).gate == GateConfig(sigmas, 0.0)
+        assert of(rig_with(form=form, stride=8, law="pseudovelocity"), 1000.0).gate == GateConfig(0.0, 0.0)
+        assert of(rig_with(form=form, stride=8, outlier_gate=0.0), 1000.0).gate == GateConfig(0.0, 0.0)
+    assert (native.weak(weak_config(RIG, 1000.0)).run(jolted.phi, jolted.y).reason == OUTLIER).any()
+    off = native.weak(weak_config(rig_with(outlier_gate=0.0), 1000.0))
+    assert not (off.run(jolted.phi, jolted.y).reason == OUTLIER).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_keeps_nothing_out_of_a_run_that_is_as_it_should_be(seed: int, native: Native) -> None:
+    # 40 s from a start that is half wrong: the same bits with the gate and without it
+    run = simulate(sensors=standard_sensors(14), truth="linear", duration=40.0, seed=seed).run
+    hashes = []
+    for sigmas in (0.0, 4.0):
+        core = native.weak(weak_config(rig_with(outlier_gate=sigmas), 1000.0, standard_start(seed)))
+        core.run(run.phi, run.y, sums=False)
+        assert core.counters["rejected_outlier"] == 0
+        hashes.append(core.running_hash)
+    assert hashes[0] == hashes[1]
 
 
 @pytest.mark.parametrize("form", ["weak", "strong"])

@@ -119,8 +119,8 @@ def test_settings_changed_in_code_are_checked_too() -> None:
         full_angle=st.booleans(),
         zero=st.booleans(),
         kappa_min=st.floats(0, 0.999),
-        outlier_gate=st.floats(0, 1e3),
-        outlier_patience_s=st.floats(0, 1e12),
+        outlier_gate=st.none() | st.floats(0, 1e3),
+        outlier_patience_s=st.none() | st.floats(0, 1e12),
     ),
 )
 def test_text_gives_the_same_rig_back(
@@ -214,11 +214,26 @@ def test_the_published_defaults() -> None:
         damping=False,
         zero=True,
         kappa_min=1e-5,
-        outlier_gate=0.0,
-        outlier_patience_s=0.0,
+        outlier_gate=None,
+        outlier_patience_s=None,
     )
     assert Identifier(form="strong").window == 0.241
     assert Identifier(form="weak").window == 1.25
+
+
+def test_the_gate_where_the_file_does_not_say() -> None:
+    assert Identifier(form="weak").gate == 4.0
+    assert Identifier(form="strong").gate == 6.0
+    assert Identifier(law="pseudovelocity").gate == 0.0, "the paper has none"
+    assert Identifier(core="q31").gate == 0.0
+    assert Identifier(outlier_gate=0.0).gate == 0.0
+    assert Identifier(law="pseudovelocity", outlier_gate=5.0).gate == 5.0
+    assert Identifier().patience_s == 0.0
+    assert Identifier(forgetting_s=10.0).patience_s == 30.0
+    assert Identifier(form="strong", forgetting_s=10.0).patience_s == 60.0
+    assert Identifier(forgetting_s=1e12).patience_s == 1e12
+    assert Identifier(core="q31", forgetting_s=10.0).patience_s == 0.0
+    assert Identifier(forgetting_s=10.0, outlier_patience_s=0.0).patience_s == 0.0
 
 
 @pytest.mark.parametrize(("key", "value"), [("stride", 0), ("test_functions", 0), ("decimation", -1)])

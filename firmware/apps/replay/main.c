@@ -6,6 +6,7 @@
  * Exit codes: 0 played, 2 the core refused the settings, 3 float arithmetic is not what was promised.
  */
 #include "port.h"
+#include "pvid/little_endian.h"
 #include "pvid/pvid.h"
 #include "replay_run.h"
 #include "report.h"
@@ -48,6 +49,18 @@ typedef float sample_type;
 
 static identifier_type identifier;
 
+/* What a count is to the identifier: itself times what a step is worth; no number where there was no sample. */
+static sample_type sample_of(int16_t count, sample_type lsb)
+{
+#if !REPLAY_Q31
+    if (count == REPLAY_MISSING) {
+        static const uint8_t no_number[4] = {0x00u, 0x00u, 0xC0u, 0x7Fu};
+        return pvid_get_f32(no_number);
+    }
+#endif
+    return (sample_type)count * lsb; /* fixed point: lsb 1 */
+}
+
 typedef struct {
     uint64_t total; /* counts of pvid_port_instructions */
     uint32_t longest;
@@ -73,8 +86,8 @@ static uint32_t play(cost *whole)
     uint32_t hash = PVID_FNV_START;
     const uint32_t reading = overhead();
     for (uint32_t tick = 0; tick < REPLAY_TICKS; tick++) {
-        const sample_type phi = (sample_type)SAMPLE(tick, 0) * replay_phi_lsb; /* fixed point: lsb 1 */
-        const sample_type y = (sample_type)SAMPLE(tick, 1) * replay_y_lsb;
+        const sample_type phi = sample_of(SAMPLE(tick, 0), replay_phi_lsb);
+        const sample_type y = sample_of(SAMPLE(tick, 1), replay_y_lsb);
         const uint32_t before = pvid_port_instructions();
         const pvid_reason reason = STEP(&identifier, phi, y);
         const uint32_t counts = pvid_port_instructions() - before - reading;

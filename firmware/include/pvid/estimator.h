@@ -80,7 +80,7 @@ typedef struct {
     uint32_t rejected_saturated;
     uint32_t held_uncertain;      /* groups after which nothing was published: see trust.h */
     uint32_t held_out_of_range;   /* windows dropped because the angle was too large */
-    uint32_t misfits;             /* groups published under the alarm */
+    uint32_t misfits;             /* groups published, or updates told, under the alarm */
     uint32_t rejected_outlier;    /* rows or windows that the gate kept out: see gate.h */
 } pvid_counters; /* each stops at 2^32 - 1 */
 

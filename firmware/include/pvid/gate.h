@@ -8,7 +8,8 @@
  * do not count in it. But each of them widens it a little, so that a mechanism that has changed is let in again after
  * `patience_s`, or never, as you say. (In that time the scale of squares grows by 10^4.)
  *
- * Off by default. Total; one comparison, one division a residual.
+ * A rig file has it on where it does not say, but in equation (5) (pvid_law), which is to stay as the paper has it; a
+ * configuration of zeros has none. Total; one comparison, one division a residual.
  */
 #ifndef PVID_GATE_H
 #define PVID_GATE_H

@@ -22,6 +22,7 @@
 #include "pvid/kapitza_weak.h"
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/little_endian.h"
+#include "pvid/misfit.h"
 #include "pvid/model.h"
 #include "pvid/model_q31.h"
 #include "pvid/snapshot.h"

@@ -18,6 +18,7 @@
 #include "pvid/estimator.h"
 #include "pvid/gate.h"
 #include "pvid/kapitza.h"
+#include "pvid/misfit.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -42,7 +43,9 @@ typedef struct {
     float drive_forgetting; /* part of it that a tick replaces */
     float drive_min;        /* mean square below which no row is taken in */
     bool frozen;
+    bool alarm;             /* the last block of rows was a misfit: see misfit.h */
     pvid_gate_f32 gate;
+    pvid_misfit_f32 misfit;
     pvid_estimator_f32 estimator;
 } pvid_strong_f32;
 
@@ -50,9 +53,11 @@ typedef struct {
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m] sampled together. Answers as the estimator does, PVID_WARMING_UP
- * until the windows are full, PVID_REJECTED_OUTLIER for a row that the gate kept out, and PVID_HELD_NOT_EXCITED while the pivot is still: without a drive the
- * noise of a still sensor, differentiated four times, would pass for one. A sample that is not finite is rejected and
- * empties the windows (its neighbours are no longer equidistant); the sums keep what they know. */
+ * until the windows are full, PVID_REJECTED_OUTLIER for a row that the gate kept out, PVID_MISFIT in place of
+ * PVID_UPDATED while the rows leave more unexplained than they should (misfit.h: the estimate is not to be believed),
+ * and PVID_HELD_NOT_EXCITED while the pivot is still: without a drive the noise of a still sensor, differentiated four
+ * times, would pass for one. A sample that is not finite is rejected and empties the windows (its neighbours are no
+ * longer equidistant); the sums keep what they know. */
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */

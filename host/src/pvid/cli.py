@@ -700,26 +700,36 @@ def bench_hard(update: Path | None) -> int:
 
 
 @bench.command(name="longevity")
-@click.option("--ticks", default=10_000_000, show_default=True, type=click.IntRange(50_000), help="Of each run.")
+@click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7, on a board 10^6.")
 @click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
+@click.option("--on", "board", metavar="BOARD", help="In this emulator, hash for hash with this machine: mps2-an386.")
 @_UPDATE
-def bench_longevity(ticks: int, chosen: tuple[str, ...], update: Path | None) -> int:
+def bench_longevity(
+    ticks: int | None, chosen: tuple[str, ...], processes: int, board: str | None, update: Path | None
+) -> int:
     """Millions of ticks of every disturbance, beside textbook and UD recursive least squares (needs gcc).
 
     What is done is kept in build/longevity.json, for the present core: the next call goes on from there.
     """
-    from pvid.bench import longevity
+    from pvid.bench import longevity, longevity_target
     from pvid.bench.longevity_signals import SCENARIOS
+    from pvid.boards import board as board_of
 
     unknown = set(chosen) - set(SCENARIOS)
     if unknown:
         raise PvidError(f"no such scenario: {', '.join(sorted(unknown))}; there are {', '.join(SCENARIOS)}")
     scenarios = chosen or tuple(SCENARIOS)
-    with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", 2 * ticks * len(scenarios)) as advance:
-        place = {name: 2 * ticks * i for i, name in enumerate(scenarios)}
-        results = longevity.run_missing(
-            Native(), ticks, scenarios, Path(folder), lambda name, done: advance(place[name] + done)
-        )
+    if board is not None:
+        runs = len(longevity_target.combinations(scenarios))
+        with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", runs) as advance:
+            rows = longevity_target.run_missing_on(
+                board_of(board), ticks or 1_000_000, scenarios, Path(folder), advance
+            )
+        _update_readme(update, "longevity-board", _markdown(longevity_target.HEADER, rows))
+        return DONE if all(row[-1] == "equal" for row in rows) else DIFFERENT
+    with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(scenarios)) as advance:
+        results = longevity.run_missing(ticks or 10_000_000, scenarios, Path(folder), processes, advance)
     for marker, header, rows in longevity.tables(results):
         _update_readme(update, marker, _markdown(header, rows))
     return DONE

@@ -27,6 +27,9 @@ ZERO = "c"
 # With w known no better than this, relative, nothing is identified.
 WORST_SE = 0.1
 
+# What the strong form says of an estimate that is one.
+_GOOD = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
+
 _FADING = 4  # windows after the correction's switch (weak_oracle)
 
 # Windows that the float64 core's alarm wants to have seen.
@@ -57,7 +60,8 @@ class Identification:
     `lost` counts samples that were rejected; `hash` is None where the core has none (f64). In the weak form the values
     are the published ones (pvid/trust.h): `trusted_s` is when the last of them was trusted [s] (None: never, they are
     the start), `misfit` the variance of the residuals over what the sensors' noise explains, and `alarm` whether that
-    is too much. In the strong form, which has no such gate, they are the last ones, and None, None, False.
+    is too much. In the strong form, which publishes whatever it has, they are the last ones, and None, None; `alarm` is
+    the float32 core's own (pvid/misfit.h).
     """
 
     value: dict[str, float]
@@ -83,11 +87,7 @@ class Identification:
         w is known."""
         if self.form == "weak":
             return self.trusted_s is not None
-        return (
-            self.updates > 0
-            and self.status in (Reason.UPDATED.text, Reason.ACCUMULATED.text)
-            and self.se["w"] <= WORST_SE * abs(self.value["w"])
-        )
+        return self.updates > 0 and self.status in _GOOD and self.se["w"] <= WORST_SE * abs(self.value["w"])
 
     @property
     def warning(self) -> str | None:
@@ -97,6 +97,11 @@ class Identification:
                 f"the residuals have {self.misfit:.1f} times the variance that the sensors' noise explains: large "
                 f"angles, friction, or a wrong phi_lsb; the errors are larger than the standard errors say"
             )
+        if self.alarm:
+            return (
+                "the rows leave more unexplained than they should: too coarse an encoder for the strong form, a jolt "
+                "in sums that do not forget it, or a mechanism that has changed; the estimate is not to be believed"
+            )
         if self.trusted_s is not None and self.status not in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
             return f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}"
         return None
@@ -104,7 +109,7 @@ class Identification:
     @property
     def verdict(self) -> str:
         """Why nothing was identified, in words."""
-        if self.form == "strong" and self.updates and self.status in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
+        if self.form == "strong" and self.updates and self.status in _GOOD:
             return f"the standard error of w is {100 * self.se['w'] / abs(self.value['w']):.0f} % of it"
         return self.status
 
@@ -185,7 +190,8 @@ def _in_float32(
     counters = identifier.counters
     last = identifier.estimate if isinstance(identifier, WeakIdentifier) else identifier.assess()
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
-    gated = isinstance(identifier, WeakIdentifier) and len(trusted) > 0
+    told = len(trusted) > 0
+    publishes = isinstance(identifier, WeakIdentifier)
     estimates = record.estimate
     trajectory = _trajectory(
         run.t[::every],
@@ -200,9 +206,9 @@ def _in_float32(
         p=last["p"][:n_p].astype(np.float64),
         covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
         kappa=float(last["kappa"]),
-        trusted_s=float(run.t[trusted[-1]]) if gated else None,
+        trusted_s=float(run.t[trusted[-1]]) if told and publishes else None,
         misfit=identifier.misfit if isinstance(identifier, WeakIdentifier) else None,
-        alarm=gated and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],

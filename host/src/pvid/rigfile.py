@@ -32,6 +32,13 @@ Differentiator = Literal["savitzky-golay", "finite-difference"]
 # The weak form wants about one slow period; the strong form is least wrong here with degree 12 and 20 bits.
 _WINDOW_S: dict[Form, float] = {"weak": 1.25, "strong": 0.241}
 
+# What the gate keeps out where the file does not say [times the usual]: windows are alike, rows follow the motion.
+_GATE: dict[Form, float] = {"weak": 4.0, "strong": 6.0}
+
+# Until it believes in a change [time constants of forgetting]: windows of a changed mechanism pass no sooner; of its
+# rows enough do wherever their residuals cross zero.
+_PATIENCE: dict[Form, float] = {"weak": 3.0, "strong": 6.0}
+
 
 def _number(default: Any, unit: str, low: float, high: float) -> Any:
     """A field that holds a number from low to high; an int where the default is one."""
@@ -109,8 +116,10 @@ class Identifier:
     damping : two regressors more, for viscous friction
     zero : the encoder's zero is unknown, a fourth parameter of the weak form
     kappa_min : hold the estimate while less than this part of w's information is its own
-    outlier_gate : keep out rows or windows whose residuals are larger than so many times the usual; 0: none
-    outlier_patience_s : until the gate believes that the mechanism has changed [s]; 0: never
+    outlier_gate : keep out rows or windows whose residuals are larger than so many times the usual; 0: none; where the
+        file does not say, see `gate`
+    outlier_patience_s : until the gate believes that the mechanism has changed [s]; 0: never; where the file does not
+        say, 3 times forgetting_s in the weak form, 6 times in the strong one
     """
 
     form: Form = _choice("weak", Form)
@@ -130,8 +139,8 @@ class Identifier:
     damping: bool = False
     zero: bool = True
     kappa_min: float = _number(1e-5, "", 0.0, 0.999)
-    outlier_gate: float = _number(0.0, "", 0.0, 1e3)
-    outlier_patience_s: float = _number(0.0, "s", 0.0, 1e12)
+    outlier_gate: float | None = _number(None, "", 0.0, 1e3)
+    outlier_patience_s: float | None = _number(None, "s", 0.0, 1e12)
 
     def __post_init__(self) -> None:
         _check_fields(self, "[identifier] ")
@@ -140,6 +149,22 @@ class Identifier:
     def window(self) -> float:
         """Length of the window [s]: window_s, or the form's own length when that is 0."""
         return self.window_s if self.window_s > 0.0 else _WINDOW_S[self.form]
+
+    @property
+    def gate(self) -> float:
+        """What the gate keeps out [times the usual]: outlier_gate, or 4 (weak form) and 6 (strong form) where the file
+        does not say; none then with equation (5), which is to stay as the paper has it, and in fixed point, whose
+        figures are without."""
+        if self.outlier_gate is not None:
+            return self.outlier_gate
+        return _GATE[self.form] if self.law == "stationary" and self.core != "q31" else 0.0
+
+    @property
+    def patience_s(self) -> float:
+        """Until the gate believes in a change [s], 0: never."""
+        if self.outlier_patience_s is not None:
+            return self.outlier_patience_s
+        return min(_PATIENCE[self.form] * self.forgetting_s, 1e12) if self.gate > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -299,12 +324,20 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else text[:40] + "..."
 
 
+# Fields that say nothing by default, and the property that holds what follows from the others.
+_DERIVED = {"outlier_gate": "gate", "outlier_patience_s": "patience_s"}
+
+
 def _lines(owner: Any) -> list[str]:
-    """`key = value  # unit` for each field that holds a value."""
+    """`key = value  # unit` for each field that holds a value; in a comment what follows where it holds none."""
     lines = []
     for key in fields(owner):
         value = getattr(owner, key.name)
-        if key.name in _TABLES or value is None:
+        if key.name in _TABLES:
+            continue
+        if value is None:
+            if key.name in _DERIVED:
+                lines.append(f"# {key.name} = {getattr(owner, _DERIVED[key.name])!r}")
             continue
         shown = (
             f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)

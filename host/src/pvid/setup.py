@@ -78,7 +78,7 @@ def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
 
 def gate_config(rig: RigFile) -> GateConfig:
     """What the rig file says of outliers."""
-    return GateConfig(rig.identifier.outlier_gate, rig.identifier.outlier_patience_s)
+    return GateConfig(rig.identifier.gate, rig.identifier.patience_s)
 
 
 def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig:

@@ -46,7 +46,7 @@ LONGEST_TERMS = ("tick", "front_pair", "stage", "factor", "factor_function_squar
 
 def stages_of(functions: int, zero_unknown: bool = True, iterations: int = 3) -> int:
     """Stages of a complete window (pvid_weak_finish_stages_f32): rows, Gauss-Newton steps, assessment."""
-    rows = 8 * functions + 2 + 4 * -(-functions // 6)
+    rows = 8 * functions + 2 + 5 * -(-functions // 6)
     projection, parameters = (11, 4) if zero_unknown else (7, 3)
     step = projection + 6
     return rows + 1 + iterations * step + projection + 4 + parameters

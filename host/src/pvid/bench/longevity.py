@@ -1,7 +1,8 @@
 """How long it lives: 10^7 ticks of every disturbance and forgetting, beside textbook and UD recursive least squares.
 
 Looked for: anything that is not finite; a matrix S that is not positive without a reason told; an answer that is far
-from the truth by its own standard errors, long after the disturbance is over, and says nothing.
+from the truth by its own standard errors, long after the disturbance is over, and says nothing. Samples are made and
+played in chunks: memory does not grow with the ticks.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ import json
 import subprocess
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,6 @@ from pvid.bench.longevity_signals import BEFORE, L1, RATE_HZ, SCENARIOS, Sensing
 from pvid.boards import ROOT
 from pvid.errors import PvidError
 from pvid.native import (
-    GateConfig,
     Native,
     Reason,
     StrongConfig,
@@ -45,8 +45,6 @@ STRIDE = 8  # ticks between the points of the strong form's Savitzky-Golay filte
 STRONG_FORGETTING_S = (0.1, 1.0, 10.0, 100.0, 0.0)
 WEAK_FORGETTING_S = (10.0, 100.0, 0.0)  # a group is a window of 0.62 s: below four of them init refuses
 PEERS = ("RLS", "UD RLS")
-GATE_SIGMAS = {"weak": 4.0, "strong": 6.0}
-GATE_PATIENCE = 6.0  # times the time constant of forgetting; without one the gate never gives way
 ENCODER = Sensing()
 EXACT = Sensing(phi_lsb=0.0, y_lsb=0.0, zero=0.0)
 JUDGED = (
@@ -59,21 +57,25 @@ JUDGED = (
     Reason.REJECTED_OUTLIER,
 )
 BACK = 3.0  # standard errors
+# What the strong form's filter makes of the standard rig, relative, of w, d1, d2, and of which the standard errors know
+# nothing: 0.095, 0.096 and 0.19 % with the undisturbed drive, 0.12, 0.13 and 0.31 % where w is larger by 20 %.
+FILTER_BIAS = {"weak": (0.0, 0.0, 0.0), "strong": (0.0015, 0.0015, 0.0035)}
 
 
 @dataclass(frozen=True)
 class Lane:
-    """One estimator: `kind` weak, strong, RLS or UD RLS; forgetting_s 0: none."""
+    """One estimator: `kind` weak, strong, RLS or UD RLS; forgetting_s 0: none; of ours with the outlier gate, as a rig
+    file has it that does not say, or without."""
 
     kind: str
     forgetting_s: float
-    gated: bool = False
+    gated: bool = True
 
     @property
     def label(self) -> str:
         """As the tables name it."""
         time = f"{self.forgetting_s:g} s" if self.forgetting_s else "none"
-        return f"{self.kind}, {time}" + (", gate" if self.gated else "")
+        return f"{self.kind}, {time}" + ("" if self.gated else ", no gate")
 
     @property
     def sensing(self) -> Sensing:
@@ -81,10 +83,10 @@ class Lane:
         return ENCODER if self.kind == "weak" else EXACT
 
 
-WEAK_LANES = tuple(Lane("weak", tau, gated) for gated in (False, True) for tau in WEAK_FORGETTING_S)
+WEAK_LANES = (*(Lane("weak", tau) for tau in WEAK_FORGETTING_S), Lane("weak", 0.0, gated=False))
 STRONG_LANES = (
     *(Lane("strong", tau) for tau in STRONG_FORGETTING_S),
-    *(Lane("strong", tau, gated=True) for tau in STRONG_FORGETTING_S[-3:]),
+    *(Lane("strong", tau, gated=False) for tau in (10.0, 0.0)),
 )
 PEER_LANES = tuple(Lane(kind, tau) for kind in PEERS for tau in STRONG_FORGETTING_S)
 LANES = (*WEAK_LANES, *STRONG_LANES, *PEER_LANES)
@@ -100,7 +102,7 @@ class Outcome:
     not_finite : ticks and looks at which anything was not finite
     singular : looks at which p had just stepped and S with what the start brings along was not positive
     error_before, error_after : of w, per cent, before the disturbance and at the end
-    errors : largest error of w, d1, d2 at the end, in its own standard errors
+    errors : largest error of w, d1, d2 at the end, in its own standard errors, beyond FILTER_BIAS
     told : how the last windows or ticks ended
     disturbed : how they ended in the disturbance, by reason
     """
@@ -120,31 +122,31 @@ class Outcome:
         return self.told == Reason.UPDATED.text and not self.errors <= BACK
 
 
-def _strong(forgetting_s: float) -> StrongConfig:
-    """The strong form with a filter that is cheap enough for 10^7 ticks, and exact sensors."""
+def rig_of(lane: Lane) -> RigFile:
+    """The standard rig with the lane's settings; the strong form with a filter that is cheap enough for 10^7 ticks."""
     rig = RigFile.standard()
-    form = replace(rig.identifier, form="strong", stride=STRIDE, forgetting_s=forgetting_s)
-    return strong_config(replace(rig, identifier=form, sensor=replace(rig.sensor, phi_lsb=0.0, y_lsb=0.0)), RATE_HZ)
+    settings = replace(rig.identifier, forgetting_s=lane.forgetting_s, outlier_gate=None if lane.gated else 0.0)
+    sensor = replace(rig.sensor, phi_lsb=lane.sensing.phi_lsb, y_lsb=lane.sensing.y_lsb)
+    if lane.kind != "weak":
+        settings = replace(settings, form="strong", stride=STRIDE)
+    return replace(rig, identifier=settings, sensor=sensor)
+
+
+def _strong(forgetting_s: float) -> StrongConfig:
+    return strong_config(rig_of(Lane("strong", forgetting_s)), RATE_HZ)
 
 
 class _Core:
     """A lane of the shipped core."""
 
     def __init__(self, native: Native, lane: Lane) -> None:
-        rig = RigFile.standard()
-        sigmas, patience = (GATE_SIGMAS[lane.kind], GATE_PATIENCE * lane.forgetting_s) if lane.gated else (0.0, 0.0)
-        settings = replace(
-            rig.identifier,
-            forgetting_s=lane.forgetting_s,
-            outlier_gate=sigmas,
-            outlier_patience_s=patience,
-        )
+        rig = rig_of(lane)
         self.identifier: WeakIdentifier | StrongIdentifier
         if lane.kind == "weak":
-            self.identifier = native.weak(weak_config(replace(rig, identifier=settings), RATE_HZ))
+            self.identifier = native.weak(weak_config(rig, RATE_HZ))
         else:
-            config = replace(_strong(lane.forgetting_s), gate=GateConfig(sigmas, patience))
-            self.identifier = native.strong(config)
+            self.identifier = native.strong(strong_config(rig, RATE_HZ))
+        self.bias = FILTER_BIAS[lane.kind]
         self.outcome = Outcome()
         self._lately: list[int] = []
 
@@ -178,7 +180,8 @@ class _Core:
             self.outcome.error_before = error
             return
         self.outcome.error_after = error
-        self.outcome.errors = float(np.max(np.abs(seen["p"][:3] - truth) / seen["se"][:3]))
+        beyond = np.maximum(np.abs(seen["p"][:3] - truth) - np.array(self.bias) * truth, 0.0)
+        self.outcome.errors = float(np.max(beyond / seen["se"][:3]))
         alarms = [r for r in self._lately if r == Reason.MISFIT]
         self.outcome.told = Reason(alarms[-1] if alarms else (self._lately or [Reason.WARMING_UP])[-1]).text
 
@@ -256,10 +259,8 @@ def measure(
     scenario: str,
     lanes: Sequence[Lane],
     ticks: int,
-    progress: Callable[[int], None] | None = None,
 ) -> dict[str, Outcome]:
-    """Outcomes of the lanes by label; `progress` is told the ticks done, of all sensings together."""
-    done = 0
+    """Outcomes of the lanes by label."""
     outcomes = {}
     for sensing in dict.fromkeys(lane.sensing for lane in lanes):
         mine = [lane for lane in lanes if lane.sensing == sensing]
@@ -276,9 +277,6 @@ def measure(
             for one in ours:
                 one.run(phi32, y32, disturbed=signals.first <= tick < signals.last)
             tick += len(phi)
-            if progress is not None:
-                progress(done + tick)
-        done += tick
         for lane, one in zip(mine, ours, strict=True):
             one.compare(signals.w(1.0), at_end=True)
             outcomes[lane.label] = one.outcome
@@ -312,21 +310,29 @@ def save(results: Results, path: Path = RESULTS) -> None:
     path.write_text(json.dumps({"core": core_digest(), "scenarios": results}, indent=1), encoding="utf-8")
 
 
-def run_missing(
-    native: Native, ticks: int, scenarios: Sequence[str], folder: Path, progress: Callable[[str, int], None]
-) -> Results:
-    """Measures what is not there yet, a scenario after the other, and keeps each as soon as it is done.
+def _measure_alone(library: Path, scenario: str, ticks: int) -> dict[str, Any]:
+    """One scenario, in a process of its own."""
+    outcomes = measure(Native(), ctypes.CDLL(str(library)), scenario, LANES, ticks)
+    return {"ticks": ticks, "lanes": {label: asdict(one) for label, one in outcomes.items()}}
 
-    `progress(scenario, ticks)` follows, twice the run's ticks for each scenario.
+
+def run_missing(
+    ticks: int, scenarios: Sequence[str], folder: Path, processes: int, progress: Callable[[int], None]
+) -> Results:
+    """Measures what is not there yet, so many scenarios at a time, and keeps each as soon as it is done.
+
+    `progress` is told how many scenarios are there.
     """
-    library = build_library(folder)
+    library = Path(build_library(folder)._name)
     results = load()
-    for scenario in scenarios:
-        if results.get(scenario, {}).get("ticks", 0) < ticks:
-            outcomes = measure(native, library, scenario, LANES, ticks, partial(progress, scenario))
-            results[scenario] = {"ticks": ticks, "lanes": {label: asdict(one) for label, one in outcomes.items()}}
+    missing = [name for name in scenarios if results.get(name, {}).get("ticks", 0) < ticks]
+    progress(len(scenarios) - len(missing))
+    with ProcessPoolExecutor(processes) as pool:
+        work = {pool.submit(_measure_alone, library, name, ticks): name for name in missing}
+        for number, done in enumerate(as_completed(work), start=1):
+            results[work[done]] = done.result()
             save(results)
-        progress(scenario, 2 * ticks)
+            progress(len(scenarios) - len(missing) + number)
     return results
 
 

@@ -17,6 +17,7 @@ from pvid.twin import cholesky
 from pvid.twin import kapitza_strong as model
 from pvid.twin.gate import Gate
 from pvid.twin.information import Information
+from pvid.twin.misfit import Misfit
 from pvid.twin.pattern import PatternModel
 
 Float32 = npt.NDArray[np.float32]
@@ -94,16 +95,25 @@ class Estimator:
         gain = (np.float32(config.feedback_hz) * np.float32(config.divider)) / rate
         return np.float32(gain if config.feedback_hz > 0 and gain < 1 else 1)
 
-    def step(self, n: Float32, y: Float32, gate: Gate | None = None) -> npt.NDArray[np.uint8]:
+    def step(
+        self, n: Float32, y: Float32, gate: Gate | None = None, misfit: Misfit | None = None
+    ) -> npt.NDArray[np.uint8]:
         """One row a lane: N [11, lanes], Y [lanes]. Returns the reasons [lanes]; `sums` is up to date after it."""
         with np.errstate(all="ignore"):
-            passed = np.ones(len(y), np.bool_)
-            if gate is not None and gate.is_on:
-                e, _ = model.innovate(self.p, n, y)
-                passed = gate.passes(e * e)
-            return self._step(n, y, passed)
+            e, gradient = model.innovate(self.p, n, y)
+            if misfit is not None:
+                misfit.take(e, gradient[0] * self.p[0])
+            passed = np.ones(len(y), np.bool_) if gate is None else gate.passes(e * e)
+            reason = self._step(n, y, e, gradient, passed)
+            if misfit is not None:
+                told = misfit.alarm & (reason == Reason.UPDATED)
+                reason[told] = Reason.MISFIT
+                self.counters["misfits"] += told
+            return reason
 
-    def _step(self, n: Float32, y: Float32, passed: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    def _step(
+        self, n: Float32, y: Float32, e: Float32, gradient: Float32, passed: npt.NDArray[np.bool_]
+    ) -> npt.NDArray[np.uint8]:
         squares = y * y
         for entry in n:
             squares = squares + entry * entry
@@ -122,7 +132,6 @@ class Estimator:
             return reason
         listening = taken & (self.gain < 1)
         if listening.any():
-            e, gradient = model.innovate(self.p, n, y)
             self.innovation = np.where(listening, self.innovation + gradient * e, self.innovation)
         self.sums = self.information.add(model.terms(n, y), taken)
         self.counters["rows"] += taken

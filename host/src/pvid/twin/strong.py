@@ -13,6 +13,7 @@ from pvid.twin import kapitza_strong as model
 from pvid.twin.differentiator import derivatives
 from pvid.twin.estimator import Estimator
 from pvid.twin.gate import Gate
+from pvid.twin.misfit import Misfit
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
@@ -48,6 +49,8 @@ class StrongTwin:
         rate = np.float32(config.sample_rate)
         floor = np.float32(1e-6) * self.estimator.row_variance
         self.gate = Gate(config.gate, rate, np.float32(0.25) * rate, floor)
+        settings = estimators or [config.estimator]
+        self.misfit = Misfit(rate, np.array([one.forgetting_s for one in settings], np.float32))
 
     def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, Reasons]:
         """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
@@ -88,7 +91,7 @@ class StrongTwin:
         Returns what every tick told, [ticks, lanes].
         """
         n, row_y, fate = self.rows(phi, y)
-        return follow_rows(self.estimator, n, row_y, fate, after, self.gate)
+        return follow_rows(self.estimator, n, row_y, fate, after, self.gate, self.misfit)
 
     def run(
         self,
@@ -100,7 +103,9 @@ class StrongTwin:
     ) -> TwinRecord:
         """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
         n, row_y, fate = self.rows(phi, y)
-        return run_rows(self.estimator, n, row_y, fate=fate, sums=sums, progress=progress, gate=self.gate)
+        return run_rows(
+            self.estimator, n, row_y, fate=fate, sums=sums, progress=progress, gate=self.gate, misfit=self.misfit
+        )
 
 
 def run_rows(
@@ -112,6 +117,7 @@ def run_rows(
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
     gate: Gate | None = None,
+    misfit: Misfit | None = None,
 ) -> TwinRecord:
     """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share.
 
@@ -129,7 +135,7 @@ def run_rows(
         if progress is not None and tick % 512 == 0:
             progress(tick)
 
-    reason = follow_rows(estimator, n, y, fate, record, gate)
+    reason = follow_rows(estimator, n, y, fate, record, gate, misfit)
     return TwinRecord(p=p, sums=state, reason=reason, published=np.empty((0, model.N_P, lanes), np.float32))
 
 
@@ -140,6 +146,7 @@ def follow_rows(
     fate: Reasons | None,
     after: Callable[[int, Reasons], None],
     gate: Gate | None = None,
+    misfit: Misfit | None = None,
 ) -> Reasons:
     """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
 
@@ -152,7 +159,7 @@ def follow_rows(
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
         if fate is None or fate[tick] == Reason.ACCUMULATED:
-            reason[tick] = estimator.step(wide_n[tick], wide_y[tick], gate)
+            reason[tick] = estimator.step(wide_n[tick], wide_y[tick], gate, misfit)
         else:
             reason[tick] = fate[tick]
             if fate[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):

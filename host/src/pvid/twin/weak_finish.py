@@ -66,7 +66,7 @@ def rows(
 
 def _stages_of_rows(design: WeakTables) -> int:
     parts = -(-design.functions // _FUNCTIONS_A_STAGE)
-    return 7 * design.functions + 2 + 4 * parts
+    return 7 * design.functions + 2 + 5 * parts
 
 
 def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEstimator, angle: Angle | None) -> int:
