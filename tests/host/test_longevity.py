@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pvid.bench import longevity
+from pvid import replay_image
+from pvid.bench import longevity, longevity_target
 from pvid.bench.longevity import (
     ENCODER,
     LANES,
@@ -22,7 +23,9 @@ from pvid.bench.longevity import (
     Outcome,
 )
 from pvid.bench.longevity_signals import RATE_HZ, SCENARIOS, Signals
+from pvid.boards import board
 from pvid.compare import first_difference
+from pvid.errors import PvidError
 from pvid.native import Native, Reason
 from pvid.rig import Sensors, simulate
 from pvid.rigfile import RigFile
@@ -183,3 +186,59 @@ def test_wrong_answers_without_a_word_are_called_silent() -> None:
     assert Outcome(told="updated", errors=float("nan")).silent
     assert not Outcome(told="updated", errors=2.0).silent
     assert not Outcome(told="misfit", errors=40.0).silent
+
+
+def test_an_error_is_charged_beyond_the_filter_s_own() -> None:
+    assert longevity.FILTER_BIAS["weak"] == (0.0, 0.0, 0.0)
+    assert max(longevity.FILTER_BIAS["strong"]) < 0.005
+
+
+def test_two_processes_do_what_one_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(longevity, "RESULTS", tmp_path / "longevity.json")
+    monkeypatch.setattr(longevity, "LANES", (Lane("weak", 0.0), Lane("RLS", 1.0)))
+    told: list[int] = []
+    names = ("perfect", "absent")
+    found = longevity.run_missing(50_000, names, tmp_path, 2, told.append)
+    assert told == [0, 1, 2]
+    again = longevity.run_missing(50_000, names, tmp_path, 1, told.append)
+    assert told[3:] == [2]
+    assert json.dumps(again, sort_keys=True) == json.dumps(found, sort_keys=True)
+    library = longevity.build_library(tmp_path)
+    alone = longevity.measure(Native(), library, "absent", longevity.LANES, 50_000)
+    assert found["absent"]["lanes"]["weak, none"]["error_after"] == alone["weak, none"].error_after
+
+
+# ---- on a board ----
+
+
+@pytest.mark.parametrize(("scenario", "form"), [("dropped samples", "weak"), ("step", "strong")])
+def test_a_board_has_the_host_s_hashes(
+    scenario: str, form: str, library: ctypes.CDLL, native: Native, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the long runs' way: samples in a file that the assembler takes in
+    monkeypatch.setattr(replay_image, "MANY_TICKS", 10_000)
+    found = longevity_target.measure_on(board("mps2-an386"), library, native, scenario, form, 20_000)
+    assert (found.ticks, found.compared, found.differs_at) == (20_000, 40, None)
+    assert found.cells[-1] == "equal"
+
+
+def test_counts_are_the_samples(library: ctypes.CDLL) -> None:
+    run = longevity_target.run_of(library, "dropped samples", "weak", 40_000)
+    missing = run.counts[:, 0] == replay_image.MISSING
+    assert missing.any()
+    assert np.array_equal(missing, np.isnan(run.phi))
+    assert np.array_equal(missing, np.isnan(run.y))
+    phi = np.concatenate([phi for phi, _ in Signals(library, "dropped samples", 40_000, ENCODER).chunks()])
+    assert np.array_equal(run.phi[~missing], phi[~missing].astype(np.float32))
+
+
+def test_what_does_not_fit_a_count_is_left_out_and_refused(library: ctypes.CDLL) -> None:
+    assert ("sensor wrap", "strong") not in longevity_target.combinations(tuple(SCENARIOS))
+    assert len(longevity_target.combinations(tuple(SCENARIOS))) == 2 * len(SCENARIOS) - 1
+    with pytest.raises(PvidError, match='"sensor wrap" does not fit 16-bit counts'):
+        longevity_target.run_of(library, "sensor wrap", "strong", 40_000)
+
+
+def test_a_hash_that_differs_is_named() -> None:
+    one = longevity_target.OnBoard("mps2-an386", "perfect", "weak", 1000, 1, 2, 1000)
+    assert one.cells[-1] == "DIFFERENT within the 500 before 1000"

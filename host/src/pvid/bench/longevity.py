@@ -40,6 +40,7 @@ from pvid.setup import strong_config, weak_config
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
 
+LIBRARY = "liblongevity.so"
 RESULTS = ROOT / "build" / "longevity.json"
 STRIDE = 8  # ticks between the points of the strong form's Savitzky-Golay filters
 STRONG_FORGETTING_S = (0.1, 1.0, 10.0, 100.0, 0.0)
@@ -238,7 +239,7 @@ def build_library(folder: Path) -> ctypes.CDLL:
     """The motion and the baselines of tests/longevity, built with the core's options into `folder`."""
     core, here, cost = (ROOT / name for name in ("firmware", "tests/longevity", "tests/cost"))
     sources = [*sorted((core / "src").glob("*.c")), *sorted(here.glob("*.c")), cost / "rls_f32.c"]
-    library = folder / "liblongevity.so"
+    library = folder / LIBRARY
     folder.mkdir(parents=True, exist_ok=True)
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=default"]
     command += [f"-I{path}" for path in (core / "include", here, cost)]
@@ -296,23 +297,25 @@ def core_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def load(path: Path = RESULTS) -> Results:
-    """Results of earlier runs with the present core, by scenario; none where there are none."""
+def load(path: Path | None = None) -> Results:
+    """Results of earlier runs with the present core, by scenario, from RESULTS; none where there are none."""
+    path = path or RESULTS
     if not path.exists():
         return {}
     stored = json.loads(path.read_text(encoding="utf-8"))
     return stored["scenarios"] if stored.get("core") == core_digest() else {}
 
 
-def save(results: Results, path: Path = RESULTS) -> None:
-    """Keeps them for the next call, which goes on from there."""
+def save(results: Results, path: Path | None = None) -> None:
+    """Keeps them in RESULTS for the next call, which goes on from there."""
+    path = path or RESULTS
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps({"core": core_digest(), "scenarios": results}, indent=1), encoding="utf-8")
 
 
-def _measure_alone(library: Path, scenario: str, ticks: int) -> dict[str, Any]:
+def _measure_alone(library: Path, scenario: str, lanes: Sequence[Lane], ticks: int) -> dict[str, Any]:
     """One scenario, in a process of its own."""
-    outcomes = measure(Native(), ctypes.CDLL(str(library)), scenario, LANES, ticks)
+    outcomes = measure(Native(), ctypes.CDLL(str(library)), scenario, lanes, ticks)
     return {"ticks": ticks, "lanes": {label: asdict(one) for label, one in outcomes.items()}}
 
 
@@ -323,12 +326,13 @@ def run_missing(
 
     `progress` is told how many scenarios are there.
     """
-    library = Path(build_library(folder)._name)
+    build_library(folder)
+    library = folder / LIBRARY
     results = load()
     missing = [name for name in scenarios if results.get(name, {}).get("ticks", 0) < ticks]
     progress(len(scenarios) - len(missing))
     with ProcessPoolExecutor(processes) as pool:
-        work = {pool.submit(_measure_alone, library, name, ticks): name for name in missing}
+        work = {pool.submit(_measure_alone, library, name, LANES, ticks): name for name in missing}
         for number, done in enumerate(as_completed(work), start=1):
             results[work[done]] = done.result()
             save(results)
