@@ -242,3 +242,13 @@ def test_what_does_not_fit_a_count_is_left_out_and_refused(library: ctypes.CDLL)
 def test_a_hash_that_differs_is_named() -> None:
     one = longevity_target.OnBoard("mps2-an386", "perfect", "weak", 1000, 1, 2, 1000)
     assert one.cells[-1] == "DIFFERENT within the 500 before 1000"
+
+
+def test_the_long_columns_are_kept_beside_the_others() -> None:
+    lanes = {lane.label: vars(Outcome(ticks=7, told="updated", errors=1.0, error_after=0.5)) for lane in LANES}
+    kept = {"perfect": {"ticks": 7, "lanes": lanes}, "step" + longevity.LONG: {"ticks": 10**7, "lanes": lanes}}
+    found = {marker: (header, rows) for marker, header, rows in longevity.tables(kept)}
+    header, rows = found["longevity-long"]
+    assert header == ("disturbance", "ticks", "weak, 10 s", "weak, none", "strong, 1 s", "strong, none")
+    assert rows == [(f"step: {SCENARIOS['step']}", "1e7", "0.5 %", "0.5 %", "0.5 %", "0.5 %")]
+    assert [len(found[marker][1]) for marker in ("longevity-weak", "longevity-strong", "longevity-peers")] == [1, 1, 1]

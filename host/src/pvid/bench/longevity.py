@@ -1,4 +1,4 @@
-"""How long it lives: 10^7 ticks of every disturbance and forgetting, beside textbook and UD recursive least squares.
+"""How long it lives: millions of ticks of every disturbance and forgetting, beside textbook and UD least squares.
 
 Looked for: anything that is not finite; a matrix S that is not positive without a reason told; an answer that is far
 from the truth by its own standard errors, long after the disturbance is over, and says nothing. Samples are made and
@@ -91,6 +91,8 @@ STRONG_LANES = (
 )
 PEER_LANES = tuple(Lane(kind, tau) for kind in PEERS for tau in STRONG_FORGETTING_S)
 LANES = (*WEAK_LANES, *STRONG_LANES, *PEER_LANES)
+LONG_LANES = (Lane("weak", 10.0), Lane("weak", 0.0), Lane("strong", 1.0), Lane("strong", 0.0))
+LONG = ", long"  # behind a scenario, where its results are those of LONG_LANES
 
 
 @dataclass
@@ -320,21 +322,28 @@ def _measure_alone(library: Path, scenario: str, lanes: Sequence[Lane], ticks: i
 
 
 def run_missing(
-    ticks: int, scenarios: Sequence[str], folder: Path, processes: int, progress: Callable[[int], None]
+    ticks: int,
+    scenarios: Sequence[str],
+    folder: Path,
+    processes: int,
+    progress: Callable[[int], None],
+    *,
+    long: bool = False,
 ) -> Results:
     """Measures what is not there yet, so many scenarios at a time, and keeps each as soon as it is done.
 
-    `progress` is told how many scenarios are there.
+    All lanes, or LONG_LANES alone. `progress` is told how many scenarios are there.
     """
+    lanes, suffix = (LONG_LANES, LONG) if long else (LANES, "")
     build_library(folder)
     library = folder / LIBRARY
     results = load()
-    missing = [name for name in scenarios if results.get(name, {}).get("ticks", 0) < ticks]
+    missing = [name for name in scenarios if results.get(name + suffix, {}).get("ticks", 0) < ticks]
     progress(len(scenarios) - len(missing))
     with ProcessPoolExecutor(processes) as pool:
-        work = {pool.submit(_measure_alone, library, name, LANES, ticks): name for name in missing}
+        work = {pool.submit(_measure_alone, library, name, lanes, ticks): name for name in missing}
         for number, done in enumerate(as_completed(work), start=1):
-            results[work[done]] = done.result()
+            results[work[done] + suffix] = done.result()
             save(results)
             progress(len(scenarios) - len(missing) + number)
     return results
@@ -355,14 +364,15 @@ def _cell(lane: Lane, one: Outcome, ticks: int) -> str:
 
 def tables(results: Results) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
     """Marker, header and rows of the tables in host/README.md."""
-    for marker, lanes in (
-        ("longevity-weak", WEAK_LANES),
-        ("longevity-strong", STRONG_LANES),
-        ("longevity-peers", PEER_LANES),
+    for marker, lanes, suffix in (
+        ("longevity-long", LONG_LANES, LONG),
+        ("longevity-weak", WEAK_LANES, ""),
+        ("longevity-strong", STRONG_LANES, ""),
+        ("longevity-peers", PEER_LANES, ""),
     ):
         rows = []
         for scenario, meaning in SCENARIOS.items():
-            stored = results.get(scenario)
+            stored = results.get(scenario + suffix)
             if stored is None:
                 continue
             outcomes = [Outcome(**stored["lanes"][lane.label]) for lane in lanes]
