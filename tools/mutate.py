@@ -6,8 +6,8 @@
 
 The quick tests are two: what tests/host/playback.py plays through the shared library, under every setting of every form
 and core, whose bits the suite compares with the numpy twin; and the CMocka programs of tests/unit, as they are, then
-under clang's sanitizers as in tools/test. A crash and a loop without an end are noticed, too. A change that leaves the
-object code as it was is no mutant.
+those that take less than a second under clang's address and undefined-behaviour sanitizers. A crash and a loop without
+an end are noticed, too. A change that leaves the object code as it was is no mutant.
 
 A survivor stands in tests/mutants.toml with its reason, or the command fails. `equivalent = true` there says that no
 test could see it, and why; such a mutant is left out of the second of the two rates.
@@ -202,10 +202,7 @@ NATIVE = Kit("native", "gcc", ("-std=c99", *SIZES))
 PLAIN = Kit("plain", "gcc", ("-std=c99",))
 WRAPS = f"-fsanitize-ignorelist={ROOT / 'tests' / 'sanitizers.ignore'}"
 CHECKS = "-fsanitize=address,undefined,float-cast-overflow,integer"
-SANITIZERS = (
-    Kit("address", "clang", ("-std=c11", WRAPS), (CHECKS, "-fno-sanitize-recover=all")),
-    Kit("memory", "clang", ("-std=c99",), ("-fsanitize=memory", "-fno-sanitize-recover=all")),
-)
+SANITIZERS = (Kit("address", "clang", ("-std=c11", WRAPS), (CHECKS, "-fno-sanitize-recover=all")),)
 
 
 def ran(command: Sequence[str | Path]) -> bool:

@@ -161,6 +161,13 @@ def weak_variants() -> list[Variant]:
     open_door = {"trust": TrustConfig(**hasty), "drive_min": 0.0}, {"trust": TrustConfigQ31(**hasty), "drive_min": 0}
     add("hostile", hostile_samples(), others=open_door[0], others_q31=open_door[1])
     add("shut at once", samples, others=open_door[0], others_q31=open_door[1])
+    add(
+        "never shut",
+        samples,
+        with_settings(forgetting_s=1e5),
+        others={"trust": TrustConfig(shut_max=0)},
+        others_q31={"trust": TrustConfigQ31(shut_max=0)},
+    )
     add("gate", samples, with_settings(outlier_gate=4.0, outlier_patience_s=3.0))
     found.append(Variant("weak, small angles", replace(weak_config(RIG, RATE), angle_limit=0.1), samples))
     for full_angle, damping in ((True, False), (True, True), (False, True)):

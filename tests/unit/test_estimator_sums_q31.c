@@ -161,6 +161,42 @@ static void rows_of_any_size_say_the_same(void **state)
     }
 }
 
+/* A start that is worth as much as 1500 rows takes half of a step away, also where the sums were divided by four. */
+static void the_start_weighs_the_same_beside_sums_of_any_size(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 small;
+    static pvid_estimator_q31 large;
+    pvid_model_q31 measured = model;
+    measured.positive = 13u; /* steps are measured by p, not by the narrow start; p[1] starts where it belongs */
+    config.model = &measured;
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        config.start_sd[i] = P_ONE / 1000;
+        config.lower[i] = (i == 1u) ? config.lower[i] : 1;
+    }
+    config.start[1] = -P_ONE / 2;
+    config.divider = 1500;
+    config.row_sd = 256 * 1460; /* 37800 of an entry, 0.001, and the root of 1500 */
+    assert_int_equal(pvid_estimator_init_q31(&small, &config), PVID_OK);
+    config.row_sd <<= 10;
+    assert_int_equal(pvid_estimator_init_q31(&large, &config), PVID_OK);
+    for (int i = 0; i < 1500; i++) {
+        const uint32_t seed = generator;
+        add_row(&small, 0);
+        generator = seed;
+        add_row(&large, 10);
+        const pvid_reason reason = (i < 1499) ? PVID_ACCUMULATED : PVID_UPDATED;
+        assert_int_equal(pvid_estimator_update_q31(&small), reason);
+        assert_int_equal(pvid_estimator_update_q31(&large), reason);
+    }
+    assert_true(large.information.exponent >= 1);
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        const double way = (a == 1u) ? 0.5 : ((p_of(&small, a) - 0.5) / (truth[a] - 0.5));
+        assert_true((way > 0.45) && (way < 0.55));
+        assert_true(fabs(p_of(&small, a) - p_of(&large, a)) < 1.0e-5);
+    }
+}
+
 /* What is expected of the noise, before there are rows to tell, is in the sums' unit as well. */
 static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
 {
@@ -338,6 +374,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_of_any_size_say_the_same),
+        cmocka_unit_test_setup(the_start_weighs_the_same_beside_sums_of_any_size, start_again),
         cmocka_unit_test_setup(the_expected_noise_is_in_the_unit_of_the_sums, start_again),
         cmocka_unit_test_setup(a_row_at_its_limit_fits, start_again),
         cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),

@@ -1,0 +1,249 @@
+/* What is beyond float32, a format or a counter is told, held or refused, each by itself. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "estimator_q31.h"
+#include "plant.h"
+#include "pvid/pvid.h"
+#include "strong_table_q31.h"
+#include "weak_table_q31.h"
+
+/* ---- physical parameters in float32 ---- */
+
+static bool physical(float w, float d1, float d2, float l1, float w_variance, float d1_variance, float d2_variance)
+{
+    pvid_estimate_f32 estimate;
+    memset(&estimate, 0, sizeof estimate);
+    estimate.p[PVID_KAPITZA_W] = w;
+    estimate.p[PVID_KAPITZA_D1] = d1;
+    estimate.p[PVID_KAPITZA_D2] = d2;
+    estimate.covariance[0][0] = w_variance;
+    estimate.covariance[1][1] = d1_variance;
+    estimate.covariance[2][2] = d2_variance;
+    pvid_kapitza_f32 value = {1.0f, 2.0f, 3.0f};
+    pvid_kapitza_f32 se = {4.0f, 5.0f, 6.0f};
+    const bool told = pvid_kapitza_physical_f32(&estimate, l1, &value, &se);
+    assert_true(told == (value.g != 1.0f)); /* left unwritten unless */
+    assert_true(told == (se.rho2 != 6.0f));
+    return told;
+}
+
+static void physical_parameters_are_finite_or_none(void **state)
+{
+    (void)state;
+    assert_true(physical(31.0f, 8.9f, 5.6f, 0.3f, 1.0f, 1.0f, 1.0f));
+    assert_false(physical(1.0e38f, 8.9f, 5.6f, 1.0e6f, 0.0f, 0.0f, 0.0f));      /* g */
+    assert_false(physical(31.0f, 1.0e30f, 1.0e-10f, 0.3f, 0.0f, 0.0f, 0.0f));    /* l2 */
+    assert_false(physical(31.0f, 1.00001f, 2.0e-39f, 1.0e3f, 0.0f, 0.0f, 0.0f)); /* rho2, and not l2 */
+    assert_false(physical(1.0f, 8.9f, 5.6f, 1.0e21f, 1.0e38f, 0.0f, 0.0f));     /* of g */
+    assert_false(physical(31.0f, 8.9f, 0.1f, 1.0e3f, 0.0f, 3.0e38f, 0.0f));     /* of l2 */
+    assert_false(physical(31.0f, 2.00001f, 1.0f, 1.0f, 0.0f, 3.0e38f, 0.0f));   /* of rho2, and not of l2 */
+}
+
+/* ---- where p is put ---- */
+
+static void a_place_is_a_number_within_the_bounds(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
+    config.model = &pvid_kapitza_weak_f32;
+    config.update_rate_hz = 1.0f;
+    config.row_sd = 1.0f;
+    for (int i = 0; i < 4; i++) {
+        config.start[i] = 2.0f;
+        config.start_sd[i] = 1.0f;
+        config.lower[i] = 1.0f;
+        config.upper[i] = 4.0f;
+    }
+    pvid_estimator_f32 estimator;
+    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_OK);
+    const float there[4] = {0.5f, NAN, 5.0f, 3.0f};
+    pvid_estimator_place_f32(&estimator, there);
+    const float placed[4] = {1.0f, 2.0f, 4.0f, 3.0f};
+    assert_memory_equal(estimator.p, placed, sizeof placed);
+    assert_true(estimator.theta[0] == 2.0f); /* d1, at the new p */
+}
+
+/* ---- rows of the fixed-point strong form: each entry may be the one that does not fit ---- */
+
+static bool row_fits(int32_t phi0, int32_t phi2, int32_t phi4, int32_t u0, int32_t u1, int32_t u2)
+{
+    const pvid_strong_row_q31 exact = {0};
+    const int32_t phi[PVID_ORDERS] = {phi0, 0, phi2, 0, phi4};
+    const int32_t u[PVID_Y_ORDERS_Q31] = {u0, u1, u2};
+    int32_t n[PVID_KAPITZA_STRONG_THETA];
+    int32_t y;
+    return pvid_kapitza_strong_row_q31(&exact, phi, u, &y, n);
+}
+
+static void each_entry_of_a_row_may_be_too_large(void **state)
+{
+    (void)state;
+    const int32_t limit = PVID_ROW_LIMIT_Q31;
+    assert_true(row_fits(1, 1, 1, 1, 1, 1));
+    assert_true(row_fits(0, limit, 0, 1, 0, 0));
+    assert_false(row_fits(0, limit + 1, 0, 1, 0, 0)); /* u phi2 */
+    assert_true(row_fits(limit, 0, 0, 1, 0, 0));
+    assert_false(row_fits(limit + 1, 0, 0, 1, 0, 0)); /* phi */
+    assert_false(row_fits(0, 0, limit + 1, 0, 0, 0)); /* phi4 */
+    assert_false(row_fits(0, 1 << 15, 0, 0, 1 << 15, 0)); /* u1 phi2 */
+    assert_false(row_fits(0, 1 << 9, 0, 0, 1 << 10, 0));  /* 2 u1 u1 phi2: Y */
+    assert_false(row_fits(0, 1 << 15, 0, 0, 0, 1 << 15)); /* u2 phi2: the bracket */
+    assert_false(row_fits(0, 0, 1 << 14, 1 << 14, 0, 0)); /* u phi4 */
+    assert_false(row_fits(0, 1 << 10, 0, 1 << 7, 0, 0));  /* u^3 phi2 = 2^31 */
+    assert_false(row_fits(1 << 9, 0, 0, 1 << 5, 0, 0));   /* u^4 phi = 2^29 */
+}
+
+static pvid_weak_q31 identifier;
+
+/* ---- what is remembered ---- */
+
+static void a_weight_beyond_its_counter_is_its_end(void **state)
+{
+    (void)state;
+    assert_int_equal(pvid_weak_init_q31(&identifier, &weak_unit), PVID_OK);
+    pvid_information_q31 *information = &identifier.estimator.information;
+    pvid_estimate_q31 estimate;
+    int64_t *weight = &information->sums[information->n_sums - 1u];
+    *weight = ((int64_t)UINT32_MAX << 16) + 65535;
+    pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+    assert_true(estimate.weight == UINT32_MAX);
+    *weight = (int64_t)1 << 50;
+    pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+    assert_true(estimate.weight == UINT32_MAX);
+    *weight = ((int64_t)UINT32_MAX - 1) << 16;
+    pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+    assert_true(estimate.weight == UINT32_MAX - 1u);
+}
+
+/* ---- a whole run of which no row fits ---- */
+
+static void run_strong(const pvid_strong_config_q31 *config)
+{
+    static pvid_strong_q31 self;
+    assert_int_equal(pvid_strong_init_q31(&self, config), PVID_OK);
+    plant_state plant = released_plant();
+    uint32_t refused = 0;
+    for (int i = 0; i < 400; i++) {
+        double phi;
+        double y;
+        plant_step(&plant, &phi, &y);
+        const pvid_reason reason = pvid_strong_step_q31(&self, (int32_t)floor((phi / 5.992112452678286e-06) + 0.5),
+                                                        (int32_t)floor((y / 5.0e-06) + 0.5));
+        assert_true((reason == PVID_WARMING_UP) == (i < 80));
+        refused += (reason == PVID_REJECTED_SATURATED) ? 1u : 0u;
+    }
+    assert_int_equal(self.estimator.counters.rejected_saturated, refused);
+    assert_int_equal(self.estimator.counters.rows + refused, 320);
+    assert_true(refused >= 100u);
+}
+
+static void rows_that_do_not_fit_are_counted_tick_by_tick(void **state)
+{
+    (void)state;
+    pvid_strong_config_q31 config = strong_unit;
+    config.drive_min = 0;
+    memset(&config.row, 0, sizeof config.row); /* products as they are: 60 bits */
+    run_strong(&config);
+    config = strong_unit;
+    config.drive_min = 0;
+    for (int i = 0; i < 3; i++) { /* p so far off that no innovation fits */
+        config.estimator.start[i] = config.estimator.upper[i];
+    }
+    run_strong(&config);
+    config.gate.sigmas = 3u << 16; /* the gate has nothing to weigh */
+    run_strong(&config);
+}
+
+static void a_snapshot_of_another_form_is_of_another_kind(void **state)
+{
+    (void)state;
+    static pvid_strong_q31 other;
+    static uint8_t image[PVID_SNAPSHOT_WEAK_Q31];
+    static uint8_t strong_image[PVID_SNAPSHOT_STRONG_Q31];
+    assert_int_equal(pvid_weak_init_q31(&identifier, &weak_unit), PVID_OK);
+    assert_int_equal(pvid_strong_init_q31(&other, &strong_unit), PVID_OK);
+    const size_t n = pvid_snapshot_save_weak_q31(&identifier, &weak_unit, 1, image, sizeof image);
+    const size_t m = pvid_snapshot_save_strong_q31(&other, &strong_unit, 1, strong_image, sizeof strong_image);
+    assert_int_equal(pvid_snapshot_restore_strong_q31(&other, &strong_unit, image, n), PVID_SNAPSHOT_OTHER_KIND);
+    assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &weak_unit, strong_image, m),
+                     PVID_SNAPSHOT_OTHER_KIND);
+    assert_int_equal(pvid_snapshot_restore_strong_q31(&other, &strong_unit, strong_image, m), PVID_SNAPSHOT_RESTORED);
+}
+
+/* ---- a design whose Gram tables say nothing, or too little ---- */
+
+static void run(const pvid_weak_design_q31 *design, int reasons[16])
+{
+    pvid_weak_config_q31 config = weak_unit;
+    config.design = design;
+    assert_int_equal(pvid_weak_init_q31(&identifier, &config), PVID_OK);
+    plant_state plant = released_plant();
+    memset(reasons, 0, 16 * sizeof reasons[0]);
+    for (int i = 0; i < 12000; i++) {
+        double phi;
+        double y;
+        plant_step(&plant, &phi, &y);
+        reasons[pvid_weak_step_q31(&identifier, (int32_t)floor((phi / 3.834951969714103e-4) + 0.5),
+                                   (int32_t)floor((y / 5.0e-6) + 0.5))]++;
+    }
+}
+
+/* Without a factor the rows keep the whitening of the design, which is made at its nominal p: still the same answer. */
+static void a_gram_matrix_that_cannot_be_factored_leaves_the_designs_whitening(void **state)
+{
+    (void)state;
+    static int32_t nothing[PVID_WEAK_GRAMS * 21];
+    static const double unit[3] = {4.0421986745463477e-07, 5.9604644775390625e-08, 2.9802322387695312e-08};
+    int reasons[16];
+    pvid_weak_design_q31 design = weak_unit_design;
+    design.gram = nothing;
+    run(&design, reasons);
+    assert_false(identifier.finish.whitened);
+    assert_int_equal(identifier.estimator.counters.rejected_saturated, 0);
+    assert_true(identifier.estimator.counters.rows >= 90u);
+    for (int k = 0; k < 3; k++) {
+        assert_true(fabs((unit[k] * (double)identifier.estimator.p[k] / plant_p[k]) - 1.0) < 0.02);
+    }
+}
+
+/* A factor that is far too small makes rows far too large: they are refused and counted, and p stays. */
+static void rows_that_whitening_makes_too_large_are_refused(void **state)
+{
+    (void)state;
+    static int32_t small[PVID_WEAK_GRAMS * 21];
+    for (size_t i = 0; i < sizeof small / sizeof small[0]; i++) {
+        small[i] = weak_unit_design.gram[i] / (1 << 20);
+    }
+    int reasons[16];
+    pvid_weak_design_q31 design = weak_unit_design;
+    design.gram = small;
+    run(&design, reasons);
+    assert_true(identifier.estimator.counters.rejected_saturated > 0u);
+    assert_true(reasons[PVID_REJECTED_SATURATED] > 0);
+    for (int k = 0; k < 4; k++) {
+        const pvid_estimator_config_q31 *bounds = &weak_unit.estimator;
+        assert_true((identifier.estimator.p[k] >= bounds->lower[k]) && (identifier.estimator.p[k] <= bounds->upper[k]));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(physical_parameters_are_finite_or_none),
+        cmocka_unit_test(a_place_is_a_number_within_the_bounds),
+        cmocka_unit_test(each_entry_of_a_row_may_be_too_large),
+        cmocka_unit_test(rows_that_do_not_fit_are_counted_tick_by_tick),
+        cmocka_unit_test(a_snapshot_of_another_form_is_of_another_kind),
+        cmocka_unit_test(a_weight_beyond_its_counter_is_its_end),
+        cmocka_unit_test(a_gram_matrix_that_cannot_be_factored_leaves_the_designs_whitening),
+        cmocka_unit_test(rows_that_whitening_makes_too_large_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
