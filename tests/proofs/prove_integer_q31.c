@@ -1,7 +1,7 @@
 /* integer_q31: every argument that integer_q31.h allows, magnitudes an octave at a time, both signs, all shifts. */
 #include "prove.h"
 
-#include "integer_q31.h"
+#include "contracts.h"
 
 /* The octave of numbers of `bits` bits: 0, or 2^(bits-1)..2^bits - 1. */
 static int64_t of_bits(uint32_t bits, bool negative)
