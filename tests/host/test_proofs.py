@@ -1,4 +1,5 @@
-"""tools/prove.py says so when a module is not safe: a decoder that writes one byte too far is not proved."""
+"""tools/prove.py says so when a module is not safe: a decoder that writes one byte too far, a function that breaks
+the contract that others rely on."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def prove(top: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(top / "tools" / "prove.py"), "link"]
+def prove(top: Path, name: str = "link") -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(top / "tools" / "prove.py"), name]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -30,3 +31,17 @@ def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
     done = prove(tmp_path)
     assert done.returncode == 1
     assert "link.c" in done.stdout and "out of bounds index" in done.stdout
+
+
+def test_a_contract_that_is_not_kept_is_an_alarm(tmp_path: Path) -> None:
+    for name in ("firmware/include", "firmware/src", "tests/proofs"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    (tmp_path / "tools").mkdir()
+    shutil.copy(ROOT / "tools" / "prove.py", tmp_path / "tools")
+    scaled = tmp_path / "firmware" / "src" / "scaled_q31.c"
+    text = scaled.read_text(encoding="utf-8")
+    assert "#define DIGITS 30\n" in text
+    scaled.write_text(text.replace("#define DIGITS 30\n", "#define DIGITS 31\n"), encoding="utf-8")
+    done = prove(tmp_path, "scaled_of_q31")
+    assert done.returncode == 1
+    assert "function pvid_scaled_of_q31: postcondition got status unknown" in done.stdout
