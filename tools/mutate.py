@@ -178,10 +178,10 @@ class Kit:
     options: tuple[str, ...]
     checks: tuple[str, ...] = ()  # options of the linker as well
 
-    def compiles(self, target: Path, source: Path) -> bool:
-        """Compiles a file whose private headers stand beside it, or in firmware/src."""
+    def compiles(self, target: Path, source: Path, headers: Path = SOURCES) -> bool:
+        """Compiles a file whose private headers stand beside it, or in `headers`."""
         target.parent.mkdir(parents=True, exist_ok=True)
-        includes = [*INCLUDES, f"-I{source.parent}", f"-I{SOURCES}", f"-I{playback.UNIT}"]
+        includes = [*INCLUDES, f"-I{headers}", f"-I{SOURCES}"]
         return ran([self.compiler, *COMMON, *self.options, *self.checks, *includes, "-c", source, "-o", target])
 
     def links(self, target: Path, objects: list[Path]) -> Path:
@@ -368,9 +368,9 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
         program = BUILD / kit.name / "tests" / test
         if test in anew:
             program = folder / kit.name / test
-            source = folder / f"{test}.c"
-            shutil.copy(playback.UNIT / source.name, source)
-            if not kit.compiles(program.with_suffix(".o"), source) or not kit.links_test(program, library[0].parent):
+            source = playback.UNIT / f"{test}.c"
+            built = kit.compiles(program.with_suffix(".o"), source, folder)
+            if not built or not kit.links_test(program, library[0].parent):
                 raise SystemExit(f"{test} does not compile with {kit.name}: {mutant.told()}")
         if not passes(program, library[0].parent):
             return test if kit is PLAIN else f"{test} ({kit.name})"
