@@ -80,6 +80,19 @@ bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PV
     return pvid_cholesky_factor_f32(factor, n_p, (const float(*)[PVID_MAX_P])s);
 }
 
+bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
+                                   const float force[], float variance)
+{
+    float x[PVID_MAX_P];
+    float square = 0.0f;
+    pvid_cholesky_solve_f32(factor, force, x);
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        square += force[a] * x[a];
+    }
+    const float noise = (variance < self->row_variance) ? variance : self->row_variance;
+    return square <= (self->dead_zone * (self->correlation * noise));
+}
+
 static void assess_as_start(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate)
 {
     for (size_t a = 0; a < self->model->n_p; a++) {

@@ -94,6 +94,9 @@ static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
     if (!pvid_within_f32(config->noise_margin, 0.0f, 1.0e6f)) {
         return PVID_BAD_NOISE_MARGIN;
     }
+    if (!pvid_within_f32(config->dead_zone, 0.0f, 100.0f)) {
+        return PVID_BAD_DEAD_ZONE;
+    }
     if ((config->law != PVID_LAW_STATIONARY) && (config->law != PVID_LAW_PSEUDOVELOCITY)) {
         return PVID_BAD_LAW;
     }
@@ -135,6 +138,7 @@ pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimat
     self->step_limit = config->step_limit;
     self->kappa_min = config->kappa_min;
     self->noise_margin = config->noise_margin;
+    self->dead_zone = config->dead_zone * config->dead_zone;
     self->divider = config->divider;
     return PVID_OK;
 }
@@ -257,6 +261,7 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
 
 /* ---- the solve ---- */
 
+/* Counts why p stays where it is. */
 static pvid_reason hold(uint32_t *counter, pvid_reason reason)
 {
     pvid_count_up(counter);
@@ -269,6 +274,17 @@ static inline void complete_system(pvid_estimator_f32 *self, size_t a, float gai
     s[a][a] += self->prior[a];
     rhs[a] = (gain * rhs[a]) + ((1.0f - gain) * self->innovation[a]);
     self->innovation[a] = 0.0f;
+}
+
+/* For a model that projects its sums by itself. */
+static bool is_at_rest(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor)
+{
+    float sums[PVID_MAX_SUMS];
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float force[PVID_MAX_P];
+    pvid_information_read_f32(&self->information, sums);
+    const float energy = self->model->project(self->p, sums, &sums[self->model->n_moments], s, force);
+    return pvid_estimator_is_at_rest_f32(self, factor, force, pvid_estimator_variance_f32(self, sums, energy));
 }
 
 /* One step of p from S and F, for a model that projects its sums by itself. */
@@ -285,6 +301,9 @@ static pvid_reason step_of_any(pvid_estimator_f32 *self, float gain, float s[][P
     }
     if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
         return hold(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
+    }
+    if ((self->dead_zone > 0.0f) && is_at_rest(self, &factor)) {
+        return hold(&self->counters.at_rest, PVID_UPDATED);
     }
     pvid_cholesky_solve_f32(&factor, rhs, dp);
     const float size = pvid_estimator_size_f32(self, dp);
@@ -317,8 +336,8 @@ static inline void take_step_of_three(pvid_estimator_f32 *self, const float dp[]
     }
 }
 
-/* step_of_any for three parameters, the paper's number: the same, written out, so that S, its factor and dp stay in
- * registers. */
+/* step_of_any for three parameters, the paper's number, and no dead zone: the same, written out, so that S, its factor
+ * and dp stay in registers. */
 static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
 {
     float dp[PVID_MAX_P];
@@ -344,7 +363,8 @@ static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[]
 
 static inline pvid_reason step_of(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
 {
-    return (self->model->n_p == 3u) ? step_of_three(self, gain, s, rhs) : step_of_any(self, gain, s, rhs);
+    const bool plain = (self->model->n_p == 3u) && !(self->dead_zone > 0.0f);
+    return plain ? step_of_three(self, gain, s, rhs) : step_of_any(self, gain, s, rhs);
 }
 
 static pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, const float sums[])

@@ -118,6 +118,11 @@ pvid_reason pvid_estimator_solve_sums_f32(pvid_estimator_f32 *self, bool ends_gr
 bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
                                     float weight);
 
+/* Whether p is within the dead zone of estimator.h: force is F [n_p], factor that of S + H0, variance that of the
+ * residuals. False for what is no number. Cost: a solve. */
+bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
+                                   const float force[], float variance);
+
 /* s^2 of a row: residual sum of squares over degrees of freedom; row_sd^2 while there are none. */
 float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy);
 

@@ -10,6 +10,7 @@
 #define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
 #define FORMAT_MAX 64
 #define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
+#define DEAD_ZONE_MAX ((uint32_t)100 << 16)
 
 /* ---- configuration ---- */
 
@@ -88,6 +89,9 @@ static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
     if (config->noise_margin > NOISE_MARGIN_MAX) {
         return PVID_BAD_NOISE_MARGIN;
     }
+    if (config->dead_zone > DEAD_ZONE_MAX) {
+        return PVID_BAD_DEAD_ZONE;
+    }
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
 }
 
@@ -154,6 +158,7 @@ pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimat
     self->step_limit = config->step_limit;
     self->kappa_min = config->kappa_min;
     self->noise_margin = config->noise_margin;
+    self->dead_zone = config->dead_zone;
     self->divider = config->divider;
     return PVID_OK;
 }

@@ -47,7 +47,7 @@ static inline const int64_t *pvid_b_of_q31(const pvid_information_q31 *informati
 /* (sd 2^exponent / start_sd)^2 = prior 2^-(returned), prior of 31 bits; 0 < sd < 2^31. */
 int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior);
 
-/* *e = Y - N^T theta of a row; whether N, Y and e fit, that is whether the row may be taken in. e is held within 2^45. */
+/* *e = Y - N^T theta of a row; whether N, Y and e fit, that is whether the row may be taken in. |e| < 2^45. */
 bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e);
 
 /* Sets theta = f(p), and what rows are multiplied with. */

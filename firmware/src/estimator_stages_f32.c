@@ -95,6 +95,13 @@ static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     }
 }
 
+static bool is_at_rest(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
+{
+    return (self->dead_zone > 0.0f) &&
+           pvid_estimator_is_at_rest_f32(self, &solve->factor, solve->force,
+                                         pvid_estimator_variance_f32(self, solve->sums, 0.0f));
+}
+
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
@@ -104,7 +111,10 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
         self->innovation[a] = 0.0f;
     }
     memcpy(solve->p, self->p, sizeof solve->p);
-    if (solve->reason == PVID_UPDATED) {
+    if ((solve->reason == PVID_UPDATED) && is_at_rest(self, solve)) {
+        pvid_count_up(&self->counters.at_rest);
+        solve->rests = true;
+    } else if (solve->reason == PVID_UPDATED) {
         float dp[PVID_MAX_P];
         pvid_cholesky_solve_f32(&solve->factor, rhs, dp);
         const float size = pvid_estimator_size_f32(self, dp);
@@ -143,7 +153,7 @@ static size_t follow_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
 static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const bool steps = solve->reason == PVID_UPDATED;
-    if (!steps && (solve->refuge == NULL)) {
+    if (solve->rests || (!steps && (solve->refuge == NULL))) {
         return;
     }
     const size_t n = self->model->n_theta;
@@ -191,6 +201,7 @@ static void begin(pvid_estimator_solve_f32 *solve)
     solve->variance = 0.0f;
     solve->size = 0.0f;
     solve->ends_group = false;
+    solve->rests = false;
     solve->refuge = NULL;
     solve->estimate = NULL;
 }

@@ -3,6 +3,7 @@
 
 #include "count.h"
 #include "estimator_q31.h"
+#include "scaled_q31.h"
 
 enum {
     STAGE_MATRIX,   /* a few rows of M at a time, scaled */
@@ -27,6 +28,7 @@ enum {
 #define ROWS_A_STAGE 8u
 #define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
 #define PIVOTS_A_STAGE 2u
+#define REST_BITS 28 /* of F: products with a solution of 30 bits add up in 62 */
 
 static void hold(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
 {
@@ -154,21 +156,67 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     }
 }
 
+/* rhs = C^T force, scaled as the rows of q, and x, its solution; returns the exponent of x. */
+static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve_q31 *solve, const int32_t force[],
+                         int64_t rhs[PVID_MAX_P], int32_t x[])
+{
+    memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
+    for (size_t k = 0; k < model->n_c; k++) {
+        rhs[model->c_column[k]] += pvid_product_q31(solve->c[k], force[model->c_row[k]]);
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        rhs[a] = pvid_scale_q31(rhs[a], solve->g[a]);
+    }
+    return pvid_cholesky_solve_q31(&solve->factor, rhs, x);
+}
+
+/* F^T (S + H0)^-1 F, F of all data, in the unit of the sums of squares. */
+static pvid_scaled_q31 asked_of(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    const int64_t *b = pvid_b_of_q31(&self->information);
+    int64_t wide[PVID_MAX_THETA_Q31];
+    int32_t force[PVID_MAX_THETA_Q31];
+    for (size_t i = 0; i < n; i++) {
+        wide[i] = pvid_scale_q31(b[i], solve->h[i]);
+    }
+    const int32_t down = pvid_to_block_q31((uint32_t)n, wide, 30, force);
+    int64_t rhs[PVID_MAX_P];
+    int32_t x[PVID_MAX_P];
+    int32_t f[PVID_MAX_P];
+    const int32_t of_x = solve_for(self->model, solve, force, rhs, x);
+    const int32_t of_f = pvid_to_block_q31(self->model->n_p, rhs, REST_BITS, f);
+    int64_t sum = 0;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        sum += pvid_product_q31(f[a], x[a]);
+    }
+    return pvid_scaled_of_q31(sum, ((of_x + of_f + (2 * down)) - PVID_S_BITS) - 30);
+}
+
+/* Whether p is within the dead zone of estimator.h. */
+static bool is_at_rest(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    if (self->dead_zone == 0u) {
+        return false;
+    }
+    const pvid_scaled_q31 found = pvid_estimator_variance_q31(self);
+    const pvid_scaled_q31 told = pvid_estimator_expected_variance_q31(self);
+    const pvid_scaled_q31 noise = pvid_scaled_exceeds_q31(found, told) ? told : found;
+    const pvid_scaled_q31 wide = pvid_scaled_times_q31(noise, pvid_scaled_of_q31(self->correlation, -16));
+    const pvid_scaled_q31 zone = pvid_scaled_of_q31((int64_t)self->dead_zone * self->dead_zone, -32);
+    return !pvid_scaled_exceeds_q31(asked_of(self, solve), pvid_scaled_times_q31(zone, wide));
+}
+
 static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const pvid_model_q31 *model = self->model;
     if (solve->reason != PVID_UPDATED) {
         return;
     }
-    int64_t rhs[PVID_MAX_P] = {0};
+    solve->rests = is_at_rest(self, solve);
+    int64_t rhs[PVID_MAX_P];
     int32_t x[PVID_MAX_P];
-    for (size_t k = 0; k < model->n_c; k++) {
-        rhs[model->c_column[k]] += pvid_product_q31(solve->c[k], solve->force[model->c_row[k]]);
-    }
-    for (size_t a = 0; a < model->n_p; a++) {
-        rhs[a] = pvid_scale_q31(rhs[a], solve->g[a]);
-    }
-    const int32_t exponent = pvid_cholesky_solve_q31(&solve->factor, rhs, x) + solve->force_exponent;
+    const int32_t exponent = solve_for(model, solve, solve->force, rhs, x) + solve->force_exponent;
     for (size_t a = 0; a < model->n_p; a++) {
         const int32_t shift = ((solve->f[a] + solve->g[a]) - exponent) + PVID_S_BITS + 30;
         solve->dp[a] = pvid_clamp_q31(pvid_scale_q31(x[a], shift), STEP_MAX);
@@ -236,7 +284,9 @@ static void scale_theta_step(const pvid_estimator_q31 *self, pvid_estimator_solv
 static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     memcpy(solve->p, self->p, sizeof solve->p);
-    if (solve->reason == PVID_UPDATED) {
+    if (solve->rests) {
+        pvid_count_up(&self->counters.at_rest);
+    } else if (solve->reason == PVID_UPDATED) {
         solve->size = size_of(self, solve->dp);
         take_step(self, solve, solve->size, solve->p);
     } else if (solve->has_refuge) {
@@ -289,7 +339,7 @@ static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solv
 static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const bool steps = solve->reason == PVID_UPDATED;
-    if (!steps && !solve->has_refuge) {
+    if (solve->rests || (!steps && !solve->has_refuge)) {
         return;
     }
     const size_t n = self->model->n_theta;
@@ -340,6 +390,7 @@ static void begin(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solv
     solve->judging = false;
     solve->informed = true;
     solve->has_refuge = false;
+    solve->rests = false;
     solve->gain = PVID_ONE_Q30;
     solve->size = 0;
     solve->variance = pvid_estimator_expected_variance_q31(self); /* while p may still be far off */

@@ -32,6 +32,7 @@ static uint32_t estimator_of(uint32_t hash, const pvid_estimator_config_f32 *con
     running = one(running, config->step_limit);
     running = one(running, config->kappa_min);
     running = one(running, config->noise_margin);
+    running = one(running, config->dead_zone);
     running = pvid_fnv_word(running, (uint32_t)config->law);
     return pvid_fnv_word(running, config->divider);
 }

@@ -92,6 +92,7 @@ static uint32_t estimator_of(uint32_t hash, const pvid_estimator_config_q31 *con
     running = pvid_fnv_word(running, config->step_limit);
     running = words(running, &config->kappa_min, 1);
     running = pvid_fnv_word(running, config->noise_margin);
+    running = pvid_fnv_word(running, config->dead_zone);
     return pvid_fnv_word(running, config->divider);
 }
 

@@ -14,12 +14,6 @@
 /* 2^100: of squares, far beyond any row that is taken in. */
 static const pvid_scaled_q31 scale_max = {(int32_t)1 << 29, 71};
 
-static bool exceeds(pvid_scaled_q31 a, pvid_scaled_q31 b)
-{
-    const pvid_scaled_q31 less = {-b.m, b.e};
-    return pvid_scaled_plus_q31(a, less).m > 0;
-}
-
 pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *config, uint32_t memory,
                                pvid_scaled_q31 floor)
 {
@@ -51,7 +45,7 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
         return true;
     }
     const bool learning = self->judged < self->memory;
-    const bool passes = learning || !exceeds(square, pvid_scaled_times_q31(self->limit, self->scale));
+    const bool passes = learning || !pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->scale));
     pvid_scaled_q31 scale = self->scale;
     if (passes) {
         const pvid_scaled_q31 less = {-scale.m, scale.e};
@@ -61,7 +55,7 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
     } else {
         scale = pvid_scaled_times_q31(scale, self->widening);
     }
-    scale = exceeds(self->floor, scale) ? self->floor : scale;
-    self->scale = exceeds(scale, scale_max) ? scale_max : scale;
+    scale = pvid_scaled_exceeds_q31(self->floor, scale) ? self->floor : scale;
+    self->scale = pvid_scaled_exceeds_q31(scale, scale_max) ? scale_max : scale;
     return passes;
 }

@@ -15,6 +15,13 @@ pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
 pvid_scaled_q31 pvid_scaled_times_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
 pvid_scaled_q31 pvid_scaled_over_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
 
+/* a > b. */
+static inline bool pvid_scaled_exceeds_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
+{
+    const pvid_scaled_q31 less = {-b.m, b.e};
+    return pvid_scaled_plus_q31(a, less).m > 0;
+}
+
 /* a 2^exponent. */
 static inline pvid_scaled_q31 pvid_scaled_shifted_q31(pvid_scaled_q31 a, int32_t exponent)
 {

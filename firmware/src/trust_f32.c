@@ -6,6 +6,7 @@
 #include "count.h"
 #include "estimator_f32.h"
 #include "finite_f32.h"
+#include "trust_tell.h"
 
 const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .kappa_min = 3.0e-5f,
@@ -149,26 +150,14 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
         return reason;
     }
-    if ((reason == PVID_UPDATED) || (pvid_trust_refuge_f32(self) != NULL)) { /* a refuge: p is back */
-        self->shut = 0;
-    } else {
-        pvid_count_up_16(&self->shut);
-    }
+    pvid_trust_count_shut(&self->shut, reason, pvid_trust_refuge_f32(self) != NULL);
     if (self->published) {
         take_surplus(self, surplus);
     }
-    pvid_reason told = verdict(self, estimator, reason, size, informed, candidate);
-    if (told == PVID_UPDATED) {
+    const pvid_reason judged = verdict(self, estimator, reason, size, informed, candidate);
+    if (judged == PVID_UPDATED) {
         self->estimate = *candidate;
         self->published = true;
-        if (self->misfit) {
-            pvid_count_up(&estimator->counters.misfits);
-            told = PVID_MISFIT;
-        }
-    } else if (told == PVID_HELD_UNCERTAIN) {
-        pvid_count_up(&estimator->counters.held_uncertain);
-    } else if ((told == PVID_HELD_NOT_EXCITED) && (reason == PVID_UPDATED)) {
-        pvid_count_up(&estimator->counters.held_not_excited);
     }
-    return told;
+    return pvid_trust_tell(&estimator->counters, judged, reason, self->misfit);
 }

@@ -17,6 +17,7 @@ const uint32_t pvid_native_layout[] = {
     FIELD(pvid_estimator_config_f32, start),
     FIELD(pvid_estimator_config_f32, row_sd),
     FIELD(pvid_estimator_config_f32, noise_margin),
+    FIELD(pvid_estimator_config_f32, dead_zone),
     FIELD(pvid_estimator_config_f32, law),
     FIELD(pvid_estimator_config_f32, divider),
     (uint32_t)sizeof(pvid_strong_config_f32),

@@ -11,6 +11,7 @@ const uint32_t pvid_native_layout_q31[] = {
     (uint32_t)sizeof(pvid_estimator_config_q31),
     FIELD(pvid_estimator_config_q31, p_bits),
     FIELD(pvid_estimator_config_q31, row_sd),
+    FIELD(pvid_estimator_config_q31, dead_zone),
     FIELD(pvid_estimator_config_q31, divider),
     (uint32_t)sizeof(pvid_weak_design_q31),
     FIELD(pvid_weak_design_q31, shift),

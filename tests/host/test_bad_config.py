@@ -145,6 +145,7 @@ ESTIMATOR = {
     "estimator.step_limit": Range(1e-6, 0.9, Status.BAD_STEP_LIMIT),
     "estimator.kappa_min": Range(0.0, 0.999, Status.BAD_KAPPA_MIN),
     "estimator.noise_margin": Range(0.0, 1e6, Status.BAD_NOISE_MARGIN),
+    "estimator.dead_zone": Range(0.0, 100.0, Status.BAD_DEAD_ZONE),
     "estimator.law": Range(0, 1, Status.BAD_LAW),
     "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
 }
@@ -196,6 +197,7 @@ Q31 = {
     "estimator.step_limit": Range(1, 58982, Status.BAD_STEP_LIMIT),
     "estimator.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_KAPPA_MIN),
     "estimator.noise_margin": Range(0, 2**30, Status.BAD_NOISE_MARGIN),
+    "estimator.dead_zone": Range(0, 100 << 16, Status.BAD_DEAD_ZONE),
     "pivot_noise.m": Range(0, 2**30, Status.BAD_PIVOT_NOISE),
     "pivot_noise.e": Range(-200, 200, Status.BAD_PIVOT_NOISE),
     "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
@@ -367,6 +369,7 @@ ODD_FLOATS: dict[str, st.SearchStrategy[float]] = {
     "estimator.step_limit": magnitudes(-6, -0.05),
     "estimator.kappa_min": st.just(0.0) | magnitudes(-9, -0.001),
     "estimator.noise_margin": st.just(0.0) | magnitudes(-6, 6),
+    "estimator.dead_zone": st.just(0.0) | magnitudes(-12, 2),
     "sample_rate_hz": magnitudes(-3, 6),
     "l1": magnitudes(-6, 6),
     "pivot_noise": st.just(0.0) | magnitudes(-12, 9),

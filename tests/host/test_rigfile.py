@@ -121,6 +121,7 @@ def test_settings_changed_in_code_are_checked_too() -> None:
         kappa_min=st.floats(0, 0.999),
         outlier_gate=st.none() | st.floats(0, 1e3),
         outlier_patience_s=st.none() | st.floats(0, 1e12),
+        dead_zone=st.floats(0, 100),
     ),
 )
 def test_text_gives_the_same_rig_back(
@@ -216,6 +217,7 @@ def test_the_published_defaults() -> None:
         kappa_min=1e-5,
         outlier_gate=None,
         outlier_patience_s=None,
+        dead_zone=0.0,
     )
     assert Identifier(form="strong").window == 0.241
     assert Identifier(form="weak").window == 1.25

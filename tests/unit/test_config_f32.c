@@ -30,6 +30,7 @@
         FIELD(type, in, step_limit, KIND_FLOAT, 1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT),                                  \
         FIELD(type, in, kappa_min, KIND_FLOAT, 0.0, 0.999f, PVID_BAD_KAPPA_MIN),                                      \
         FIELD(type, in, noise_margin, KIND_FLOAT, 0.0, 1.0e6f, PVID_BAD_NOISE_MARGIN),                                \
+        FIELD(type, in, dead_zone, KIND_FLOAT, 0.0, 100.0f, PVID_BAD_DEAD_ZONE),                                      \
         FIELD(type, in, law, KIND_INT32, 0.0, 1.0, PVID_BAD_LAW),                                                     \
         FIELD(type, in, divider, KIND_UINT16, 1.0, 65535.0, PVID_BAD_DIVIDER)
 #define OF_FORGETTING(type, in, seconds)                                                                              \

@@ -37,6 +37,7 @@
         FIELD(type, in, step_limit, KIND_UINT32, 1.0, 58982.0, PVID_BAD_STEP_LIMIT),                                  \
         FIELD(type, in, kappa_min, KIND_INT32, 0.0, KAPPA_LAST, PVID_BAD_KAPPA_MIN),                                  \
         FIELD(type, in, noise_margin, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_NOISE_MARGIN),                              \
+        FIELD(type, in, dead_zone, KIND_UINT32, 0.0, 6553600.0, PVID_BAD_DEAD_ZONE),                                  \
         FIELD(type, in, divider, KIND_UINT16, 1.0, 65535.0, PVID_BAD_DIVIDER)
 
 /* ---- the estimator, on a model of the user's own ---- */

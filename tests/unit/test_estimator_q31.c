@@ -71,6 +71,66 @@ static void add_rows(uint32_t first, uint32_t last)
     }
 }
 
+/* Rows without noise ask for nothing once p is there: every further solve is at rest, with p and the sums as they are; a
+ * zone wider than the way is not left at all. */
+static void within_the_dead_zone_p_stays(void **state)
+{
+    (void)state;
+    config.dead_zone = 1u << 16;
+    begin();
+    add_rows(0, 60);
+    assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
+    assert_int_equal(estimator.counters.updates, 1);
+    while (estimator.counters.at_rest == 0u) {
+        assert_in_range(estimator.counters.updates, 1, 20);
+        assert_int_equal(pvid_estimator_iterate_q31(&estimator), PVID_UPDATED);
+    }
+    const pvid_estimator_q31 before = estimator;
+    assert_int_equal(pvid_estimator_iterate_q31(&estimator), PVID_UPDATED);
+    assert_int_equal(estimator.counters.at_rest, 2);
+    assert_memory_equal(estimator.p, before.p, sizeof before.p);
+    assert_memory_equal(&estimator.information, &before.information, sizeof before.information);
+    assert_int_equal(estimator.counters.updates, before.counters.updates);
+    config.dead_zone = 100u << 16;
+    config.row_sd = INT32_MAX; /* the noise that is told; what is found is less, and counts */
+    begin();
+    add_rows(0, 60);
+    assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
+    assert_int_equal(estimator.counters.at_rest + estimator.counters.updates, 1);
+}
+
+/* With noise in the rows: wider zones are left less often. (With the paper's law F does not decay, and p may never come
+ * to rest.) */
+static void a_wider_dead_zone_is_left_less_often(void **state)
+{
+    (void)state;
+    const int32_t gains[2] = {1 << 30, 1 << 29};
+    for (int i = 0; i < 2; i++) {
+        uint32_t steps[3];
+        for (uint32_t zone = 0; zone < 3u; zone++) {
+            start_again(NULL);
+            config.gain = gains[i];
+            config.row_sd = 512 * 256;
+            config.dead_zone = zone << 16;
+            begin();
+            uint32_t generator = 7u;
+            for (uint32_t k = 0; k < 400u; k++) {
+                int32_t n[8];
+                int32_t y;
+                row_of(k, n, &y);
+                generator = (generator * 1664525u) + 1013904223u;
+                y += (int32_t)(generator >> 21) - 1024; /* of 591 rms */
+                assert_int_equal(pvid_estimator_add_q31(&estimator, n, y), PVID_ACCUMULATED);
+                (void)pvid_estimator_update_q31(&estimator);
+            }
+            steps[zone] = estimator.counters.updates;
+            assert_true((estimator.counters.at_rest > 0u) == (zone > 0u));
+        }
+        assert_true(steps[0] > steps[1]);
+        assert_true(steps[1] > steps[2]);
+    }
+}
+
 static void assert_refused(pvid_status status)
 {
     memset(&estimator, 0x5A, sizeof estimator);
@@ -231,6 +291,8 @@ static void without_rows_the_start_is_published(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(within_the_dead_zone_p_stays, start_again),
+        cmocka_unit_test_setup(a_wider_dead_zone_is_left_less_often, start_again),
         cmocka_unit_test_setup(init_names_what_it_refuses, start_again),
         cmocka_unit_test_setup(gauss_newton_steps_end_at_the_parameters_that_made_the_rows, start_again),
         cmocka_unit_test_setup(a_row_beyond_its_format_changes_nothing_but_the_counter, start_again),

@@ -219,7 +219,7 @@ static void what_is_frozen_takes_no_row_in(void **state)
     assert_true(self.estimator.counters.rows > rows);
 }
 
-/* A snapshot at every tick, from before the window is full: both go on alike. One of the weak form is none of its own. */
+/* A snapshot at every tick, from before the window is full on: both go on alike. */
 static void a_restored_run_continues_bit_for_bit(void **state)
 {
     (void)state;

@@ -266,7 +266,8 @@ static void what_is_frozen_moves_no_sum_and_goes_on_without_a_bump(void **state)
     assert_in_range(after[PVID_UPDATED] + after[PVID_MISFIT] + after[PVID_HELD_UNCERTAIN], 1, 2);
 }
 
-/* Somebody holds the pendulum back for a moment: the windows that hold it are left out, by name, and without the gate they are taken in. */
+/* Somebody holds the pendulum back for a moment: the windows that hold it are left out, by name, and without the gate
+ * they are taken in. */
 static void the_gate_keeps_a_jolt_out(void **state)
 {
     (void)state;

@@ -254,6 +254,7 @@ static const pvid_weak_config_q31 weak_unit = {
         .step_limit = 19661u,
         .kappa_min = 5369,
         .noise_margin = 1048576u,
+        .dead_zone = 0u,
         .divider = 1,
     },
     .trust = {

@@ -17,6 +17,18 @@
  * Total and bounded: whatever the rows, p stays finite and inside its bounds. A row or a step that
  * cannot be used is counted and leaves the state as it was. Not thread-safe.
  *
+ * The dead zone (off by default) keeps p still while the data do not ask for more than noise explains: no step is taken
+ * while p is within `dead_zone` standard errors of where all data together want it,
+ *
+ *   F^T (S + H0)^-1 F <= dead_zone^2 correlation s^2,   s^2 the lesser of the residual variance and row_sd^2.
+ *
+ * It is the relative dead zone of adaptive control (the error is measured by what noise makes of it), but on the
+ * normalised residual of the sums, not of the last row: B and M are sufficient, so a dead zone on single innovations
+ * would stop p a single row's noise short of the answer, and leaving rows out by their size would bias the sums. Rows
+ * are always taken in; what a step that is not taken would have done is in F and comes with a later one (not so what
+ * (1 - g) sum C^T N e would have added: that is dropped, as in the literature). Standard errors do not count the zone.
+ * With g = 0 F does not decay, and p may never come to rest.
+ *
  * How B is kept. A model with a `project` of its own gets B = sum N Y. Without one, B and yy are
  * kept relative to the estimate, b = B - M theta and rr = sum (Y - N^T theta)^2, moved along by
  * b -= M dtheta at every step: the same quantities without the cancellation, so that the residual
@@ -61,12 +73,14 @@ typedef struct {
                                    less of p[0] than the start does, 0..1; 0: always step */
     float noise_margin;         /* no step while the data say less than so many times what noise of row_sd
                                    alone would (for models that know it), 0..1e6; 0: do not ask */
+    float dead_zone;            /* no step while p is within so many standard errors of where the data want it,
+                                   0..100; 0: no dead zone */
     pvid_law law;
     uint16_t divider;           /* groups of rows a solve, 1.. */
 } pvid_estimator_config_f32;
 
 /* Defaults: stationary law, Gauss-Newton at every tick, no forgetting, row_weight 1, step_limit 0.3,
- * kappa_min 1e-5, noise_margin 16. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
+ * kappa_min 1e-5, noise_margin 16, no dead zone. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
 extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
 
 typedef struct {
@@ -82,6 +96,7 @@ typedef struct {
     uint32_t held_out_of_range;   /* windows dropped because the angle was too large */
     uint32_t misfits;             /* groups published, or updates told, under the alarm */
     uint32_t rejected_outlier;    /* rows or windows that the gate kept out: see gate.h */
+    uint32_t at_rest;             /* solves within the dead zone: p stayed */
 } pvid_counters; /* each stops at 2^32 - 1 */
 
 /* State; only the functions below write to it. */
@@ -101,6 +116,7 @@ typedef struct {
     float step_limit;
     float kappa_min;
     float noise_margin;
+    float dead_zone;              /* squared */
     float noise[PVID_NOISE_TRACES]; /* what the model's `noise` is told; written by whoever makes the rows */
     float energy;                 /* sum of e^2 of the rows since the last group's end, at the p they met */
     uint16_t divider;
@@ -145,6 +161,7 @@ typedef struct {
     uint8_t start;   /* of the column of C in work among its non-zeros */
     uint8_t next;    /* non-zero to be multiplied next */
     bool ends_group;
+    bool rests;      /* within the dead zone: no step is taken */
     float gain;
     float fall;      /* of rr */
     float sums[PVID_MAX_SUMS];

@@ -51,6 +51,8 @@ typedef struct {
     int32_t kappa_min;            /* Q30, 0..0.999 */
     uint32_t noise_margin;        /* Q16: no step while the data say less than so many times what noise of row_sd
                                      would; 0: not asked. For models that know what noise makes */
+    uint32_t dead_zone;           /* Q16, 0..100: no step while p is within so many standard errors of where the data
+                                     want it, see estimator.h; 0: no dead zone */
     uint16_t divider;             /* groups of rows a solve, 1.. */
 } pvid_estimator_config_q31;
 
@@ -104,6 +106,7 @@ typedef struct {
     uint32_t step_limit;
     int32_t kappa_min;
     uint32_t noise_margin;
+    uint32_t dead_zone;
     pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by whoever makes the rows */
     int64_t energy; /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
     uint16_t divider;
@@ -139,6 +142,7 @@ typedef struct {
     bool judging;    /* an assessment */
     bool informed;   /* the data say more than noise does */
     bool has_refuge;
+    bool rests;      /* within the dead zone: no step is taken */
     int32_t refuge[PVID_MAX_P]; /* where p goes if it may not step */
     int64_t size;    /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
     int64_t energy;  /* sum of e^2 of the group's rows at the p they met */

@@ -1,8 +1,8 @@
 /* pvid/gate_q31.h - keeps what does not fit out of the sums: gate.h in integers alone.
  *
  * The same rule, the same robust scale, the same patience: see there. Off by default. Squares of residuals span more
- * than any fixed point holds, so they are weighed as numbers of 30 digits with an exponent; the scale is one, too. Total
- * and bounded: one division and some ten shifts and products a residual.
+ * than any fixed point holds, so they are weighed as numbers of 30 digits with an exponent; the scale is one, too.
+ * Total and bounded: one division and some ten shifts and products a residual.
  */
 #ifndef PVID_GATE_Q31_H
 #define PVID_GATE_Q31_H
@@ -18,7 +18,7 @@ extern "C" {
 #endif
 
 typedef struct {
-    uint32_t sigmas;          /* largest residual [times the usual size], Q16: 2..1000 (2 2^16..1000 2^16); 0: no gate */
+    uint32_t sigmas;          /* largest residual [times the usual size], Q16: 2..1000; 0: no gate */
     uint32_t patience_groups; /* rows (strong form) or windows (weak form) until a changed mechanism is believed,
                                  1..2^30; 0: never */
 } pvid_gate_config_q31;

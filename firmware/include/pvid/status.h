@@ -35,12 +35,13 @@ typedef enum {
     PVID_BAD_ANGLE,           /* full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or
                                  friction with a known zero or with bounds too small for it */
     PVID_BAD_GATE_SIGMAS,     /* not finite, or neither 0 nor 2..1e3 */
-    PVID_BAD_GATE_PATIENCE    /* not finite or outside 0..1e12 s */
+    PVID_BAD_GATE_PATIENCE,   /* not finite or outside 0..1e12 s */
+    PVID_BAD_DEAD_ZONE        /* not finite or outside 0..100 */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */
 typedef enum {
-    PVID_UPDATED = 0,            /* the parameters took a step */
+    PVID_UPDATED = 0,            /* the parameters took a step, or are within the dead zone and need none */
     PVID_WARMING_UP,             /* the window of samples is not full yet */
     PVID_ACCUMULATED,            /* data taken in, no solve due at this tick (divider) */
     PVID_HELD_NOT_EXCITED,       /* the data say nothing of w: no drive, kappa below its threshold, or no more

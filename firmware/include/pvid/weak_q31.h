@@ -190,8 +190,8 @@ const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self);
 
-/* Freezes the identifier, or lets it go on, as pvid_weak_freeze_f32: while it is frozen every window that is completed is
- * dropped with PVID_HELD_FROZEN, and p and the sums stay. */
+/* Freezes the identifier, or lets it go on, as pvid_weak_freeze_f32: while it is frozen every window that is completed
+ * is dropped with PVID_HELD_FROZEN, and p and the sums stay. */
 void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen);
 
 #ifdef __cplusplus

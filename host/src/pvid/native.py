@@ -86,6 +86,7 @@ class Status(IntEnum):
     BAD_ANGLE = 27
     BAD_GATE_SIGMAS = 28
     BAD_GATE_PATIENCE = 29
+    BAD_DEAD_ZONE = 30
 
 
 class Law(IntEnum):
@@ -123,6 +124,7 @@ class EstimatorConfigStruct(ctypes.Structure):
         ("step_limit", ctypes.c_float),
         ("kappa_min", ctypes.c_float),
         ("noise_margin", ctypes.c_float),
+        ("dead_zone", ctypes.c_float),
         ("law", ctypes.c_int),
         ("divider", ctypes.c_uint16),
     ]
@@ -216,6 +218,7 @@ class CountersStruct(ctypes.Structure):
             "held_out_of_range",
             "misfits",
             "rejected_outlier",
+            "at_rest",
         )
     ]
 
@@ -278,6 +281,7 @@ class EstimatorConfig:
     step_limit: float = 0.3
     kappa_min: float = 1e-5
     noise_margin: float = 16.0
+    dead_zone: float = 0.0
     law: Law = Law.STATIONARY
     divider: int = 1
 
@@ -412,6 +416,7 @@ def _struct_layout() -> list[int]:
         at(EstimatorConfigStruct, "start"),
         at(EstimatorConfigStruct, "row_sd"),
         at(EstimatorConfigStruct, "noise_margin"),
+        at(EstimatorConfigStruct, "dead_zone"),
         at(EstimatorConfigStruct, "law"),
         at(EstimatorConfigStruct, "divider"),
         ctypes.sizeof(StrongConfigStruct),
@@ -540,7 +545,7 @@ def _estimator_struct(config: EstimatorConfig) -> EstimatorConfigStruct:
         values = np.asarray(getattr(config, name), np.float32)
         getattr(struct, name)[: len(values)] = [float(v) for v in values]
     scalars = ("row_sd", "forgetting_s", "feedback_hz", "correlation", "row_weight", "step_limit")
-    for name in (*scalars, "kappa_min", "noise_margin"):
+    for name in (*scalars, "kappa_min", "noise_margin", "dead_zone"):
         setattr(struct, name, float(getattr(config, name)))
     struct.law = int(config.law)
     struct.divider = config.divider

@@ -34,7 +34,7 @@ class EstimatorConfigQ31:
     """Settings of the fixed-point estimator, as in estimator_q31.h.
 
     p in the formats p_bits, Y and N in y_bits and n_bits; row_sd in 2^-8 of Y's unit; correlation, row_weight and
-    step_limit and noise_margin in Q16, gain and kappa_min in Q30.
+    step_limit, noise_margin and dead_zone in Q16, gain and kappa_min in Q30.
     """
 
     start: tuple[int, ...]
@@ -52,6 +52,7 @@ class EstimatorConfigQ31:
     step_limit: int = 19661
     kappa_min: int = 10737
     noise_margin: int = 0
+    dead_zone: int = 0
     divider: int = 1
 
 
@@ -128,6 +129,7 @@ class EstimatorConfigStruct(ctypes.Structure):
         ("step_limit", ctypes.c_uint32),
         ("kappa_min", ctypes.c_int32),
         ("noise_margin", ctypes.c_uint32),
+        ("dead_zone", ctypes.c_uint32),
         ("divider", ctypes.c_uint16),
     ]
 
@@ -343,6 +345,7 @@ def _checked_layout(native: Native) -> _Layout:
         ctypes.sizeof(EstimatorConfigStruct),
         EstimatorConfigStruct.p_bits.offset,
         EstimatorConfigStruct.row_sd.offset,
+        EstimatorConfigStruct.dead_zone.offset,
         EstimatorConfigStruct.divider.offset,
         ctypes.sizeof(WeakDesignStruct),
         WeakDesignStruct.shift.offset,
@@ -379,6 +382,7 @@ def estimator_struct(config: EstimatorConfigQ31) -> EstimatorConfigStruct:
         setattr(struct, name, getattr(config, name))
     struct.kappa_min = config.kappa_min
     struct.noise_margin = config.noise_margin
+    struct.dead_zone = config.dead_zone
     struct.divider = config.divider
     return struct
 

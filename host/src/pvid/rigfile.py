@@ -120,6 +120,7 @@ class Identifier:
         file does not say, see `gate`
     outlier_patience_s : until the gate believes that the mechanism has changed [s]; 0: never; where the file does not
         say, 3 times forgetting_s in the weak form, 6 times in the strong one
+    dead_zone : keep p while it is within so many standard errors of where the data want it; 0: always follow them
     """
 
     form: Form = _choice("weak", Form)
@@ -141,6 +142,7 @@ class Identifier:
     kappa_min: float = _number(1e-5, "", 0.0, 0.999)
     outlier_gate: float | None = _number(None, "", 0.0, 1e3)
     outlier_patience_s: float | None = _number(None, "s", 0.0, 1e12)
+    dead_zone: float = _number(0.0, "", 0.0, 100.0)
 
     def __post_init__(self) -> None:
         _check_fields(self, "[identifier] ")

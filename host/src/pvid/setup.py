@@ -60,6 +60,7 @@ def estimator_config(rig: RigFile, bank: FirBank, start: npt.ArrayLike | None = 
         correlation=float(max(bank.half, 1)),
         kappa_min=settings.kappa_min,
         law=LAWS[settings.law],
+        dead_zone=settings.dead_zone,
         divider=settings.divider,
     )
 
@@ -176,6 +177,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
             feedback_hz=0.0,
             kappa_min=min(settings.kappa_min, WEAK_KAPPA_MIN),
             law=LAWS[settings.law],
+            dead_zone=settings.dead_zone,
             divider=settings.divider,
         ),
     )

@@ -164,6 +164,7 @@ def _estimator_q31(
         row_sd=min(max(1, round(settings.row_sd / row_unit * 2.0 ** (y_bits + 8))), 2**31 - 1),
         step_limit=round(settings.step_limit * 2**16),
         kappa_min=round(settings.kappa_min * 2**30),
+        dead_zone=round(settings.dead_zone * 2**16),
         divider=settings.divider,
         **own,
     )

@@ -37,9 +37,10 @@ _SETTINGS = (
     "step_limit",
     "kappa_min",
     "noise_margin",
+    "dead_zone",
     "divider",
 )
-_UNSIGNED = ("forgetting_groups", "correlation", "row_weight", "step_limit", "noise_margin")
+_UNSIGNED = ("forgetting_groups", "correlation", "row_weight", "step_limit", "noise_margin", "dead_zone")
 
 
 def estimator_lines(settings: EstimatorConfigQ31) -> list[str]:

@@ -38,6 +38,7 @@ _COUNTERS = (
     "held_out_of_range",
     "misfits",
     "rejected_outlier",
+    "at_rest",
 )
 
 
@@ -79,6 +80,8 @@ class Estimator:
         self.correlation = _lanes([c.correlation for c in configs])
         self.step_limit = _lanes([c.step_limit for c in configs])
         self.kappa_min = _lanes([c.kappa_min for c in configs])
+        dead_zone = _lanes([c.dead_zone for c in configs])
+        self.dead_zone = dead_zone * dead_zone
         self.divider = np.array([c.divider for c in configs])
         self.phase = np.zeros(len(configs), np.int64)
         self.gain = np.array([self._gain(c, rate) for c in configs], np.float32)
@@ -147,8 +150,8 @@ class Estimator:
     def _solve(self, due: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
         s, force, _ = model.project(self.p, self.sums)
         everywhere = np.ones(len(due), np.bool_)
-        x, reason = self._step_from(s, force, self.gain, due, everywhere)
-        moving = due & (reason == Reason.UPDATED)
+        x, reason, rests = self._step_from(s, force, self.gain, due, everywhere)
+        moving = due & (reason == Reason.UPDATED) & ~rests
         self.p = np.where(moving, x, self.p)
         self.counters["updates"] += moving
         return reason
@@ -168,8 +171,9 @@ class Estimator:
         gain: Float32,
         due: npt.NDArray[np.bool_],
         informed: npt.NDArray[np.bool_],
-    ) -> tuple[Float32, npt.NDArray[np.uint8]]:
-        """Where p goes from S and F, and whether it may: UPDATED or why it is held, in every lane."""
+    ) -> tuple[Float32, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
+        """Where p goes from S and F, whether it may (UPDATED or why it is held), and whether it rests in its dead zone,
+        in every lane."""
         for a in range(len(self.p)):
             s[a, a] = s[a, a] + self.prior[a]
         rhs = gain * force + (np.float32(1) - gain) * self.innovation
@@ -179,10 +183,11 @@ class Estimator:
         solvable = f.ok & kappa.ok
         own = (kappa.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
         excited = informed & (kappa.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
+        rests = due & solvable & excited & self._at_rest(f, force)
         dp = cholesky.solve(f, rhs)
         magnitudes = (dp / self._reference()).view(np.uint32) & np.uint32(0x7FFFFFFF)
         size = magnitudes.max(axis=0).view(np.float32)
-        moving = due & solvable & excited & np.isfinite(size)
+        moving = due & solvable & excited & np.isfinite(size) & ~rests
         self.size = np.where(moving, size, np.float32(0))
         limited = size > self.step_limit
         factor = np.where(limited, self.step_limit / size, np.float32(1)).astype(np.float32, copy=False)
@@ -192,14 +197,28 @@ class Estimator:
         below = x < self.lower
         x = np.where(below, self.lower, x)
         reason = np.full(len(due), Reason.UPDATED, np.uint8)
-        reason[~np.isfinite(size)] = Reason.HELD_PIVOT
+        reason[~np.isfinite(size) & ~rests] = Reason.HELD_PIVOT
         reason[~excited] = Reason.HELD_NOT_EXCITED
         reason[~solvable] = Reason.HELD_PIVOT
         self.counters["limited"] += moving & limited
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         self.counters["held_not_excited"] += due & (reason == Reason.HELD_NOT_EXCITED)
         self.counters["held_pivot"] += due & (reason == Reason.HELD_PIVOT)
-        return x, reason
+        self.counters["at_rest"] += rests
+        return x, reason, rests
+
+    def _at_rest(self, f: cholesky.Factor, force: Float32) -> npt.NDArray[np.bool_]:
+        """Where p is within the dead zone: f the factor of S + H0."""
+        if not (self.dead_zone > 0).any():
+            return np.zeros(len(self.dead_zone), np.bool_)
+        sums = self.information.read()
+        found = self._variance(sums, self._assessed(sums)[1])
+        x = cholesky.solve(f, force)
+        square = np.zeros(len(found), np.float32)
+        for a in range(len(x)):
+            square = square + force[a] * x[a]
+        noise = np.where(found < self.row_variance, found, self.row_variance)
+        return (self.dead_zone > 0) & (square <= self.dead_zone * (self.correlation * noise))
 
     def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
         """S [n_p, n_p, lanes] and the sum of squared residuals [lanes], not below its rounding."""
@@ -384,12 +403,12 @@ class RelativeEstimator(Estimator):
         force = pattern.transpose_times(c, b)
         s = pattern.project(c, matrix)
         informed = self._informed(s, self.row_variance, sums[-1])
-        x, reason = self._step_from(s, force, gain, self.everywhere, informed)
-        stepping = reason == Reason.UPDATED
+        x, reason, rests = self._step_from(s, force, gain, self.everywhere, informed)
+        stepping = (reason == Reason.UPDATED) & ~rests
         x = np.where(stepping, x, self.p)
         fleeing = np.zeros_like(stepping)
         if refuge is not None:
-            fleeing = ~stepping & refuge[0]
+            fleeing = ~stepping & ~rests & refuge[0]
             x = np.where(fleeing, refuge[1], x)
         theta = pattern.theta(x)
         step = theta - self.theta

@@ -37,6 +37,7 @@ SIZE_BITS = 22  # format of the size of a step
 TERM_MAX = 2**40  # of |N_i theta_i|, far beyond the limit of a row
 HELD_LIMIT = 2 * SUM_LIMIT  # of |b|, rr and what a step may add to them
 UNIT_BITS = cholesky.RHS_BITS - 1
+_REST_BITS = 28  # of F, where a dead zone is asked for
 _NOTHING = -200  # exponent of a number that is 0
 _COUNTERS = (
     "rows",
@@ -51,6 +52,7 @@ _COUNTERS = (
     "held_out_of_range",
     "misfits",
     "rejected_outlier",
+    "at_rest",
 )
 
 
@@ -113,6 +115,7 @@ class EstimatorQ31:
         self.step_limit = lane("step_limit")
         self.kappa_min = lane("kappa_min")
         self.noise_margin = lane("noise_margin")
+        self.dead_zone = lane("dead_zone")
         self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
         self.energy = np.zeros(lanes, np.int64)
         self.group_energy = self.energy
@@ -370,18 +373,38 @@ class EstimatorQ31:
         reason[~factor.ok] = Reason.HELD_PIVOT
 
         b = self.sums[model.moments : model.moments + model.n_theta]
+        rests = (reason == Reason.UPDATED) & self._at_rest(factor, c, scale(b, h), g)
         force, force_h = cholesky.to_block(scale(self._driving(b), h), 30)
         self.fresh[:] = 0
-        rhs = np.stack([(c[own] * force[self._c_row[own]]).sum(axis=0) for own in self._columns])
-        x, x_h = cholesky.solve(factor, scale(rhs, g))
+        _, x, x_h = self._solve_for(factor, c, force, g)
         dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
         steps = reason == Reason.UPDATED
-        p = self._limited(dp, steps)
+        self.counters["at_rest"] += rests
+        p = self._limited(dp, steps & ~rests)
         fleeing = np.zeros(self.lanes, np.bool_)
         if refuge is not None:
             fleeing = ~steps & refuge[0]
             p = np.where(fleeing, refuge[1], p)
-        return self._follow(p, m, h, b, reason, fleeing)
+        return self._follow(p, m, h, b, reason, fleeing, rests)
+
+    def _solve_for(self, factor: cholesky.Factor, c: Int, force: Int, g: Int) -> tuple[Int, Int, Int]:
+        """(rhs, x, h): C^T force, scaled as the rows of q, and its solution x 2^h."""
+        rhs = scale(np.stack([(c[own] * force[self._c_row[own]]).sum(axis=0) for own in self._columns]), g)
+        return rhs, *cholesky.solve(factor, rhs)
+
+    def _at_rest(self, factor: cholesky.Factor, c: Int, b: Int, g: Int) -> Mask:
+        """Where p is within the dead zone; b scaled as the rows of C."""
+        if not (self.dead_zone > 0).any():
+            return np.zeros(self.lanes, np.bool_)
+        force, down = cholesky.to_block(b, 30)
+        rhs, x, exponent = self._solve_for(factor, c, force, g)
+        f, more = cholesky.to_block(rhs, _REST_BITS)
+        asked = scaled((f * x).sum(axis=0), exponent + more + 2 * down - 62)
+        found, told = self._row_variance(), self.expected_variance
+        noise = pick(found.exceeds(told), told, found)
+        zone = scaled(self.dead_zone * self.dead_zone, -32)
+        bound = zone.times(noise.times(scaled(self.correlation, -16)))
+        return (self.dead_zone > 0) & ~asked.exceeds(bound)
 
     def _driving(self, b: Int) -> Int:
         """g b + (1 - g) sum N e since the last solve."""
@@ -407,7 +430,7 @@ class EstimatorQ31:
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         return np.where(moving, x, self.p)
 
-    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons, fleeing: Mask) -> Reasons:
+    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons, fleeing: Mask, rests: Mask) -> Reasons:
         """Moves p, theta, b and rr together: b -= M dtheta, rr -= dtheta^T (b_old + b_new)."""
         model = self.model
         theta = model.theta(p)
@@ -421,14 +444,15 @@ class EstimatorQ31:
         fall = (v * w).sum(axis=0)
         residual = self.sums[-2] - clamp(scale(fall, -(v_h + w_h)), HELD_LIMIT)
         overflow = (residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0)
-        reason[overflow & (reason == Reason.UPDATED)] = Reason.HELD_PIVOT
-        moving = (reason == Reason.UPDATED) | (fleeing & ~overflow)
+        reason[overflow & (reason == Reason.UPDATED) & ~rests] = Reason.HELD_PIVOT
+        stepping = (reason == Reason.UPDATED) & ~rests
+        moving = stepping | (fleeing & ~overflow)
         kept = self.sums[model.moments : -2]
         self.sums[model.moments : -2] = np.where(moving, b - moved, kept)
         self.sums[-2] = np.where(moving, np.maximum(residual, 0), self.sums[-2])
         self.theta = np.where(moving, theta, self.theta)
         self.p = np.where(moving, p, self.p)
-        self.counters["updates"] += reason == Reason.UPDATED
+        self.counters["updates"] += stepping
         self.counters["held_not_excited"] += reason == Reason.HELD_NOT_EXCITED
         self.counters["held_pivot"] += reason == Reason.HELD_PIVOT
         return reason

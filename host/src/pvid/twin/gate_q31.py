@@ -19,10 +19,6 @@ def _minus(a: Scaled) -> Scaled:
     return Scaled(-a.m, a.e)
 
 
-def _exceeds(a: Scaled, b: Scaled) -> Mask:
-    return np.asarray(a.plus(_minus(b)).m > 0)
-
-
 class GateQ31:
     """The gate of every lane; all share the configuration, `floor` [lanes] is their own."""
 
@@ -44,12 +40,12 @@ class GateQ31:
             return np.ones(self.judged.shape, np.bool_)
         asking = np.ones(self.judged.shape, np.bool_) if asked is None else asked
         learning = self.judged < self.memory
-        passes = learning | ~_exceeds(square, self.limit.times(self.scale))
+        passes = learning | ~square.exceeds(self.limit.times(self.scale))
         judged = np.where(passes & learning, self.judged + 1, self.judged)
         change = square.plus(_minus(self.scale)).over(scaled(np.maximum(judged, 1), 0))
         scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))
-        scale = pick(_exceeds(self.floor, scale), self.floor, scale)
-        scale = pick(_exceeds(scale, _SCALE_MAX), _SCALE_MAX, scale)
+        scale = pick(self.floor.exceeds(scale), self.floor, scale)
+        scale = pick(scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)
         self.judged = np.where(asking, judged, self.judged)
         self.scale = pick(asking, Scaled(integers(scale.m), integers(scale.e)), self.scale)
         return passes | ~asking

@@ -34,6 +34,10 @@ class Scaled(NamedTuple):
         wide = self.m << 30
         return scaled(np.sign(wide) * (np.abs(wide) // other.m), self.e - other.e - 30)
 
+    def exceeds(self, other: Scaled) -> npt.NDArray[np.bool_]:
+        """Where it is larger."""
+        return np.asarray(self.plus(Scaled(-other.m, other.e)).m > 0)
+
     def shifted(self, exponent: npt.ArrayLike) -> Scaled:
         """Times 2^exponent."""
         return Scaled(self.m, self.e + integers(exponent))

@@ -18,6 +18,30 @@ _ARRIVED, _SMALL_STEP, _SURPLUS_MAX = np.float32(0.3), np.float32(1e-4), np.floa
 _COUNT_MAX = 0xFFFF
 
 
+def shut_after(shut: npt.NDArray[np.int64], stepped: Mask, is_back: Mask) -> npt.NDArray[np.int64]:
+    """Groups in a row that said too little for a step [lanes]; of trust_tell.h, as `tell`."""
+    return np.where(stepped | is_back, 0, np.minimum(shut + 1, _COUNT_MAX))
+
+
+def tell(
+    counters: dict[str, npt.NDArray[np.int64]],
+    reason: npt.NDArray[np.uint8],
+    excited: Mask,
+    sure: Mask,
+    misfit: Mask,
+) -> npt.NDArray[np.uint8]:
+    """Counts the verdicts on what solves with these reasons left, and says what is told of them [lanes]."""
+    stepped = reason == Reason.UPDATED
+    told = reason.copy()
+    told[stepped & ~excited] = Reason.HELD_NOT_EXCITED
+    told[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
+    told[stepped & excited & sure & misfit] = Reason.MISFIT
+    counters["misfits"] += told == Reason.MISFIT
+    counters["held_uncertain"] += told == Reason.HELD_UNCERTAIN
+    counters["held_not_excited"] += stepped & ~excited
+    return told
+
+
 class Trust:
     """pvid_trust_f32 of every lane of an estimator; `estimate` is what is published, ESTIMATE_DTYPE [lanes]."""
 
@@ -101,10 +125,8 @@ class Trust:
         if (reason == Reason.ACCUMULATED).all():
             return reason
         stepped = reason == Reason.UPDATED
-        back = ~stepped & self.refuge[0]
-        self.shut = np.where(stepped | back, 0, np.minimum(self.shut + 1, _COUNT_MAX))
+        self.shut = shut_after(self.shut, stepped, self.refuge[0])
         self._take_surplus(self.published, surplus)
-        counters = self.estimator.counters
         with np.errstate(all="ignore"):
             error = self.widest(candidate)
             near = _ARRIVED * error
@@ -113,14 +135,7 @@ class Trust:
         excited = informed & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         enough = self.groups >= self.config.groups_min
         sure = enough & (error <= np.float32(self.config.se_max)) & arrived
-        told = reason.copy()
-        told[stepped & ~excited] = Reason.HELD_NOT_EXCITED
-        told[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
         good = stepped & excited & sure
         self.estimate = np.where(good, candidate, self.estimate)
         self.published = self.published | good
-        told[good & self.misfit] = Reason.MISFIT
-        counters["misfits"] += good & self.misfit
-        counters["held_uncertain"] += told == Reason.HELD_UNCERTAIN
-        counters["held_not_excited"] += stepped & ~excited
-        return told
+        return tell(self.estimator.counters, reason, excited, sure, self.misfit)

@@ -9,6 +9,7 @@ from pvid.native import Reason
 from pvid.native_q31 import ESTIMATE_DTYPE, TrustConfigQ31
 from pvid.twin.estimator_q31 import ONE, SIZE_BITS, EstimatorQ31
 from pvid.twin.integer_q31 import Int, clamp, round_shift
+from pvid.twin.trust import shut_after, tell
 
 Mask = npt.NDArray[np.bool_]
 Reasons = npt.NDArray[np.uint8]
@@ -84,8 +85,7 @@ class TrustQ31:
         if (reason == Reason.ACCUMULATED).all():
             return reason
         stepped = reason == Reason.UPDATED
-        back = ~stepped & self.refuge[0]
-        self.shut = np.where(stepped | back, 0, np.minimum(self.shut + 1, _COUNT_MAX))
+        self.shut = shut_after(self.shut, stepped, self.refuge[0])
         self._take_surplus(self.published, surplus)
         error = self._widest(candidate)
         near = round_shift(clamp(error, 1 << 44) * _ARRIVED, 16 + (_ERROR_BITS - SIZE_BITS))
@@ -93,15 +93,7 @@ class TrustQ31:
         enough_kappa = self.config.kappa_min
         excited = informed & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         sure = (self.groups >= self.config.groups_min) & (error <= self.config.se_max) & arrived
-        told = reason.copy()
-        told[stepped & ~excited] = Reason.HELD_NOT_EXCITED
-        told[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
         good = stepped & excited & sure
         self.estimate = np.where(good, candidate, self.estimate)
         self.published = self.published | good
-        told[good & self.misfit] = Reason.MISFIT
-        counters = self.estimator.counters
-        counters["misfits"] += good & self.misfit
-        counters["held_uncertain"] += told == Reason.HELD_UNCERTAIN
-        counters["held_not_excited"] += stepped & ~excited
-        return told
+        return tell(self.estimator.counters, reason, excited, sure, self.misfit)
