@@ -14,6 +14,7 @@
 #define U_LIMIT ((int32_t)1 << 18)
 #define COUNTS_LIMIT ((int32_t)1 << 24)
 #define EXPONENT_LIMIT 200
+#define TERM_LIMIT ((int64_t)1 << 20) /* of what a test function is multiplied with */
 
 /* Windows that the gate's scale remembers; it stands relative to what noise explains, below which it never falls. */
 #define GATE_MEMORY 4u
@@ -32,6 +33,45 @@ static bool shifts_are_valid(const uint8_t shift[], size_t n, uint8_t low, uint8
     return valid;
 }
 
+/* Whether a weight times the sum of two differences fits 32 bits for every one; *total: sum of their magnitudes. */
+static bool taps_fit(const PVID_TABLE int32_t *weights, size_t half, int32_t full_scale, int64_t *total)
+{
+    bool fit = true;
+    *total = 0;
+    for (size_t i = 0; i < half; i++) {
+        const int64_t magnitude = (int64_t)pvid_magnitude_q31(weights[i]);
+        fit = fit && ((4 * magnitude * full_scale) <= INT32_MAX);
+        *total += magnitude;
+    }
+    return fit;
+}
+
+/* The part of the design tool's proof that costs one walk through the tables. */
+static bool tables_fit(const pvid_weak_design_q31 *design)
+{
+    const size_t functions = design->functions;
+    const size_t half = (design->taps - 1u) / 2u;
+    int64_t smooth;
+    int64_t second;
+    if (!taps_fit(design->smooth, half, design->phi_max, &smooth) ||
+        !taps_fit(design->second, half, design->y_max, &second)) {
+        return false;
+    }
+    const int64_t sum = design->phi_max * (((int64_t)1 << design->smooth_bits) + (4 * smooth));
+    const int64_t f = pvid_floor_shift_q31(sum, design->phi_shift) + 1;
+    bool fit = (f <= TERM_LIMIT) &&
+               ((pvid_floor_shift_q31(design->u_max * ((f <= TERM_LIMIT) ? f : 0), design->uf_shift) + 1) <= TERM_LIMIT);
+    const int64_t rounding = (int64_t)1 << (design->sum_shift - 1u);
+    for (size_t i = 0; i < (3u * functions * design->window); i++) {
+        const int64_t magnitude = (int64_t)pvid_magnitude_q31(design->chi[i]);
+        fit = fit && (((magnitude * TERM_LIMIT) + rounding) <= INT32_MAX);
+    }
+    for (size_t i = 0; i < ((PVID_WEAK_GRAMS / 2u) * functions * (functions + 1u)); i++) {
+        fit = fit && (pvid_magnitude_q31(design->gram[i]) <= (uint64_t)PVID_ONE_Q30);
+    }
+    return fit;
+}
+
 static bool design_is_valid(const pvid_weak_design_q31 *design)
 {
     if ((design == NULL) || !pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
@@ -48,7 +88,7 @@ static bool design_is_valid(const pvid_weak_design_q31 *design)
     valid = valid && shifts_are_valid(design->integral_shift, PVID_WEAK_INTEGRALS_Q31, 0, 62) &&
             shifts_are_valid(design->high_shift, 2, 0, 61) && shifts_are_valid(design->product_shift, 5, 0, 62) &&
             shifts_are_valid(design->shift, PVID_WEAK_TERMS_Q31, 0, 62);
-    return valid;
+    return valid && tables_fit(design);
 }
 
 static bool pivot_noise_is_valid(pvid_scaled_q31 noise)

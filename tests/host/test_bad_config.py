@@ -20,16 +20,16 @@ from hypothesis import strategies as st
 from struct_fields import Field, fields_of
 
 from pvid.native import EstimatorConfig, Native, RowEstimator, Status, StrongIdentifier, WeakIdentifier
-from pvid.native_q31 import WeakIdentifierQ31
+from pvid.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
 from pvid.rig import simulate, standard_sensors
 from pvid.rigfile import RigFile
 from pvid.setup import strong_config, weak_config
-from pvid.setup_q31 import weak_config_q31
+from pvid.setup_q31 import strong_config_q31, weak_config_q31
 from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
-Identifier = StrongIdentifier | WeakIdentifier | WeakIdentifierQ31
+Identifier = StrongIdentifier | WeakIdentifier | StrongIdentifierQ31 | WeakIdentifierQ31
 Samples = npt.NDArray[Any]
 
 RIG = RigFile.standard()
@@ -102,12 +102,14 @@ def subjects(native: Native) -> dict[str, Subject]:
     with_friction = rig_with(full_angle=True, damping=True)
     strong = native.strong(strong_config(rig_with(form="strong"), 1000.0))
     weak, corrected = (native.weak(weak_config(rig, 1000.0)) for rig in (RIG, with_friction))
-    q31 = WeakIdentifierQ31(native, weak_config_q31(RIG, 1000.0))
+    weak_q31 = WeakIdentifierQ31(native, weak_config_q31(RIG, 1000.0))
+    strong_q31 = StrongIdentifierQ31(native, strong_config_q31(rig_with(form="strong"), 1000.0))
     made = (
         Subject("strong", "pvid_strong_init_f32", strong, run.phi, run.y),
         Subject("weak", "pvid_weak_init_f32", weak, run.phi, run.y),
         Subject("corrected", "pvid_weak_init_f32", corrected, run.phi, run.y),
-        Subject("q31", "pvid_weak_init_q31", q31, *counts),
+        Subject("weak q31", "pvid_weak_init_q31", weak_q31, *counts),
+        Subject("strong q31", "pvid_strong_init_q31", strong_q31, *counts),
     )
     return {subject.name: subject for subject in made}
 
@@ -177,11 +179,7 @@ WEAK = {
 }
 LEAST = -(2**31)
 FORMAT = Range(-64, 64, Status.BAD_MODEL)
-Q31 = {
-    "drive_min": Range(0, 2**18, Status.BAD_DRIVE_MIN),
-    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
+ESTIMATOR_Q31 = {
     "estimator.start": Range(LEAST, 2**31 - 1, Status.BAD_START, (Status.BAD_START,)),
     "estimator.start_sd": Range(1, 2**31 - 1, Status.BAD_START_SD),
     "estimator.lower": Range(LEAST + 1, 2**31 - 1, Status.BAD_BOUNDS, (Status.BAD_BOUNDS, Status.BAD_START)),
@@ -198,6 +196,16 @@ Q31 = {
     "estimator.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_KAPPA_MIN),
     "estimator.noise_margin": Range(0, 2**30, Status.BAD_NOISE_MARGIN),
     "estimator.dead_zone": Range(0, 100 << 16, Status.BAD_DEAD_ZONE),
+    "gate.sigmas": Range(2 << 16, 1000 << 16, Status.BAD_GATE_SIGMAS, besides=(0,)),
+    "gate.patience_groups": Range(0, 2**30, Status.BAD_GATE_PATIENCE),
+    "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
+}
+WEAK_Q31 = {
+    **ESTIMATOR_Q31,
+    "drive_min": Range(0, 2**18, Status.BAD_DRIVE_MIN),
+    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
     "pivot_noise.m": Range(0, 2**30, Status.BAD_PIVOT_NOISE),
     "pivot_noise.e": Range(-200, 200, Status.BAD_PIVOT_NOISE),
     "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
@@ -205,15 +213,30 @@ Q31 = {
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.shut_max": Range(0, 65535, Status.OK),
-    "gate.sigmas": Range(2 << 16, 1000 << 16, Status.BAD_GATE_SIGMAS, besides=(0,)),
-    "gate.patience_groups": Range(0, 2**30, Status.BAD_GATE_PATIENCE),
-    "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
+}
+SHIFT = Range(0, 62, Status.BAD_DESIGN)
+STRONG_Q31 = {
+    **ESTIMATOR_Q31,
+    **{f"row.{name}": SHIFT for name in ("n_a", "n_e", "n_phi2", "n_phi0", "part", "y")},
+    "u_multiplier": Range(1, 2**31 - 1, Status.BAD_DESIGN),
+    "u_shift": SHIFT,
+    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "drive_min": Range(0, 2**30, Status.BAD_DRIVE_MIN),
+    "drive_ticks": Range(1, 2**30, Status.BAD_DRIVE_MIN),
+    # what counts within full scale could overflow is refused, too
+    "bank.phi_max": Range(1, 2**24, Status.BAD_BANK, (Status.BAD_BANK,)),
+    "bank.y_max": Range(1, 2**24, Status.BAD_BANK, (Status.BAD_BANK,)),
+    "bank.centre": Range(1, 2**30, Status.BAD_BANK, (Status.BAD_BANK,)),
+    "bank.phi_shift": Range(0, 62, Status.BAD_BANK, (Status.BAD_BANK,)),
+    "bank.y_shift": Range(0, 62, Status.BAD_BANK, (Status.BAD_BANK,)),
 }
 RANGES = {
     "strong": STRONG,
     "weak": WEAK,
     "corrected": {**WEAK, "passes": Range(1, 8, Status.BAD_ANGLE, (Status.BAD_ITERATIONS,))},
-    "q31": Q31,
+    "weak q31": WEAK_Q31,
+    "strong q31": STRONG_Q31,
 }
 # Filled in by init, or a flag that another subject has set, or the sizes and tables below.
 NOT_HERE = {"estimator.model", "estimator.update_rate_hz", "full_angle", "friction", "zero_unknown", "angle", "passes"}
@@ -230,7 +253,7 @@ REFUSED = {
         "design.lag": (0,),
         **{f"design.{table}": (None,) for table in ("smooth", "second", "chi", "gram")},
     },
-    "q31": {
+    "weak q31": {
         "design.taps": (0, 1, 3, 6, 65535),
         "design.decimation": (0, 33, 65535),
         "design.window": (0, 7, 156, 65535),
@@ -247,23 +270,24 @@ REFUSED = {
         **{f"design.{table}": (None,) for table in ("smooth", "second", "chi", "gram", "multiplier")},
     },
 }
+REFUSED["strong q31"] = REFUSED["strong"]
 REFUSED["corrected"] = {**REFUSED["weak"], "angle": (None,)}
 NAMES = tuple(RANGES)
 
 
-def is_used(field: Field, n_p: int) -> bool:
+def is_used(field: Field, n_p: int, n_theta: int) -> bool:
     """Whether the model has such an entry."""
     name = field.group.removeprefix("estimator.")
     if name in ("start", "start_sd", "lower", "upper", "p_bits"):
         return field.place < n_p
-    return name != "n_bits" or field.place < 8
+    return name != "n_bits" or field.place < n_theta
 
 
 def ranged(subject: Subject) -> Iterator[tuple[Field, Range]]:
     """Every field that is to be used, with what it may hold."""
     for field in subject.fields.values():
         known = RANGES[subject.name].get(field.group)
-        if known is not None and is_used(field, subject.identifier.n_p):
+        if known is not None and is_used(field, subject.identifier.n_p, 11 if subject.name.startswith("strong") else 8):
             yield field, known
 
 
@@ -295,7 +319,7 @@ def values_for(field: Field, known: Range) -> st.SearchStrategy[Any]:
 def test_no_field_is_forgotten_here(name: str, subjects: dict[str, Subject]) -> None:
     known = {field.group for field, _ in ranged(subjects[name])}
     refused = {entry.partition("[")[0] for entry in REFUSED[name]}
-    leave = NOT_HERE | (set() if name in ("strong", "q31") else NOT_WEAK) | {"design.gram_bits"}
+    leave = NOT_HERE | (NOT_WEAK if name in ("weak", "corrected") else set()) | {"design.gram_bits"}
     assert {field.group for field in subjects[name].fields.values()} - leave == (known | refused) - leave
 
 
@@ -328,7 +352,7 @@ def test_what_is_no_number_is_always_refused(name: str, subjects: dict[str, Subj
 
 @pytest.mark.parametrize("name", NAMES)
 def test_sizes_formats_and_missing_tables_are_refused(name: str, subjects: dict[str, Subject]) -> None:
-    status = Status.BAD_BANK if name == "strong" else Status.BAD_DESIGN
+    status = Status.BAD_BANK if name.startswith("strong") else Status.BAD_DESIGN
     for field, values in REFUSED[name].items():
         for value in values:
             expected = Status.BAD_ANGLE if field == "angle" else status
@@ -427,10 +451,11 @@ def test_what_is_accepted_stays_finite(name: str, subjects: dict[str, Subject], 
         subject.assert_finite(*data.draw(odd_samples(subject), label="samples"))
 
 
+@pytest.mark.parametrize("name", ("weak q31", "strong q31"))
 @settings(max_examples=100, deadline=None)
 @given(data=st.data())
-def test_what_the_fixed_point_core_accepts_keeps_its_bounds(subjects: dict[str, Subject], data: Any) -> None:
-    subject = subjects["q31"]
+def test_what_the_fixed_point_core_accepts_keeps_its_bounds(name: str, subjects: dict[str, Subject], data: Any) -> None:
+    subject = subjects[name]
     subject.restore()
     many = st.lists(st.sampled_from(list(ranged(subject))), min_size=1, max_size=6)
     values = {field.name: data.draw(values_for(field, known)) for field, known in data.draw(many)}

@@ -341,16 +341,21 @@ static const bound weak_fields[] = {
     {                                                                                                                 \
         #member, offsetof(pvid_weak_design_q31, member), kind, low, high, PVID_BAD_DESIGN, PVID_BAD_ITERATIONS        \
     }
+/* Where F or U F would need more than 21 bits the design is refused for that. */
+#define TIGHT(member, kind, low, high)                                                                                \
+    {                                                                                                                 \
+        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, PVID_BAD_DESIGN, PVID_BAD_DESIGN            \
+    }
 static const bound design_fields[] = {
     SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS),
     SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION),
     SIZE(window, KIND_UINT16, 9.0, PVID_MAX_WEAK_WINDOW),
     SIZE(functions, KIND_UINT8, 4.0, PVID_MAX_FUNCTIONS),
     SIZE(lag, KIND_UINT8, 1.0, 255.0),
-    SIZE(smooth_bits, KIND_UINT8, 0.0, 31.0),
-    SIZE(phi_shift, KIND_UINT8, 0.0, 62.0),
+    TIGHT(smooth_bits, KIND_UINT8, 0.0, 31.0),
+    TIGHT(phi_shift, KIND_UINT8, 0.0, 62.0),
     SIZE(u_shift, KIND_UINT8, 0.0, 62.0),
-    SIZE(uf_shift, KIND_UINT8, 0.0, 62.0),
+    TIGHT(uf_shift, KIND_UINT8, 0.0, 62.0),
     SIZE(integral_shift[0], KIND_UINT8, 0.0, 62.0),
     SIZE(integral_shift[2], KIND_UINT8, 0.0, 62.0),
     SIZE(high_shift[0], KIND_UINT8, 0.0, 61.0),
@@ -362,9 +367,9 @@ static const bound design_fields[] = {
     SIZE(shift[PVID_WEAK_TERMS_Q31 - 1], KIND_UINT8, 0.0, 62.0),
     SIZE(gram_bits[0], KIND_INT8, -128.0, 127.0),
     SIZE(gram_bits[PVID_WEAK_GRAMS - 1], KIND_INT8, -128.0, 127.0),
-    SIZE(phi_max, KIND_INT32, 1.0, 16777216.0),
+    TIGHT(phi_max, KIND_INT32, 1.0, 16777216.0),
     SIZE(y_max, KIND_INT32, 1.0, 16777216.0),
-    SIZE(u_max, KIND_INT32, 1.0, 262144.0),
+    TIGHT(u_max, KIND_INT32, 1.0, 262144.0),
 };
 
 static void the_weak_forms_fields_end_where_they_say(void **state)
@@ -412,6 +417,50 @@ static void a_design_without_a_table_is_refused(void **state)
     ASSERT_TABLE(chi);
     ASSERT_TABLE(multiplier);
     ASSERT_TABLE(gram);
+}
+
+#define REFUSED_AND_NOT(place, refused, accepted)                                                                     \
+    do {                                                                                                              \
+        (place) = (refused);                                                                                          \
+        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                               \
+        (place) = (accepted);                                                                                         \
+        assert_int_equal(init_weak(), PVID_OK);                                                                       \
+        (place) = 0;                                                                                                  \
+    } while (0)
+
+/* Both ends of what an entry may be, in the first and the last place of every table. */
+static void a_table_that_would_overflow_is_refused(void **state)
+{
+    (void)state;
+    const size_t half = (design.taps - 1u) / 2u;
+    const size_t last_chi = (3u * design.functions * design.window) - 1u;
+    const size_t last_gram = ((PVID_WEAK_GRAMS / 2u) * design.functions * (design.functions + 1u)) - 1u;
+    const int32_t steepest = INT32_MAX / (4 * design.y_max);
+    REFUSED_AND_NOT(taps[1][0], steepest + 1, steepest);
+    REFUSED_AND_NOT(taps[1][half - 1u], -steepest - 1, -steepest);
+    REFUSED_AND_NOT(taps[1][0], INT32_MIN, 0);
+    /* what the smoothing weights may add up to: F = 2^20 - 1 at full scale */
+    const int64_t room = ((((int64_t)1 << 20) << design.phi_shift) - 1) / design.phi_max;
+    const int64_t most = (room - ((int64_t)1 << design.smooth_bits)) / 4;
+    const int64_t tallest = INT32_MAX / (4 * design.phi_max);
+    const int32_t tall = (int32_t)((most < tallest) ? most : tallest);
+    REFUSED_AND_NOT(taps[0][0], tall + 1, tall / 2);
+    REFUSED_AND_NOT(taps[0][half - 1u], -tall - 1, -(tall / 2));
+    const int32_t rounding = (int32_t)1 << (design.sum_shift - 1u);
+    const int16_t highest = (int16_t)((INT32_MAX - rounding) >> 20);
+    REFUSED_AND_NOT(chi[0], (int16_t)(highest + 1), highest);
+    REFUSED_AND_NOT(chi[last_chi], (int16_t)(-highest - 1), (int16_t)-highest);
+    REFUSED_AND_NOT(gram[0], (1 << 30) + 1, 1 << 30);
+    REFUSED_AND_NOT(gram[last_gram], -(1 << 30) - 1, -(1 << 30));
+    chi[last_chi + 1u] = INT16_MAX; /* beyond the tables nothing is looked at */
+    gram[last_gram + 1u] = INT32_MAX;
+    taps[0][half] = INT32_MAX;
+    taps[1][half] = INT32_MAX;
+    assert_int_equal(init_weak(), PVID_OK);
+    chi[last_chi + 1u] = 0;
+    gram[last_gram + 1u] = 0;
+    taps[0][half] = 0;
+    taps[1][half] = 0;
 }
 
 /* A window of nine samples has 4 x 16 free ticks at D = 24; what does not fit into four stages each is refused. */
@@ -512,6 +561,7 @@ int main(void)
         cmocka_unit_test_setup(every_field_of_the_strong_form_is_in_its_fingerprint, start_strong),
         cmocka_unit_test_setup(the_weak_forms_fields_end_where_they_say, start_weak),
         cmocka_unit_test(a_design_without_a_table_is_refused),
+        cmocka_unit_test_setup(a_table_that_would_overflow_is_refused, start_weak),
         cmocka_unit_test_setup(a_window_that_cannot_be_worked_off_is_refused, start_weak),
         cmocka_unit_test_setup(the_weak_form_keeps_what_it_was_told, start_weak),
         cmocka_unit_test_setup(every_field_of_the_weak_form_is_in_its_fingerprint, start_weak),

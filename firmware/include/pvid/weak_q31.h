@@ -175,8 +175,15 @@ typedef struct {
 
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range (PVID_BAD_DESIGN,
  * PVID_BAD_DRIVE_MIN, those of the estimator), or a window cannot be worked off before the next one is complete
- * (PVID_BAD_ITERATIONS, as in weak.h). That the design's formats fit its tables is the design tool's word: it proves
- * it before it writes them. */
+ * (PVID_BAD_ITERATIONS, as in weak.h).
+ *
+ * Of the tables it checks, in one walk, what it costs no analysis to know: a weight of `smooth` or `second` times four
+ * full scales fits 32 bits; F and U F fit 21 bits for every count within full scale; an entry of chi times a term of 21
+ * bits fits 32 bits with its rounding; no entry of gram is beyond 2^30 (gram_bits may be any). The rest is the design
+ * tool's word, which proves it by interval analysis before it writes a table (host/src/pvid/weak_design_q31.py) and
+ * tells the bits left free, `margins`: for every sample with |U| <= u_max the double integrals fit 63 bits, each shifted
+ * one 32, each term 21, the sum of a window's products 32, and a column of terms 31. Tables of your own need that
+ * proof: with others, sums wrap. */
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config);
 
 /* One tick: phi and y_A sampled together [counts]. Answers as pvid_weak_step_f32, but for a sample beyond full scale:
