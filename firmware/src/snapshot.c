@@ -121,13 +121,13 @@ size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_iden
 }
 
 pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length,
-                                           const pvid_snapshot_identity *identity, void *object,
+                                           const pvid_snapshot_identity *identity, uint8_t object[],
                                            const pvid_snapshot_shape *shape, void *behind)
 {
     const pvid_snapshot_status status = inspect(image, length, identity);
     if (status == PVID_SNAPSHOT_RESTORED) {
         const uint8_t *copy = &image[PVID_SNAPSHOT_HEADER];
-        take_all_but_pointers((uint8_t *)object, copy, shape);
+        take_all_but_pointers(object, copy, shape);
         if (behind != NULL) {
             memcpy(behind, &copy[shape->bytes], identity->bytes - shape->bytes);
         }

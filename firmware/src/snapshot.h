@@ -37,7 +37,7 @@ size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_iden
 
 /* Restores both if image[] holds an undamaged snapshot of this identity; pointers stay what they are. */
 pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length,
-                                           const pvid_snapshot_identity *identity, void *object,
+                                           const pvid_snapshot_identity *identity, uint8_t object[],
                                            const pvid_snapshot_shape *shape, void *behind);
 
 /* Whether the pointer at `place` of the object was one when the snapshot was taken, or NULL. */

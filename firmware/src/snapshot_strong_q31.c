@@ -50,5 +50,5 @@ pvid_snapshot_status pvid_snapshot_restore_strong_q31(pvid_strong_q31 *self, con
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL));
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_restore(image, length, &identity, self, &shape, NULL);
+    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
 }

@@ -86,7 +86,8 @@ pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const p
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
     const pvid_snapshot_identity identity = identity_of(config);
     pvid_weak_angle_f32 *behind = has_angle(config) ? self->angle : NULL;
-    const pvid_snapshot_status status = pvid_snapshot_restore(image, length, &identity, self, &shape, behind);
+    const pvid_snapshot_status status =
+        pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, behind);
     if (status == PVID_SNAPSHOT_RESTORED) { /* what pointed into the object points into it again */
         pvid_weak_finish_f32 *finish = &self->finish;
         finish->angle = pvid_snapshot_had_pointer(image, PLACE(finish.angle)) ? self->angle : NULL;

@@ -61,5 +61,5 @@ pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const p
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_restore(image, length, &identity, self, &shape, NULL);
+    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
 }
