@@ -78,7 +78,7 @@ def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> No
     image, _ = build_image(BOARDS["atmega2560"], replay)
     report = play(BOARDS["atmega2560"], image, TIMEOUT_S)
     assert_same_hashes(report, replay, native)
-    assert report.instructions_mean == pytest.approx(112_000, rel=0.05)  # clock cycles
+    assert report.instructions_mean == pytest.approx(114_000, rel=0.05)  # clock cycles
     with pytest.raises(PvidError, match="overflowed"):
         build_image(BOARDS["atmega328p"], replay)
 
