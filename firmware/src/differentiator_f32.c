@@ -43,9 +43,10 @@ pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pv
     self->bank.weights = bank->weights;
     self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);
     const float rate = sample_rate_hz / (float)bank->stride;
-    self->rate_power[0] = 1.0f;
-    for (size_t k = 1; k < PVID_ORDERS; k++) {
-        self->rate_power[k] = self->rate_power[k - 1] * rate;
+    float power = 1.0f;
+    for (size_t i = 0; i < (PVID_ORDERS - 1u); i++) {
+        power *= rate;
+        self->rate_power[i] = power;
     }
     pvid_differentiator_reset_f32(self);
     return PVID_OK;

@@ -82,10 +82,10 @@ static inline void pvid_fir_end_f32(const pvid_differentiator_f32 *self, const p
                                     float out[PVID_ORDERS])
 {
     out[0] = sums->middle + sums->sum[0];
-    out[1] = sums->sum[1] * self->rate_power[1];
-    out[2] = sums->sum[2] * self->rate_power[2];
-    out[3] = sums->sum[3] * self->rate_power[3];
-    out[4] = sums->sum[4] * self->rate_power[4];
+    out[1] = sums->sum[1] * self->rate_power[0];
+    out[2] = sums->sum[2] * self->rate_power[1];
+    out[3] = sums->sum[3] * self->rate_power[2];
+    out[4] = sums->sum[4] * self->rate_power[3];
 }
 
 #endif
