@@ -59,8 +59,10 @@ static bool tables_fit(const pvid_weak_design_q31 *design)
     }
     const int64_t sum = design->phi_max * (((int64_t)1 << design->smooth_bits) + (4 * smooth));
     const int64_t f = pvid_floor_shift_q31(sum, design->phi_shift) + 1;
-    bool fit = (f <= TERM_LIMIT) &&
-               ((pvid_floor_shift_q31(design->u_max * ((f <= TERM_LIMIT) ? f : 0), design->uf_shift) + 1) <= TERM_LIMIT);
+    if (f > TERM_LIMIT) {
+        return false;
+    }
+    bool fit = (pvid_floor_shift_q31(design->u_max * f, design->uf_shift) + 1) <= TERM_LIMIT;
     const int64_t rounding = (int64_t)1 << (design->sum_shift - 1u);
     for (size_t i = 0; i < (3u * functions * design->window); i++) {
         const int64_t magnitude = (int64_t)pvid_magnitude_q31(design->chi[i]);

@@ -169,6 +169,7 @@ def weak_variants() -> list[Variant]:
         others_q31={"trust": TrustConfigQ31(shut_max=0)},
     )
     add("gate", samples, with_settings(outlier_gate=4.0, outlier_patience_s=3.0))
+    add("dead zone", samples, with_settings(dead_zone=1.0))
     found.append(Variant("weak, small angles", replace(weak_config(RIG, RATE), angle_limit=0.1), samples))
     for full_angle, damping in ((True, False), (True, True), (False, True)):
         config = weak_config(with_settings(full_angle=full_angle, damping=damping), RATE)
@@ -222,6 +223,10 @@ def strong_variants() -> list[Variant]:
     gated = with_settings(five_points, outlier_gate=6.0, outlier_patience_s=0.5)
     add("gate", gated)
     add_q31("gate", gated)
+    resting = with_settings(five_points, dead_zone=3.0)
+    add("dead zone", resting)
+    add("dead zone, noisy rows expected", resting, {"row_sd": 1e6})
+    add_q31("dead zone", resting)
     add("Gauss-Newton", five_points, {"feedback_hz": 0.0, "kappa_min": 0.0})
     add("still pivot", five_points, drive_min=3.0)
     add_q31("Gauss-Newton", five_points, {"gain": 2**30, "kappa_min": 0})
