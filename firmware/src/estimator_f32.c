@@ -244,13 +244,19 @@ static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], f
     return PVID_ACCUMULATED;
 }
 
+/* innovate's answers for begin_row, which listens to them only while g < 1. */
+static inline float heard(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
+{
+    return (self->gain < 1.0f) ? self->model->innovate(self->p, n, y, gradient) : 0.0f;
+}
+
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     if (pvid_relative_f32(self->model)) {
         return add_relative_row(self, n, y);
     }
-    float gradient[PVID_MAX_P];
-    const float e = self->model->innovate(self->p, n, y, gradient);
+    float gradient[PVID_MAX_P] = {0};
+    const float e = heard(self, n, y, gradient);
     const pvid_reason reason = begin_row(self, n, y, e, gradient);
     if (reason == PVID_ACCUMULATED) {
         float sums[PVID_MAX_SUMS];
@@ -424,8 +430,8 @@ pvid_reason pvid_estimator_step_known_f32(pvid_estimator_f32 *self, const float 
 pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     if (!pvid_relative_f32(self->model)) {
-        float gradient[PVID_MAX_P];
-        const float e = self->model->innovate(self->p, n, y, gradient);
+        float gradient[PVID_MAX_P] = {0};
+        const float e = heard(self, n, y, gradient);
         return pvid_estimator_step_known_f32(self, n, y, e, gradient);
     }
     const pvid_reason added = add_relative_row(self, n, y);

@@ -105,7 +105,8 @@ static inline bool pvid_estimator_is_due_f32(pvid_estimator_f32 *self)
     return true;
 }
 
-/* pvid_estimator_step_f32 for a model with functions of its own, of which innovate's answers at p are known. */
+/* pvid_estimator_step_f32 for a model with functions of its own, of which innovate's answers at p are known (they are
+ * asked for while g < 1). */
 pvid_reason pvid_estimator_step_known_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
                                           const float gradient[]);
 

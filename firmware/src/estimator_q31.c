@@ -192,6 +192,13 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
     return fits && within_row_limit(rest);
 }
 
+void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e)
+{
+    self->energy = pvid_clamp_q31(self->energy + pvid_product_q31(e, e), PVID_WIDE);
+    pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
+    pvid_count_up(&self->counters.rows);
+}
+
 pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
 {
     int64_t e;
@@ -199,9 +206,7 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
-    self->energy = pvid_clamp_q31(self->energy + (e * e), PVID_WIDE);
-    pvid_information_add_q31(&self->information, n, (int32_t)e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
-    pvid_count_up(&self->counters.rows);
+    pvid_estimator_take_row_q31(self, n, (int32_t)e);
     return PVID_ACCUMULATED;
 }
 

@@ -48,10 +48,9 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
     const bool passes = learning || !pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->scale));
     pvid_scaled_q31 scale = self->scale;
     if (passes) {
-        const pvid_scaled_q31 less = {-scale.m, scale.e};
         self->judged = learning ? (self->judged + 1u) : self->judged;
         const pvid_scaled_q31 judged = pvid_scaled_of_q31(self->judged, 0);
-        scale = pvid_scaled_plus_q31(scale, pvid_scaled_over_q31(pvid_scaled_plus_q31(square, less), judged));
+        scale = pvid_scaled_plus_q31(scale, pvid_scaled_over_q31(pvid_scaled_minus_q31(square, scale), judged));
     } else {
         scale = pvid_scaled_times_q31(scale, self->widening);
     }

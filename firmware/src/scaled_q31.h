@@ -15,11 +15,17 @@ pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
 pvid_scaled_q31 pvid_scaled_times_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
 pvid_scaled_q31 pvid_scaled_over_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
 
+/* a - b, as a + b. */
+static inline pvid_scaled_q31 pvid_scaled_minus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
+{
+    const pvid_scaled_q31 less = {-b.m, b.e};
+    return pvid_scaled_plus_q31(a, less);
+}
+
 /* a > b. */
 static inline bool pvid_scaled_exceeds_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
 {
-    const pvid_scaled_q31 less = {-b.m, b.e};
-    return pvid_scaled_plus_q31(a, less).m > 0;
+    return pvid_scaled_minus_q31(a, b).m > 0;
 }
 
 /* a 2^exponent. */

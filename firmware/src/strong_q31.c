@@ -105,12 +105,11 @@ static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int3
     return true;
 }
 
-/* Whether the row fits the estimate as well as rows usually do; one that does not fit its formats is not asked. */
-static bool passes(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
+/* Whether a row with this innovation fits the estimate as well as rows usually do. */
+static bool passes(pvid_strong_q31 *self, int32_t e)
 {
-    int64_t e;
-    return !pvid_estimator_innovation_q31(&self->estimator, n, y, &e) ||
-           pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(e * e, 0));
+    return (self->gate.limit.m == 0) ||
+           pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(pvid_product_q31(e, e), 0));
 }
 
 pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
@@ -140,13 +139,15 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
     }
     int32_t n[PVID_KAPITZA_STRONG_THETA];
     int32_t row_y;
-    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n)) {
+    int64_t e;
+    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n) ||
+        !pvid_estimator_innovation_q31(&self->estimator, n, row_y, &e)) {
         return refuse(self);
     }
-    if ((self->gate.limit.m > 0) && !passes(self, n, row_y)) {
+    if (!passes(self, (int32_t)e)) {
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    const pvid_reason added = pvid_estimator_add_q31(&self->estimator, n, row_y);
-    return (added == PVID_ACCUMULATED) ? pvid_estimator_update_q31(&self->estimator) : added;
+    pvid_estimator_take_row_q31(&self->estimator, n, (int32_t)e);
+    return pvid_estimator_update_q31(&self->estimator);
 }

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from pvid import snapshot
 from pvid.capture import Run
+from pvid.compare_q31 import identifier_q31
 from pvid.native import Native, StrongIdentifier, WeakConfig, WeakIdentifier
 from pvid.native_q31 import StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.rig import simulate, standard_sensors, standard_start
@@ -116,14 +117,8 @@ def play_all(native: Native) -> int:
         run = runs[20 if settings["form"] == "strong" else 14]
         fixed = config_of_q31(rig, 1000.0, start)
         phi, y = (counts[:TICKS] for counts in counts_of(rig, run))
-        identifier: Identifier
-        if isinstance(fixed, WeakConfigQ31):
-            identifier = WeakIdentifierQ31(native, fixed)
-            full_scale = fixed.design.phi_max, fixed.design.y_max
-        else:
-            identifier = StrongIdentifierQ31(native, fixed)
-            full_scale = fixed.design.bank.phi_max, fixed.design.bank.y_max
-        done += play(identifier, count_samples(phi, y, *full_scale))
+        limits = fixed.design if isinstance(fixed, WeakConfigQ31) else fixed.design.bank
+        done += play(identifier_q31(native, fixed), count_samples(phi, y, limits.phi_max, limits.y_max))
     return done
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.capture import Run
+from pvid.compare_q31 import identifier_q31
 from pvid.native import Law, Native, StrongConfig, StrongIdentifier, TrustConfig, WeakConfig, WeakIdentifier
 from pvid.native_q31 import (
     StrongConfigQ31,
@@ -250,11 +251,7 @@ def started(native: Native, config: Config) -> Identifier:
     """The identifier of a configuration."""
     if isinstance(config, WeakConfig):
         return native.weak(config)
-    if isinstance(config, StrongConfig):
-        return native.strong(config)
-    if isinstance(config, WeakConfigQ31):
-        return WeakIdentifierQ31(native, config)
-    return StrongIdentifierQ31(native, config)
+    return native.strong(config) if isinstance(config, StrongConfig) else identifier_q31(native, config)
 
 
 # ---- what they show ----

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pvid.capture import Run
-from pvid.compare_q31 import first_difference
+from pvid.compare_q31 import first_difference, identifier_q31
 from pvid.errors import PvidError
 from pvid.native import GateConfig, Native, Reason, Status
-from pvid.native_q31 import GateConfigQ31, StrongIdentifierQ31, WeakIdentifierQ31
+from pvid.native_q31 import GateConfigQ31, StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
 from pvid.setup_q31 import config_for_run, counts_of, gate_config_q31, p_of, strong_config_q31, weak_config_q31
@@ -91,19 +91,32 @@ def test_who_is_not_asked_passes_and_leaves_the_scale_as_it_was() -> None:
 # ---- in the identifiers ----
 
 
+def gated_like(
+    twin: WeakTwinQ31 | StrongTwinQ31,
+    config: WeakConfigQ31 | StrongConfigQ31,
+    phi: npt.NDArray[Any],
+    y: npt.NDArray[Any],
+    matrix: dict[str, Native],
+) -> list[WeakIdentifierQ31 | StrongIdentifierQ31]:
+    """The core in every build, whose bits and counters were the twin's, and whose gate has kept something out."""
+    expected = twin.run(phi, y)
+    cores = [identifier_q31(native, config) for native in matrix.values()]
+    for core in cores:
+        record = core.run(phi, y, hashes=False)
+        assert first_difference(record, expected) is None, core.native.build
+        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+        assert (record.reason == OUTLIER).sum() == core.counters["rejected_outlier"] > 0
+    return cores
+
+
 @pytest.mark.parametrize(("patience_s", "zero"), [(0.0, True), (2.0, False)])
 def test_the_weak_form_equals_its_twin(patience_s: float, zero: bool, matrix: dict[str, Native], jolted: Run) -> None:
     rig = rig_with(outlier_gate=4.0, outlier_patience_s=patience_s, zero=zero, test_functions=8)
     config = weak_config_q31(rig, 1000.0)
     phi, y = counts_of(rig, jolted)
     twin = WeakTwinQ31(config)
-    expected = twin.run(phi, y)
-    for native in matrix.values():
-        core = WeakIdentifierQ31(native, config)
-        record = core.run(phi, y, hashes=False)
-        assert first_difference(record, expected) is None, native.build
-        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
-        assert (record.reason == OUTLIER).sum() == core.counters["rejected_outlier"] > 0
+    for core in gated_like(twin, config, phi, y, matrix):
+        assert isinstance(core, WeakIdentifierQ31)
         assert core.estimate.tobytes() == twin.trust.estimate[0].tobytes()
 
 
@@ -112,14 +125,7 @@ def test_the_strong_form_equals_its_twin(patience_s: float, matrix: dict[str, Na
     rig = rig_with(form="strong", stride=8, outlier_gate=6.0, outlier_patience_s=patience_s, forgetting_s=2.0)
     config = strong_config_q31(rig, 1000.0)
     phi, y = (c[28_500:31_000] for c in counts_of(rig, jolted))
-    twin = StrongTwinQ31(config)
-    expected = twin.run(phi, y)
-    for native in matrix.values():
-        core = StrongIdentifierQ31(native, config)
-        record = core.run(phi, y, hashes=False)
-        assert first_difference(record, expected) is None, native.build
-        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
-        assert (record.reason == OUTLIER).sum() == core.counters["rejected_outlier"] > 0
+    assert gated_like(StrongTwinQ31(config), config, phi, y, matrix)
 
 
 def test_windows_that_were_touched_are_kept_out(native: Native, jolted: Run) -> None:

@@ -24,24 +24,8 @@ static uint8_t again[ROOM];
 
 static pvid_weak_config_f32 weak_config(void)
 {
-    pvid_weak_config_f32 config = {
-        .sample_rate_hz = (float)TABLE_RATE,
-        .l1 = 0.3f,
-        .design = &table_design,
-        .zero_unknown = true,
-        .iterations = 3,
-        .estimator = pvid_estimator_defaults_f32,
-        .trust = pvid_trust_defaults_f32,
-    };
     const float start[4] = {22.0f, 12.0f, 4.0f, 0.0f};
-    for (int i = 0; i < 4; i++) {
-        config.estimator.start[i] = start[i];
-        config.estimator.start_sd[i] = (i < 3) ? (0.5f * start[i]) : 0.5f;
-        config.estimator.lower[i] = (i < 3) ? (0.05f * start[i]) : -1.0f;
-        config.estimator.upper[i] = (i < 3) ? (20.0f * start[i]) : 1.0f;
-    }
-    config.estimator.row_sd = 1.0e-4f;
-    return config;
+    return table_config(start);
 }
 
 static void run(pvid_weak_f32 *self, plant_state *plant, int ticks)

@@ -28,25 +28,9 @@ static int start_again(void **state)
 {
     (void)state;
     make_table();
-    const pvid_weak_config_f32 fresh = {
-        .sample_rate_hz = (float)TABLE_RATE,
-        .l1 = 0.3f,
-        .design = &table_design,
-        .zero_unknown = true,
-        .iterations = 3,
-        .passes = 2,
-        .estimator = pvid_estimator_defaults_f32,
-        .trust = pvid_trust_defaults_f32,
-    };
-    config = fresh;
     const float start[4] = {30.0f, 9.0f, 5.5f, 0.0f};
-    for (int i = 0; i < 4; i++) {
-        config.estimator.start[i] = start[i];
-        config.estimator.start_sd[i] = (i < 3) ? (0.5f * start[i]) : 0.5f;
-        config.estimator.lower[i] = (i < 3) ? (0.05f * start[i]) : -1.0f;
-        config.estimator.upper[i] = (i < 3) ? (20.0f * start[i]) : 1.0f;
-    }
-    config.estimator.row_sd = 1.0e-4f;
+    config = table_config(start);
+    config.passes = 2;
     return 0;
 }
 

@@ -21,7 +21,7 @@ STAGES = {
     "add": "checks, innovation, sums of M, B, yy",
     "project": "C^T M C and C^T (B - M theta)",
     "estimator": "the estimator's whole step: add, project, factor, solve, move p",
-    "gauss-newton": "the same with feedback_hz = 0, which adds up no innovation",
+    "gauss-newton": "the same with feedback_hz = 0, which needs no innovation",
     "tick": "samples in, parameters out",
     "assess": "standard errors and kappa (only when published)",
     "weak": "weak form, samples in, parameters out: mean over its windows (K = 12, 1 kHz)",

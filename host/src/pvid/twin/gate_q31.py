@@ -15,10 +15,6 @@ _GROWTH, _GROWTH_BITS = 150902, 14
 _SCALE_MAX = scaled(1, 100)
 
 
-def _minus(a: Scaled) -> Scaled:
-    return Scaled(-a.m, a.e)
-
-
 class GateQ31:
     """The gate of every lane; all share the configuration, `floor` [lanes] is their own."""
 
@@ -42,7 +38,7 @@ class GateQ31:
         learning = self.judged < self.memory
         passes = learning | ~square.exceeds(self.limit.times(self.scale))
         judged = np.where(passes & learning, self.judged + 1, self.judged)
-        change = square.plus(_minus(self.scale)).over(scaled(np.maximum(judged, 1), 0))
+        change = square.minus(self.scale).over(scaled(np.maximum(judged, 1), 0))
         scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))
         scale = pick(self.floor.exceeds(scale), self.floor, scale)
         scale = pick(scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)

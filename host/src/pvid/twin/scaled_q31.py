@@ -25,6 +25,10 @@ class Scaled(NamedTuple):
         total = scaled((more.m << 30) + scale(less.m << 30, np.maximum(more.e - less.e, 0)), more.e - 30)
         return pick(self.m == 0, other, pick(other.m == 0, self, total))
 
+    def minus(self, other: Scaled) -> Scaled:
+        """The difference."""
+        return self.plus(Scaled(-other.m, other.e))
+
     def times(self, other: Scaled) -> Scaled:
         """The product."""
         return scaled(self.m * other.m, self.e + other.e)
@@ -36,7 +40,7 @@ class Scaled(NamedTuple):
 
     def exceeds(self, other: Scaled) -> npt.NDArray[np.bool_]:
         """Where it is larger."""
-        return np.asarray(self.plus(Scaled(-other.m, other.e)).m > 0)
+        return np.asarray(self.minus(other).m > 0)
 
     def shifted(self, exponent: npt.ArrayLike) -> Scaled:
         """Times 2^exponent."""
