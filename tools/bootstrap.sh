@@ -73,6 +73,7 @@ missing_packages() {
         need qemu-system-arm command -v qemu-system-arm
     fi
     if [[ $1 == test || $1 == targets ]]; then
+        need ccache command -v ccache
         need gcc-riscv64-unknown-elf command -v riscv64-unknown-elf-gcc
         need qemu-system-misc command -v qemu-system-riscv32
         need gcc-avr command -v avr-gcc

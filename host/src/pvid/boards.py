@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import select
 import shutil
@@ -17,6 +18,7 @@ from pvid.errors import PvidError
 ROOT = Path(__file__).resolve().parents[3]
 BUILD = ROOT / "build" / "targets"
 SIMAVR_STDIO = BUILD / "simavr_stdio"
+COMPILED = ROOT / "build" / "cache" / "ccache"  # objects of all trees
 
 
 @dataclass(frozen=True)
@@ -128,9 +130,12 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
     configure += [f"-DCMAKE_TOOLCHAIN_FILE={ROOT / 'firmware' / 'cmake' / target.toolchain}.cmake"]
     configure += [f"-DPVID_BOARD={target.name}", "-DPVID_DEVELOPER=ON"]
     configure += [f"-D{name}={value}" for name, value in options.items()]
+    configure += ["-DCMAKE_C_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
+    # Trees of one processor hold the same objects but for a macro or two: compiled once.
+    environment = {**os.environ, "CCACHE_DIR": str(COMPILED), "CCACHE_NOHASHDIR": "true"}
     with one_at_a_time(tree):
         for command in (configure, ["cmake", "--build", str(tree)]):
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
             if done.returncode != 0:
                 lines = (done.stdout + done.stderr).strip().splitlines()
                 errors = [line for line in lines if re.search(r"error|undefined|overflowed|CMake Error", line)]
