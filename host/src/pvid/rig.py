@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import solve_ivp
 
 from pvid.capture import MIN_ROWS, Run
 from pvid.errors import PvidError
@@ -398,6 +397,8 @@ def _truth(
     truth: Truth,
 ) -> tuple[FloatArray, Exact | None]:
     """State (n, 4) at the sample times and, for the linear truth, its exact derivatives; all read-only."""
+    from scipy.integrate import solve_ivp  # here: half of what any command takes to start
+
     t = _sample_times(sample_rate, duration)
     equations = _equations_of_motion(pendulum, drive, truth)
     fastest = max((tone.frequency_hz for tone in drive.tones), default=0.0)
