@@ -15,24 +15,33 @@ def integers(values: npt.ArrayLike) -> Int:
     return np.asarray(values, np.int64)
 
 
-def round_shift(x: Int, s: npt.ArrayLike) -> Int:
+def round_shift(x: Int, s: npt.ArrayLike | int) -> Int:
     """x 2^-s rounded half up, s >= 0."""
+    if isinstance(s, int):
+        if s == 0:
+            return x
+        twice: Int = x >> min(s - 1, 63)  # of the result, which is its larger half
+        return twice - (twice >> 1)
     shift = integers(s)
-    twice = x >> np.minimum(np.maximum(shift - 1, 0), 63)  # of the result, but for a shift of 0
-    rounded = (twice >> 1) + (twice & 1)
-    return np.where(shift > 63, 0, np.where(shift > 0, rounded, x))
+    one = np.minimum(shift, 1)  # 0 where nothing is shifted
+    twice = x >> np.minimum(shift - one, 63)
+    return (twice >> one) + (twice & one)
 
 
 def scale(x: Int, s: npt.ArrayLike) -> Int:
     """x 2^-s, rounded half up where s > 0, saturated at WIDE where s < 0."""
     shift = integers(s)
-    right = round_shift(x, np.maximum(shift, 0))
-    if (shift >= 0).all():
-        return right
+    rising = shift < 0
+    if not rising.any():
+        return round_shift(x, shift)
     left = np.minimum(np.maximum(-shift, 0), 62)
     fits = np.abs(x) <= (np.int64(WIDE - 1) >> left)  # of x, bits and shift are 62 at most
-    shifted = np.where(fits, x << left, np.sign(x) * WIDE)
-    return np.where(shift < 0, shifted, right)
+    shifted = x << left
+    if not fits.all():
+        shifted = np.where(fits, shifted, np.sign(x) * WIDE)
+    if rising.all():
+        return shifted
+    return np.where(rising, shifted, round_shift(x, np.maximum(shift, 0)))
 
 
 def clamp(x: Int, limit: int) -> Int:
@@ -43,10 +52,10 @@ def clamp(x: Int, limit: int) -> Int:
 def bit_length(x: Int) -> Int:
     """Bits of x >= 0; 0 for 0."""
     values = integers(x)
-    exponent = np.frexp(values.astype(np.float64))[1].astype(
-        np.int64
-    )  # of the nearest float: 2^exponent may be above x
-    return exponent - ((values > 0) & (values < (np.int64(1) << np.maximum(exponent - 1, 0))))
+    # Without its second bit a number is not rounded up to the next power of two: its float's exponent is its length.
+    exponent = (values & ~(values >> 1)).astype(np.float64).view(np.int64) >> 52
+    found: Int = np.maximum(exponent - 1022, 0)
+    return found
 
 
 def square_root(x: Int) -> Int:

@@ -62,19 +62,18 @@ def _product(a: Int, b: Int) -> Int:
     return round_shift(a * b, _DOWN)
 
 
-def _powers(x: Int, w: Int, count: int) -> list[Int]:
-    """x w .. x w^count from x and w of 31 bits, the product x w given."""
-    found = [x]
-    for _ in range(count - 1):
+def _powers(p: Int, w: Int) -> Int:
+    """p w, p w^2, p w^3 and p w^4 [4, n, lanes] from p [n, lanes] and w of 31 bits: the first is a product."""
+    found = [_product(p, w)]
+    for _ in range(3):
         found.append(times_q31(found[-1], w))
-    return found
+    return np.stack(found)
 
 
 def theta(p: Int) -> Int:
     """f(p) [11, lanes]."""
     w = p[W]
-    d1 = _powers(_product(p[D1], w), w, 3)
-    d2 = _powers(_product(p[D2], w), w, 4)
+    d1, d2 = _powers(p[D1:], w).transpose(1, 0, 2)
     by_d1 = [p[D1] << _UP, 3 * d1[0], 3 * d1[1], d1[2]]
     return np.stack([w << _UP, _product(w, w), *by_d1, p[D2] << _UP, d2[0], 3 * d2[1], d2[2], d2[3]])
 
@@ -82,9 +81,7 @@ def theta(p: Int) -> Int:
 def jacobian(p: Int) -> Int:
     """Non-zeros of d theta / d p [18, lanes]."""
     w = p[W]
-    d1 = _powers(_product(p[D1], w), w, 2)
-    d2 = _powers(_product(p[D2], w), w, 3)
-    w2, w3, w4 = _powers(_product(w, w), w, 3)
+    (w2, w3, w4, _), d1, d2 = _powers(p, w).transpose(1, 0, 2)
     one = np.full_like(w, 1 << (30 + _UP))
     first = w << _UP
     by_w = [one, first, 3 * (p[D1] << _UP), 3 * d1[0], 3 * d1[1], p[D2] << _UP, 3 * d2[0], 3 * d2[1], d2[2]]
