@@ -97,6 +97,8 @@ missing_packages() {
         need pkg-config command -v pkg-config
         need shellcheck command -v shellcheck
         need valgrind command -v valgrind
+        need why3 command -v why3
+        need z3 command -v z3
         if [[ $(uname -m) == x86_64 ]]; then
             need gcc-multilib links_with gcc -m32
         fi

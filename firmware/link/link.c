@@ -14,8 +14,21 @@ typedef struct {
     uint8_t code;   /* one more than the bytes in it */
 } stuffer;
 
-static void stuff(stuffer *self, const uint8_t bytes[], size_t n)
+/* Each byte adds at most 255 to 254 at + code, which is why PVID_LINK_ENCODED_BYTES is room enough. */
+/*@ requires \valid(self) && \valid_read(bytes + (0 .. n - 1)) && \valid(self->out + (0 .. room - 1));
+    requires \separated(self, self->out + (0 .. room - 1), bytes + (0 .. n - 1));
+    requires 1 <= self->code <= 255 && self->code_at < self->at;
+    requires 254 * self->at + self->code + 255 * n <= 254 * room && room <= 65535;
+    assigns self->at, self->code_at, self->code, self->out[0 .. room - 1];
+    ensures 1 <= self->code <= 255 && self->code_at < self->at;
+    ensures 254 * self->at + self->code <= 254 * \old(self->at) + \old(self->code) + 255 * n; */
+static void stuff(stuffer *self, const uint8_t bytes[], size_t n) /*@ ghost (size_t room) */
 {
+    /*@ loop invariant 0 <= i <= n;
+        loop invariant 1 <= self->code <= 255 && self->code_at < self->at;
+        loop invariant 254 * self->at + self->code <= \at(254 * self->at + self->code, Pre) + 255 * i;
+        loop assigns i, self->at, self->code_at, self->code, self->out[0 .. room - 1];
+        loop variant n - i; */
     for (size_t i = 0; i < n; i++) {
         if (self->code == GROUP) { /* full: opened only now, for nothing may follow */
             self->code_at = self->at++;
@@ -34,6 +47,11 @@ static void stuff(stuffer *self, const uint8_t bytes[], size_t n)
     self->out[self->code_at] = self->code;
 }
 
+/*@ requires \valid_read(frame) && \valid_read(frame->payload + (0 .. frame->length - 1));
+    requires \valid(out + (0 .. room - 1));
+    requires \separated(frame, out + (0 .. room - 1));
+    requires \separated(frame->payload + (0 .. frame->length - 1), out + (0 .. room - 1));
+    assigns out[0 .. room - 1]; */
 size_t pvid_link_encode(const pvid_link_frame *frame, uint8_t out[], size_t room)
 {
     if ((frame->length > PVID_LINK_MAX_SENT) || (room < PVID_LINK_ENCODED_BYTES(frame->length))) {
@@ -50,9 +68,9 @@ size_t pvid_link_encode(const pvid_link_frame *frame, uint8_t out[], size_t room
     pvid_put_u32(crc, pvid_crc32(of_header, frame->payload, frame->length));
 
     stuffer state = {.out = out, .at = 1, .code_at = 0, .code = 1u};
-    stuff(&state, header, sizeof header);
-    stuff(&state, frame->payload, frame->length);
-    stuff(&state, crc, sizeof crc);
+    stuff(&state, header, sizeof header) /*@ ghost (PVID_LINK_ENCODED_BYTES(frame->length)) */;
+    stuff(&state, frame->payload, frame->length) /*@ ghost (PVID_LINK_ENCODED_BYTES(frame->length)) */;
+    stuff(&state, crc, sizeof crc) /*@ ghost (PVID_LINK_ENCODED_BYTES(frame->length)) */;
     out[state.at] = 0u;
     return state.at + 1u;
 }

@@ -1,5 +1,4 @@
-/* The decoder of the frame codec: any number of any bytes. (The encoder's place in `out` is bounded by a count of groups
- * of 254, which intervals do not see; tests/fuzz/fuzz_link.c runs it under the sanitizers.) */
+/* The decoder of the frame codec: any number of any bytes. (The encoder: prove_encoder.c.) */
 #include "prove.h"
 
 #include "link.h"

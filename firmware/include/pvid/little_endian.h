@@ -5,12 +5,16 @@
 #include <stdint.h>
 #include <string.h>
 
+/*@ requires \valid(out + (0 .. 1));
+    assigns out[0 .. 1]; */
 static inline void pvid_put_u16(uint8_t out[2], uint16_t value)
 {
     out[0] = (uint8_t)(value & 0xFFu);
     out[1] = (uint8_t)(value >> 8);
 }
 
+/*@ requires \valid(out + (0 .. 3));
+    assigns out[0 .. 3]; */
 static inline void pvid_put_u32(uint8_t out[4], uint32_t value)
 {
     pvid_put_u16(out, (uint16_t)(value & 0xFFFFu));
