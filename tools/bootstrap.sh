@@ -93,6 +93,7 @@ missing_packages() {
         need g++ command -v g++
         need gcovr command -v gcovr
         need libclang-rt-dev links_with clang -fsanitize=address,undefined
+        need llvm command -v opt
         need libcmocka-dev test -e /usr/include/cmocka.h
         need pkg-config command -v pkg-config
         need shellcheck command -v shellcheck

@@ -8,8 +8,9 @@ int main(void);
 /* Volatile: no call of memset or memcpy, whose frames would lie in what is being painted. */
 static void fill(volatile uint32_t *from, const volatile uint32_t *end, uint32_t word)
 {
-    for (; from < end; from++) {
-        *from = word;
+    const size_t words = ((uintptr_t)end - (uintptr_t)from) / sizeof word;
+    for (size_t i = 0; i < words; i++) {
+        from[i] = word;
     }
 }
 

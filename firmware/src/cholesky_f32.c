@@ -81,7 +81,7 @@ void pvid_cholesky_inverse_column_f32(const pvid_cholesky_f32 *self, size_t j, f
     float column[PVID_MAX_P];
     unit[j] = 1.0f;
     pvid_cholesky_solve_f32(self, unit, column);
-    for (size_t i = 0; i <= j; i++) { /* the two triangles differ by rounding: keep one */
+    for (size_t i = 0; i < j + 1u; i++) { /* the two triangles differ by rounding: keep one */
         inverse[i][j] = column[i];
         inverse[j][i] = column[i];
     }

@@ -124,7 +124,9 @@ static void assess_in_stages(const pvid_estimator_f32 *self, pvid_estimate_f32 *
 {
     pvid_estimator_solve_f32 solve;
     pvid_estimator_begin_assessment_f32(self, &solve, estimate);
-    while (!pvid_estimator_assess_on_f32(self, &solve)) {
+    bool done = false;
+    for (uint16_t left = pvid_estimator_assessment_stages_f32(self); (left > 0u) && !done; left--) {
+        done = pvid_estimator_assess_on_f32(self, &solve);
     }
 }
 

@@ -216,7 +216,9 @@ static pvid_reason solve_at_once(pvid_estimator_q31 *self, bool ends_group)
 {
     pvid_estimator_solve_q31 solve;
     pvid_estimator_begin_q31(self, &solve, ends_group);
-    while (!pvid_estimator_advance_q31(self, &solve)) {
+    bool done = false;
+    for (uint16_t left = pvid_estimator_stages_q31(self, ends_group); (left > 0u) && !done; left--) {
+        done = pvid_estimator_advance_q31(self, &solve);
     }
     return solve.reason;
 }

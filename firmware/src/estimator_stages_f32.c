@@ -336,10 +336,12 @@ bool pvid_estimator_assess_on_f32(const pvid_estimator_f32 *self, pvid_estimator
 static size_t projection_stages(const pvid_model_f32 *model)
 {
     size_t stages = 1u;
-    for (size_t start = 0; start < model->n_c;) {
-        const size_t end = pvid_pattern_end_f32(model, start);
-        stages += 1u + (((end - start) + (COLUMNS_A_STAGE - 1u)) / COLUMNS_A_STAGE);
-        start = end;
+    size_t place = 0; /* in a column of C */
+    for (size_t k = 0; k < model->n_c; k++) {
+        const bool first = (k == 0u) || (model->c_column[k] != model->c_column[k - 1u]);
+        place = first ? 0u : (place + 1u);
+        stages += first ? 1u : 0u;
+        stages += ((place % COLUMNS_A_STAGE) == 0u) ? 1u : 0u;
     }
     return stages;
 }
@@ -364,7 +366,9 @@ static pvid_reason solve_in_stages(pvid_estimator_f32 *self, bool ends_group)
 {
     pvid_estimator_solve_f32 solve;
     pvid_estimator_begin_f32(self, &solve, ends_group);
-    while (!pvid_estimator_advance_f32(self, &solve)) {
+    bool done = false;
+    for (uint16_t left = pvid_estimator_stages_f32(self, ends_group); (left > 0u) && !done; left--) {
+        done = pvid_estimator_advance_f32(self, &solve);
     }
     return solve.reason;
 }

@@ -89,8 +89,8 @@ static void eliminate_part(pvid_estimator_solve_q31 *solve, size_t n_p, size_t p
 {
     const size_t first = (part - 1u) * PIVOTS_A_STAGE;
     const size_t end = ((n_p - first) > PIVOTS_A_STAGE) ? (first + PIVOTS_A_STAGE) : n_p;
-    for (size_t turn = first + 1u; turn <= end; turn++) {
-        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q, n_p - turn);
+    for (size_t turn = first; turn < end; turn++) {
+        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q, (n_p - 1u) - turn);
     }
 }
 

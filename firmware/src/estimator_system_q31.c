@@ -42,8 +42,8 @@ size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const
 size_t pvid_system_row_stages_q31(size_t n_theta)
 {
     size_t stages = 0;
-    for (size_t row = 0; row < n_theta; row = rows_end(n_theta, row)) {
-        stages++;
+    for (size_t row = 0; (row < n_theta) && (stages < n_theta); row = rows_end(n_theta, row)) {
+        stages++; /* of a row at least */
     }
     return stages;
 }

@@ -122,14 +122,14 @@ void pvid_information_end_group_f32(pvid_information_f32 *self)
     self->age = 0;
     const size_t sums = number_of_sums(self);
     const float retention = self->retention;
-    size_t i = 0;
-    for (; (i + LANES) <= sums; i += LANES) {
+    const size_t in_lanes = sums - (sums % LANES);
+    for (size_t i = 0; i < in_lanes; i += LANES) {
         PVID_UNROLL
         for (size_t j = i; j < i + LANES; j++) {
             fold(&self->high[j], &self->low[j], retention);
         }
     }
-    for (; i < sums; i++) {
+    for (size_t i = in_lanes; i < sums; i++) {
         fold(&self->high[i], &self->low[i], retention);
     }
 }

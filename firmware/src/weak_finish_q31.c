@@ -145,7 +145,7 @@ static void combine_row(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *
     const size_t start = row_start(row);
     const int64_t diagonal = combined(self, &design->gram[start + row], size);
     self->exponent[row] = (int16_t)pvid_half_exponent_q31((diagonal > 0) ? diagonal : 1);
-    for (size_t j = 0; j <= row; j++) {
+    for (size_t j = 0; j < row + 1u; j++) {
         const int64_t sum = combined(self, &design->gram[start + j], size);
         const int32_t exponent = self->exponent[row] + self->exponent[j];
         self->factor[start + j] = (int32_t)pvid_clamp_q31(pvid_scale_q31(sum, exponent), PVID_ONE_Q30);
@@ -241,11 +241,11 @@ static void factor_part(pvid_weak_finish_q31 *self, row_part part)
 /* r L = e_row^T, from the last entry back: entries first..last-1 of r. */
 static void invert_entries(pvid_weak_finish_q31 *self, size_t row, size_t first, size_t last)
 {
-    for (size_t turn = 1; turn <= last - first; turn++) {
-        const size_t j = last - turn;
+    for (size_t turn = 0; turn < last - first; turn++) {
+        const size_t j = (last - 1u) - turn;
         int64_t sum = (j == row) ? ((int64_t)PVID_ONE_Q30 << INVERSE_BITS) : 0;
         size_t at = row_start(j + 1u) + j;
-        for (size_t k = j + 1u; k <= row; k++) {
+        for (size_t k = j + 1u; k < row + 1u; k++) {
             sum -= (int64_t)self->inverted[k] * self->factor[at];
             at += k + 1u;
         }
@@ -257,12 +257,12 @@ static void invert_entries(pvid_weak_finish_q31 *self, size_t row, size_t first,
 static void weigh_row(pvid_weak_finish_q31 *self, size_t row)
 {
     int32_t largest = PVID_NOTHING_Q31;
-    for (size_t j = 0; j <= row; j++) {
+    for (size_t j = 0; j < row + 1u; j++) {
         const int32_t length = pvid_length_q31(self->inverted[j]) - self->exponent[j];
         largest = (length > largest) ? length : largest;
     }
     self->inverted_exponent = (int16_t)(largest - ROW_BITS);
-    for (size_t j = 0; j <= row; j++) {
+    for (size_t j = 0; j < row + 1u; j++) {
         const int32_t shift = self->inverted_exponent + self->exponent[j];
         self->inverted[j] = (int32_t)pvid_scale_q31(self->inverted[j], shift);
     }

@@ -40,7 +40,7 @@ static inline void continue_job(pvid_weak_front_f32 *self)
     size_t newer = job->newer;
     size_t older = job->older;
     size_t i = job->pair;
-    while (i < last) {
+    for (uint32_t runs = 0; (runs < PVID_WEAK_JOB_RUNS) && (i < last); runs++) {
         const size_t run = pvid_weak_job_outwards(job, last - i, &newer, &older);
         const float *after = self->ring[newer];
         const float *before = self->ring[older];

@@ -38,7 +38,7 @@ static void continue_job(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *
     size_t newer = job->newer;
     size_t older = job->older;
     size_t i = job->pair;
-    while (i < last) {
+    for (uint32_t runs = 0; (runs < PVID_WEAK_JOB_RUNS) && (i < last); runs++) {
         const size_t run = pvid_weak_job_outwards(job, last - i, &newer, &older);
         const int32_t *after = self->ring[newer];
         const int32_t *before = self->ring[older];

@@ -110,6 +110,10 @@ static inline size_t pvid_weak_job_end(const pvid_weak_job *self)
     return self->pair + ((left < self->slice) ? left : self->slice);
 }
 
+/* Most stretches of a job between which a place crosses an end of the ring: the ring is longer than the two halves of a
+ * block together, so that one of its places at most crosses an end, and that once. */
+#define PVID_WEAK_JOB_RUNS 2u
+
 /* Moves to the next pair outwards; returns how many of the `left` pairs from it on lie ahead without crossing the
  * ring's ends. */
 static inline size_t pvid_weak_job_outwards(const pvid_weak_job *self, size_t left, size_t *newer, size_t *older)

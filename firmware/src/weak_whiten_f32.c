@@ -94,7 +94,7 @@ void pvid_weak_whiten_inverse_f32(const pvid_weak_whiten_f32 *self, size_t row, 
     for (size_t j = row; j-- > 0u;) {
         float sum = 0.0f;
         size_t at = row_start(j + 1u) + j;
-        for (size_t k = j + 1u; k <= row; k++) {
+        for (size_t k = j + 1u; k < row + 1u; k++) {
             sum += inverse[k] * self->factor[at];
             at += k + 1u;
         }
@@ -107,7 +107,7 @@ void pvid_weak_whiten_trace_f32(pvid_weak_whiten_f32 *self, const pvid_weak_desi
 {
     const float *g = &design->gram[(GRAM_22 + which) * row_start(design->functions)];
     float trace = (row == 0u) ? 0.0f : self->trace[which];
-    for (size_t a = 0; a <= row; a++) {
+    for (size_t a = 0; a < row + 1u; a++) {
         float below = 0.0f;
         for (size_t b = 0; b < a; b++) {
             below += inverse[b] * g[b];

@@ -74,7 +74,8 @@ static void a_job_visits_every_pair_at_its_place(void **state)
         size_t older = job.older;
         const size_t last = pvid_weak_job_end(&job);
         size_t i = job.pair;
-        while (i < last) {
+        for (uint32_t runs = 0; i < last; runs++) {
+            assert_true(runs < PVID_WEAK_JOB_RUNS);
             const size_t run = pvid_weak_job_outwards(&job, last - i, &newer, &older);
             const uint32_t centre = 4u + (5u * (begun - 1u));
             for (size_t k = 0; k < run; k++) {
@@ -93,6 +94,34 @@ static void a_job_visits_every_pair_at_its_place(void **state)
     assert_int_equal(job.pair, job.half);
 }
 
+/* A job that is done at once, in a ring as short as can be, is cut in two at an end of the ring, unless it begins in the
+ * middle or at an end. */
+static void a_job_crosses_an_end_of_the_ring_once(void **state)
+{
+    (void)state;
+    pvid_weak_job job;
+    pvid_weak_job_init(&job, 9, 1);
+    assert_int_equal(job.length, 9);
+    uint32_t crossed = 0;
+    for (uint32_t tick = 0; tick < 8u + 90u; tick++) {
+        if (!pvid_weak_job_begins(&job)) {
+            continue;
+        }
+        size_t newer = job.newer;
+        size_t older = job.older;
+        uint32_t runs = 0;
+        for (size_t i = 0; i < job.half; runs++) {
+            const size_t run = pvid_weak_job_outwards(&job, job.half - i, &newer, &older);
+            i += run;
+            newer += run - 1u;
+            older -= run - 1u;
+        }
+        assert_in_range(runs, 1, PVID_WEAK_JOB_RUNS);
+        crossed += runs - 1u;
+    }
+    assert_int_equal(crossed, 60);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -101,6 +130,7 @@ int main(void)
         cmocka_unit_test(stages_go_together_only_where_they_must),
         cmocka_unit_test(what_is_odd_and_within),
         cmocka_unit_test(a_job_visits_every_pair_at_its_place),
+        cmocka_unit_test(a_job_crosses_an_end_of_the_ring_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

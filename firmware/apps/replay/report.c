@@ -21,7 +21,7 @@ static void report_digits(uint32_t value, uint32_t base, uint32_t least)
     char digits[DIGITS + 1u];
     size_t place = DIGITS;
     digits[place] = '\0';
-    while ((value != 0u) || (place > (DIGITS - least))) {
+    while ((place > 0u) && ((value != 0u) || (place > (DIGITS - least)))) {
         place--;
         digits[place] = "0123456789abcdef"[value % base];
         value /= base;

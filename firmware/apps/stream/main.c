@@ -371,11 +371,14 @@ static bool listen(void)
         n = pvid_receiver_take(bytes, sizeof bytes);
     }
     const bool any = at < n;
-    while (at < n) {
-        if (pvid_link_decode(&stream.decoder, bytes[at++], &frame)) {
-            obey(&frame);
-            break;
-        }
+    bool whole = false;
+    size_t next = at;
+    for (const size_t end = n; (next < end) && !whole; next++) {
+        whole = pvid_link_decode(&stream.decoder, bytes[next], &frame);
+    }
+    at = next;
+    if (whole) {
+        obey(&frame);
     }
     return any;
 }

@@ -131,9 +131,11 @@ size_t pvid_port_stack_size(void)
 
 size_t pvid_port_stack_used(void)
 {
-    const volatile uint8_t *byte = &__heap_start;
-    while ((byte <= &__stack) && (*byte == PAINT)) {
-        byte++;
+    const volatile uint8_t *lowest = &__heap_start;
+    const size_t size = pvid_port_stack_size();
+    size_t painted = 0;
+    while ((painted < size) && (lowest[painted] == PAINT)) {
+        painted++;
     }
-    return (size_t)(&__stack - byte) + 1u;
+    return size - painted;
 }

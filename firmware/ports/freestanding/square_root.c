@@ -36,7 +36,7 @@ float sqrtf(float x)
     uint32_t fraction = bits & FRACTION_MASK;
     if (exponent == 0) { /* subnormal: bring the leading bit to its place */
         exponent = 1;
-        while ((fraction & HIDDEN_BIT) == 0u) {
+        for (int32_t shift = 0; (shift < FRACTION_BITS) && ((fraction & HIDDEN_BIT) == 0u); shift++) {
             fraction <<= 1;
             exponent--;
         }
