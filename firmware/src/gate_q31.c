@@ -34,6 +34,7 @@ pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *
         self->widening = pvid_scaled_plus_q31(one, pvid_scaled_over_q31(growth, patience));
     }
     self->scale = floor;
+    self->part = one;
     self->memory = (memory >= 1u) ? memory : 1u;
     self->judged = 0;
     return PVID_OK;
@@ -48,9 +49,11 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
     const bool passes = learning || !pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->scale));
     pvid_scaled_q31 scale = self->scale;
     if (passes) {
-        self->judged = learning ? (self->judged + 1u) : self->judged;
-        const pvid_scaled_q31 judged = pvid_scaled_of_q31(self->judged, 0);
-        scale = pvid_scaled_plus_q31(scale, pvid_scaled_over_q31(pvid_scaled_minus_q31(square, scale), judged));
+        if (learning) {
+            self->judged++;
+            self->part = pvid_scaled_over_q31(pvid_scaled_of_q31(1, 0), pvid_scaled_of_q31(self->judged, 0));
+        }
+        scale = pvid_scaled_plus_q31(scale, pvid_scaled_times_q31(pvid_scaled_minus_q31(square, scale), self->part));
     } else {
         scale = pvid_scaled_times_q31(scale, self->widening);
     }

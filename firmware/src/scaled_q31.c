@@ -22,7 +22,7 @@ pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
 
 pvid_scaled_q31 pvid_scaled_times_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
 {
-    return pvid_scaled_of_q31((int64_t)a.m * b.m, a.e + b.e);
+    return pvid_scaled_of_q31(pvid_product_q31(a.m, b.m), a.e + b.e);
 }
 
 pvid_scaled_q31 pvid_scaled_over_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)

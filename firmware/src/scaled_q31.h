@@ -22,10 +22,18 @@ static inline pvid_scaled_q31 pvid_scaled_minus_q31(pvid_scaled_q31 a, pvid_scal
     return pvid_scaled_plus_q31(a, less);
 }
 
-/* a > b. */
+/* a > b, b >= 0: the exponents decide unless they are neighbours. */
 static inline bool pvid_scaled_exceeds_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
 {
-    return pvid_scaled_minus_q31(a, b).m > 0;
+    if ((a.m <= 0) || (b.m == 0)) {
+        return a.m > 0;
+    }
+    const uint32_t twice_a = (a.e > b.e) ? 1u : 0u;
+    const uint32_t twice_b = (b.e > a.e) ? 1u : 0u;
+    if ((a.e > (b.e + 1)) || (b.e > (a.e + 1))) {
+        return a.e > b.e;
+    }
+    return ((uint32_t)a.m << twice_a) > ((uint32_t)b.m << twice_b);
 }
 
 /* a 2^exponent. */

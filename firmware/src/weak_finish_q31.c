@@ -27,6 +27,7 @@ enum {
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
+    STAGE_FIT,   /* likewise: what the rows leave unexplained, for the gate */
     STAGE_NOISE, /* are the rows to be taken in? and what noise there is in them */
     STAGE_ADD,   /* K times: a row to the estimator */
     STAGE_SOLVE, /* `iterations` solves of several stages each */
@@ -35,10 +36,11 @@ enum {
     STAGE_IDLE
 };
 
-/* Functions whose columns one stage takes that assembles them, looks along a direction, removes it. */
+/* Functions whose columns one stage takes that assembles them, looks along a direction, removes it, takes residuals. */
 #define ASSEMBLED_A_STAGE 3u
 #define ALONG_A_STAGE 6u
 #define REMOVED_A_STAGE 3u
+#define FITTED_A_STAGE 3u
 
 /* Parts of a long row. WHITEN_PARTS divides PVID_WEAK_COLUMNS_Q31. */
 #define FACTOR_PARTS 2u
@@ -397,7 +399,8 @@ static void remove_components(pvid_weak_finish_q31 *self, size_t first, size_t l
     }
 }
 
-/* What a window's rows leave unexplained, a few functions at a time; a row that does not fit as large as can be. */
+/* What a window's rows leave unexplained, a few functions at a time; a row that does not fit as large as can be. Only the gate
+ * asks for it. */
 static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *estimator, size_t first, size_t last,
                           int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
@@ -543,10 +546,14 @@ static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
         next = at_most(index, ALONG_A_STAGE, functions);
         find_components(self, index, next, sums);
         break;
-    default: /* STAGE_REMOVE_A, STAGE_REMOVE_B */
+    case STAGE_REMOVE_A:
+    case STAGE_REMOVE_B:
         next = at_most(index, REMOVED_A_STAGE, functions);
         remove_components(self, index, next, sums);
-        if ((self->stage == STAGE_REMOVE_B) && (self->gate.limit.m > 0)) {
+        break;
+    default: /* STAGE_FIT */
+        next = at_most(index, FITTED_A_STAGE, functions);
+        if (self->gate.limit.m > 0) {
             add_residuals(self, estimator, index, next, sums);
         }
         break;
@@ -619,7 +626,8 @@ uint32_t pvid_weak_finish_stages_q31(uint8_t functions, uint8_t iterations, cons
     const uint32_t along = (functions + (ALONG_A_STAGE - 1u)) / ALONG_A_STAGE;
     const uint32_t removed = (functions + (REMOVED_A_STAGE - 1u)) / REMOVED_A_STAGE;
     const uint32_t assembled = (functions + (ASSEMBLED_A_STAGE - 1u)) / ASSEMBLED_A_STAGE;
-    const uint32_t once = (2u * (uint32_t)functions) + assembled + (uint32_t)triangles;
+    const uint32_t fitted = (functions + (FITTED_A_STAGE - 1u)) / FITTED_A_STAGE;
+    const uint32_t once = (2u * (uint32_t)functions) + assembled + (uint32_t)triangles + fitted;
     const uint32_t rows = once + (2u * (2u + along + removed));
     const uint32_t first = pvid_estimator_stages_q31(estimator, true);
     const uint32_t more = pvid_estimator_stages_q31(estimator, false);

@@ -164,9 +164,11 @@ def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
 # ---- settings ----
 
 
-def test_it_is_off_unless_asked_for(jolted: Run) -> None:
-    for form in ("weak", "strong"):
-        assert config_for_run(rig_with(form=form, stride=8), jolted).gate == GateConfigQ31(0, 0)
+def test_it_is_on_as_in_float32_unless_the_law_is_the_paper_s(jolted: Run) -> None:
+    for form, sigmas in (("weak", 4), ("strong", 6)):
+        assert config_for_run(rig_with(form=form, stride=8), jolted).gate == GateConfigQ31(sigmas << 16, 0)
+        paper = rig_with(form=form, stride=8, law="pseudovelocity")
+        assert config_for_run(paper, jolted).gate == GateConfigQ31(0, 0)
 
 
 def test_a_rig_file_s_gate_reaches_the_core_and_the_board(jolted: Run) -> None:

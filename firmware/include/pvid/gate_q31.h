@@ -1,8 +1,8 @@
 /* pvid/gate_q31.h - keeps what does not fit out of the sums: gate.h in integers alone.
  *
- * The same rule, the same robust scale, the same patience: see there. Off by default. Squares of residuals span more
+ * The same rule, the same robust scale, the same patience: see there. Squares of residuals span more
  * than any fixed point holds, so they are weighed as numbers of 30 digits with an exponent; the scale is one, too.
- * Total and bounded: one division and some ten shifts and products a residual.
+ * Total and bounded: some ten shifts and products a residual.
  */
 #ifndef PVID_GATE_Q31_H
 #define PVID_GATE_Q31_H
@@ -29,6 +29,7 @@ typedef struct {
     pvid_scaled_q31 floor;    /* least scale */
     pvid_scaled_q31 widening; /* factor on the scale at an outlier */
     pvid_scaled_q31 scale;    /* mean square of what passed */
+    pvid_scaled_q31 part;     /* of it that the next one replaces: 1 / judged */
     uint32_t memory;          /* residuals that the scale remembers */
     uint32_t judged;          /* residuals taken in; stops at memory */
 } pvid_gate_q31;

@@ -155,11 +155,10 @@ class Identifier:
     @property
     def gate(self) -> float:
         """What the gate keeps out [times the usual]: outlier_gate, or 4 (weak form) and 6 (strong form) where the file
-        does not say; none then with equation (5), which is to stay as the paper has it, and in fixed point, whose
-        figures are without."""
+        does not say; none then with equation (5), which is to stay as the paper has it."""
         if self.outlier_gate is not None:
             return self.outlier_gate
-        return _GATE[self.form] if self.law == "stationary" and self.core != "q31" else 0.0
+        return _GATE[self.form] if self.law == "stationary" else 0.0
 
     @property
     def patience_s(self) -> float:

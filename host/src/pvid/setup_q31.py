@@ -181,15 +181,9 @@ def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
     return GateConfigQ31(round(gate.sigmas * 2**16), max(round(patience), 1) if patience > 0 else 0)
 
 
-def _in_fixed_point(rig: RigFile) -> RigFile:
-    """The rig file with this core, which has its own defaults."""
-    return replace(rig, identifier=replace(rig.identifier, core="q31"))
-
-
 def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
     """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p."""
     tables = tables_of(rig, sample_rate)
-    rig = _in_fixed_point(rig)
     float_config = weak_config(rig, sample_rate, start)
     windows_hz = sample_rate / (tables.decimation * float_config.hop)
     e = float_config.estimator
@@ -236,7 +230,6 @@ def _scaled(x: float) -> tuple[int, int]:
 def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfigQ31:
     """Settings of the strong form at `sample_rate` [Hz]; `start` overrides the nominal p."""
     design = strong_design_of(rig, sample_rate)
-    rig = _in_fixed_point(rig)
     config = strong_config(rig, sample_rate, start)
     e = config.estimator
     gain = e.feedback_hz * e.divider / sample_rate if e.feedback_hz > 0 else 1.0

@@ -38,7 +38,8 @@ class GateQ31:
         learning = self.judged < self.memory
         passes = learning | ~square.exceeds(self.limit.times(self.scale))
         judged = np.where(passes & learning, self.judged + 1, self.judged)
-        change = square.minus(self.scale).over(scaled(np.maximum(judged, 1), 0))
+        part = scaled(np.ones_like(judged), 0).over(scaled(np.maximum(judged, 1), 0))
+        change = square.minus(self.scale).times(part)
         scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))
         scale = pick(self.floor.exceeds(scale), self.floor, scale)
         scale = pick(scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)

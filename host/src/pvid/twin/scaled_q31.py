@@ -39,7 +39,7 @@ class Scaled(NamedTuple):
         return scaled(np.sign(wide) * (np.abs(wide) // other.m), self.e - other.e - 30)
 
     def exceeds(self, other: Scaled) -> npt.NDArray[np.bool_]:
-        """Where it is larger."""
+        """Where it is larger, other >= 0."""
         return np.asarray(self.minus(other).m > 0)
 
     def shifted(self, exponent: npt.ArrayLike) -> Scaled:

@@ -34,6 +34,7 @@ _Y, _A, _B = 8, 9, 10
 _ASSEMBLED_A_STAGE = 3
 _ALONG_A_STAGE = 6
 _REMOVED_A_STAGE = 3
+_FITTED_A_STAGE = 3
 _FACTOR_PARTS, _TRACE_PARTS, _WHITEN_PARTS = 2, 3, 3
 _GRAM_22, _GRAM_DOWN, _ROW_BITS = 3, 16, 12
 INVERSE_BITS = 15
@@ -210,6 +211,7 @@ def _stages_before_add(design: WeakTablesQ31) -> int:
         + assembled
         + triangles
         + 2 * (2 + -(-functions // _ALONG_A_STAGE) + -(-functions // _REMOVED_A_STAGE))
+        + -(-functions // _FITTED_A_STAGE)
     )
 
 
