@@ -50,6 +50,7 @@ static const pvid_strong_config_q31 strong_unit = {
     .y_offset = 0,
     .drive_min = 4486235,
     .drive_ticks = 1000u,
+    .gate = {393216u, 0u},
     .estimator = {
         .start = {56120908, 83886080, 100663296},
         .start_sd = {28060454, 41943040, 50331648},
@@ -66,6 +67,7 @@ static const pvid_strong_config_q31 strong_unit = {
         .step_limit = 19661u,
         .kappa_min = 10737,
         .noise_margin = 0u,
+        .dead_zone = 0u,
         .divider = 1,
     },
 };

@@ -264,7 +264,7 @@ static const pvid_weak_config_q31 weak_unit = {
         .groups_min = 3,
         .shut_max = 16,
     },
-    .gate = {0u, 0u},
+    .gate = {262144u, 0u},
 };
 
 /* for pvid_kapitza_physical_q31; a macro, so that who does not ask for it is not told it is unused */
