@@ -33,7 +33,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 INCLUDES = " ".join(
     f"-I'{ROOT / name}'"
-    for name in ("firmware/include", "firmware/src", "firmware/link", "firmware/ports", "tests/proofs")
+    for name in ("firmware/include", "firmware/src", "firmware/link", "firmware/ports", "tests/proofs", "tests/unit")
 )
 PAGE = ROOT / "firmware" / "README.md"
 LONGEST = 3600  # seconds: many times what the slowest needs on a machine that is busy
@@ -80,6 +80,24 @@ PROOFS = (
         ("-eva-auto-loop-unroll", "60", "-eva-min-loop-unroll", "40"),
     ),
     Proof(
+        "differentiator_banks_q31",
+        "any weights, shifts and full scales, any half and stride of windows up to 41 samples and the longest of each",
+        ("src/differentiator_q31.c", "src/integer_q31.c"),
+        (
+            *("-eva-min-loop-unroll", "161", "-eva-split-return", "full"),
+            *("-eva-slevel-function", "any_bank:10,pvid_differentiator_init_q31:10"),
+        ),
+        left=(
+            r"signed overflow\. assert .*\* \(?(even|odd)_",
+            r"signed downcast\.\s+assert .*\btmp\b",
+            r"signed downcast\. assert largest ",
+            r"signed overflow\.\s+assert tmp \+ 1 ",
+        ),
+        why="what `init` itself finds by sums over the weights, and intervals forget: a weight times the largest "
+        "difference fits 32 bits, hence the sum over all weights 55, and the sum that any counts can reach fits a "
+        "derivative. `differentiator_q31` shows it, bank by bank",
+    ),
+    Proof(
         "kapitza_q31",
         "theta and Jacobian of the three models within 2^60 for any p; their formats; the strong form's rows",
         ("src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c", "src/integer_q31.c"),
@@ -113,10 +131,30 @@ PROOFS = (
         ("-eva-auto-loop-unroll", "1100", "-eva-min-loop-unroll", "13"),
     ),
     Proof(
+        "weak_front_q31",
+        "the weights of the tests' design: any samples within full scale, the ring's head in any place",
+        ("src/weak_front_q31.c", "src/integer_q31.c"),
+        ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "100"),
+    ),
+    Proof(
+        "weak_window_q31",
+        "the tests' design: any F and U that the front lets through, from a window's start and from a gap on",
+        ("src/weak_window_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+        ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "70"),
+        taken=("pvid_scaled_of_q31",),
+    ),
+    Proof(
         "snapshot",
         "two slots with any bytes in them, any lengths and identities; sealing one",
         ("src/snapshot.c", "src/crc32.c", "src/fnv.c"),
         ("-eva-auto-loop-unroll", "10"),
+    ),
+    Proof(
+        "snapshot_q31",
+        "states of both forms saved into any room, any bytes of any length restored; their pointers stay",
+        ("src/snapshot_strong_q31.c", "src/snapshot_weak_q31.c", "src/snapshot.c", "src/crc32.c", "src/fnv.c"),
+        ("-eva-min-loop-unroll", "3", "-eva-auto-loop-unroll", "50"),
+        taken=("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31"),
     ),
     Proof(
         "receiver",

@@ -188,6 +188,11 @@ static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
         window->once[i] = 0;
         window->twice[i] = 0;
     }
+    window->f_sum = 0;
+    window->u_sum = 0;
+    window->u_square_sum = 0;
+    window->bend_square_sum = 0;
+    window->bends = 0;
 }
 
 /* The first window begins with the next decimated sample. The second stands in its middle then: what it gathers until

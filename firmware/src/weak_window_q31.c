@@ -27,6 +27,15 @@ static void integrate(pvid_weak_window_q31 *self, const int64_t now[], const uin
     }
 }
 
+/* What pvid_round_shift_q31 takes off x: half of 2^shift at most. */
+static int64_t rest_of(int64_t x, uint8_t shift)
+{
+    const int64_t half = ((int64_t)1 << shift) / 2;
+    const int64_t raised = x + half;
+    const uint64_t below = (uint64_t)raised & (((uint64_t)1 << shift) - 1u);
+    return (int64_t)below - half;
+}
+
 /* product 2^-shift. */
 static int32_t shifted(int64_t product, uint8_t shift)
 {
@@ -51,7 +60,7 @@ void pvid_weak_window_terms_q31(pvid_weak_window_q31 *self, const pvid_weak_desi
         const int64_t product = -(u * integral[i]);
         const int64_t high = pvid_round_shift_q31(product, design->high_shift[i]);
         term[PVID_TERM_UIUF_HIGH_Q31 + i] = (int32_t)high;
-        term[PVID_TERM_UIUF_Q31 + i] = shifted(product - (high * ((int64_t)1 << design->high_shift[i])), shift[i]);
+        term[PVID_TERM_UIUF_Q31 + i] = shifted(rest_of(product, design->high_shift[i]), shift[i]);
     }
     term[PVID_TERM_UF_Q31] = -shifted(now[UF], design->uf_shift);
     term[PVID_TERM_F_Q31] = -f;

@@ -39,7 +39,9 @@ pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent);
     requires -1000000 <= exponent <= 1000000;
     assigns \result \from x, exponent;
     ensures -0x40000000 <= \result.m <= 0x40000000;
-    ensures -1000030 <= \result.e <= 1000034; */
+    ensures x >= 1 ==> \result.m >= 0x20000000;
+    ensures x >= 0 ==> \result.m >= 0;
+    ensures exponent - 30 <= \result.e <= exponent + 34; */
 pvid_scaled_q31 pvid_scaled_of_q31(int64_t x, int32_t exponent);
 
 /*@ requires 1 <= n <= PVID_MAX_P && 1 <= bits <= 30;

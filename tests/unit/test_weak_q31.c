@@ -182,6 +182,32 @@ static void a_gap_is_a_sample_beyond_full_scale_without_the_sample(void **state)
 
 /* The pivot leaps from one end of its travel to the other at the rate that the smoothing filter lets through best: no
  * such acceleration is within u_max. */
+/* Gap after gap before any window has come round: sums that went on from one to the next would overflow in the end, by
+ * the square of a second difference of F after little more than an hour. */
+static void what_a_gap_cuts_off_is_summed_no_further(void **state)
+{
+    (void)state;
+    pvid_weak_design_q31 design = weak_unit_design;
+    design.lag = 1;
+    config.design = &design;
+    start();
+    int64_t bends = 0;
+    int64_t squares = 0;
+    for (int turn = 0; turn < 5; turn++) {
+        for (int i = 0; i < HOP_TICKS; i++) {
+            const int32_t angle = (((i / DECIMATION) % 2) == 0) ? design.phi_max : -design.phi_max;
+            (void)pvid_weak_step_q31(&identifier, angle, (i * i) / 4096);
+        }
+        const pvid_weak_window_q31 *half_way = &identifier.window[1];
+        assert_false(half_way->whole);
+        assert_true((half_way->bend_square_sum > 0) && (half_way->u_square_sum > 0));
+        bends = (turn == 0) ? half_way->bend_square_sum : bends;
+        squares = (turn == 0) ? half_way->u_square_sum : squares;
+        assert_true((half_way->bend_square_sum == bends) && (half_way->u_square_sum == squares));
+        pvid_weak_gap_q31(&identifier);
+    }
+}
+
 static void an_acceleration_beyond_its_range_is_refused(void **state)
 {
     (void)state;
@@ -376,6 +402,7 @@ int main(void)
         cmocka_unit_test_setup(the_first_window_places_the_zero, start_again),
         cmocka_unit_test_setup(what_lies_beyond_full_scale_restarts_the_windows_and_keeps_the_sums, start_again),
         cmocka_unit_test_setup(a_gap_is_a_sample_beyond_full_scale_without_the_sample, start_again),
+        cmocka_unit_test_setup(what_a_gap_cuts_off_is_summed_no_further, start_again),
         cmocka_unit_test_setup(an_acceleration_beyond_its_range_is_refused, start_again),
         cmocka_unit_test_setup(without_drive_the_start_is_held_and_the_reason_says_so, start_again),
         cmocka_unit_test_setup(laws_and_forgetting_take_their_settings, start_again),
