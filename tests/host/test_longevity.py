@@ -4,37 +4,51 @@ from __future__ import annotations
 
 import ctypes
 import json
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from pvid import replay_image
-from pvid.bench import longevity, longevity_target
+from pvid import compare_q31, replay_image
+from pvid.bench import longevity, longevity_tables, longevity_target
 from pvid.bench.longevity import (
+    COLUMNS,
     ENCODER,
-    LANES,
+    FILTER_BIAS,
+    FINE,
     STRONG_FORGETTING_S,
     STRONG_LANES,
-    WEAK_FORGETTING_S,
+    STRONG_Q31_LANES,
     WEAK_LANES,
+    WEAK_Q31_LANES,
     Lane,
     Outcome,
+    config_q31_of,
+    filter_bias,
+    rig_of,
 )
-from pvid.bench.longevity_signals import RATE_HZ, SCENARIOS, Signals
+from pvid.bench.longevity_signals import HELD_OUT, OTHER_DRIVE, RATE_HZ, SCENARIOS, Disturbance, Sensing, Signals
 from pvid.boards import board
 from pvid.compare import first_difference
 from pvid.errors import PvidError
 from pvid.native import Native, Reason
-from pvid.rig import Sensors, simulate
-from pvid.rigfile import RigFile
+from pvid.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.rig import STANDARD_DRIVE, Sensors, simulate
 from pvid.setup import strong_config, weak_config
+from pvid.setup_q31 import counts_of_samples
 from pvid.twin.strong import StrongTwin
+from pvid.twin.strong_q31 import StrongTwinQ31
 from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
 
 TICKS = 100_000
-TWIN_TICKS = {"weak": 25_000, "strong": 6_000}
+SLOW_TICKS = 50_000  # of the strong form in fixed point
+LANES = (*WEAK_LANES, *STRONG_LANES, *WEAK_Q31_LANES)
+Outcomes = dict[str, dict[str, Outcome]]
 
 
 @pytest.fixture(scope="module")
@@ -43,20 +57,22 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 
 @pytest.fixture(scope="module")
-def outcomes(native: Native, library: ctypes.CDLL) -> dict[str, dict[str, Outcome]]:
-    return {name: longevity.measure(native, library, name, LANES, TICKS) for name in SCENARIOS}
+def outcomes(native: Native, library: ctypes.CDLL) -> Outcomes:
+    found = {name: longevity.measure(native, library, one, LANES, TICKS) for name, one in SCENARIOS.items()}
+    for name, one in SCENARIOS.items():
+        found[name] |= longevity.measure(native, library, one, STRONG_Q31_LANES, SLOW_TICKS)
+    return found
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_nothing_of_ours_is_ever_not_finite(scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
-    for lane in LANES:
-        outcome = outcomes[scenario][lane.label]
-        if lane.kind in ("weak", "strong"):
-            assert (outcome.ticks, outcome.not_finite, outcome.singular) == (TICKS, 0, 0), lane.label
+def test_nothing_of_ours_is_ever_not_finite(scenario: str, outcomes: Outcomes) -> None:
+    for label, outcome in outcomes[scenario].items():
+        ticks = SLOW_TICKS if label.startswith("strong q31") else TICKS
+        assert (outcome.ticks, outcome.not_finite, outcome.singular) == (ticks, 0, 0), label
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_nothing_of_ours_is_ever_silently_wrong(scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
+def test_nothing_of_ours_is_ever_silently_wrong(scenario: str, outcomes: Outcomes) -> None:
     # with the gate and without it
     for lane in (*WEAK_LANES, *STRONG_LANES):
         assert not outcomes[scenario][lane.label].silent, lane.label
@@ -67,7 +83,7 @@ OVER = ("perfect", "absent", "constant", "one tone", "switching", "dropped sampl
 
 
 @pytest.mark.parametrize("scenario", OVER)
-def test_what_is_over_is_over(scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
+def test_what_is_over_is_over(scenario: str, outcomes: Outcomes) -> None:
     for lane in (lane for lane in (*WEAK_LANES, *STRONG_LANES) if lane.gated):
         outcome = outcomes[scenario][lane.label]
         assert outcome.told == Reason.UPDATED.text, lane.label
@@ -76,7 +92,7 @@ def test_what_is_over_is_over(scenario: str, outcomes: dict[str, dict[str, Outco
 
 
 @pytest.mark.parametrize("scenario", ["stuck sensor", "saturated sensor", "sensor wrap", "outliers", "slipping clock"])
-def test_sums_that_never_forget_survive_a_bad_sensor(scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
+def test_sums_that_never_forget_survive_a_bad_sensor(scenario: str, outcomes: Outcomes) -> None:
     # 0.18 % with the slipping clock, whose windows differ too little from the usual; alarm
     for lane in (Lane("weak", 0.0), Lane("strong", 0.0)):
         outcome = outcomes[scenario][lane.label]
@@ -88,7 +104,7 @@ def test_sums_that_never_forget_survive_a_bad_sensor(scenario: str, outcomes: di
 
 @pytest.mark.parametrize("scenario", ["step", "drift"])
 @pytest.mark.parametrize("lane", ["weak, 10 s", "strong, 0.1 s", "strong, 1 s", "strong, 10 s"])
-def test_forgetting_follows_a_parameter(lane: str, scenario: str, outcomes: dict[str, dict[str, Outcome]]) -> None:
+def test_forgetting_follows_a_parameter(lane: str, scenario: str, outcomes: Outcomes) -> None:
     # 80 s after the step and 40 s after the end of the drift: four time constants and more
     outcome = outcomes[scenario][lane]
     assert outcome.errors <= longevity.BACK
@@ -97,27 +113,53 @@ def test_forgetting_follows_a_parameter(lane: str, scenario: str, outcomes: dict
 
 @pytest.mark.parametrize("scenario", ["step", "drift"])
 @pytest.mark.parametrize("kind", ["weak", "strong"])
-def test_sums_that_never_forget_say_that_they_cannot_follow(
-    kind: str, scenario: str, outcomes: dict[str, dict[str, Outcome]]
-) -> None:
+def test_sums_that_never_forget_say_that_they_cannot_follow(kind: str, scenario: str, outcomes: Outcomes) -> None:
     outcome = outcomes[scenario][Lane(kind, 0.0).label]
     assert abs(outcome.error_after) > 3.0
     assert outcome.told != Reason.UPDATED.text
 
 
-def test_the_baselines_die_where_ours_lives(outcomes: dict[str, dict[str, Outcome]]) -> None:
+def test_the_baselines_die_where_ours_lives(native: Native, library: ctypes.CDLL) -> None:
     # without excitation their covariance grows by 1 / lambda a tick until float32 ends
-    for kind in longevity.PEERS:
-        for scenario in ("absent", "constant", "stuck sensor"):
-            assert outcomes[scenario][f"{kind}, 0.1 s"].ticks < TICKS // 2, (kind, scenario)
-        assert abs(outcomes["perfect"][f"{kind}, none"].error_after) < 1.0, "the baseline itself is sound"
+    peers = [Lane(kind, 0.1) for kind in longevity.PEERS]
+    for scenario in ("absent", "constant", "stuck sensor"):
+        found = longevity.measure(native, library, SCENARIOS[scenario], peers, TICKS)
+        assert max(one.ticks for one in found.values()) < TICKS // 2, scenario
+    sound = longevity.measure(
+        native, library, SCENARIOS["perfect"], [replace(one, forgetting_s=0.0) for one in peers], TICKS
+    )
+    assert max(abs(one.error_after) for one in sound.values()) < 1.0, "the baseline itself is sound"
+
+
+# Not for the thresholds' choice. At 10^5 ticks, the tenth part of the command's.
+@pytest.mark.parametrize("number", range(0, len(HELD_OUT), 3))
+def test_signals_held_out_find_nothing_silently_wrong(number: int, native: Native, library: ctypes.CDLL) -> None:
+    lanes = (Lane("weak", 10.0), Lane("weak", 0.0), Lane("strong", 1.0), Lane("strong", 0.0))
+    found = longevity.measure(native, library, HELD_OUT[number], lanes, TICKS)
+    assert not [label for label, one in found.items() if one.silent or one.not_finite or one.singular]
+
+
+# ---- equal to the twin ----
+
+
+TWIN_TICKS = {"weak": 25_000, "strong": 1_500, "weak q31": 6_000, "strong q31": 600}
+
+
+def samples(library: ctypes.CDLL, scenario: str, ticks: int, sensing: Sensing) -> tuple[np.ndarray, np.ndarray]:
+    chunks = list(Signals(library, SCENARIOS[scenario], ticks, sensing).chunks())
+    return np.concatenate([phi for phi, _ in chunks]), np.concatenate([y for _, y in chunks])
+
+
+def counts(library: ctypes.CDLL, scenario: str, ticks: int, sensing: Sensing) -> tuple[npt.NDArray[np.int64], ...]:
+    phi, y = samples(library, scenario, ticks, sensing)
+    return counts_of_samples(phi, sensing.phi_lsb), counts_of_samples(y, sensing.y_lsb)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: ctypes.CDLL) -> None:
-    phi, y = samples(library, scenario, "weak")
-    config = weak_config(RigFile.standard(), RATE_HZ)
-    lanes = [replace(config.estimator, forgetting_s=tau) for tau in WEAK_FORGETTING_S]
+    phi, y = samples(library, scenario, TWIN_TICKS["weak"], ENCODER)
+    config = weak_config(rig_of(Lane("weak", 0.0)), RATE_HZ)
+    lanes = [replace(config.estimator, forgetting_s=tau) for tau in longevity.WEAK_FORGETTING_S]
     expected = WeakTwin(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
         record = native.weak(replace(config, estimator=estimator)).run(phi, y, hashes=False)
@@ -125,12 +167,13 @@ def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: c
         assert first_difference(record, *theirs, expected.published[:, :, lane]) is None
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
-def test_the_strong_form_equals_its_twin(scenario: str, native: Native, library: ctypes.CDLL) -> None:
-    phi, y = samples(library, scenario, "strong")
-    rig = RigFile.standard()
-    settings = replace(rig.identifier, form="strong", stride=longevity.STRIDE)
-    config = strong_config(replace(rig, identifier=settings), RATE_HZ)
+@pytest.mark.parametrize(
+    ("scenario", "ticks"),
+    [*((name, TWIN_TICKS["strong"]) for name in SCENARIOS), ("stuck sensor", 9_000)],  # two blocks of its verdict
+)
+def test_the_strong_form_equals_its_twin(scenario: str, ticks: int, native: Native, library: ctypes.CDLL) -> None:
+    phi, y = samples(library, scenario, ticks, ENCODER)
+    config = strong_config(rig_of(Lane("strong", 0.0)), RATE_HZ)
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in STRONG_FORGETTING_S]
     expected = StrongTwin(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
@@ -139,9 +182,28 @@ def test_the_strong_form_equals_its_twin(scenario: str, native: Native, library:
         assert first_difference(record, *theirs) is None
 
 
-def samples(library: ctypes.CDLL, scenario: str, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    chunks = list(Signals(library, scenario, TWIN_TICKS[kind], ENCODER).chunks())
-    return np.concatenate([phi for phi, _ in chunks]), np.concatenate([y for _, y in chunks])
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_weak_form_equals_its_twin_in_fixed_point(scenario: str, native: Native, library: ctypes.CDLL) -> None:
+    phi, y = counts(library, scenario, TWIN_TICKS["weak q31"], ENCODER)
+    configs = [config_q31_of(lane) for lane in WEAK_Q31_LANES]
+    for gate in {config.gate for config in configs}:  # lanes of the twin share the gate
+        alike = [config for config in configs if config.gate == gate]
+        twin = WeakTwinQ31(cast(WeakConfigQ31, alike[0]), [config.estimator for config in alike])
+        expected = twin.run(phi, y)
+        for lane, config in enumerate(alike):
+            record = compare_q31.identifier_q31(native, config).run(phi, y, hashes=False)
+            assert compare_q31.first_difference(record, expected, lane) is None
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_strong_form_equals_its_twin_in_fixed_point(scenario: str, native: Native, library: ctypes.CDLL) -> None:
+    phi, y = counts(library, scenario, TWIN_TICKS["strong q31"], FINE)
+    config = cast(StrongConfigQ31, config_q31_of(Lane("strong", 0.0, core="q31")))
+    lanes = [config.estimator, replace(config.estimator, forgetting_groups=10_000)]
+    expected = StrongTwinQ31(config, lanes).run(phi, y)
+    for lane, estimator in enumerate(lanes):
+        record = compare_q31.identifier_q31(native, replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        assert compare_q31.first_difference(record, expected, lane) is None
 
 
 # ---- the bench itself ----
@@ -150,7 +212,7 @@ def samples(library: ctypes.CDLL, scenario: str, kind: str) -> tuple[np.ndarray,
 def test_the_motion_is_that_of_the_rig(library: ctypes.CDLL) -> None:
     # the simulator integrates the same equations with error control
     sensing = replace(ENCODER, phi_lsb=0.0, y_lsb=0.0, zero=0.0)
-    phi, y = next(iter(Signals(library, "perfect", 50_000, sensing).chunks()))
+    phi, y = next(iter(Signals(library, SCENARIOS["perfect"], 50_000, sensing).chunks()))
     run = simulate(sensors=Sensors(), truth="linear", duration=len(phi) / RATE_HZ, seed=1).run
     n = min(len(phi), len(run.phi))
     assert np.abs(phi[:n] - run.phi[:n]).max() < 1e-7
@@ -159,7 +221,8 @@ def test_the_motion_is_that_of_the_rig(library: ctypes.CDLL) -> None:
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_a_disturbance_begins_and_ends(scenario: str, library: ctypes.CDLL) -> None:
-    whole = [Signals(library, name, 50_000, replace(ENCODER, phi_lsb=0.0, y_lsb=0.0)) for name in ("perfect", scenario)]
+    exact = replace(ENCODER, phi_lsb=0.0, y_lsb=0.0)
+    whole = [Signals(library, SCENARIOS[name], 50_000, exact) for name in ("perfect", scenario)]
     same = []
     for signals in whole:
         chunks = list(signals.chunks())
@@ -171,14 +234,49 @@ def test_a_disturbance_begins_and_ends(scenario: str, library: ctypes.CDLL) -> N
     assert (scenario == "perfect") == (not differs.any())
 
 
-def test_results_are_kept_for_the_same_core_alone(tmp_path: Path) -> None:
-    place = tmp_path / "longevity.json"
-    assert longevity.load(place) == {}
-    longevity.save({"perfect": {"ticks": 7, "lanes": {}}}, place)
-    assert longevity.load(place) == {"perfect": {"ticks": 7, "lanes": {}}}
-    stored = json.loads(place.read_text())
-    place.write_text(json.dumps(stored | {"core": "another"}))
-    assert longevity.load(place) == {}
+def test_a_disturbance_may_be_short_and_a_slip_slow(library: ctypes.CDLL) -> None:
+    exact = replace(ENCODER, phi_lsb=0.0, y_lsb=0.0)
+    still = Signals(library, Disturbance("stuck sensor", "", duration_s=3.0), 100_000, exact)
+    phi, _ = (np.concatenate(x) for x in zip(*still.chunks(), strict=True))
+    assert np.ptp(phi[20_000:23_000]) == 0.0
+    assert np.ptp(phi[23_000:23_100]) > 0.0
+    # every sample but those that are left out stands where it was or a tick later, across the ends of chunks, too
+    clean, slow = (
+        np.concatenate([phi for phi, _ in Signals(library, one, 100_000, exact).chunks()])
+        for one in (SCENARIOS["perfect"], Disturbance("slipping clock", "", slip_s=30.0))
+    )
+    assert np.array_equal(slow[30_000:60_000], clean[29_999:59_999])
+    assert np.array_equal(slow[:30_000], clean[:30_000])
+
+
+def test_what_is_held_out_was_not_seen() -> None:
+    assert not set(HELD_OUT) & set(SCENARIOS.values())
+    assert {one.kind for one in HELD_OUT} == set(SCENARIOS)
+    assert len({one.meaning + one.kind for one in HELD_OUT}) == len(HELD_OUT)
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    place = tmp_path / "longevity" / "results.json"
+    monkeypatch.setattr(longevity_tables, "RESULTS", place)
+    return place
+
+
+def test_results_are_kept_for_the_same_code_and_signals_alone(results: Path) -> None:
+    assert longevity_tables.load("perfect", "weak", 7, "abc") is None
+    kept = longevity_tables.keep("perfect", "weak", 7, "abc", {"lanes": {}})
+    longevity_tables.keep("perfect", "strong", 7, "abc", {"lanes": {}})
+    assert longevity_tables.load("perfect", "weak", 7, "abc") == kept
+    assert longevity_tables.load("perfect", "weak", 8, "abc") is None, "fewer ticks than asked for"
+    assert longevity_tables.load("perfect", "weak", 7, "abd") is None
+    one = longevity_tables.Task(SCENARIOS["step"], "weak", 7)
+    assert one.made_with != longevity_tables.Task(replace(SCENARIOS["step"], seed=2), "weak", 7).made_with
+    assert one.made_with != longevity_tables.Task(SCENARIOS["step"], "weak-q31", 7).made_with
+
+
+def test_comments_move_no_result_and_each_core_has_its_own() -> None:
+    digests = {core: longevity_tables.code_digest(core) for core in ("f32", "q31", "peers")}
+    assert len(set(digests.values())) == 3
 
 
 def test_wrong_answers_without_a_word_are_called_silent() -> None:
@@ -188,67 +286,108 @@ def test_wrong_answers_without_a_word_are_called_silent() -> None:
     assert not Outcome(told="misfit", errors=40.0).silent
 
 
-def test_an_error_is_charged_beyond_the_filter_s_own() -> None:
-    assert longevity.FILTER_BIAS["weak"] == (0.0, 0.0, 0.0)
-    assert max(longevity.FILTER_BIAS["strong"]) < 0.005
+@pytest.mark.parametrize(
+    ("change", "drive"), [(1.0, STANDARD_DRIVE), (1.2, STANDARD_DRIVE), (0.8, STANDARD_DRIVE), (0.9, OTHER_DRIVE)]
+)
+def test_an_error_is_charged_beyond_the_filter_s_own(
+    change: float, drive: Any, native: Native, library: ctypes.CDLL
+) -> None:
+    # 0.022 to 0.111 % of w and of d1, 0.046 to 0.279 % of d2; the allowance is at most 1.5 times the largest
+    assert FILTER_BIAS["weak"] == (0.0, 0.0, 0.0)
+    allowed = np.array(FILTER_BIAS["strong"])
+    bias = filter_bias(native, library, change, drive)
+    assert (bias < allowed).all()
+    if drive == STANDARD_DRIVE and change == 1.0:
+        assert (allowed < 1.6 * bias).all(), "no more than it takes"
 
 
-def test_two_processes_do_what_one_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(longevity, "RESULTS", tmp_path / "longevity.json")
-    monkeypatch.setattr(longevity, "LANES", (Lane("weak", 0.0), Lane("RLS", 1.0)))
+def test_two_processes_do_what_one_does(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(COLUMNS, "weak", (Lane("weak", 0.0),))
+    monkeypatch.setitem(COLUMNS, "peers", (Lane("RLS", 1.0),))
     told: list[int] = []
-    names = ("perfect", "absent")
-    found = longevity.run_missing(50_000, names, tmp_path, 2, told.append)
-    assert told == [0, 1, 2]
-    again = longevity.run_missing(50_000, names, tmp_path, 1, told.append)
-    assert told[3:] == [2]
-    assert json.dumps(again, sort_keys=True) == json.dumps(found, sort_keys=True)
+    tasks = longevity_tables.tasks_of([SCENARIOS["perfect"], SCENARIOS["absent"]], ["weak", "peers"], 50_000)
+    longevity_tables.run_missing(tasks, tmp_path, 2, told.append)
+    assert told == [0, 1, 2, 3, 4]
+    found = results.read_text()
+    longevity_tables.run_missing(tasks, tmp_path, 1, told.append)
+    assert told[5:] == [4]
+    assert results.read_text() == found
     library = longevity.build_library(tmp_path)
-    alone = longevity.measure(Native(), library, "absent", longevity.LANES, 50_000)
-    assert found["absent"]["lanes"]["weak, none"]["error_after"] == alone["weak, none"].error_after
+    alone = longevity.measure(Native(), library, SCENARIOS["absent"], COLUMNS["weak"], 50_000)
+    kept = json.loads(found)["absent: no drive, no motion"]["weak"]["lanes"]["weak, none"]
+    assert kept == json.loads(json.dumps(asdict(alone["weak, none"])))
+
+
+def kept_outcomes(disturbance: Disturbance, columns: Sequence[str], ticks: int) -> None:
+    """Results of a disturbance as a campaign would leave them: all within their errors, but one."""
+    for column in columns:
+        lanes = {
+            lane.label: asdict(Outcome(ticks, told="updated", errors=1.0, error_after=0.5)) for lane in COLUMNS[column]
+        }
+        if column == "strong":
+            lanes["strong, none"] |= {"errors": 4.25}
+            lanes["strong, 1 s"] |= {"told": "misfit", "errors": 9.0}
+        if column == "peers":
+            lanes["RLS, 0.1 s"] |= {"ticks": ticks // 2}
+        task = longevity_tables.Task(disturbance, column, ticks)
+        longevity_tables.keep(task.key, column, ticks, task.made_with, {"lanes": lanes})
+
+
+def test_the_tables_say_what_is_silent(results: Path) -> None:
+    kept_outcomes(SCENARIOS["step"], list(COLUMNS), 10**7)
+    found = {marker: (header, rows) for marker, header, rows in longevity_tables.tables()}
+    assert list(found) == [f"longevity-{column}" for column in COLUMNS]
+    header, rows = found["longevity-strong"]
+    assert header[:4] == ("disturbance", "ticks", "strong, 0.1 s", "strong, 1 s")
+    cells = ["0.5 %", "0.5 %, alarm", "0.5 %", "0.5 %", "0.5 %, **4.2 s.e.**", "0.5 %", "0.5 %"]
+    assert rows == [("step: w larger by 20 % from then on", "1e7", *cells)]
+    assert found["longevity-peers"][1][0][2:4] == ("NaN 3000000 ticks on", "0.5 %")
+
+
+def test_the_table_of_held_out_signals_counts_what_is_silent(results: Path) -> None:
+    kept_outcomes(HELD_OUT[0], ["weak", "strong"], 10**6)
+    marker, header, rows = longevity_tables.held_out_table()
+    assert marker == "longevity-held-out"
+    assert header == ("disturbance", "weak", "strong", "weak q31", "strong q31", "silent")
+    assert rows[0] == ("perfect: another seed", "4/0/0", "5/1/1", "-", "-", "strong, none: 0.5 %, 4.2 s.e.")
+    assert rows[-1] == ("**all**", "4/0/0", "5/1/1", "0/0/0", "0/0/0", "")
 
 
 # ---- on a board ----
 
 
-@pytest.mark.parametrize(("scenario", "form"), [("dropped samples", "weak"), ("step", "strong")])
+@pytest.mark.parametrize(
+    ("scenario", "form", "core"),
+    [("dropped samples", "weak", "f32"), ("step", "strong", "f32"), ("stuck sensor", "weak", "q31")],
+)
 def test_a_board_has_the_host_s_hashes(
-    scenario: str, form: str, library: ctypes.CDLL, native: Native, monkeypatch: pytest.MonkeyPatch
+    scenario: str, form: str, core: str, library: ctypes.CDLL, native: Native, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the long runs' way: samples in a file that the assembler takes in
     monkeypatch.setattr(replay_image, "MANY_TICKS", 10_000)
-    found = longevity_target.measure_on(board("mps2-an386"), library, native, scenario, form, 20_000)
+    found = longevity_target.measure_on(board("mps2-an386"), library, native, scenario, form, core, 20_000)
     assert (found.ticks, found.compared, found.differs_at) == (20_000, 40, None)
     assert found.cells[-1] == "equal"
 
 
 def test_counts_are_the_samples(library: ctypes.CDLL) -> None:
-    run = longevity_target.run_of(library, "dropped samples", "weak", 40_000)
+    run = longevity_target.run_of(library, "dropped samples", "weak", "f32", 40_000)
     missing = run.counts[:, 0] == replay_image.MISSING
     assert missing.any()
     assert np.array_equal(missing, np.isnan(run.phi))
     assert np.array_equal(missing, np.isnan(run.y))
-    phi = np.concatenate([phi for phi, _ in Signals(library, "dropped samples", 40_000, ENCODER).chunks()])
+    phi = np.concatenate([phi for phi, _ in Signals(library, SCENARIOS["dropped samples"], 40_000, ENCODER).chunks()])
     assert np.array_equal(run.counts[~missing, 0], np.rint(phi[~missing] / np.float64(run.phi_lsb)))
 
 
 def test_what_does_not_fit_a_count_is_left_out_and_refused(library: ctypes.CDLL) -> None:
-    assert ("sensor wrap", "strong") not in longevity_target.combinations(tuple(SCENARIOS))
-    assert len(longevity_target.combinations(tuple(SCENARIOS))) == 2 * len(SCENARIOS) - 1
+    found = longevity_target.combinations(tuple(SCENARIOS))
+    assert ("sensor wrap", "strong", "f32") not in found
+    assert len(found) == 4 * len(SCENARIOS) - 2
     with pytest.raises(PvidError, match='"sensor wrap" does not fit 16-bit counts'):
-        longevity_target.run_of(library, "sensor wrap", "strong", 40_000)
+        longevity_target.run_of(library, "sensor wrap", "strong", "f32", 40_000)
 
 
 def test_a_hash_that_differs_is_named() -> None:
-    one = longevity_target.OnBoard("mps2-an386", "perfect", "weak", 1000, 1, 2, 1000)
+    one = longevity_target.OnBoard("mps2-an386", "perfect", "weak", "f32", 1000, 1, 2, 1000)
     assert one.cells[-1] == "DIFFERENT within the 500 before 1000"
-
-
-def test_the_long_columns_are_kept_beside_the_others() -> None:
-    lanes = {lane.label: vars(Outcome(ticks=7, told="updated", errors=1.0, error_after=0.5)) for lane in LANES}
-    kept = {"perfect": {"ticks": 7, "lanes": lanes}, "step" + longevity.LONG: {"ticks": 10**7, "lanes": lanes}}
-    found = {marker: (header, rows) for marker, header, rows in longevity.tables(kept)}
-    header, rows = found["longevity-long"]
-    assert header == ("disturbance", "ticks", "weak, 10 s", "weak, none", "strong, 1 s", "strong, none")
-    assert rows == [(f"step: {SCENARIOS['step']}", "1e7", "0.5 %", "0.5 %", "0.5 %", "0.5 %")]
-    assert [len(found[marker][1]) for marker in ("longevity-weak", "longevity-strong", "longevity-peers")] == [1, 1, 1]

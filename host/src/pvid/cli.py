@@ -700,26 +700,36 @@ def bench_hard(update: Path | None) -> int:
 
 
 @bench.command(name="longevity")
-@click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^6, with --long 10^7.")
+@click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7; 10^6 held out or on a board.")
 @click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option("--columns", "columns", multiple=True, help="Likewise: weak, strong, weak-q31, strong-q31, peers.")
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
-@click.option("--long", is_flag=True, help="The four columns that matter most, and no baselines.")
+@click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")
 @click.option("--on", "board", metavar="BOARD", help="In this emulator, hash for hash with this machine: mps2-an386.")
 @_UPDATE
 def bench_longevity(
-    ticks: int | None, chosen: tuple[str, ...], processes: int, long: bool, board: str | None, update: Path | None
+    ticks: int | None,
+    chosen: tuple[str, ...],
+    columns: tuple[str, ...],
+    processes: int,
+    held_out: bool,
+    board: str | None,
+    update: Path | None,
 ) -> int:
     """Millions of ticks of every disturbance, beside textbook and UD recursive least squares (needs gcc).
 
-    What is done is kept in build/longevity.json, for the present core: the next call goes on from there.
+    What is done is kept in build/longevity, for the present core: the next call goes on from there.
     """
-    from pvid.bench import longevity, longevity_target
-    from pvid.bench.longevity_signals import SCENARIOS
+    from pvid.bench import longevity_tables as kept
+    from pvid.bench import longevity_target
+    from pvid.bench.longevity import COLUMNS, OURS
+    from pvid.bench.longevity_signals import HELD_OUT, SCENARIOS
     from pvid.boards import board as board_of
 
-    unknown = set(chosen) - set(SCENARIOS)
-    if unknown:
-        raise PvidError(f"no such scenario: {', '.join(sorted(unknown))}; there are {', '.join(SCENARIOS)}")
+    for name, given, known in (("scenario", chosen, SCENARIOS), ("column", columns, COLUMNS)):
+        unknown = set(given) - set(known)
+        if unknown:
+            raise PvidError(f"no such {name}: {', '.join(sorted(unknown))}; there are {', '.join(known)}")
     scenarios = chosen or tuple(SCENARIOS)
     if board is not None:
         runs = len(longevity_target.combinations(scenarios))
@@ -729,10 +739,15 @@ def bench_longevity(
             )
         _update_readme(update, "longevity-board", _markdown(longevity_target.HEADER, rows))
         return DONE if all(row[-1] == "equal" for row in rows) else DIFFERENT
-    with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(scenarios)) as advance:
-        ticks = ticks or (10_000_000 if long else 1_000_000)
-        results = longevity.run_missing(ticks, scenarios, Path(folder), processes, advance, long=long)
-    for marker, header, rows in longevity.tables(results):
+    if held_out:
+        ticks = ticks or kept.HELD_OUT_TICKS
+        tasks = kept.tasks_of((one for one in HELD_OUT if one.kind in scenarios), columns or OURS, ticks)
+    else:
+        ticks = ticks or kept.TICKS
+        tasks = kept.tasks_of((SCENARIOS[name] for name in scenarios), columns or COLUMNS, ticks)
+    with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(tasks)) as advance:
+        kept.run_missing(tasks, Path(folder), processes, advance)
+    for marker, header, rows in [kept.held_out_table(ticks)] if held_out else kept.tables(ticks):
         if rows:
             _update_readme(update, marker, _markdown(header, rows))
     return DONE

@@ -86,10 +86,10 @@ def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
 
 def counts_of(rig: RigFile, run: Run) -> tuple[Int64, Int64]:
     """What the sensors of a rig count in a run: phi and y, both [ticks]."""
-    return _counts(run.phi, rig.sensor.phi_lsb), _counts(run.y, rig.sensor.y_lsb)
+    return counts_of_samples(run.phi, rig.sensor.phi_lsb), counts_of_samples(run.y, rig.sensor.y_lsb)
 
 
-def _counts(values: npt.NDArray[np.float64], lsb: float) -> Int64:
+def counts_of_samples(values: npt.NDArray[np.float64], lsb: float) -> Int64:
     """As a 32-bit register holds them; what is not a number is as far beyond full scale as can be."""
     counts = np.rint(np.nan_to_num(values / lsb, nan=-(2.0**31), posinf=2.0**31, neginf=-(2.0**31)))
     return np.clip(counts, -(2.0**31), 2.0**31 - 1).astype(np.int64)

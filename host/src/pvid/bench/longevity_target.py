@@ -14,28 +14,35 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from pvid.bench.longevity import STRIDE, Results, build_library, load, save
+from pvid.bench.longevity import STRIDE, build_library
 from pvid.bench.longevity_signals import CHUNK, RATE_HZ, SCENARIOS, Sensing, Signals
+from pvid.bench.longevity_tables import keep, load, measured_with
 from pvid.boards import Board
+from pvid.compare_q31 import identifier_q31
 from pvid.errors import PvidError
-from pvid.native import Native, WeakConfig
+from pvid.native import Native, StrongIdentifier, WeakConfig, WeakIdentifier
+from pvid.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
 from pvid.replay_image import MISSING, REPORT_EVERY, ReplayRun, build_image, play
 from pvid.rigfile import RigFile
 from pvid.setup import config_of
+from pvid.setup_q31 import config_of_q31
 
 BITS = {"weak": 14, "strong": 19}
 WRAPS = "sensor wrap"  # a turn of 19 bits does not fit 16: the weak form's does
 PATIENCE_S = 3600.0
+SLOW = 10  # the strong form in fixed point, of 30 000 instructions a tick, plays the tenth part of the ticks
 SETTLED = 10_000  # ticks from which on a tick's cost is taken
 
 
-def combinations(scenarios: Sequence[str]) -> list[tuple[str, str]]:
-    """Scenario and form of every run that can be played."""
-    return [(name, form) for name in scenarios for form in BITS if (name, form) != (WRAPS, "strong")]
+def combinations(scenarios: Sequence[str]) -> list[tuple[str, str, str]]:
+    """Scenario, form and core of every run that can be played."""
+    pairs = [(form, core) for form in BITS for core in ("f32", "q31")]
+    return [(name, *pair) for name in scenarios for pair in pairs if (name, pair[0]) != (WRAPS, "strong")]
 
 
-def run_of(library: ctypes.CDLL, scenario: str, form: str, ticks: int) -> ReplayRun:
-    """The scenario's samples in counts, and the settings that a rig file gives the form; no forgetting.
+def run_of(library: ctypes.CDLL, scenario: str, form: str, core: str, ticks: int) -> ReplayRun:
+    """The scenario's samples in counts, and the settings that a rig file gives the form; no forgetting. To the
+    fixed-point core a sample that is missing is one beyond full scale.
 
     Raises
     ------
@@ -46,7 +53,7 @@ def run_of(library: ctypes.CDLL, scenario: str, form: str, ticks: int) -> Replay
     sensing = replace(Sensing(), phi_lsb=lsb)
     counts = np.empty((ticks, 2), np.int16)
     at = 0
-    for phi, y in Signals(library, scenario, ticks, sensing).chunks():
+    for phi, y in Signals(library, SCENARIOS[scenario], ticks, sensing).chunks():
         whole = np.rint(np.stack([phi / sensing.phi_lsb, y / sensing.y_lsb], axis=1))
         if np.nanmax(np.abs(whole)) > np.iinfo(np.int16).max:
             raise PvidError(f'"{scenario}" does not fit 16-bit counts')
@@ -62,17 +69,24 @@ def run_of(library: ctypes.CDLL, scenario: str, form: str, ticks: int) -> Replay
         phi_lsb=np.float32(lsb),
         y_lsb=np.float32(sensing.y_lsb),
         measure_from=min(SETTLED, ticks // 2),
+        fixed=config_of_q31(rig, RATE_HZ) if core == "q31" else None,
     )
 
 
 def host_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash on this machine after every REPORT_EVERY ticks; memory does not grow with the run."""
-    identifier = native.weak(run.config) if isinstance(run.config, WeakConfig) else native.strong(run.config)
-    phi, y = run.phi, run.y
-    parts = [
-        identifier.run(phi[at : at + CHUNK], y[at : at + CHUNK], sums=False).hash[REPORT_EVERY - 1 :: REPORT_EVERY]
-        for at in range(0, run.ticks, CHUNK)
-    ]
+    identifier: WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdentifierQ31
+    samples: tuple[npt.NDArray[np.generic], npt.NDArray[np.generic]]
+    if run.fixed is not None:
+        identifier, samples = identifier_q31(native, run.fixed), (run.counts[:, 0], run.counts[:, 1])
+    elif isinstance(run.config, WeakConfig):
+        identifier, samples = native.weak(run.config), (run.phi, run.y)
+    else:
+        identifier, samples = native.strong(run.config), (run.phi, run.y)
+    parts = []
+    for at in range(0, run.ticks, CHUNK):
+        phi, y = (x[at : at + CHUNK] for x in samples)
+        parts.append(identifier.run(phi, y, sums=False).hash[REPORT_EVERY - 1 :: REPORT_EVERY])
     return np.concatenate(parts)
 
 
@@ -83,6 +97,7 @@ class OnBoard:
     board: str
     scenario: str
     form: str
+    core: str
     ticks: int
     hash: int
     compared: int
@@ -96,8 +111,8 @@ class OnBoard:
         )
         return (
             self.board,
-            f"{self.scenario}: {SCENARIOS[self.scenario]}",
-            self.form,
+            f"{self.scenario}: {SCENARIOS[self.scenario].meaning}",
+            f"{self.form}, {self.core}",
             str(self.ticks),
             str(self.compared),
             f"{self.hash:08x}",
@@ -108,7 +123,9 @@ class OnBoard:
 HEADER = ("board", "disturbance", "form", "ticks", "hashes compared", "the last", "with the host")
 
 
-def measure_on(board: Board, library: ctypes.CDLL, native: Native, scenario: str, form: str, ticks: int) -> OnBoard:
+def measure_on(
+    board: Board, library: ctypes.CDLL, native: Native, scenario: str, form: str, core: str, ticks: int
+) -> OnBoard:
     """Plays a scenario on a board and compares all running hashes.
 
     Raises
@@ -118,17 +135,14 @@ def measure_on(board: Board, library: ctypes.CDLL, native: Native, scenario: str
     """
     if ticks % CHUNK != 0:
         raise PvidError(f"a run on a board has a multiple of {CHUNK} ticks")
-    run = run_of(library, scenario, form, ticks)
+    run = run_of(library, scenario, form, core, ticks)
     image, _ = build_image(board, run)
     report = play(board, image, PATIENCE_S)
     here = host_hashes(run, native)
     at = REPORT_EVERY * (np.arange(len(here)) + 1)
     wrong = [int(tick) for tick, hashed in zip(at, here, strict=True) if report.hashes.get(int(tick)) != hashed]
-    return OnBoard(board.name, scenario, form, report.ticks, report.hash, len(at), wrong[0] if wrong else None)
-
-
-def _key(board: Board, scenario: str, form: str) -> str:
-    return f"{scenario}, {form} form on {board.name}"
+    differs = wrong[0] if wrong else None
+    return OnBoard(board.name, scenario, form, core, report.ticks, report.hash, len(at), differs)
 
 
 def run_missing_on(
@@ -139,15 +153,15 @@ def run_missing_on(
     `progress` is told how many runs are there.
     """
     library, native = build_library(folder), Native()
-    results: Results = load()
     rows = []
-    for number, (scenario, form) in enumerate(combinations(scenarios), start=1):
-        stored = results.get(_key(board, scenario, form), {})
-        if stored.get("ticks", 0) < ticks:
-            cells = measure_on(board, library, native, scenario, form, ticks).cells
-            stored = {"ticks": ticks, "cells": list(cells)}
-            results = {**load(), _key(board, scenario, form): stored}
-            save(results)
+    for number, (scenario, form, core) in enumerate(combinations(scenarios), start=1):
+        name, key = f"{form}, {core} on {board.name}", f"{scenario}: {SCENARIOS[scenario].meaning}"
+        made_with = measured_with(core, SCENARIOS[scenario])
+        asked = ticks // SLOW if (form, core) == ("strong", "q31") else ticks
+        stored = load(key, name, asked, made_with)
+        if stored is None:
+            cells = measure_on(board, library, native, scenario, form, core, asked).cells
+            stored = keep(key, name, asked, made_with, {"cells": cells})
         rows.append(tuple(stored["cells"]))
         progress(number)
     return rows
