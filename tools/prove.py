@@ -104,25 +104,56 @@ PROOFS = (
         ("-eva-auto-loop-unroll", "200"),
     ),
     Proof(
+        "block_q31",
+        "`pvid_to_block_q31`, any entries, the longest of each length, first or last",
+        ("src/cholesky_q31.c", "src/integer_q31.c"),
+        (
+            *("-eva-min-loop-unroll", "66", "-eva-slevel-function"),
+            "pvid_bit_length_q31:20,pvid_scale_q31:20,pvid_magnitude_q31:5,pvid_to_block_q31:20",
+        ),
+    ),
+    Proof(
         "cholesky_q31",
-        "factor and solution, n = 1..4, any equilibrated matrix, any right-hand side",
+        "factor, its pivots and solutions, n = 1..4, any matrix within 30 bits, any right-hand side",
         ("src/cholesky_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
         (
-            *("-eva-auto-loop-unroll", "200", "-eva-slevel", "100"),
+            *("-eva-auto-loop-unroll", "200", "-eva-slevel", "100", "-eva-subdivide-non-linear", "4"),
             *("-inline-calls", "pvid_pivot_is_data_q31", "-eva-domains", "equality,symbolic-locations"),
+            *("-eva-split-return", "full"),
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
             "pvid_to_block_q31",
         ),
-        left=(
-            r"signed downcast\.\s+assert \(int64_t\)\(pivot / \(int64_t\)diagonal\)",
-            r"signed downcast\.\s+assert\s+\(int64_t\)\(self->pivot\[j\] / ",
-            r"function pvid_reciprocal_of_q31: precondition got status unknown",
+    ),
+    Proof(
+        "kapitza_physical_q31",
+        "any estimate in any scale",
+        ("src/kapitza_q31.c", "src/cholesky_q31.c", "src/integer_q31.c"),
+        ("-eva-slevel", "100", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
+        taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_root_of_q31", "pvid_to_block_q31"),
+    ),
+    Proof(
+        "gate_q31",
+        "any configuration and floor; any residual on top of any scale that a residual leaves",
+        ("src/gate_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+        ("-eva-slevel", "100", "-eva-split-return", "full"),
+        taken=("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+    ),
+    Proof(
+        "trust_q31",
+        "any configuration of the three models; any group on top of any state that a group leaves",
+        ("src/trust_q31.c", "src/integer_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
+        ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
+    ),
+    Proof(
+        "fingerprint_q31",
+        "any configuration of both forms, tables of any extent that fits; `pvid_fnv_estimator_q31`, any state",
+        (
+            *("src/fingerprint_q31.c", "src/fnv_q31.c", "src/fnv.c"),
+            *("src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
         ),
-        why="a pivot is its diagonal entry less squares, hence at most that entry: Eva takes the product of a number "
-        "with itself for one of two numbers. `pvid_to_block_q31` is taken at its word: its proof would need an octave "
-        "for each entry",
+        ("-eva-auto-loop-unroll", "20"),
     ),
     Proof(
         "information_q31",

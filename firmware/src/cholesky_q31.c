@@ -26,20 +26,29 @@ void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n)
     self->first_pivot = 0;
 }
 
+/* A pivot over its diagonal entry, which squares were taken from. */
+static int32_t part_of(int64_t pivot, int32_t diagonal)
+{
+    return (int32_t)pvid_clamp_q31(pivot / diagonal, PVID_ONE_Q30);
+}
+
 void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j)
 {
+    if (!self->positive) { /* rows of u that are missing must not be read */
+        return;
+    }
     const size_t n = self->n;
     const int32_t diagonal = s[j][j];
     int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
     for (size_t k = j + 1u; k < n; k++) {
-        pivot -= pvid_product_q31(self->u[j][k], self->u[j][k]);
+        pivot -= pvid_square_q31(self->u[j][k]);
     }
-    self->positive = self->positive && pvid_pivot_is_data_q31(pivot, diagonal);
-    if (!self->positive) {
+    if (!pvid_pivot_is_data_q31(pivot, diagonal)) {
+        self->positive = false;
         return;
     }
     self->pivot[j] = pivot;
-    self->first_pivot = (j == 0u) ? (int32_t)(pivot / diagonal) : 0;
+    self->first_pivot = (j == 0u) ? part_of(pivot, diagonal) : 0;
     self->inverse[j] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
     for (size_t i = 0; i < j; i++) {
         int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
@@ -54,7 +63,7 @@ int32_t pvid_cholesky_least_pivot_q31(const pvid_cholesky_q31 *self, const int32
 {
     int32_t least = PVID_ONE_Q30;
     for (size_t j = 0; j < self->n; j++) {
-        const int32_t relative = (int32_t)(self->pivot[j] / s[j][j]);
+        const int32_t relative = part_of(self->pivot[j], s[j][j]);
         least = (relative < least) ? relative : least;
     }
     return least;

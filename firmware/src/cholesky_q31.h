@@ -38,10 +38,10 @@ bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t 
 /* x[n] = U^-1 rhs, |rhs| < 2^PVID_RHS_BITS. */
 void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[], int32_t x[]);
 
-/* x[n] 2^(returned) = S^-1 rhs, |rhs| <= PVID_WIDE. */
+/* x[n] 2^(returned) = S^-1 rhs, |rhs| < INT64_MAX. */
 int32_t pvid_cholesky_solve_q31(const pvid_cholesky_q31 *self, const int64_t rhs[], int32_t x[]);
 
-/* out[n] 2^(returned) = x, the largest of `bits` bits, bits <= 30; |x| <= PVID_WIDE. */
+/* out[n] 2^(returned) = x, the largest of `bits` bits, bits <= 30; |x| < INT64_MAX. */
 int32_t pvid_to_block_q31(uint32_t n, const int64_t x[], int32_t bits, int32_t out[]);
 
 #endif

@@ -40,6 +40,15 @@ pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *
     return PVID_OK;
 }
 
+/* scale within floor..scale_max. Where exponents are more than one apart they alone decide. */
+static pvid_scaled_q31 held(pvid_scaled_q31 scale, pvid_scaled_q31 floor)
+{
+    if ((scale.e < (floor.e - 1)) || pvid_scaled_exceeds_q31(floor, scale)) {
+        return floor;
+    }
+    return ((scale.e > (scale_max.e + 1)) || pvid_scaled_exceeds_q31(scale, scale_max)) ? scale_max : scale;
+}
+
 bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
 {
     if (self->limit.m == 0) {
@@ -57,7 +66,6 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
     } else {
         scale = pvid_scaled_times_q31(scale, self->widening);
     }
-    scale = pvid_scaled_exceeds_q31(self->floor, scale) ? self->floor : scale;
-    self->scale = pvid_scaled_exceeds_q31(scale, scale_max) ? scale_max : scale;
+    self->scale = held(scale, self->floor);
     return passes;
 }

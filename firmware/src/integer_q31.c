@@ -39,15 +39,15 @@ uint32_t pvid_bit_length_q31(uint64_t x)
     const uint32_t high = (uint32_t)(x >> 32);
     uint32_t rest = (high != 0u) ? high : (uint32_t)(x & 0xFFFFFFFFu);
     uint32_t length = (high != 0u) ? 32u : 0u;
-    if ((rest >> 16) != 0u) {
+    if (rest > 0xFFFFu) {
         rest >>= 16;
         length += 16u;
     }
-    if ((rest >> 8) != 0u) {
+    if (rest > 0xFFu) {
         rest >>= 8;
         length += 8u;
     }
-    if ((rest >> 4) != 0u) {
+    if (rest > 0xFu) {
         rest >>= 4;
         length += 4u;
     }

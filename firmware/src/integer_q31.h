@@ -44,6 +44,16 @@ static inline int64_t pvid_product_q31(int32_t a, int32_t b)
 #endif
 }
 
+/* a a. */
+static inline int64_t pvid_square_q31(int32_t a)
+{
+#if defined(__ARM_ARCH_6M__)
+    return pvid_product_in_halves_q31(a, a);
+#else
+    return (int64_t)a * a;
+#endif
+}
+
 /* x 2^-s rounded half up; any s >= 0, x < INT64_MAX. */
 static inline int64_t pvid_round_shift_q31(int64_t x, uint32_t s)
 {
@@ -53,7 +63,7 @@ static inline int64_t pvid_round_shift_q31(int64_t x, uint32_t s)
     return (s > 63u) ? 0 : pvid_floor_shift_q31(pvid_floor_shift_q31(x, s - 1u) + 1, 1);
 }
 
-/* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0. */
+/* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0; |x| < INT64_MAX. */
 int64_t pvid_scale_q31(int64_t x, int32_t s);
 
 /* x held within +-limit. */

@@ -19,7 +19,7 @@ static int64_t times_over(int64_t a, int32_t b, int64_t c)
     const int32_t up = (int32_t)pvid_bit_length_q31((uint64_t)PVID_WIDE) - 1 - (int32_t)pvid_bit_length_q31((uint64_t)a);
     const int64_t quotient = pvid_scale_q31(a, -up) / c; /* a 2^up / c */
     const int32_t down = (int32_t)pvid_bit_length_q31((uint64_t)quotient) - 31;
-    const int64_t mantissa = pvid_scale_q31(quotient, down); /* 31 bits */
+    const int64_t mantissa = pvid_clamp_q31(pvid_scale_q31(quotient, down), (int64_t)1 << 31); /* 31 bits, rounded */
     return pvid_clamp_q31(pvid_scale_q31(mantissa * b, up - down), PVID_WIDE / 2);
 }
 

@@ -73,7 +73,7 @@ static void take_surplus(pvid_trust_q31 *self, int64_t surplus)
     if (self->judged < self->long_memory) {
         self->judged++;
     }
-    self->long_mean += (x - self->long_mean) / (int64_t)self->judged;
+    self->long_mean = pvid_clamp_q31(self->long_mean + ((x - self->long_mean) / (int64_t)self->judged), SURPLUS_MAX);
     self->recent[self->next] = x;
     self->next = (uint8_t)((self->next + 1u == PVID_TRUST_SHORT) ? 0u : (self->next + 1u));
     int64_t sum = 0;

@@ -28,16 +28,35 @@ static void any_length(uint32_t bits, bool negative)
     /*@ assert -0x4000000000000000 <= product <= 0x4000000000000000; */
 }
 
+static void any_far_shift(int64_t x)
+{
+    (void)pvid_scale_q31(x, any_i32(65, INT32_MAX));
+    (void)pvid_scale_q31(x, any_i32(-INT32_MAX, -65));
+}
+
 void main(void)
 {
     for (uint32_t bits = 0; bits <= 62u; bits++) {
         any_length(bits, false);
         any_length(bits, true);
         const int64_t m = of_bits(bits, false);
-        (void)pvid_root_of_q31(m, any_i32(-1000, 1000));
+        (void)pvid_root_of_q31(m, -100000); /* an exponent is but added to, but even ones and odd ones differ */
+        (void)pvid_root_of_q31(m, 99999);
         (void)pvid_square_root_q31((uint64_t)m);
     }
-    (void)pvid_scale_q31(any_i64(-((int64_t)1 << 62), (int64_t)1 << 62), any_i32(0, INT32_MAX));
+    (void)pvid_root_of_q31(PVID_WIDE, -100000);
+    (void)pvid_root_of_q31(PVID_WIDE, 99999);
+    (void)pvid_square_root_q31((uint64_t)PVID_WIDE);
+    any_far_shift(any_i64(0, PVID_WIDE));
+    any_far_shift(any_i64(-PVID_WIDE, -1));
+    any_far_shift(any_i64(PVID_WIDE + 1, INT64_MAX - 1));
+    any_far_shift(any_i64(-INT64_MAX, -PVID_WIDE - 1));
+    for (int32_t s = -64; s <= 64; s++) {
+        (void)pvid_scale_q31(PVID_WIDE, s);
+        (void)pvid_scale_q31(-PVID_WIDE, s);
+        (void)pvid_scale_q31(any_i64(PVID_WIDE + 1, INT64_MAX - 1), s);
+        (void)pvid_scale_q31(any_i64(-INT64_MAX, -PVID_WIDE - 1), s);
+    }
     for (uint32_t bits = 1; bits <= 31u; bits++) {
         (void)pvid_reciprocal_of_q31((uint32_t)of_bits(bits, false));
     }

@@ -61,7 +61,7 @@ def factor(s: Int) -> Factor:
             for m in range(j + 1, n):
                 total = total - u[i, m] * u[j, m]
             u[i, j] = divide(total, inverse[j], k[j], ONE)
-    return Factor(u, inverse, k, np.where(ok, relative, 0), np.where(ok, least, 0), ok)
+    return Factor(u, inverse, k, np.where(ok, np.minimum(relative, ONE), 0), np.where(ok, least, 0), ok)
 
 
 def lower_solve(f: Factor, rhs: Int) -> Int:

@@ -41,8 +41,8 @@ class GateQ31:
         part = scaled(np.ones_like(judged), 0).over(scaled(np.maximum(judged, 1), 0))
         change = square.minus(self.scale).times(part)
         scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))
-        scale = pick(self.floor.exceeds(scale), self.floor, scale)
-        scale = pick(scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)
+        scale = pick((scale.e < self.floor.e - 1) | self.floor.exceeds(scale), self.floor, scale)
+        scale = pick((scale.e > _SCALE_MAX.e + 1) | scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)
         self.judged = np.where(asking, judged, self.judged)
         self.scale = pick(asking, Scaled(integers(scale.m), integers(scale.e)), self.scale)
         return passes | ~asking

@@ -18,7 +18,7 @@ def _times_over(a: Int, b: Int, c: Int) -> Int:
     up = 62 - bit_length(a)
     quotient = scale(a, -up) // c
     down = bit_length(quotient) - 31
-    mantissa = scale(quotient, down)
+    mantissa = np.minimum(scale(quotient, down), 1 << 31)
     return clamp(scale(mantissa * b, up - down), WIDE // 2)
 
 

@@ -60,7 +60,7 @@ class TrustQ31:
         self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
         change = x - self.long_mean
         step = np.sign(change) * (np.abs(change) // np.maximum(self.judged, 1))
-        self.long_mean = np.where(lanes, self.long_mean + step, self.long_mean)
+        self.long_mean = np.where(lanes, clamp(self.long_mean + step, _SURPLUS_MAX), self.long_mean)
         places = np.flatnonzero(lanes)
         self.recent[self.next[places], places] = x[places]
         self.next = np.where(lanes, (self.next + 1) % _SHORT, self.next)

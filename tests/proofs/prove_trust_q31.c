@@ -1,0 +1,80 @@
+/* trust_q31: any configuration; any group of any reason, any estimate within its bounds, on top of any state that the
+ * functions keep. */
+#include "prove.h"
+
+#include "pvid/kapitza_strong_q31.h"
+#include "pvid/kapitza_weak_q31.h"
+#include "pvid/trust_q31.h"
+
+#define SURPLUS_MAX (1000000LL << PVID_SURPLUS_BITS)
+
+static pvid_estimator_q31 estimator;
+
+static void any_estimator(const pvid_model_q31 *model)
+{
+    estimator.model = model;
+    estimator.information.block = (uint16_t)any_u32(1, 64);
+    estimator.information.retention = any_i32(1, INT32_MAX);
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        estimator.p[a] = any_i32(-INT32_MAX, INT32_MAX);
+        estimator.start_sd[a] = any_i32(1, INT32_MAX);
+    }
+    Frama_C_make_unknown((char *)&estimator.counters, sizeof estimator.counters);
+}
+
+/* What an assessment of p within its bounds gives. */
+static void any_estimate(const pvid_model_q31 *model, pvid_estimate_q31 *estimate)
+{
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        estimate->p[a] = any_i32((((model->positive >> a) & 1u) != 0u) ? 1 : -INT32_MAX, INT32_MAX);
+        estimate->se[a] = any_i32(0, INT32_MAX);
+        for (size_t b = 0; b < PVID_MAX_P; b++) {
+            estimate->correlation[a][b] = any_i32(INT32_MIN, INT32_MAX);
+        }
+    }
+    estimate->kappa = any_i32(INT32_MIN, INT32_MAX);
+    estimate->least_pivot = any_i32(INT32_MIN, INT32_MAX);
+    estimate->residual_sd = any_i32(0, INT32_MAX);
+    estimate->weight = any_u32(0, UINT32_MAX);
+}
+
+/* A verdict after none, or some, that had a residual. */
+static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most)
+{
+    pvid_trust_q31 trust;
+    pvid_estimate_q31 candidate;
+    pvid_trust_config_q31 config;
+    Frama_C_make_unknown((char *)&config, sizeof config);
+    any_estimator(model);
+    if (pvid_trust_init_q31(&trust, &config, &estimator) != PVID_OK) {
+        return;
+    }
+    /*@ assert trust.long_memory >= 1; */
+    pvid_trust_place_q31(&trust, &estimator);
+    trust.groups = (uint16_t)any_u32(0, UINT16_MAX);
+    trust.shut = (uint16_t)any_u32(0, UINT16_MAX);
+    trust.judged = (uint16_t)any_u32(least, most);
+    trust.next = (uint8_t)any_u32(0, PVID_TRUST_SHORT - 1);
+    trust.published = any_bool();
+    trust.misfit = any_bool();
+    trust.long_mean = any_i64(-SURPLUS_MAX, SURPLUS_MAX);
+    for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
+        trust.recent[i] = any_i64(-SURPLUS_MAX, SURPLUS_MAX);
+    }
+    any_estimate(model, &candidate);
+    (void)pvid_trust_judge_q31(&trust, &estimator, (pvid_reason)any_i32(PVID_UPDATED, PVID_HELD_FROZEN),
+                               any_i64(0, (int64_t)1 << 62), any_bool(), any_i64(-INT64_MAX, INT64_MAX), &candidate);
+    /*@ assert -SURPLUS_MAX <= trust.long_mean <= SURPLUS_MAX; */
+    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> -SURPLUS_MAX <= trust.recent[i] <= SURPLUS_MAX; */
+    /*@ assert trust.next < PVID_TRUST_SHORT; */
+}
+
+void main(void)
+{
+    const pvid_model_q31 *const models[3] = {&pvid_kapitza_strong_q31, &pvid_kapitza_weak_q31,
+                                             &pvid_kapitza_weak_zeroed_q31};
+    for (size_t i = 0; i < 3u; i++) {
+        any_group(models[i], 0, 0);
+        any_group(models[i], 1, UINT16_MAX);
+    }
+}
