@@ -172,7 +172,7 @@ PROOFS = (
         "the tests' design: any F and U that the front lets through, from a window's start and from a gap on",
         ("src/weak_window_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "70"),
-        taken=("pvid_scaled_of_q31",),
+        taken=("pvid_scaled_of_q31", "pvid_scaled_over_q31"),
     ),
     Proof(
         "snapshot",
