@@ -732,11 +732,9 @@ def bench_longevity(
             raise PvidError(f"no such {name}: {', '.join(sorted(unknown))}; there are {', '.join(known)}")
     scenarios = chosen or tuple(SCENARIOS)
     if board is not None:
-        runs = len(longevity_target.combinations(scenarios))
-        with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", runs) as advance:
-            rows = longevity_target.run_missing_on(
-                board_of(board), ticks or 1_000_000, scenarios, Path(folder), advance
-            )
+        runs = longevity_target.combinations(scenarios, columns or OURS)
+        with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(runs)) as advance:
+            rows = longevity_target.run_missing_on(board_of(board), ticks or 1_000_000, runs, Path(folder), advance)
         _update_readme(update, "longevity-board", _markdown(longevity_target.HEADER, rows))
         return DONE if all(row[-1] == "equal" for row in rows) else DIFFERENT
     if held_out:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from pvid.bench.longevity import STRIDE, build_library
+from pvid.bench.longevity import COLUMNS, OURS, STRIDE, build_library
 from pvid.bench.longevity_signals import CHUNK, RATE_HZ, SCENARIOS, Sensing, Signals
 from pvid.bench.longevity_tables import keep, load, measured_with
 from pvid.boards import Board
@@ -34,9 +34,9 @@ SLOW = 10  # the strong form in fixed point, of 30 000 instructions a tick, play
 SETTLED = 10_000  # ticks from which on a tick's cost is taken
 
 
-def combinations(scenarios: Sequence[str]) -> list[tuple[str, str, str]]:
-    """Scenario, form and core of every run that can be played."""
-    pairs = [(form, core) for form in BITS for core in ("f32", "q31")]
+def combinations(scenarios: Sequence[str], columns: Sequence[str] = OURS) -> list[tuple[str, str, str]]:
+    """Scenario, form and core of every run that can be played, of these columns."""
+    pairs = [(COLUMNS[name][0].kind, COLUMNS[name][0].core) for name in OURS if name in columns]
     return [(name, *pair) for name in scenarios for pair in pairs if (name, pair[0]) != (WRAPS, "strong")]
 
 
@@ -146,15 +146,20 @@ def measure_on(
 
 
 def run_missing_on(
-    board: Board, ticks: int, scenarios: Sequence[str], folder: Path, progress: Callable[[int], None]
+    board: Board,
+    ticks: int,
+    among: Sequence[tuple[str, str, str]],
+    folder: Path,
+    progress: Callable[[int], None],
 ) -> list[tuple[str, ...]]:
-    """Plays what is not there yet, keeps each run as soon as it is done, and returns the table's rows.
+    """Plays those of `combinations` that are not there yet, keeps each as soon as it is done, and returns the table's
+    rows.
 
     `progress` is told how many runs are there.
     """
     library, native = build_library(folder), Native()
     rows = []
-    for number, (scenario, form, core) in enumerate(combinations(scenarios), start=1):
+    for number, (scenario, form, core) in enumerate(among, start=1):
         name, key = f"{form}, {core} on {board.name}", f"{scenario}: {SCENARIOS[scenario].meaning}"
         made_with = measured_with(core, SCENARIOS[scenario])
         asked = ticks // SLOW if (form, core) == ("strong", "q31") else ticks
