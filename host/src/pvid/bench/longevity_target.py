@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from pvid.bench.longevity import COLUMNS, OURS, STRIDE, build_library
+from pvid.bench.longevity import OURS, STRIDE, build_library
 from pvid.bench.longevity_signals import CHUNK, RATE_HZ, SCENARIOS, Sensing, Signals
 from pvid.bench.longevity_tables import keep, load, measured_with
 from pvid.boards import Board
@@ -28,6 +28,7 @@ from pvid.setup import config_of
 from pvid.setup_q31 import config_of_q31
 
 BITS = {"weak": 14, "strong": 19}
+PAIRS = [(form, core) for form in ("weak", "strong") for core in ("f32", "q31")]
 WRAPS = "sensor wrap"  # a turn of 19 bits does not fit 16: the weak form's does
 PATIENCE_S = 3600.0
 SLOW = 10  # the strong form in fixed point, of 30 000 instructions a tick, plays the tenth part of the ticks
@@ -36,7 +37,7 @@ SETTLED = 10_000  # ticks from which on a tick's cost is taken
 
 def combinations(scenarios: Sequence[str], columns: Sequence[str] = OURS) -> list[tuple[str, str, str]]:
     """Scenario, form and core of every run that can be played, of these columns."""
-    pairs = [(COLUMNS[name][0].kind, COLUMNS[name][0].core) for name in OURS if name in columns]
+    pairs = [(form, core) for form, core in PAIRS if f"{form}{'-q31' * (core == 'q31')}" in columns]
     return [(name, *pair) for name in scenarios for pair in pairs if (name, pair[0]) != (WRAPS, "strong")]
 
 
