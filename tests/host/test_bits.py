@@ -5,17 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
+import numpy.typing as npt
 
-from pvid.compare import compare_lanes, compare_run, first_difference
+from pvid.capture import Run
+from pvid.compare import compare_run, first_difference
 from pvid.native import EstimatorConfig, Law, Native, Reason, StrongConfig
 from pvid.rig import STANDARD_DRIVE, Drive, Simulation, simulate, standard_sensors, standard_start
 from pvid.rigfile import Differentiator, RigFile
 from pvid.setup import strong_config
 from pvid.twin import fnv
-from pvid.twin.strong import StrongTwin, lanes_of
+from pvid.twin import kapitza_strong as model
+from pvid.twin.gate import Gate
+from pvid.twin.strong import StrongTwin, TwinRecord, lanes_of, run_rows
 
+RATE = 1000.0
 STARTS = 20
+PIECE = 1000
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
 DIFFERENTIATORS: tuple[Differentiator, ...] = ("finite-difference", "savitzky-golay")
 
@@ -24,7 +29,12 @@ def configuration(differentiator: Differentiator) -> StrongConfig:
     rig = RigFile.standard()
     settings = replace(rig.identifier, form="strong", differentiator=differentiator, stride=1)
     # every row is taken in, also where five points make the pivot sensor's noise larger than its motion
-    return replace(strong_config(replace(rig, identifier=settings), 1000.0), drive_min=0.0)
+    return replace(strong_config(replace(rig, identifier=settings), RATE), drive_min=0.0)
+
+
+def window(config: StrongConfig) -> int:
+    """Samples before the first that makes a row."""
+    return 2 * int(config.weights.shape[1]) * config.stride
 
 
 def variants(config: EstimatorConfig) -> list[EstimatorConfig]:
@@ -42,37 +52,102 @@ def test_the_matrix_holds_what_its_names_say(matrix: dict[str, Native]) -> None:
         assert native.arithmetic_faults() == 0
 
 
-@pytest.mark.parametrize("differentiator", DIFFERENTIATORS)
-def test_whole_identifier_equals_the_twin_in_every_build(
-    differentiator: Differentiator, matrix: dict[str, Native], standard_20_bits: Simulation
-) -> None:
-    run = standard_20_bits.run
-    config = configuration(differentiator)
-    lanes = variants(config.estimator)
-    twin = StrongTwin(config, lanes).run(run.phi, run.y)
-    assert len(run.t) >= 40_000
-    for lane, estimator in enumerate(lanes):
-        p, sums, reason = twin.p[:, :, lane], twin.sums[:, :, lane], twin.reason[:, lane]
-        hashes = fnv.running_hashes(p, sums, reason)
-        for name in BUILDS:
-            record = matrix[name].strong(replace(config, estimator=estimator)).run(run.phi, run.y)
-            assert first_difference(record, p, sums, reason) is None, name
-            assert np.array_equal(record.hash, hashes), name
+class GateOfSome(Gate):
+    """The gate of a twin in some lanes [lanes]: it lets pass whatever comes to the others."""
+
+    def __init__(self, twin: StrongTwin, lanes: npt.NDArray[np.bool_]) -> None:
+        vars(self).update(vars(twin.gate))
+        self.lanes = lanes
+
+    def passes(self, square: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+        return super().passes(square) | ~self.lanes
 
 
-@pytest.mark.parametrize("differentiator", DIFFERENTIATORS)
-def test_twenty_starts_equal_the_twin_in_every_build(
-    differentiator: Differentiator, matrix: dict[str, Native], standard_20_bits: Simulation
+class Group:
+    """Cores behind one differentiator in every build: estimators that take rows, whole identifiers that take samples.
+
+    The samples begin where they give the first row at the tick `first_row` of the run, so that all groups can be lanes
+    of one twin.
+    """
+
+    def __init__(self, config: StrongConfig, natives: list[Native], run: Run, first_row: int) -> None:
+        self.natives = natives
+        starts = [standard_start(seed) for seed in range(STARTS)]
+        whole = variants(config.estimator)
+        fed_rows = [lane for variant in whole for lane in lanes_of(variant, starts)]
+        self.lanes = fed_rows + whole
+        self.is_whole = [False] * len(fed_rows) + [True] * len(whole)
+        self.estimators = [[native.estimator(lane, RATE) for native in natives] for lane in fed_rows]
+        self.identifiers = [[native.strong(replace(config, estimator=lane)) for native in natives] for lane in whole]
+        warming_up = window(config)
+        phi, y = (x[first_row - warming_up :] for x in (run.phi, run.y))
+        n, row_y, fate = StrongTwin(config).rows(phi, y)
+        assert (fate[:warming_up] == Reason.WARMING_UP).all()
+        assert (fate[warming_up:] == Reason.ACCUMULATED).all()
+        self.n, self.row_y = n[warming_up:], row_y[warming_up:]
+        self.phi, self.y = phi[warming_up:], y[warming_up:]
+        self.hashes = [self._warm_up(k, phi[:warming_up], y[:warming_up]) for k in range(len(whole))]
+
+    def _warm_up(self, k: int, phi: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> int:
+        """Feeds identifier k until its next sample makes a row; returns its hash."""
+        start = np.asarray(self.lanes[len(self.estimators) + k].start, np.float32)
+        p = np.tile(start, (len(phi), 1))
+        told = np.full(len(phi), Reason.WARMING_UP, np.uint8)
+        return self._compare_identifiers(k, phi, y, p, np.zeros((len(phi), model.SUMS), np.float32), told, fnv.START)
+
+    def _compare_identifiers(
+        self,
+        k: int,
+        phi: npt.NDArray[np.float64],
+        y: npt.NDArray[np.float64],
+        p: npt.NDArray[np.float32],
+        sums: npt.NDArray[np.float32],
+        reason: npt.NDArray[np.uint8],
+        hashed: int,
+    ) -> int:
+        hashes = fnv.running_hashes(p, sums, reason, hashed)
+        for native, identifier in zip(self.natives, self.identifiers[k], strict=True):
+            record = identifier.run(phi, y)
+            assert first_difference(record, p, sums, reason) is None, native.build
+            assert np.array_equal(record.hash, hashes), native.build
+        return int(hashes[-1])
+
+    def compare(self, part: slice, twin: TwinRecord, first_lane: int) -> None:
+        """Asserts that every build has the bits of its lane of the twin after every row of a part."""
+        for lane in range(len(self.lanes)):
+            own = first_lane + lane
+            p, sums = (np.ascontiguousarray(x[:, :, own]) for x in (twin.p, twin.sums))
+            reason = np.ascontiguousarray(twin.reason[:, own])
+            if self.is_whole[lane]:
+                k = lane - len(self.estimators)
+                samples = self.phi[part], self.y[part]
+                self.hashes[k] = self._compare_identifiers(k, *samples, p, sums, reason, self.hashes[k])
+                continue
+            reason[reason == Reason.MISFIT] = Reason.UPDATED  # the verdict is the identifier's
+            for native, estimator in zip(self.natives, self.estimators[lane], strict=True):
+                record = estimator.run(self.n[part], self.row_y[part], hashes=False)
+                assert first_difference(record, p, sums, reason) is None, native.build
+
+
+def test_twenty_starts_and_whole_identifiers_equal_the_twin_in_every_build(
+    matrix: dict[str, Native], standard_20_bits: Simulation
 ) -> None:
-    run = standard_20_bits.run
-    config = configuration(differentiator)
-    n, y, fate = StrongTwin(config).rows(run.phi, run.y)
-    ready = fate == Reason.ACCUMULATED
-    assert ready.sum() >= 40_000
-    starts = [standard_start(seed) for seed in range(STARTS)]
-    lanes = [lane for variant in variants(config.estimator) for lane in lanes_of(variant, starts)]
-    differing = compare_lanes([matrix[name] for name in BUILDS], lanes, n[ready], y[ready], 1000.0)
-    assert not differing, [(native.build, lane, str(difference)) for native, lane, difference in differing[:3]]
+    """Both differentiators, both laws, with and without forgetting: 168 lanes of one twin, compared at every row."""
+    configs = [configuration(of) for of in DIFFERENTIATORS]
+    natives = [matrix[name] for name in BUILDS]
+    first_row = max(window(config) for config in configs)
+    groups = [Group(config, natives, standard_20_bits.run, first_row) for config in configs]
+    rows, lanes = len(groups[0].row_y), len(groups[0].lanes)
+    assert rows >= 40_000
+    twin = StrongTwin(configs[0], [lane for group in groups for lane in group.lanes])
+    gate = GateOfSome(twin, np.array([whole for group in groups for whole in group.is_whole]))
+    for first in range(0, rows, PIECE):
+        part = slice(first, first + PIECE)
+        n = np.repeat(np.stack([group.n[part] for group in groups], axis=2), lanes, axis=2)
+        y = np.repeat(np.stack([group.row_y[part] for group in groups], axis=1), lanes, axis=1)
+        expected = run_rows(twin.estimator, n, y, gate=gate, misfit=twin.misfit)
+        for place, group in enumerate(groups):
+            group.compare(part, expected, place * lanes)
 
 
 def test_a_changed_bit_is_found_and_named(native: Native, standard_20_bits: Simulation) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.native import (
-    EstimatorConfig,
     Native,
     Record,
     StrongConfig,
@@ -18,8 +17,7 @@ from pvid.native import (
     WeakIdentifier,
 )
 from pvid.twin import fnv
-from pvid.twin.estimator import Estimator
-from pvid.twin.strong import StrongTwin, run_rows
+from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
 P_NAMES = ("w", "d1", "d2", "c", "c1", "c2")
@@ -132,39 +130,3 @@ def compare_run(
             record, p, sums, reason, twin.published[:, :, 0] if isinstance(config, WeakConfig) else None
         ),
     )
-
-
-def compare_lanes(
-    natives: list[Native],
-    configs: list[EstimatorConfig],
-    n: npt.NDArray[np.float32],
-    y: npt.NDArray[np.float32],
-    rate: float,
-    piece: int = 2000,
-) -> list[tuple[Native, int, Difference]]:
-    """Many estimators on the same rows against one pass of the twin, in every build of the core.
-
-    The twin runs once, `piece` ticks at a time, and every build follows: memory stays bounded and no lane is
-    sampled, all are compared after every tick. Returns (build, lane, first difference) of those that differ.
-    """
-    twin = Estimator(configs, rate)
-    cores = [[native.estimator(config, rate) for config in configs] for native in natives]
-    differing: dict[tuple[int, int], Difference] = {}
-    for first in range(0, len(y), piece):
-        part = slice(first, first + piece)
-        expected = run_rows(twin, n[part], y[part])
-        for build, lanes in enumerate(cores):
-            for lane, core in enumerate(lanes):
-                record = core.run(n[part], y[part], hashes=False)
-                difference = first_difference(
-                    record, expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane]
-                )
-                if difference is not None and (build, lane) not in differing:
-                    shifted = Difference(
-                        first + difference.tick,
-                        difference.variable,
-                        difference.core_word,
-                        difference.twin_word,
-                    )
-                    differing[build, lane] = shifted
-    return [(natives[build], lane, difference) for (build, lane), difference in sorted(differing.items())]

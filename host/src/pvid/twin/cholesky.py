@@ -33,15 +33,14 @@ class Factor:
 def factor(s: Float32) -> Factor:
     """Factors the upper triangle of s [n, n, lanes]. Lanes that fail compute on with harmless garbage."""
     n, _, lanes = s.shape
-    ok = np.ones(lanes, np.bool_)
-    scale = np.empty((n, lanes), np.float32)
-    for i in range(n):
-        ok &= (s[i, i] >= _SMALLEST_NORMAL) & (s[i, i] < np.inf)
-        scale[i] = _inverse_root_scale(s[i, i])
+    diagonals = s[range(n), range(n)]
+    ok: Mask = np.all((diagonals >= _SMALLEST_NORMAL) & (diagonals < np.inf), axis=0)
+    scale = _inverse_root_scale(diagonals)
+    scaled = (s * scale[:, None]) * scale
     u = np.zeros((n, n, lanes), np.float32)
     first_pivot = np.zeros(lanes, np.float32)
     for j in reversed(range(n)):
-        diagonal = (s[j, j] * scale[j]) * scale[j]
+        diagonal = scaled[j, j]
         pivot = diagonal
         for k in range(j + 1, n):
             pivot = pivot - u[j, k] * u[j, k]
@@ -50,7 +49,7 @@ def factor(s: Float32) -> Factor:
             first_pivot = np.where(ok, pivot / diagonal, first_pivot)
         u[j, j] = np.float32(1) / np.sqrt(pivot)
         for i in range(j):
-            total = (s[i, j] * scale[i]) * scale[j]
+            total = scaled[i, j]
             for k in range(j + 1, n):
                 total = total - u[i, k] * u[j, k]
             u[i, j] = total * u[j, j]

@@ -47,6 +47,13 @@ def _capped(residual: Float32) -> Float32:
     return np.where(residual <= RESIDUAL_MAX, residual, RESIDUAL_MAX)
 
 
+def _squares(n: Float32, y: Float32) -> Float32:
+    """Y^2 + N_0^2 + N_1^2 + .., summed in this order [lanes]."""
+    each = np.concatenate([y[None], n])
+    total: Float32 = np.add.accumulate(each * each)[-1]
+    return total
+
+
 def _lanes(values: Sequence[float]) -> Float32:
     return np.array(values, np.float32)
 
@@ -117,20 +124,18 @@ class Estimator:
     def _step(
         self, n: Float32, y: Float32, e: Float32, gradient: Float32, passed: npt.NDArray[np.bool_]
     ) -> npt.NDArray[np.uint8]:
-        squares = y * y
-        for entry in n:
-            squares = squares + entry * entry
-        usable = squares <= ROW_LIMIT * ROW_LIMIT
-        not_finite = passed & ~usable & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
-        saturated = passed & ~usable & ~not_finite
+        usable = _squares(n, y) <= ROW_LIMIT * ROW_LIMIT
         taken = passed & usable
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
-        reason[not_finite] = Reason.REJECTED_NOT_FINITE
-        reason[saturated] = Reason.REJECTED_SATURATED
-        reason[~passed] = Reason.REJECTED_OUTLIER
-        self.counters["rejected_outlier"] += ~passed
-        self.counters["rejected_not_finite"] += not_finite
-        self.counters["rejected_saturated"] += saturated
+        if not taken.all():
+            not_finite = passed & ~usable & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
+            saturated = passed & ~usable & ~not_finite
+            reason[not_finite] = Reason.REJECTED_NOT_FINITE
+            reason[saturated] = Reason.REJECTED_SATURATED
+            reason[~passed] = Reason.REJECTED_OUTLIER
+            self.counters["rejected_outlier"] += ~passed
+            self.counters["rejected_not_finite"] += not_finite
+            self.counters["rejected_saturated"] += saturated
         if not taken.any():
             return reason
         listening = taken & (self.gain < 1)
@@ -303,10 +308,7 @@ class RelativeEstimator(Estimator):
     def add(self, n: Float32, y: Float32) -> npt.NDArray[np.uint8]:
         """One row of a group: N [n_theta, lanes], Y [lanes]."""
         with np.errstate(all="ignore"):
-            squares = y * y
-            for entry in n:
-                squares = squares + entry * entry
-            fits = squares <= ROW_LIMIT * ROW_LIMIT
+            fits = _squares(n, y) <= ROW_LIMIT * ROW_LIMIT
             not_finite = ~fits & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
             e = y
             for entry, theta in zip(n, self.theta, strict=True):

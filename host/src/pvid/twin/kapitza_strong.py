@@ -37,10 +37,23 @@ _LEFT = np.array([a for a, _ in _pairs()])
 _RIGHT = np.array([b for _, b in _pairs()])
 
 AA, AE, EE = 0, 1, 2
-# A, E and Y times -u^k phi'' (and -u^k phi), by descending k
-_SEQUENCES_2 = np.array([[3, 4, 5, 6], [7, 8, 9, 10], [MOMENTS + j for j in _PHI2]])
-_SEQUENCES_0 = np.array([[*range(11, 16)], [*range(16, 21)], [MOMENTS + j for j in _PHI0]])
-_PHI2_PHI2, _PHI2_PHI0, _PHI0_PHI0 = 21, 28, 36
+# A, E and Y times -u^k phi'' and -u^k phi, by descending k
+_BY_PHI2 = np.array([[3, 4, 5, 6], [7, 8, 9, 10], [MOMENTS + j for j in _PHI2]])
+_BY_PHI0 = np.array([[*range(11, 16)], [*range(16, 21)], [MOMENTS + j for j in _PHI0]])
+# phi'' phi'', phi'' phi and phi phi, of 7, 8 and 9 sums each; a place beyond the last is not used
+_SQUARES = np.array([range(21, 30), range(28, 37), range(36, 45)])
+
+
+def _windows(sequences: npt.NDArray[np.int64], orders: int) -> npt.NDArray[np.int64]:
+    """Places i .. i + orders - 1 of every sequence, [i, sequences, orders]."""
+    last = sequences.shape[1] - orders
+    return np.stack([sequences[:, i : i + orders] for i in range(last + 1)])
+
+
+_WINDOWS_2, _WINDOWS_0, _WINDOWS_SQUARES = _windows(_BY_PHI2, 2), _windows(_BY_PHI0, 2), _windows(_SQUARES, 3)
+# binom(r, i), i = 1 .. r, one column a sequence: r = 2 and 3; r = 4, 5 and 6
+_BINOMIALS_2, _BINOMIALS_0 = np.array([[2], [1]], np.float32), np.array([[3], [3], [1]], np.float32)
+_BINOMIALS_SQUARES = np.array([[4, 5, 6], [6, 10, 15], [4, 10, 20], [1, 5, 15], [0, 1, 6], [0, 0, 1]], np.float32)
 
 
 def rows(phi: Float32, u: Float32) -> tuple[Float32, Float32]:
@@ -70,86 +83,76 @@ def rows(phi: Float32, u: Float32) -> tuple[Float32, Float32]:
 def terms(n: Float32, y: Float32) -> Float32:
     """What a row adds to the sums: [SUMS, lanes] from N [11, lanes] and Y [lanes]."""
     extended = np.concatenate([n, y[None], np.ones_like(y)[None]])
-    product: Float32 = extended[_LEFT] * extended[_RIGHT]
+    product: Float32 = extended.take(_LEFT, axis=0) * extended.take(_RIGHT, axis=0)
     return product
 
 
-def _shift(sequence: Float32, coefficients: list[Float32], w: Float32, orders: int) -> list[Float32]:
-    """<a b G^r>, <a b G^(r+1)> (and <a b G^(r+2)>) as shift_pair and shift_triple have it.
+def _shifted(sums: Float32, windows: npt.NDArray[np.int64], binomials: Float32, powers: Float32) -> Float32:
+    """What shift_pair and shift_triple sum up before they multiply by w: [orders, sequences, lanes].
 
-    sequence [..., r + orders, lanes] by descending powers of u; coefficients binom(r, i) w^i, i = 1..r.
+    The last sequence has as many terms as there are binomials, each before it one less.
     """
-    s = [sequence[..., k, :] for k in range(orders)]
-    for i, c in enumerate(coefficients, start=1):
-        s = [s[k] + c * sequence[..., i + k, :] for k in range(orders)]
-    low = s[-1]
-    mid = s[-2] + w * low
-    if orders == 2:
-        return [low, mid]
-    return [low, mid, (s[0] + w * s[1]) + w * mid]
+    count, sequences = binomials.shape
+    terms = (binomials[:, :, None] * powers[:count, None])[:, :, None] * sums.take(windows[1:], axis=0)
+    s: Float32 = sums.take(windows[0], axis=0)
+    for i, term in enumerate(terms):
+        first = max(i - count + sequences, 0)
+        s[first:] = s[first:] + term[first:]
+    return s.transpose(1, 0, 2)
 
 
 def project(p: Float32, sums: Float32) -> tuple[Float32, Float32, Float32]:
-    """S [3, 3, lanes] (upper triangle), F [3, lanes] and theta^T M theta - 2 theta^T B [lanes]."""
+    """S [3, 3, lanes] (upper triangle), F [3, lanes] and theta^T M theta - 2 theta^T B [lanes].
+
+    What phi'' and phi (and their squares and product) need alike is computed as the rows of one array.
+    """
     f = np.float32
     w, d1, d2 = p
     w2 = w * w
     w3 = w2 * w
     w4 = w2 * w2
-    w5 = w4 * w
+    powers = np.stack([w, w2, w3, w4, w4 * w, w3 * w3])
     two_w = f(2) * w
     three_d1 = f(3) * d1
     four_d2 = f(4) * d2
-    r2 = [f(2) * w, w2]
-    r3 = [f(3) * w, f(3) * w2, w3]
-    r4 = [f(4) * w, f(6) * w2, f(4) * w3, w4]
-    r5 = [f(5) * w, f(10) * w2, f(10) * w3, f(5) * w4, w5]
-    r6 = [f(6) * w, f(15) * w2, f(20) * w3, f(15) * w4, f(6) * w5, w3 * w3]
-    low2, high2 = _shift(sums[_SEQUENCES_2], r2, w, 2)
-    low0, high0 = _shift(sums[_SEQUENCES_0], r3, w, 2)
-    a2_low, e2_low, y2_low = low2
-    a2_high, e2_high, y2_high = high2
-    a0_low, e0_low, y0_low = low0
-    a0_high, e0_high, y0_high = high0
-    k22_low, k22_mid, k22_high = _shift(sums[_PHI2_PHI2 : _PHI2_PHI2 + 7], r4, w, 3)
-    k20_low, k20_mid, k20_high = _shift(sums[_PHI2_PHI0 : _PHI2_PHI0 + 8], r5, w, 3)
-    k00_low, k00_mid, k00_high = _shift(sums[_PHI0_PHI0 : _PHI0_PHI0 + 9], r6, w, 3)
+    pair_2 = _shifted(sums, _WINDOWS_2, _BINOMIALS_2, powers)
+    pair_0 = _shifted(sums, _WINDOWS_0, _BINOMIALS_0, powers)
+    pairs = np.stack([pair_2, pair_0], axis=2)  # [2, (A, E, Y), (phi'', phi), lanes]
+    low = pairs[1]
+    high = pairs[0] + w * low
+    (a_low, e_low, y_low), (a_high, e_high, y_high) = low, high
+    k_first, k_second, k_low = _shifted(sums, _WINDOWS_SQUARES, _BINOMIALS_SQUARES, powers)
+    k_mid = k_second + w * k_low
+    k_high = (k_first + w * k_second) + w * k_mid
     m_aa, m_ae, m_ee = sums[AA], sums[AE], sums[EE]
     b_a, b_e = sums[MOMENTS], sums[MOMENTS + 1]
 
-    x_2 = a2_low + two_w * e2_low
-    x_0 = a0_low + two_w * e0_low
+    x = a_low + two_w * e_low
     x_x = (m_aa + two_w * m_ae) + two_w * (m_ae + two_w * m_ee)
-    n_2 = x_2 + (three_d1 * k22_low + four_d2 * k20_low)
-    n_0 = x_0 + (three_d1 * k20_low + four_d2 * k00_low)
-    s_ww = x_x + (three_d1 * (x_2 + n_2) + four_d2 * (x_0 + n_0))
-    s_w1 = (a2_high + two_w * e2_high) + (three_d1 * k22_mid + four_d2 * k20_mid)
-    s_w2 = (a0_high + two_w * e0_high) + (three_d1 * k20_mid + four_d2 * k00_mid)
+    n = x + (three_d1 * k_low[:2] + four_d2 * k_low[1:])
+    x_n = x + n
+    s_ww = x_x + (three_d1 * x_n[0] + four_d2 * x_n[1])
+    s_wd = (a_high + two_w * e_high) + (three_d1 * k_mid[:2] + four_d2 * k_mid[1:])
 
     q_a = w * m_aa + w2 * m_ae
     q_e = w * m_ae + w2 * m_ee
-    q_2 = w * a2_low + w2 * e2_low
-    q_0 = w * a0_low + w2 * e0_low
-    q_w = (q_a + two_w * q_e) + (three_d1 * q_2 + four_d2 * q_0)
-    q_n1 = w * a2_high + w2 * e2_high
-    q_n2 = w * a0_high + w2 * e0_high
-    y_w = (b_a + two_w * b_e) + (three_d1 * y2_low + four_d2 * y0_low)
-    t_1 = q_n1 + (d1 * k22_high + d2 * k20_high)
-    t_2 = q_n2 + (d1 * k20_high + d2 * k00_high)
+    q = w * a_low + w2 * e_low
+    q_w = (q_a + two_w * q_e) + (three_d1 * q[0] + four_d2 * q[1])
+    q_n = w * a_high + w2 * e_high
+    y_w = (b_a + two_w * b_e) + (three_d1 * y_low[0] + four_d2 * y_low[1])
+    t = q_n + (d1 * k_high[:2] + d2 * k_high[1:])
 
     s = np.zeros((N_P, N_P, *w.shape), np.float32)
-    s[0, 0], s[0, 1], s[0, 2] = s_ww, s_w1, s_w2
-    s[1, 1], s[1, 2], s[2, 2] = k22_high, k20_high, k00_high
+    s[0, 0], s[0, 1:] = s_ww, s_wd
+    s[1, 1:], s[2, 2] = k_high[:2], k_high[2]
     force = np.empty((N_P, *w.shape), np.float32)
-    force[0] = (y_w - q_w) - (d1 * s_w1 + d2 * s_w2)
-    force[1] = y2_high - t_1
-    force[2] = y0_high - t_2
+    force[0] = (y_w - q_w) - (d1 * s_wd[0] + d2 * s_wd[1])
+    force[1:] = y_high - t
 
     q_q = w * q_a + w2 * q_e
     q_b = w * b_a + w2 * b_e
-    along_1 = (q_n1 + t_1) - f(2) * y2_high
-    along_2 = (q_n2 + t_2) - f(2) * y0_high
-    energy = (q_q - f(2) * q_b) + (d1 * along_1 + d2 * along_2)
+    along = (q_n + t) - f(2) * y_high
+    energy = (q_q - f(2) * q_b) + (d1 * along[0] + d2 * along[1])
     return s, force, energy
 
 

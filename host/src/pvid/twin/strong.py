@@ -119,7 +119,7 @@ def run_rows(
     gate: Gate | None = None,
     misfit: Misfit | None = None,
 ) -> TwinRecord:
-    """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share.
+    """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share, or with an axis of lanes more.
 
     `fate` [ticks] tells what became of a tick before it reached the estimator; by default all have a row.
     """
@@ -155,8 +155,8 @@ def follow_rows(
     ticks = len(y)
     lanes = estimator.p.shape[1]
     reason = np.empty((ticks, lanes), np.uint8)
-    wide_n = np.broadcast_to(n[:, :, None], (ticks, model.N_THETA, lanes))
-    wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
+    wide_n = np.broadcast_to(n.reshape(ticks, model.N_THETA, -1), (ticks, model.N_THETA, lanes))
+    wide_y = np.broadcast_to(y.reshape(ticks, -1), (ticks, lanes))
     for tick in range(ticks):
         if fate is None or fate[tick] == Reason.ACCUMULATED:
             reason[tick] = estimator.step(wide_n[tick], wide_y[tick], gate, misfit)

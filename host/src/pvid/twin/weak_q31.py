@@ -34,6 +34,17 @@ class TwinRecordQ31:
     reason: npt.NDArray[np.uint8]
     published: npt.NDArray[np.int32] | None = None
 
+    def lane(self, lane: int) -> TwinRecordQ31:
+        """A copy of one lane, for whoever looks at it more than once: its ticks lie side by side."""
+        own = slice(lane, lane + 1)
+        return TwinRecordQ31(
+            p=self.p[:, :, own].copy(),
+            sums=self.sums[:, :, own].copy(),
+            exponent=self.exponent[:, own].copy(),
+            reason=self.reason[:, own].copy(),
+            published=None if self.published is None else self.published[:, :, own].copy(),
+        )
+
 
 class WeakTwinQ31:
     """The weak-form identifier in several lanes that share samples and design."""
