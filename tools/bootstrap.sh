@@ -10,6 +10,8 @@ build=$root/build
 venv=$build/venv
 python=$venv/bin/python
 unset PYTHONHOME PYTHONPATH # they would reach into the environment, or replace it
+# The matrices here are small: a second thread brings nothing, and spins where the other processors are busy.
+export OPENBLAS_NUM_THREADS=1
 trap 'exit 130' INT # also where the step that was interrupted, like pip, turns it into a failure of its own
 
 say() { printf 'pvid: %s\n' "$*" >&2; }
@@ -202,11 +204,11 @@ install_requirements() { # install_requirements PROFILE
 
 # ---- the C core ----
 
-# build_tree NAME CMAKE_OPTION...: configures build/NAME when it is new or was configured otherwise, and
-# builds what has changed.
+# build_tree NAME TARGET CMAKE_OPTION...: configures build/NAME when it is new or was configured otherwise, and
+# builds what has changed of TARGET.
 build_tree() {
-    local name=$1 tree=$build/$1
-    shift
+    local name=$1 tree=$build/$1 target=$2
+    shift 2
     local wanted="$root $*"
     if [[ ! -f $tree/build.ninja || ! -f $tree/configured || $(<"$tree/configured") != "$wanted" ]]; then
         say "configuring build/$name"
@@ -214,7 +216,7 @@ build_tree() {
         logged "configure-$name" cmake -S "$root" -B "$tree" -G Ninja "$@" || return 1
         write_stamp "$tree/configured" "$wanted"
     fi
-    logged "build-$name" ninja -C "$tree"
+    logged "build-$name" ninja -C "$tree" "$target"
 }
 
 # took_effect LIBRARY OPTIONS: the compilers' own record in it (-frecord-gcc-switches) shows, for every object,
@@ -233,7 +235,8 @@ took_effect() {
 }
 
 build_core() {
-    build_tree host -DCMAKE_C_COMPILER=gcc -DPVID_BUILD_TESTS=OFF || die "the C core did not build; see above"
+    build_tree host pvid_native -DCMAKE_C_COMPILER=gcc -DPVID_BUILD_TESTS=OFF ||
+        die "the C core did not build; see above"
 }
 
 # prepare PROFILE: as above.

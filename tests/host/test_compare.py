@@ -23,8 +23,27 @@ MUTANTS = {
 }
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run and its rig file."""
+    folder = tmp_path_factory.mktemp("recorded")
+    assert pvid(folder, "simulate", "run.csv", "--duration", "2", "--bits", "20").returncode == 0
+    return folder
+
+
+def pvid(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "pvid", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={**os.environ, **environment},
+        check=False,
+    )
+
+
 @pytest.mark.parametrize("source", MUTANTS)
-def test_a_changed_core_exits_1_and_names_tick_variable_and_words(source: str, tmp_path: Path) -> None:
+def test_a_changed_core_exits_1_and_names_tick_variable_and_words(source: str, recorded: Path, tmp_path: Path) -> None:
     original, changed = MUTANTS[source]
     core = ROOT / "firmware" / "src"
     text = (core / source).read_text(encoding="utf-8")
@@ -34,21 +53,11 @@ def test_a_changed_core_exits_1_and_names_tick_variable_and_words(source: str, t
     others = [str(path) for path in sorted(core.glob("*.c")) if path.name != source]
     includes = [f"-I{ROOT / 'firmware/include'}", f"-I{core}", '-DPVID_NATIVE_BUILD="mutant"']
     includes += ["-DPVID_MAX_P=6", "-DPVID_MAX_MOMENTS=55"]  # as host/native builds it
-    command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / source)]
+    command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / source)]
     subprocess.run([*command, *others, str(ROOT / "host/native/replay.c"), "-o", str(library), "-lm"], check=True)
 
-    def pvid(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-P", "-m", "pvid", *arguments],
-            capture_output=True,
-            text=True,
-            cwd=tmp_path,
-            env={**os.environ, **environment},
-            check=False,
-        )
-
-    assert pvid("simulate", "run.csv", "--duration", "2", "--bits", "20").returncode == 0
-    done = pvid("compare", "run.csv", "--rig", "run.toml", "--form", "strong", PVID_NATIVE_LIBRARY=str(library))
+    compare = ("compare", "run.csv", "--rig", "run.toml", "--form", "strong")
+    done = pvid(recorded, *compare, PVID_NATIVE_LIBRARY=str(library))
     assert done.returncode == 1, done.stdout + done.stderr
     words = " ".join(done.stdout.split())
     assert "DIFFERENT: tick" in words

@@ -31,7 +31,7 @@ def without(tmp_path_factory: pytest.TempPathFactory) -> Native:
     tree = tmp_path_factory.mktemp("without")
     configure = ["cmake", "-S", str(ROOT), "-B", str(tree), "-G", "Ninja", "-DPVID_BUILD_TESTS=OFF"]
     configure += [f"-D{name}={value}" for name, value in LEFT_OUT.items()]
-    for command in (configure, ["cmake", "--build", str(tree)]):
+    for command in (configure, ["cmake", "--build", str(tree), "--target", "pvid_native"]):
         subprocess.run(command, check=True, capture_output=True)
     (library,) = tree.rglob("libpvid_native.so")
     return Native(library)

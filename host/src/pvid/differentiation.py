@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -98,6 +99,7 @@ class FirBank(Folded):
         return out
 
 
+@lru_cache(maxsize=64)
 def finite_difference(stride: int = 1) -> FirBank:
     """Central differences on five points `stride` samples apart.
 
@@ -114,9 +116,11 @@ def finite_difference(stride: int = 1) -> FirBank:
             [-4.0, 1.0],
         ]
     )
+    weights.setflags(write=False)
     return FirBank(weights, stride, "finite-difference", 4)
 
 
+@lru_cache(maxsize=64)
 def savitzky_golay(window: int, degree: int, stride: int = 1) -> FirBank:
     """Derivatives at the centre of the least-squares polynomial through the window's points.
 
@@ -150,6 +154,7 @@ def savitzky_golay(window: int, degree: int, stride: int = 1) -> FirBank:
             at_centre = np.array([_legendre_derivative(n, order) for n in degrees]) / float(half) ** order
             taps = q @ np.linalg.solve(r.T, at_centre) / multiplicity
             weights[order] = taps[points > 0]
+    weights.setflags(write=False)
     return FirBank(weights, stride, "savitzky-golay", degree)
 
 

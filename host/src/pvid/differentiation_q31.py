@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.differentiation import ORDERS, FirBank, Folded
 from pvid.errors import PvidError
-from pvid.shaped_rounding import bits_for, shaped
+from pvid.shaped_rounding import bits_for, shaped, slow_factor
 
 Float = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
@@ -70,6 +71,7 @@ def largest_sums(weights: Int32, centre: int, full_scale: int) -> list[int]:
     return largest
 
 
+@lru_cache(maxsize=64)
 def integer_bank(bank: FirBank, phi_max: int, y_max: int, rate_max: float) -> FirBankQ31:
     """The integers of a bank.
 
@@ -102,6 +104,7 @@ def integer_bank(bank: FirBank, phi_max: int, y_max: int, rate_max: float) -> Fi
         reach = max(phi_max, y_max) * (2 if order % 2 else 4)
         if np.abs(weights[order].astype(np.int64)).max() * reach >= 2**31:
             raise PvidError(f"the full scale of {max(phi_max, y_max)} counts is too many for the derivative {order}")
+    weights.setflags(write=False)
     margins: dict[str, float] = {}
 
     def shifts(name: str, full_scale: int, lowest: int) -> tuple[tuple[int, ...], int]:
@@ -150,6 +153,6 @@ def _rounded(bank: FirBank, full_scale: int, rate_max: float) -> tuple[Int32, li
         bits = min(bits_for(largest * reach * 1.01, 32), 62 if order else 30)
         # relative to what the derivative of a motion of that rate is
         seen = (odd if order % 2 else even) / rates**order
-        out[order] = shaped(bank.weights[order] * 2.0**bits, seen / np.abs(seen).max(), _OWN_WEIGHT)
+        out[order] = shaped(bank.weights[order] * 2.0**bits, slow_factor(seen / np.abs(seen).max(), _OWN_WEIGHT))
         formats.append(bits)
     return out, formats

@@ -17,14 +17,20 @@ def bits_for(largest: float, bits: int) -> int:
     return math.floor(math.log2((2 ** (bits - 1) - 2) / largest))
 
 
-def shaped(values: Float, slow: Float, own_weight: float) -> Float:
-    """Integers near `values` [n] whose errors have almost no part along the columns of `slow` [n, signals].
+def slow_factor(slow: Float, own_weight: float) -> Float:
+    """Upper factor [n, n] of what errors cost by their part along the columns of `slow` [n, signals].
 
-    Rounds one entry after the other, each such that it makes up for the errors of those before (Babai's nearest plane).
     `own_weight` is that of the errors themselves beside their part along slow signals: it keeps them small.
     """
-    form = slow @ slow.T / slow.shape[1] + own_weight * np.eye(len(values))
-    factor = np.linalg.cholesky(form).T
+    form = slow @ slow.T / slow.shape[1] + own_weight * np.eye(len(slow))
+    return np.asarray(np.linalg.cholesky(form).T)
+
+
+def shaped(values: Float, factor: Float) -> Float:
+    """Integers near `values` [n] whose errors have almost no part along the slow signals of `factor`.
+
+    Rounds one entry after the other, each such that it makes up for the errors of those before (Babai's nearest plane).
+    """
     out = np.zeros_like(values)
     for i in range(len(values) - 1, -1, -1):
         owed = factor[i, i + 1 :] @ (out[i + 1 :] - values[i + 1 :])

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -396,8 +396,9 @@ def _require(name: str, value: int, low: int, high: int, macro: str = "") -> Non
         raise PvidError(f"{name} must be {low} to {high}{limit}, not {value}")
 
 
+@lru_cache(maxsize=256)
 def _test_functions(window: int, functions: int, exponent: int, dt: float) -> Float:
-    """chi, chi'' and chi'''' before whitening, shape [window, 3, functions].
+    """chi, chi'' and chi'''' before whitening, shape [window, 3, functions]; kept, since every mechanism has the same.
 
     Each is evaluated on one half and mirrored, so that its parity (that of k) holds in every bit.
     """
@@ -415,7 +416,7 @@ def _test_functions(window: int, functions: int, exponent: int, dt: float) -> Fl
             chi[half:, place, k] = right
             chi[half::-1, place, k] = -right if k % 2 else right
     _as_integral(chi[:, 2])
-    return chi
+    return _frozen(chi)
 
 
 # Gregory's end corrections of the trapezoid rule: what the differences of order 1, 2, .. at an end are multiplied by.

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.errors import PvidError
-from pvid.shaped_rounding import bits_for, shaped
+from pvid.shaped_rounding import bits_for, shaped, slow_factor
 from pvid.weak_design import WeakDesign
 
 Float = npt.NDArray[np.float64]
@@ -304,11 +305,11 @@ def _integer_chi(chi: Float) -> tuple[Int16, tuple[int, ...]]:
     16 and more.
     """
     bits = tuple(bits_for(float(np.abs(chi[:, order]).max()) * _ROOM, CHI_BITS) for order in range(3))
-    slow = _slow_signals(len(chi))
+    factor = _factor_of_slow_signals(len(chi))
     out = np.zeros(chi.shape, np.int16)
     for order, b in enumerate(bits):
         for k in range(chi.shape[2]):
-            out[1:-1, order, k] = shaped(chi[1:-1, order, k] * 2.0**b, slow[1:-1], _OWN_WEIGHT)
+            out[1:-1, order, k] = shaped(chi[1:-1, order, k] * 2.0**b, factor)
     return out, bits
 
 
@@ -327,6 +328,11 @@ def _slow_signals(window: int) -> Float:
 
 # Of the errors themselves beside their part along slow signals: keeps them below two units.
 _OWN_WEIGHT = 1e-4
+
+
+@lru_cache(maxsize=64)
+def _factor_of_slow_signals(window: int) -> Float:
+    return slow_factor(_slow_signals(window)[1:-1], _OWN_WEIGHT)
 
 
 def _integer_gram(gram: Float, dt: float) -> tuple[Int32, tuple[int, ...]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -134,9 +135,16 @@ def noise_gram(design: WeakDesign, p: Float) -> Float:
     w, d1, d2 = p[:3]
     two, zero = d1 * w, d2 * w**2
     packed = np.array([1.0, two, zero, two**2, two * zero, zero**2]) @ design.gram
-    r0 = np.zeros((design.functions, design.functions))
-    r0[np.tril_indices(design.functions)] = packed
-    return r0 + np.tril(r0, -1).T
+    return np.asarray(packed[_places_in_triangle(design.functions)])
+
+
+@cache
+def _places_in_triangle(n: int) -> npt.NDArray[np.int64]:
+    """Where each entry of a symmetric matrix [n, n] stands in its packed lower triangle."""
+    places = np.zeros((n, n), np.int64)
+    rows, columns = np.tril_indices(n)
+    places[rows, columns] = places[columns, rows] = np.arange(len(rows))
+    return places
 
 
 def overlap_gram(design: WeakDesign, p: Float) -> Float:

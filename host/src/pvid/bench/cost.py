@@ -37,7 +37,7 @@ RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: 
 
 
 def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: Sequence[str] = ()) -> Path:
-    """Compiles tests/cost with the core as a device does, into `folder`; returns the binary.
+    """Compiles tests/cost with the float32 core as a device does, into `folder`; returns the binary.
 
     `definitions` are macros, NAME=VALUE: sizes of tests/cost/weak_rig.h, bounds of pvid/config.h.
 
@@ -47,7 +47,8 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: 
         When the compiler is missing or refuses.
     """
     root = Path(__file__).resolve().parents[4]
-    sources = sorted([*(root / "firmware" / "src").glob("*.c"), *(root / "tests" / "cost").glob("*.c")])
+    core = [path for path in (root / "firmware" / "src").glob("*.c") if not path.stem.endswith("_q31")]
+    sources = sorted([*core, *(root / "tests" / "cost").glob("*.c")])
     binary = folder / "tick_cost"
     command = [compiler, "-std=c99", level, "-ffp-contract=off", f"-I{root / 'firmware' / 'include'}"]
     command += [f"-D{definition}" for definition in definitions]
