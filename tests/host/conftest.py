@@ -12,6 +12,27 @@ from pvid.rig import Simulation, simulate, standard_sensors
 
 ROOT = Path(__file__).resolve().parents[2]
 
+# tools/test gives each of its workers a file at a time: those that take a minute and more come first, the longest
+# before the others, so that the workers end together.
+LONGEST = (
+    "targets",
+    "strong_bits_q31",
+    "stream",
+    "bits",
+    "log",
+    "tune",
+    "longevity",
+    "memory",
+    "mutate",
+    "weak_starts",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts the longest files first; within a file, and among the others, nothing moves."""
+    places = {f"test_{name}.py": place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
+
 
 @pytest.fixture(scope="session")
 def native() -> Native:

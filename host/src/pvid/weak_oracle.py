@@ -374,12 +374,16 @@ class WeakOracle:
 
     def theta(self) -> Float:
         """theta at the present p, damping coefficients last."""
+        if len(self.p) == self.n_core:
+            return theta(self.p)
         return np.append(theta(self.p[: self.n_core]), self.p[self.n_core :])
 
     def jacobian(self) -> Float:
         """d theta / d p at the present p."""
         c = jacobian(self.p[: self.n_core])
         extra = len(self.p) - self.n_core
+        if not extra:
+            return c
         out = np.zeros((c.shape[0] + extra, c.shape[1] + extra))
         out[: c.shape[0], : c.shape[1]] = c
         out[c.shape[0] :, c.shape[1] :] = np.eye(extra)
@@ -455,12 +459,13 @@ class WeakOracle:
     def _step(self) -> bool:
         """One Gauss-Newton step; whether p moved."""
         prior = (self.settings.row_sd / self.sd) ** 2
-        s = self.information() + np.diag(prior)
+        c = self.jacobian()
+        s = c.T @ self.m @ c + np.diag(prior)
         kappa = kappa_of(s[: self.n_core, : self.n_core])
         if kappa < self.settings.kappa_min or (self.settings.kappa_min > 0 and kappa * s[0, 0] < 2 * prior[0]):
             return False
         d = 1 / np.sqrt(np.diag(s))
-        dp = d * np.linalg.solve(s * np.outer(d, d), d * (self.jacobian().T @ self.b))
+        dp = d * np.linalg.solve(s * np.outer(d, d), d * (c.T @ self.b))
         reach = self.p.copy()
         reach[3 : self.n_core] = self.sd[3 : self.n_core]
         reach[self.n_core :] = _DAMPING_REACH
