@@ -53,6 +53,25 @@ class Proof:
     deduced: tuple[str, ...] = ()  # functions that WP proves from their contracts, in place of Eva
 
 
+ESTIMATOR = (
+    *("src/estimator_q31.c", "src/estimator_stages_q31.c", "src/estimator_system_q31.c"),
+    *("src/estimator_assess_q31.c", "src/information_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
+    *("src/cholesky_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+)
+IN_STAGES = (  # paths are kept apart where the factor is positive and where it is not
+    *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
+    "-eva-slevel-function",
+    "main:200,asks_for_noise:5,eliminate_part:30,inform_stage:30,factor_stage:60,look:60,solve_stage:30,"
+    "pvid_estimator_advance_q31:100,pvid_estimator_assess_on_q31:100,kappa_stage:60,widen_stage:60,"
+    "pvid_estimator_invert_q31:20,pvid_cholesky_eliminate_q31:20",
+)
+TAKEN_IN_STAGES = (
+    *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_root_of_q31", "pvid_half_exponent_q31", "pvid_to_block_q31"),
+    *("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+    *("pvid_cholesky_eliminate_q31", "pvid_cholesky_least_pivot_q31", "pvid_cholesky_lower_q31"),
+    "pvid_cholesky_solve_q31",
+)
+
 PROOFS = (
     Proof(
         "integer_q31",
@@ -125,6 +144,32 @@ PROOFS = (
             *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
             "pvid_to_block_q31",
         ),
+    ),
+    Proof(
+        "estimator_q31",
+        "start and rows for the three models: any configuration, any row on top of any state",
+        ESTIMATOR,
+        (
+            *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
+            "-eva-slevel-function",
+            "main:50,any_configuration:50,any_row:50,config_is_valid:100,model_is_valid:50,parameters_are_valid:200,"
+            "pvid_estimator_init_q31:200,pvid_estimator_add_q31:20,pvid_estimator_innovation_q31:200",
+        ),
+        taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_information_init_q31"),
+    ),
+    Proof(
+        "estimator_solve_q31",
+        "every stage of a solve from any state of the three models, which leaves such a state",
+        ESTIMATOR,
+        (*IN_STAGES[:-1], f"{IN_STAGES[-1]},any_solve:5000"),
+        taken=TAKEN_IN_STAGES,
+    ),
+    Proof(
+        "estimator_assess_q31",
+        "every stage of an assessment of any such state",
+        ESTIMATOR,
+        (*IN_STAGES[:-1], f"{IN_STAGES[-1]},any_assessment:5000"),
+        taken=TAKEN_IN_STAGES,
     ),
     Proof(
         "kapitza_physical_q31",

@@ -55,9 +55,9 @@ void pvid_estimator_invert_q31(pvid_estimator_solve_q31 *solve, size_t a)
     unit[a] = (int32_t)1 << UNIT_BITS;
     pvid_cholesky_lower_q31(&solve->factor, unit, solve->column[a]);
     for (size_t i = 0; i < solve->factor.n; i++) {
-        square += (int64_t)solve->column[a][i] * solve->column[a][i];
+        square += pvid_square_q31(solve->column[a][i]);
     }
-    solve->root[a] = pvid_root_of_q31(square, 0);
+    solve->root[a] = pvid_root_of_q31((square > 0) ? square : 1, 0); /* no column is empty */
 }
 
 /* x / (a b), |x| <= a b: Q30, rounded towards 0. */

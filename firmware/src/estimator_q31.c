@@ -6,6 +6,7 @@
 #include "count.h"
 #include "information_q31.h"
 #include "integer_q31.h"
+#include "scaled_q31.h"
 
 #define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
 #define FORMAT_MAX 64
@@ -41,11 +42,11 @@ static bool model_is_valid(const pvid_estimator_config_q31 *config)
 static pvid_status parameters_are_valid(const pvid_estimator_config_q31 *config)
 {
     for (size_t i = 0; i < config->model->n_p; i++) {
-        const int32_t lower = config->lower[i];
-        if ((lower >= config->upper[i]) || (lower == INT32_MIN) || (pvid_is_positive_q31(config->model, i) && (lower <= 0))) {
+        if ((config->lower[i] >= config->upper[i]) || (config->lower[i] == INT32_MIN) ||
+            (pvid_is_positive_q31(config->model, i) && (config->lower[i] <= 0))) {
             return PVID_BAD_BOUNDS;
         }
-        if ((config->start[i] < lower) || (config->start[i] > config->upper[i])) {
+        if ((config->start[i] < config->lower[i]) || (config->start[i] > config->upper[i])) {
             return PVID_BAD_START;
         }
         if (config->start_sd[i] <= 0) {
@@ -99,7 +100,7 @@ int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, in
 {
     const int64_t ratio = ((int64_t)sd << 31) / start_sd;
     const int32_t up = 31 - (int32_t)pvid_bit_length_q31((uint64_t)ratio);
-    const int64_t mantissa = pvid_scale_q31(ratio, -up);
+    const int64_t mantissa = pvid_clamp_q31(pvid_scale_q31(ratio, -up), (int64_t)1 << 31); /* 31 bits, rounded */
     *prior = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(mantissa * mantissa, 31), INT32_MAX);
     return (2 * ((31 + up) - exponent)) - 31;
 }
@@ -107,10 +108,10 @@ int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, in
 void pvid_estimator_take_theta_q31(pvid_estimator_q31 *self, const int64_t theta[])
 {
     for (size_t i = 0; i < self->model->n_theta; i++) {
-        const int32_t exponent = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(theta[i])) - 30;
+        const pvid_scaled_q31 held = pvid_scaled_of_q31(theta[i], 0);
         self->theta[i] = theta[i];
-        self->mantissa[i] = (int32_t)pvid_scale_q31(theta[i], exponent);
-        self->shift[i] = (int16_t)(self->align[i] - exponent);
+        self->mantissa[i] = held.m;
+        self->shift[i] = (int16_t)(self->align[i] - held.e);
     }
 }
 
@@ -174,27 +175,22 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
 
 /* ---- rows ---- */
 
-static bool within_row_limit(int64_t x)
-{
-    return (x >= -PVID_ROW_LIMIT_Q31) && (x <= PVID_ROW_LIMIT_Q31);
-}
-
 bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e)
 {
-    bool fits = within_row_limit(y);
+    bool fits = (y >= -PVID_ROW_LIMIT_Q31) && (y <= PVID_ROW_LIMIT_Q31);
     int64_t rest = y;
     for (size_t i = 0; i < self->model->n_theta; i++) {
-        fits = fits && within_row_limit(n[i]);
+        fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
         const int32_t held = (int32_t)pvid_clamp_q31(n[i], PVID_ROW_LIMIT_Q31);
         rest -= pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(held, self->mantissa[i]), self->shift[i]), TERM_MAX);
     }
     *e = rest;
-    return fits && within_row_limit(rest);
+    return fits && (*e >= -PVID_ROW_LIMIT_Q31) && (*e <= PVID_ROW_LIMIT_Q31);
 }
 
 void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e)
 {
-    self->energy = pvid_clamp_q31(self->energy + pvid_product_q31(e, e), PVID_WIDE);
+    self->energy = pvid_clamp_q31(self->energy + pvid_square_q31(e), PVID_WIDE);
     pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);
 }

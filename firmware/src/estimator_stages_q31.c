@@ -241,7 +241,7 @@ static void take_step(pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *
 {
     const int64_t limit = (int64_t)self->step_limit << (PVID_SIZE_BITS - 16);
     const bool limited = size > limit;
-    const int32_t factor = limited ? (int32_t)((limit << 31) / size) : 0;
+    const int32_t factor = (size > limit) ? (int32_t)pvid_clamp_q31((limit << 31) / size, INT32_MAX) : 0;
     bool bounded = false;
     for (size_t a = 0; a < self->model->n_p; a++) {
         int64_t x = self->p[a] + (limited ? pvid_times_q31(solve->dp[a], factor) : solve->dp[a]);
@@ -276,8 +276,8 @@ static void scale_theta_step(const pvid_estimator_q31 *self, pvid_estimator_solv
     }
     solve->step_exponent = largest - 29;
     for (size_t j = 0; j < n; j++) {
-        solve->theta_step[j] =
-            (int32_t)pvid_scale_q31(step[j], (solve->step_exponent + self->align[j]) - solve->h[j]);
+        const int64_t scaled = pvid_scale_q31(step[j], (solve->step_exponent + self->align[j]) - solve->h[j]);
+        solve->theta_step[j] = (int32_t)pvid_clamp_q31(scaled, PVID_ONE_Q30 / 2);
     }
 }
 

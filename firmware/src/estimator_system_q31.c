@@ -68,7 +68,7 @@ void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[],
         f[a] = (int16_t)(largest[a] - 29);
     }
     for (size_t k = 0; k < model->n_c; k++) {
-        c[k] = (int32_t)pvid_scale_q31(value[k], f[model->c_column[k]] - exponent[k]);
+        c[k] = (int32_t)pvid_clamp_q31(pvid_scale_q31(value[k], f[model->c_column[k]] - exponent[k]), PVID_ONE_Q30 / 2);
     }
 }
 

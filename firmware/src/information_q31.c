@@ -61,7 +61,7 @@ void pvid_information_add_q31(pvid_information_q31 *self, const int32_t n[], int
             fresh[i] += product;
         }
     }
-    sum[n_theta] += pvid_product_q31(error, error);
+    sum[n_theta] += pvid_square_q31(error);
     sum[n_theta + 1u] += self->row_weight;
 }
 

@@ -4,6 +4,7 @@
 #define CONTRACTS_H
 
 #include "block_contract.h"
+#include "information_q31.h"
 #include "integer_q31.h"
 #include "scaled_q31.h"
 
@@ -89,10 +90,11 @@ int32_t pvid_half_exponent_q31(int64_t diagonal);
     assigns self->positive, self->first_pivot, self->pivot[j], self->inverse[j], self->u[0 .. j - 1][j]
         \from self->positive, self->first_pivot, s[0 .. j][j], self->u[0 .. j][j + 1 .. self->n - 1];
     ensures self->positive == 0 || self->positive == 1;
+    ensures \old(self->positive) == 0 ==> self->positive == 0;
     ensures 0 <= self->first_pivot <= 0x40000000;
     ensures self->positive != 0 ==> \initialized(&self->u[0 .. j - 1][j]);
     ensures self->positive != 0 ==> \subset(self->u[0 .. j - 1][j], (-0x40000000 .. 0x40000000));
-    ensures self->positive != 0 ==> \initialized(&self->pivot[j]) && 1 <= self->pivot[j];
+    ensures self->positive != 0 ==> \initialized(&self->pivot[j]) && 1 <= self->pivot[j] <= 0x1000000000000000;
     ensures self->positive != 0 ==> \initialized(&self->inverse[j].m) && 0x3FFFFFFF <= self->inverse[j].m <= 0x7FFFFFFF;
     ensures self->positive != 0 ==> \initialized(&self->inverse[j].k) && 0 <= self->inverse[j].k <= 30;
     ensures self->positive != 0 ==> 0x10000000 <= s[j][j] <= 0x40000000; */
@@ -119,5 +121,15 @@ void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[],
     ensures \initialized(x + (0 .. self->n - 1));
     ensures \subset(x[0 .. self->n - 1], (-0x40000000 .. 0x40000000)); */
 int32_t pvid_cholesky_solve_q31(const pvid_cholesky_q31 *self, const int64_t rhs[], int32_t x[]);
+
+/* ---- the sums ---- */
+
+/*@ requires 1 <= n_theta <= PVID_MAX_THETA_Q31;
+    requires forgetting_groups == 0 || 4 <= forgetting_groups <= 0x1000000;
+    assigns *self \from n_theta, forgetting_groups, row_weight;
+    ensures \initialized(&self->block) && 1 <= self->block <= 64;
+    ensures \initialized(&self->retention) && 1 <= self->retention; */
+void pvid_information_init_q31(pvid_information_q31 *self, uint8_t n_theta, uint32_t forgetting_groups,
+                               uint32_t row_weight);
 
 #endif

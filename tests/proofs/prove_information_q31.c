@@ -5,8 +5,7 @@
  * from Cauchy and Schwarz, since it does so with the sums of squares: intervals cannot see that. */
 #include "prove.h"
 
-#include "information_q31.h"
-#include "integer_q31.h"
+#include "contracts.h"
 
 #define SUM_BOUND ((int64_t)1 << 60)
 

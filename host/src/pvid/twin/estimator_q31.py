@@ -146,7 +146,7 @@ class EstimatorQ31:
         """(sd 2^exponent / start_sd)^2 = prior 2^-prior_exponent, prior of 31 bits."""
         ratio = (sd << 31) // self.start_sd
         up = 31 - bit_length(ratio)
-        mantissa = scale(ratio, -up)
+        mantissa = np.minimum(scale(ratio, -up), 1 << 31)
         prior = np.minimum(round_shift(mantissa * mantissa, 31), 2**31 - 1)
         return prior, 2 * ((31 + up) - exponent) - 31
 
@@ -313,7 +313,7 @@ class EstimatorQ31:
         exponent = integers(self.c_exponent)[:, None] + h[self._c_row]
         lengths = length(c) + exponent
         f = np.stack([np.maximum(lengths[own].max(axis=0), _NOTHING) for own in self._columns]) - 29
-        return scale(c, f[self._c_column] - exponent), f
+        return clamp(scale(c, f[self._c_column] - exponent), ONE // 2), f
 
     def _project(self, c: Int, m: Int) -> Int:
         """The upper triangle of C^T M C, in units of 2^(f_a + f_b + 32) [n_p, n_p, lanes]."""
@@ -422,7 +422,7 @@ class EstimatorQ31:
         self.size = np.where(moving, size, 0)
         limit = self.step_limit << (SIZE_BITS - 16)
         limited = size > limit
-        factor = (limit << 31) // np.maximum(size, limit + 1)
+        factor = np.minimum((limit << 31) // np.maximum(size, limit + 1), 2**31 - 1)
         x = self.p + np.where(limited, times_q31(dp, factor), dp)
         above, below = x > self.upper, x < self.lower
         x = np.where(above, self.upper, np.where(below, self.lower, x))
@@ -437,7 +437,7 @@ class EstimatorQ31:
         step = theta - self.theta
         align = integers(self.align)[:, None]
         v_h = np.max(length(step) - align + h, axis=0) - 29
-        v = scale(step, v_h + align - h)
+        v = clamp(scale(step, v_h + align - h), ONE // 2)
         b = clamp(b, HELD_LIMIT)
         moved = clamp(scale((m * v[:, None]).sum(axis=0), -(h + v_h)), HELD_LIMIT)
         w, w_h = cholesky.to_block(scale(2 * b - moved, h), 30)
@@ -495,7 +495,7 @@ class EstimatorQ31:
         for a in range(n_p):
             units[a][a] = 1 << UNIT_BITS
         columns = [cholesky.lower_solve(factor, unit) for unit in units]
-        roots = [root_of(np.sum(column * column, axis=0), integers(0)) for column in columns]
+        roots = [root_of(np.maximum(np.sum(column * column, axis=0), 1), integers(0)) for column in columns]
         for a, (r, e) in enumerate(roots):
             se = clamp(scale(root * r, f[a] + g[a] - (root_e + e) + 31 + UNIT_BITS), 2**31 - 1)
             out["se"][:, a] = np.where(factor.ok, se, self.start_sd[a])

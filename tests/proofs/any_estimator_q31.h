@@ -1,0 +1,84 @@
+/* Any state of an estimator that its functions keep. */
+#ifndef ANY_ESTIMATOR_Q31_H
+#define ANY_ESTIMATOR_Q31_H
+
+#include "prove.h"
+
+#include "integer_q31.h"
+#include "pvid/estimator_q31.h"
+#include "pvid/kapitza_strong_q31.h"
+#include "pvid/kapitza_weak_q31.h"
+
+/* Of every sum: what the end of a group leaves by Cauchy and Schwarz, 2^60, or a step of b and rr, 2^61, and on top of
+ * that 16 rows of a group. */
+#define SUM_BOUND ((int64_t)3 << 60)
+#define EXPONENT_BOUND 1000
+
+static inline void any_sums(const pvid_model_q31 *model, pvid_information_q31 *sums)
+{
+    sums->n_theta = model->n_theta;
+    sums->n_sums = (uint16_t)(((model->n_theta * (model->n_theta + 1u)) / 2u) + model->n_theta + 2u);
+    sums->exponent = (uint8_t)any_u32(0, 100);
+    sums->block = (uint16_t)any_u32(1, 64);
+    sums->age = (uint16_t)any_u32(0, 63);
+    sums->retention = any_i32(1, INT32_MAX);
+    sums->row_weight = any_u32(1, 65536);
+    for (size_t i = 0; i < PVID_MAX_SUMS_Q31; i++) {
+        sums->sums[i] = any_i64(-SUM_BOUND, SUM_BOUND);
+    }
+    sums->sums[sums->n_sums - 2u] = any_i64(0, SUM_BOUND);
+    sums->sums[sums->n_sums - 1u] = any_i64(0, SUM_BOUND);
+}
+
+static inline void any_parameters(pvid_estimator_q31 *self)
+{
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        const int32_t least = (((self->model->positive >> a) & 1u) != 0u) ? 1 : -INT32_MAX;
+        self->p[a] = any_i32(least, INT32_MAX);
+        self->lower[a] = any_i32(least, INT32_MAX);
+        self->upper[a] = any_i32(least, INT32_MAX);
+        self->start_sd[a] = any_i32(1, INT32_MAX);
+        self->prior[a] = any_i32(0, INT32_MAX);
+        self->prior_exponent[a] = (int16_t)any_i32(-200, 200);
+    }
+}
+
+static inline void any_formats(pvid_estimator_q31 *self)
+{
+    for (size_t i = 0; i < self->model->n_theta; i++) {
+        self->theta[i] = any_i64(-((int64_t)1 << 60), (int64_t)1 << 60);
+        self->mantissa[i] = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
+        self->shift[i] = (int16_t)any_i32(-2 * EXPONENT_BOUND, 2 * EXPONENT_BOUND);
+        self->align[i] = (int16_t)any_i32(-EXPONENT_BOUND, EXPONENT_BOUND);
+        self->theta_bits[i] = (int16_t)any_i32(-EXPONENT_BOUND, EXPONENT_BOUND);
+        self->fresh[i] = any_i64(-SUM_BOUND, SUM_BOUND);
+    }
+    for (size_t k = 0; k < self->model->n_c; k++) {
+        self->c_exponent[k] = (int16_t)any_i32(-EXPONENT_BOUND, EXPONENT_BOUND);
+    }
+}
+
+static inline void any_state(const pvid_model_q31 *model, pvid_estimator_q31 *self)
+{
+    self->model = model;
+    any_sums(model, &self->information);
+    any_parameters(self);
+    any_formats(self);
+    self->row_sd = any_i32(1, INT32_MAX);
+    self->gain = any_i32(0, PVID_ONE_Q30);
+    self->correlation = any_u32((uint32_t)1 << 16, (uint32_t)1 << 31);
+    self->step_limit = any_u32(1, 58982);
+    self->kappa_min = any_i32(0, PVID_ONE_Q30);
+    self->noise_margin = any_u32(0, (uint32_t)1 << 30);
+    self->dead_zone = any_u32(0, (uint32_t)100 << 16);
+    for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
+        self->noise[i].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
+        self->noise[i].e = any_i32(-2000, 2000);
+    }
+    self->energy = any_i64(0, PVID_WIDE);
+    self->divider = (uint16_t)any_u32(1, UINT16_MAX);
+    self->phase = (uint16_t)any_u32(0, UINT16_MAX);
+    Frama_C_make_unknown((char *)&self->counters, sizeof self->counters);
+}
+
+#endif

@@ -1,0 +1,34 @@
+/* An assessment from any state: every stage, nothing of `solve` there before. Gives an estimate as the verdict and the
+ * physical parameters take it. */
+#include "any_estimator_q31.h"
+
+#include "contracts.h"
+
+static void any_assessment(const pvid_model_q31 *model)
+{
+    pvid_estimator_q31 estimator;
+    pvid_estimator_solve_q31 solve;
+    pvid_estimate_q31 estimate;
+    any_state(model, &estimator);
+    pvid_estimator_begin_assessment_q31(&estimator, &solve, &estimate);
+    while (!pvid_estimator_assess_on_q31(&estimator, &solve, &estimate)) {
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        /*@ assert 0 <= estimate.se[a]; */
+        for (size_t b = 0; b < model->n_p; b++) {
+            /*@ assert -0x40000000 <= estimate.correlation[a][b] <= 0x40000000; */
+        }
+    }
+    /*@ assert 0 <= estimate.kappa <= 0x40000000; */
+    /*@ assert 0 <= estimate.least_pivot <= 0x40000000; */
+    /*@ assert 0 <= estimate.residual_sd; */
+    (void)pvid_estimator_assessment_stages_q31(&estimator);
+    (void)pvid_estimator_stages_q31(&estimator, true);
+}
+
+void main(void)
+{
+    any_assessment(&pvid_kapitza_strong_q31);
+    any_assessment(&pvid_kapitza_weak_q31);
+    any_assessment(&pvid_kapitza_weak_zeroed_q31);
+}
