@@ -13,26 +13,32 @@ const float pvid_five_points_f32[PVID_ORDERS * 2] = {
     -4.0f,        1.0f,          /* order 4 */
 };
 
-static bool bank_is_valid(const pvid_fir_bank_f32 *bank)
+static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
 {
-    if ((bank->weights == NULL) || (bank->half < 2u) || (bank->stride < 1u) ||
-        ((2uL * bank->half * bank->stride) + 1uL > PVID_MAX_WINDOW)) {
-        return false;
+    if ((bank->half < 2u) || (bank->half > (PVID_MAX_WINDOW - 1u) / 2u)) {
+        return PVID_BAD_HALF;
+    }
+    if ((bank->stride < 1u) || ((2uL * bank->half * bank->stride) + 1uL > PVID_MAX_WINDOW)) {
+        return PVID_BAD_STRIDE;
+    }
+    if (bank->weights == NULL) {
+        return PVID_BAD_BANK;
     }
     for (uint32_t i = 0; i < (uint32_t)PVID_ORDERS * bank->half; i++) {
         if (!pvid_finite_f32(bank->weights[i])) {
-            return false;
+            return PVID_BAD_BANK;
         }
     }
-    return true;
+    return PVID_OK;
 }
 
 pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
                                          float sample_rate_hz)
 {
     PVID_ASSERT((self != NULL) && (bank != NULL));
-    if (!bank_is_valid(bank)) {
-        return PVID_BAD_BANK;
+    const pvid_status status = bank_is_valid(bank);
+    if (status != PVID_OK) {
+        return status;
     }
     if (!pvid_within_f32(sample_rate_hz, 1.0e-3f, 1.0e6f)) {
         return PVID_BAD_SAMPLE_RATE;

@@ -57,30 +57,48 @@ static bool is_full_scale(int32_t counts)
     return (counts >= 1) && (counts <= PVID_COUNTS_LIMIT_Q31);
 }
 
-static bool bank_is_valid(const pvid_fir_bank_q31 *bank)
+/* The derivatives of one signal from `lowest` on. */
+static pvid_status channel_is_valid(const pvid_fir_bank_q31 *bank, size_t lowest, int32_t full_scale,
+                                    const uint8_t shift[])
 {
-    if ((bank->weights == NULL) || (bank->half < 2u) || (bank->stride < 1u) ||
-        (((2u * (uint64_t)bank->half * bank->stride) + 1u) > PVID_MAX_WINDOW) || (bank->centre < 1) ||
-        (bank->centre > PVID_ONE_Q30) || !is_full_scale(bank->phi_max) || !is_full_scale(bank->y_max)) {
-        return false;
+    for (size_t k = lowest; k < PVID_ORDERS; k++) {
+        if (!products_fit(bank, k, full_scale)) {
+            return PVID_BAD_FULL_SCALE;
+        }
+        if (!sum_fits(bank, k, full_scale, shift[k - lowest])) {
+            return PVID_BAD_SHIFT;
+        }
     }
-    bool valid = true;
-    for (size_t k = 0; k < PVID_ORDERS; k++) {
-        valid = valid && products_fit(bank, k, bank->phi_max) &&
-                sum_fits(bank, k, bank->phi_max, bank->phi_shift[k]);
+    return PVID_OK;
+}
+
+static pvid_status bank_is_valid(const pvid_fir_bank_q31 *bank)
+{
+    if ((bank->half < 2u) || (bank->half > ((PVID_MAX_WINDOW - 1u) / 2u))) {
+        return PVID_BAD_HALF;
     }
-    for (size_t k = PVID_Y_LOWEST_Q31; k < PVID_ORDERS; k++) {
-        valid = valid && products_fit(bank, k, bank->y_max) &&
-                sum_fits(bank, k, bank->y_max, bank->y_shift[k - PVID_Y_LOWEST_Q31]);
+    if ((bank->stride < 1u) || (((2u * (uint64_t)bank->half * bank->stride) + 1u) > PVID_MAX_WINDOW)) {
+        return PVID_BAD_STRIDE;
     }
-    return valid;
+    if (bank->weights == NULL) {
+        return PVID_BAD_BANK;
+    }
+    if ((bank->centre < 1) || (bank->centre > PVID_ONE_Q30)) {
+        return PVID_BAD_CENTRE;
+    }
+    if (!is_full_scale(bank->phi_max) || !is_full_scale(bank->y_max)) {
+        return PVID_BAD_FULL_SCALE;
+    }
+    const pvid_status phi = channel_is_valid(bank, 0, bank->phi_max, bank->phi_shift);
+    return (phi != PVID_OK) ? phi : channel_is_valid(bank, PVID_Y_LOWEST_Q31, bank->y_max, bank->y_shift);
 }
 
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
 {
     PVID_ASSERT((self != NULL) && (bank != NULL));
-    if (!bank_is_valid(bank)) {
-        return PVID_BAD_BANK;
+    const pvid_status status = bank_is_valid(bank);
+    if (status != PVID_OK) {
+        return status;
     }
     self->bank = *bank;
     self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);

@@ -20,15 +20,17 @@ static bool format_is_valid(int8_t bits)
     return (bits >= -FORMAT_MAX) && (bits <= FORMAT_MAX);
 }
 
-static bool model_is_valid(const pvid_estimator_config_q31 *config)
+static bool model_is_valid(const pvid_model_q31 *model)
 {
-    const pvid_model_q31 *model = config->model;
-    if ((model == NULL) || (model->theta == NULL) || (model->jacobian == NULL) || (model->formats == NULL) ||
+    return !((model == NULL) || (model->theta == NULL) || (model->jacobian == NULL) || (model->formats == NULL) ||
         (model->c_row == NULL) || (model->c_column == NULL) || (model->n_theta < 1u) ||
         (model->n_theta > PVID_MAX_THETA_Q31) || (model->n_p < 1u) || (model->n_p > PVID_MAX_P) ||
-        (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31)) {
-        return false;
-    }
+        (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31));
+}
+
+static bool formats_are_valid(const pvid_estimator_config_q31 *config)
+{
+    const pvid_model_q31 *model = config->model;
     bool valid = format_is_valid(config->y_bits);
     for (size_t i = 0; i < model->n_theta; i++) {
         valid = valid && format_is_valid(config->n_bits[i]);
@@ -58,8 +60,11 @@ static pvid_status parameters_are_valid(const pvid_estimator_config_q31 *config)
 
 static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
 {
-    if (!model_is_valid(config)) {
+    if (!model_is_valid(config->model)) {
         return PVID_BAD_MODEL;
+    }
+    if (!formats_are_valid(config)) {
+        return PVID_BAD_FORMAT;
     }
     const pvid_status parameters = parameters_are_valid(config);
     if (parameters != PVID_OK) {

@@ -42,12 +42,17 @@ static bool row_is_valid(const pvid_strong_row_q31 *row)
 pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
-    if (!row_is_valid(&config->row) || (config->u_multiplier <= 0) || (config->u_shift > SHIFT_MAX)) {
-        return PVID_BAD_DESIGN;
+    if (!row_is_valid(&config->row) || (config->u_shift > SHIFT_MAX)) {
+        return PVID_BAD_SHIFT;
     }
-    if ((config->drive_min < 0) || (config->drive_min > PVID_DERIVATIVE_LIMIT_Q31) || (config->drive_ticks < 1u) ||
-        (config->drive_ticks > DRIVE_TICKS_MAX)) {
+    if (config->u_multiplier <= 0) {
+        return PVID_BAD_U_MULTIPLIER;
+    }
+    if ((config->drive_min < 0) || (config->drive_min > PVID_DERIVATIVE_LIMIT_Q31)) {
         return PVID_BAD_DRIVE_MIN;
+    }
+    if ((config->drive_ticks < 1u) || (config->drive_ticks > DRIVE_TICKS_MAX)) {
+        return PVID_BAD_DRIVE_TICKS;
     }
     memset(self, 0, sizeof *self);
     pvid_status status = pvid_differentiator_init_q31(&self->differentiator, &config->bank);

@@ -21,21 +21,40 @@ static bool all_finite(const float values[], size_t n)
     return true;
 }
 
-static bool design_is_valid(const pvid_weak_design_f32 *design)
+static bool tables_are_valid(const pvid_weak_design_f32 *design)
 {
-    if ((design == NULL) || !pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
-        !pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
-        (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
-        (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
-        (design->chi == NULL) || (design->gram == NULL) || (design->lag < 1u) ||
-        !pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
-        return false;
-    }
     const size_t half = (design->taps - 1u) / 2u;
     const size_t functions = design->functions;
-    return all_finite(design->smooth, half) && all_finite(design->second, half) &&
+    return (design->smooth != NULL) && (design->second != NULL) && (design->chi != NULL) && (design->gram != NULL) &&
+           all_finite(design->smooth, half) && all_finite(design->second, half) &&
            all_finite(design->chi, 3u * functions * design->window) &&
            all_finite(design->gram, 3u * functions * (functions + 1u));
+}
+
+static pvid_status design_is_valid(const pvid_weak_design_f32 *design)
+{
+    if (design == NULL) {
+        return PVID_BAD_DESIGN;
+    }
+    if (!pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS)) {
+        return PVID_BAD_TAPS;
+    }
+    if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
+        return PVID_BAD_DECIMATION;
+    }
+    if (!pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW)) {
+        return PVID_BAD_WINDOW;
+    }
+    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
+        return PVID_BAD_FUNCTIONS;
+    }
+    if (design->lag < 1u) {
+        return PVID_BAD_LAG;
+    }
+    if (!pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
+        return PVID_BAD_OVERLAP;
+    }
+    return tables_are_valid(design) ? PVID_OK : PVID_BAD_DESIGN;
 }
 
 static bool angle_is_valid(const pvid_weak_config_f32 *config)
@@ -87,11 +106,12 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     if (!angle_is_valid(config)) {
         return PVID_BAD_ANGLE;
     }
-    if (!design_is_valid(design)) {
-        return PVID_BAD_DESIGN;
+    pvid_status status = design_is_valid(design);
+    if (status != PVID_OK) {
+        return status;
     }
     memset(self, 0, sizeof *self);
-    pvid_status status = init_estimator(self, config);
+    status = init_estimator(self, config);
     if (status != PVID_OK) {
         return status;
     }

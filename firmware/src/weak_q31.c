@@ -47,7 +47,7 @@ static bool taps_fit(const PVID_TABLE int32_t *weights, size_t half, int32_t ful
 }
 
 /* The part of the design tool's proof that costs one walk through the tables. */
-static bool tables_fit(const pvid_weak_design_q31 *design)
+static pvid_status tables_fit(const pvid_weak_design_q31 *design)
 {
     const size_t functions = design->functions;
     const size_t half = (design->taps - 1u) / 2u;
@@ -55,14 +55,14 @@ static bool tables_fit(const pvid_weak_design_q31 *design)
     int64_t second;
     if (!taps_fit(design->smooth, half, design->phi_max, &smooth) ||
         !taps_fit(design->second, half, design->y_max, &second)) {
-        return false;
+        return PVID_BAD_DESIGN;
     }
     const int64_t sum = design->phi_max * (((int64_t)1 << design->smooth_bits) + (4 * smooth));
     const int64_t f = pvid_floor_shift_q31(sum, design->phi_shift) + 1;
-    if (f > TERM_LIMIT) {
-        return false;
+    if ((f > TERM_LIMIT) || ((pvid_floor_shift_q31(design->u_max * f, design->uf_shift) + 1) > TERM_LIMIT)) {
+        return PVID_BAD_SHIFT;
     }
-    bool fit = (pvid_floor_shift_q31(design->u_max * f, design->uf_shift) + 1) <= TERM_LIMIT;
+    bool fit = true;
     const int64_t rounding = (int64_t)1 << (design->sum_shift - 1u);
     for (size_t i = 0; i < (3u * functions * design->window); i++) {
         const int64_t magnitude = (int64_t)pvid_magnitude_q31(design->chi[i]);
@@ -71,26 +71,47 @@ static bool tables_fit(const pvid_weak_design_q31 *design)
     for (size_t i = 0; i < ((PVID_WEAK_GRAMS / 2u) * functions * (functions + 1u)); i++) {
         fit = fit && (pvid_magnitude_q31(design->gram[i]) <= (uint64_t)PVID_ONE_Q30);
     }
-    return fit;
+    return fit ? PVID_OK : PVID_BAD_DESIGN;
 }
 
-static bool design_is_valid(const pvid_weak_design_q31 *design)
+static bool every_shift_is_valid(const pvid_weak_design_q31 *design)
 {
-    if ((design == NULL) || !pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS) ||
-        !pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW) || (design->decimation < 1u) ||
-        (design->decimation > PVID_MAX_DECIMATION) || (design->functions < 4u) ||
-        (design->functions > PVID_MAX_FUNCTIONS) || (design->smooth == NULL) || (design->second == NULL) ||
-        (design->chi == NULL) || (design->gram == NULL) || (design->multiplier == NULL) || (design->lag < 1u)) {
-        return false;
+    const bool single = (design->smooth_bits <= 31u) && (design->phi_shift <= 62u) && (design->u_shift <= 62u) &&
+                        (design->uf_shift <= 62u) && (design->sum_shift >= 1u) && (design->sum_shift <= 30u);
+    return single && shifts_are_valid(design->integral_shift, PVID_WEAK_INTEGRALS_Q31, 0, 62) &&
+           shifts_are_valid(design->high_shift, 2, 0, 61) && shifts_are_valid(design->product_shift, 5, 0, 62) &&
+           shifts_are_valid(design->shift, PVID_WEAK_TERMS_Q31, 0, 62);
+}
+
+static pvid_status design_is_valid(const pvid_weak_design_q31 *design)
+{
+    if (design == NULL) {
+        return PVID_BAD_DESIGN;
     }
-    bool valid = is_count(design->phi_max, COUNTS_LIMIT) && is_count(design->y_max, COUNTS_LIMIT) &&
-                 is_count(design->u_max, U_LIMIT) && (design->smooth_bits <= 31u) && (design->phi_shift <= 62u) &&
-                 (design->u_shift <= 62u) && (design->uf_shift <= 62u) && (design->sum_shift >= 1u) &&
-                 (design->sum_shift <= 30u);
-    valid = valid && shifts_are_valid(design->integral_shift, PVID_WEAK_INTEGRALS_Q31, 0, 62) &&
-            shifts_are_valid(design->high_shift, 2, 0, 61) && shifts_are_valid(design->product_shift, 5, 0, 62) &&
-            shifts_are_valid(design->shift, PVID_WEAK_TERMS_Q31, 0, 62);
-    return valid && tables_fit(design);
+    if (!pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS)) {
+        return PVID_BAD_TAPS;
+    }
+    if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
+        return PVID_BAD_DECIMATION;
+    }
+    if (!pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW)) {
+        return PVID_BAD_WINDOW;
+    }
+    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
+        return PVID_BAD_FUNCTIONS;
+    }
+    if (design->lag < 1u) {
+        return PVID_BAD_LAG;
+    }
+    if ((design->smooth == NULL) || (design->second == NULL) || (design->chi == NULL) || (design->gram == NULL) ||
+        (design->multiplier == NULL)) {
+        return PVID_BAD_DESIGN;
+    }
+    if (!is_count(design->phi_max, COUNTS_LIMIT) || !is_count(design->y_max, COUNTS_LIMIT) ||
+        !is_count(design->u_max, U_LIMIT)) {
+        return PVID_BAD_FULL_SCALE;
+    }
+    return every_shift_is_valid(design) ? tables_fit(design) : PVID_BAD_SHIFT;
 }
 
 static bool pivot_noise_is_valid(pvid_scaled_q31 noise)
@@ -108,13 +129,14 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     if (!pivot_noise_is_valid(config->pivot_noise)) {
         return PVID_BAD_PIVOT_NOISE;
     }
-    if (!design_is_valid(design)) {
-        return PVID_BAD_DESIGN;
+    pvid_status status = design_is_valid(design);
+    if (status != PVID_OK) {
+        return status;
     }
     memset(self, 0, sizeof *self);
     pvid_estimator_config_q31 estimator = config->estimator;
     estimator.model = config->zero_unknown ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;
-    pvid_status status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    status = pvid_estimator_init_q31(&self->estimator, &estimator);
     if (status != PVID_OK) {
         return status;
     }

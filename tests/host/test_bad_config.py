@@ -170,7 +170,7 @@ WEAK = {
     "pivot_noise": Range(0.0, 1e9, Status.BAD_PIVOT_NOISE),
     "angle_limit": Range(0.0, 1e9, Status.BAD_ANGLE_LIMIT),
     "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
-    "design.overlap": Range(1.0, 1e6, Status.BAD_DESIGN),
+    "design.overlap": Range(1.0, 1e6, Status.BAD_OVERLAP),
     "trust.kappa_min": Range(0.0, 0.999, Status.BAD_PUBLISH_KAPPA),
     "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
@@ -178,7 +178,7 @@ WEAK = {
     "trust.shut_max": Range(0, 65535, Status.OK),
 }
 LEAST = -(2**31)
-FORMAT = Range(-64, 64, Status.BAD_MODEL)
+FORMAT = Range(-64, 64, Status.BAD_FORMAT)
 ESTIMATOR_Q31 = {
     "estimator.start": Range(LEAST, 2**31 - 1, Status.BAD_START, (Status.BAD_START,)),
     "estimator.start_sd": Range(1, 2**31 - 1, Status.BAD_START_SD),
@@ -214,22 +214,22 @@ WEAK_Q31 = {
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.shut_max": Range(0, 65535, Status.OK),
 }
-SHIFT = Range(0, 62, Status.BAD_DESIGN)
+SHIFT = Range(0, 62, Status.BAD_SHIFT)
 STRONG_Q31 = {
     **ESTIMATOR_Q31,
     **{f"row.{name}": SHIFT for name in ("n_a", "n_e", "n_phi2", "n_phi0", "part", "y")},
-    "u_multiplier": Range(1, 2**31 - 1, Status.BAD_DESIGN),
+    "u_multiplier": Range(1, 2**31 - 1, Status.BAD_U_MULTIPLIER),
     "u_shift": SHIFT,
     "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
     "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
     "drive_min": Range(0, 2**30, Status.BAD_DRIVE_MIN),
-    "drive_ticks": Range(1, 2**30, Status.BAD_DRIVE_MIN),
+    "drive_ticks": Range(1, 2**30, Status.BAD_DRIVE_TICKS),
     # what counts within full scale could overflow is refused, too
-    "bank.phi_max": Range(1, 2**24, Status.BAD_BANK, (Status.BAD_BANK,)),
-    "bank.y_max": Range(1, 2**24, Status.BAD_BANK, (Status.BAD_BANK,)),
-    "bank.centre": Range(1, 2**30, Status.BAD_BANK, (Status.BAD_BANK,)),
-    "bank.phi_shift": Range(0, 62, Status.BAD_BANK, (Status.BAD_BANK,)),
-    "bank.y_shift": Range(0, 62, Status.BAD_BANK, (Status.BAD_BANK,)),
+    "bank.phi_max": Range(1, 2**24, Status.BAD_FULL_SCALE, (Status.BAD_FULL_SCALE, Status.BAD_SHIFT)),
+    "bank.y_max": Range(1, 2**24, Status.BAD_FULL_SCALE, (Status.BAD_FULL_SCALE, Status.BAD_SHIFT)),
+    "bank.centre": Range(1, 2**30, Status.BAD_CENTRE, (Status.BAD_SHIFT,)),
+    "bank.phi_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
+    "bank.y_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
 }
 RANGES = {
     "strong": STRONG,
@@ -243,6 +243,12 @@ NOT_HERE = {"estimator.model", "estimator.update_rate_hz", "full_angle", "fricti
 NOT_WEAK = {"estimator.correlation", "estimator.row_weight"}  # of the design
 
 # What a design and a bank refuse besides; sizes beyond those of the tables must not be accepted by chance.
+NAMED = {  # the others by their own names
+    "bank.weights": Status.BAD_BANK,
+    "angle": Status.BAD_ANGLE,
+    **{f"design.{table}": Status.BAD_DESIGN for table in ("smooth", "second", "chi", "gram", "multiplier")},
+    **{f"design.{name}": Status.BAD_FULL_SCALE for name in ("phi_max", "y_max", "u_max")},
+}
 REFUSED = {
     "strong": {"bank.half": (0, 1, 65535), "bank.stride": (0, 65535), "bank.weights": (None,)},
     "weak": {
@@ -352,11 +358,12 @@ def test_what_is_no_number_is_always_refused(name: str, subjects: dict[str, Subj
 
 @pytest.mark.parametrize("name", NAMES)
 def test_sizes_formats_and_missing_tables_are_refused(name: str, subjects: dict[str, Subject]) -> None:
-    status = Status.BAD_BANK if name.startswith("strong") else Status.BAD_DESIGN
     for field, values in REFUSED[name].items():
+        own = field.rpartition(".")[2].partition("[")[0]
+        shift = Status.BAD_SHIFT if own.endswith(("shift", "_bits")) else None
+        named = NAMED.get(field) or shift or Status[f"BAD_{own.upper()}"]
         for value in values:
-            expected = Status.BAD_ANGLE if field == "angle" else status
-            assert subjects[name].status_with({field: value}) is expected, (field, value)
+            assert subjects[name].status_with({field: value}) is named, (field, value)
     subjects[name].restore()
     assert subjects[name].initialise() is Status.OK
 

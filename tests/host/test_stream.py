@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -239,11 +240,26 @@ def test_an_image_with_the_other_core_is_refused() -> None:
         play(open_target(HOST_TARGET, standard_rig("weak", "q31")), standard_rig("weak"), run.phi, run.y)
 
 
-def test_what_the_core_refuses_is_named() -> None:
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("start", np.full(4, np.nan, np.float32)),
+        ("start_sd", np.zeros(4, np.float32)),
+        ("upper", np.full(4, np.inf, np.float32)),
+        ("row_sd", -1.0),
+        ("forgetting_s", -1.0),
+        ("feedback_hz", float("nan")),
+        ("law", 2),
+        ("divider", 0),
+    ],
+)
+def test_what_the_core_refuses_is_named(field: str, value: Any) -> None:
+    """Every setting that goes over the link."""
     run, rig = standard_run("weak", TICKS), standard_rig("weak")
     assert isinstance(rig.config, WeakConfig)
-    bad = replace(rig, config=replace(rig.config, estimator=replace(rig.config.estimator, row_sd=-1.0)))
-    with pytest.raises(PvidError, match="bad row sd"):
+    bad = replace(rig, config=replace(rig.config, estimator=replace(rig.config.estimator, **{field: value})))
+    name = {"upper": "bounds", "forgetting_s": "forgetting", "feedback_hz": "feedback"}.get(field, field)
+    with pytest.raises(PvidError, match=f"bad {name.replace('_', ' ')}"):
         play(open_target(HOST_TARGET, bad), bad, run.phi, run.y)
 
 

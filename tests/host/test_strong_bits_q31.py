@@ -240,9 +240,9 @@ def test_a_run_in_pieces_is_the_same_run(native: Native, standard_20_bits: Simul
     ("changes", "sentence"),
     [
         ({"drive_min": -1}, "bad drive min"),
-        ({"drive_ticks": 0}, "bad drive min"),
-        ({"design": {"u_multiplier": 0}}, "bad design"),
-        ({"design": {"u_shift": 63}}, "bad design"),
+        ({"drive_ticks": 0}, "bad drive ticks"),
+        ({"design": {"u_multiplier": 0}}, "bad u multiplier"),
+        ({"design": {"u_shift": 63}}, "bad shift"),
         ({"estimator": {"row_sd": 0}}, "bad row sd"),
         ({"estimator": {"gain": 2**30 + 1}}, "bad feedback"),
     ],

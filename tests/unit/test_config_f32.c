@@ -286,8 +286,8 @@ static const bound strong_fields[] = {
     FIELD(pvid_strong_config_f32, , sample_rate_hz, KIND_FLOAT, 1.0e-3f, 1.0e6f, PVID_BAD_SAMPLE_RATE),
     FIELD(pvid_strong_config_f32, , l1, KIND_FLOAT, 1.0e-6f, 1.0e6f, PVID_BAD_LENGTH),
     FIELD(pvid_strong_config_f32, , drive_min, KIND_FLOAT, 0.0, 1.0e9f, PVID_BAD_DRIVE_MIN),
-    FIELD(pvid_strong_config_f32, , bank.half, KIND_UINT16, 2.0, MOST_HALF, PVID_BAD_BANK),
-    FIELD(pvid_strong_config_f32, , bank.stride, KIND_UINT16, 1.0, MOST_HALF / 2, PVID_BAD_BANK),
+    FIELD(pvid_strong_config_f32, , bank.half, KIND_UINT16, 2.0, MOST_HALF, PVID_BAD_HALF),
+    FIELD(pvid_strong_config_f32, , bank.stride, KIND_UINT16, 1.0, MOST_HALF / 2, PVID_BAD_STRIDE),
     OF_GATE(pvid_strong_config_f32),
     OF_ESTIMATOR(pvid_strong_config_f32, estimator.),
     OF_FORGETTING(pvid_strong_config_f32, estimator., 4.0f / RATE),
@@ -428,17 +428,17 @@ static const bound weak_fields[] = {
 };
 
 /* Ends of a size leave a window that cannot always be worked off in time. */
-#define SIZE(member, kind, low, high)                                                                                 \
+#define SIZE(member, kind, low, high, status)                                                                         \
     {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_f32, member), kind, low, high, PVID_BAD_DESIGN, PVID_BAD_ITERATIONS        \
+        #member, offsetof(pvid_weak_design_f32, member), kind, low, high, status, PVID_BAD_ITERATIONS                 \
     }
 static const bound design_fields[] = {
-    SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS),
-    SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION),
-    SIZE(window, KIND_UINT16, 9.0, PVID_MAX_WEAK_WINDOW),
-    SIZE(functions, KIND_UINT8, 4.0, PVID_MAX_FUNCTIONS),
-    SIZE(lag, KIND_UINT8, 1.0, 255.0),
-    SIZE(overlap, KIND_FLOAT, 1.0, 1.0e6f),
+    SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS, PVID_BAD_TAPS),
+    SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION, PVID_BAD_DECIMATION),
+    SIZE(window, KIND_UINT16, 9.0, PVID_MAX_WEAK_WINDOW, PVID_BAD_WINDOW),
+    SIZE(functions, KIND_UINT8, 4.0, PVID_MAX_FUNCTIONS, PVID_BAD_FUNCTIONS),
+    SIZE(lag, KIND_UINT8, 1.0, 255.0, PVID_BAD_LAG),
+    SIZE(overlap, KIND_FLOAT, 1.0, 1.0e6f, PVID_BAD_OVERLAP),
 };
 
 static void the_weak_forms_fields_end_where_they_say(void **state)
@@ -449,7 +449,7 @@ static void the_weak_forms_fields_end_where_they_say(void **state)
     const uint16_t odd[2] = {3, PVID_MAX_TAPS + 2};
     for (int i = 0; i < 2; i++) {
         design.taps = odd[i];
-        assert_int_equal(init_weak(), PVID_BAD_DESIGN);
+        assert_int_equal(init_weak(), PVID_BAD_TAPS);
     }
     (void)start_weak(NULL);
     weak_settings.design = NULL;

@@ -22,7 +22,7 @@
     {                                                                                                                 \
         #member, offsetof(type, in member), kind, low, high, status, PVID_OK                                          \
     }
-#define FORMAT(type, in, member) FIELD(type, in, member, KIND_INT8, -64.0, 64.0, PVID_BAD_MODEL)
+#define FORMAT(type, in, member) FIELD(type, in, member, KIND_INT8, -64.0, 64.0, PVID_BAD_FORMAT)
 #define OF_ESTIMATOR(type, in)                                                                                        \
     FIELD(type, in, start_sd[0], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                     \
         FIELD(type, in, start_sd[1], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                 \
@@ -213,7 +213,7 @@ static pvid_status init_strong(void)
     return pvid_strong_init_q31(&strong, &strong_settings);
 }
 
-#define SHIFT(member) FIELD(pvid_strong_config_q31, , member, KIND_UINT8, 0.0, 62.0, PVID_BAD_DESIGN)
+#define SHIFT(member) FIELD(pvid_strong_config_q31, , member, KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT)
 
 static const bound strong_fields[] = {
     SHIFT(row.n_a),
@@ -225,15 +225,15 @@ static const bound strong_fields[] = {
     SHIFT(row.n_phi0[0]),
     SHIFT(row.n_phi0[4]),
     SHIFT(u_shift),
-    FIELD(pvid_strong_config_q31, , u_multiplier, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_DESIGN),
+    FIELD(pvid_strong_config_q31, , u_multiplier, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_U_MULTIPLIER),
     FIELD(pvid_strong_config_q31, , drive_min, KIND_INT32, 0.0, ONE_Q30, PVID_BAD_DRIVE_MIN),
-    FIELD(pvid_strong_config_q31, , drive_ticks, KIND_UINT32, 1.0, ONE_Q30, PVID_BAD_DRIVE_MIN),
+    FIELD(pvid_strong_config_q31, , drive_ticks, KIND_UINT32, 1.0, ONE_Q30, PVID_BAD_DRIVE_TICKS),
     FIELD(pvid_strong_config_q31, , phi_offset, KIND_INT32, -2147483648.0, INT32_LAST, PVID_OK),
     FIELD(pvid_strong_config_q31, , y_offset, KIND_INT32, -2147483648.0, INT32_LAST, PVID_OK),
-    FIELD(pvid_strong_config_q31, , bank.stride, KIND_UINT16, 1.0, (PVID_MAX_WINDOW - 1) / 4, PVID_BAD_BANK),
+    FIELD(pvid_strong_config_q31, , bank.stride, KIND_UINT16, 1.0, (PVID_MAX_WINDOW - 1) / 4, PVID_BAD_STRIDE),
     /* the fourth derivative's outermost products are 48 times four full scales, and fit 32 bits */
-    FIELD(pvid_strong_config_q31, , bank.phi_max, KIND_INT32, 1.0, 2147483647 / (48 * 4), PVID_BAD_BANK),
-    FIELD(pvid_strong_config_q31, , bank.y_max, KIND_INT32, 1.0, 2147483647 / (48 * 4), PVID_BAD_BANK),
+    FIELD(pvid_strong_config_q31, , bank.phi_max, KIND_INT32, 1.0, 2147483647 / (48 * 4), PVID_BAD_FULL_SCALE),
+    FIELD(pvid_strong_config_q31, , bank.y_max, KIND_INT32, 1.0, 2147483647 / (48 * 4), PVID_BAD_FULL_SCALE),
     FIELD(pvid_strong_config_q31, , gate.sigmas, KIND_UINT32, 131072.0, 65536000.0, PVID_BAD_GATE_SIGMAS),
     FIELD(pvid_strong_config_q31, , gate.patience_groups, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_GATE_PATIENCE),
     OF_ESTIMATOR(pvid_strong_config_q31, estimator.),
@@ -337,39 +337,39 @@ static const bound weak_fields[] = {
     FORMAT(pvid_weak_config_q31, estimator., n_bits[7]),
 };
 
-#define SIZE(member, kind, low, high)                                                                                 \
+#define SIZE(member, kind, low, high, status)                                                                         \
     {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, PVID_BAD_DESIGN, PVID_BAD_ITERATIONS        \
+        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_ITERATIONS                 \
     }
 /* Where F or U F would need more than 21 bits the design is refused for that. */
-#define TIGHT(member, kind, low, high)                                                                                \
+#define TIGHT(member, kind, low, high, status)                                                                        \
     {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, PVID_BAD_DESIGN, PVID_BAD_DESIGN            \
+        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_SHIFT                      \
     }
 static const bound design_fields[] = {
-    SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS),
-    SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION),
-    SIZE(window, KIND_UINT16, 9.0, PVID_MAX_WEAK_WINDOW),
-    SIZE(functions, KIND_UINT8, 4.0, PVID_MAX_FUNCTIONS),
-    SIZE(lag, KIND_UINT8, 1.0, 255.0),
-    TIGHT(smooth_bits, KIND_UINT8, 0.0, 31.0),
-    TIGHT(phi_shift, KIND_UINT8, 0.0, 62.0),
-    SIZE(u_shift, KIND_UINT8, 0.0, 62.0),
-    TIGHT(uf_shift, KIND_UINT8, 0.0, 62.0),
-    SIZE(integral_shift[0], KIND_UINT8, 0.0, 62.0),
-    SIZE(integral_shift[2], KIND_UINT8, 0.0, 62.0),
-    SIZE(high_shift[0], KIND_UINT8, 0.0, 61.0),
-    SIZE(high_shift[1], KIND_UINT8, 0.0, 61.0),
-    SIZE(product_shift[0], KIND_UINT8, 0.0, 62.0),
-    SIZE(product_shift[4], KIND_UINT8, 0.0, 62.0),
-    SIZE(sum_shift, KIND_UINT8, 1.0, 30.0),
-    SIZE(shift[0], KIND_UINT8, 0.0, 62.0),
-    SIZE(shift[PVID_WEAK_TERMS_Q31 - 1], KIND_UINT8, 0.0, 62.0),
-    SIZE(gram_bits[0], KIND_INT8, -128.0, 127.0),
-    SIZE(gram_bits[PVID_WEAK_GRAMS - 1], KIND_INT8, -128.0, 127.0),
-    TIGHT(phi_max, KIND_INT32, 1.0, 16777216.0),
-    SIZE(y_max, KIND_INT32, 1.0, 16777216.0),
-    TIGHT(u_max, KIND_INT32, 1.0, 262144.0),
+    SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS, PVID_BAD_TAPS),
+    SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION, PVID_BAD_DECIMATION),
+    SIZE(window, KIND_UINT16, 9.0, PVID_MAX_WEAK_WINDOW, PVID_BAD_WINDOW),
+    SIZE(functions, KIND_UINT8, 4.0, PVID_MAX_FUNCTIONS, PVID_BAD_FUNCTIONS),
+    SIZE(lag, KIND_UINT8, 1.0, 255.0, PVID_BAD_LAG),
+    TIGHT(smooth_bits, KIND_UINT8, 0.0, 31.0, PVID_BAD_SHIFT),
+    TIGHT(phi_shift, KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(u_shift, KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    TIGHT(uf_shift, KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(integral_shift[0], KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(integral_shift[2], KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(high_shift[0], KIND_UINT8, 0.0, 61.0, PVID_BAD_SHIFT),
+    SIZE(high_shift[1], KIND_UINT8, 0.0, 61.0, PVID_BAD_SHIFT),
+    SIZE(product_shift[0], KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(product_shift[4], KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(sum_shift, KIND_UINT8, 1.0, 30.0, PVID_BAD_SHIFT),
+    SIZE(shift[0], KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(shift[PVID_WEAK_TERMS_Q31 - 1], KIND_UINT8, 0.0, 62.0, PVID_BAD_SHIFT),
+    SIZE(gram_bits[0], KIND_INT8, -128.0, 127.0, PVID_OK),
+    SIZE(gram_bits[PVID_WEAK_GRAMS - 1], KIND_INT8, -128.0, 127.0, PVID_OK),
+    TIGHT(phi_max, KIND_INT32, 1.0, 16777216.0, PVID_BAD_FULL_SCALE),
+    SIZE(y_max, KIND_INT32, 1.0, 16777216.0, PVID_BAD_FULL_SCALE),
+    TIGHT(u_max, KIND_INT32, 1.0, 262144.0, PVID_BAD_FULL_SCALE),
 };
 
 static void the_weak_forms_fields_end_where_they_say(void **state)
@@ -380,13 +380,13 @@ static void the_weak_forms_fields_end_where_they_say(void **state)
     const uint16_t odd[2] = {3, PVID_MAX_TAPS + 2};
     for (int i = 0; i < 2; i++) {
         design.taps = odd[i];
-        assert_int_equal(init_weak(), PVID_BAD_DESIGN);
+        assert_int_equal(init_weak(), PVID_BAD_TAPS);
     }
     (void)start_weak(NULL);
     const uint16_t windows[2] = {7, PVID_MAX_WEAK_WINDOW + 2};
     for (int i = 0; i < 2; i++) {
         design.window = windows[i];
-        assert_int_equal(init_weak(), PVID_BAD_DESIGN);
+        assert_int_equal(init_weak(), PVID_BAD_WINDOW);
     }
     (void)start_weak(NULL);
     weak_settings.design = NULL;

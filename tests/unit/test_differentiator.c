@@ -103,8 +103,9 @@ static void every_bad_bank_and_rate_is_refused(void **state)
     bad[1].stride = 0;
     bad[2].stride = (PVID_MAX_WINDOW / 4) + 1;
     bad[3].weights = NULL;
+    const pvid_status named[4] = {PVID_BAD_HALF, PVID_BAD_STRIDE, PVID_BAD_STRIDE, PVID_BAD_BANK};
     for (int i = 0; i < 4; i++) {
-        assert_int_equal(pvid_differentiator_init_f32(&self, &bad[i], 1000.0f), PVID_BAD_BANK);
+        assert_int_equal(pvid_differentiator_init_f32(&self, &bad[i], 1000.0f), named[i]);
     }
     weights[7] = infinity - infinity;
     assert_int_equal(pvid_differentiator_init_f32(&self, &good, 1000.0f), PVID_BAD_BANK);

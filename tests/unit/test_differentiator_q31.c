@@ -77,11 +77,11 @@ static void full_scale_in_the_worst_order_stays_within_the_limit(void **state)
     assert_int_equal(d_y[2], -192 * bank.phi_max);
     assert_true(d_phi[4] <= PVID_DERIVATIVE_LIMIT_Q31);
     bank.phi_max = 5592406; /* beyond 2^30 */
-    assert_int_equal(pvid_differentiator_init_q31(&self, &bank), PVID_BAD_BANK);
+    assert_int_equal(pvid_differentiator_init_q31(&self, &bank), PVID_BAD_SHIFT);
     bank.phi_shift[4] = 1;
     assert_int_equal(pvid_differentiator_init_q31(&self, &bank), PVID_OK);
     bank.y_max = 5592406;
-    assert_int_equal(pvid_differentiator_init_q31(&self, &bank), PVID_BAD_BANK);
+    assert_int_equal(pvid_differentiator_init_q31(&self, &bank), PVID_BAD_SHIFT);
 }
 
 static void a_shift_rounds_half_up(void **state)
@@ -153,8 +153,12 @@ static void a_bank_out_of_range_is_refused(void **state)
     bad[10].weights = wide;
     bad[10].phi_shift[4] = 40;
     bad[10].y_shift[2] = 40;
+    static const pvid_status named[11] = {
+        PVID_BAD_BANK,   PVID_BAD_HALF,   PVID_BAD_STRIDE, PVID_BAD_STRIDE, PVID_BAD_FULL_SCALE, PVID_BAD_FULL_SCALE,
+        PVID_BAD_CENTRE, PVID_BAD_CENTRE, PVID_BAD_SHIFT,  PVID_BAD_SHIFT,  PVID_BAD_FULL_SCALE,
+    };
     for (size_t i = 0; i < 11u; i++) {
-        assert_int_equal(pvid_differentiator_init_q31(&self, &bad[i]), PVID_BAD_BANK);
+        assert_int_equal(pvid_differentiator_init_q31(&self, &bad[i]), named[i]);
     }
     assert_int_equal(pvid_differentiator_init_q31(&self, &good), PVID_OK);
 }

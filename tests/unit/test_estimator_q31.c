@@ -147,11 +147,11 @@ static void init_names_what_it_refuses(void **state)
     config.model = NULL;
     assert_refused(PVID_BAD_MODEL);
     config.p_bits[2] = 65;
-    assert_refused(PVID_BAD_MODEL);
+    assert_refused(PVID_BAD_FORMAT);
     config.n_bits[7] = -65;
-    assert_refused(PVID_BAD_MODEL);
+    assert_refused(PVID_BAD_FORMAT);
     config.y_bits = 100;
-    assert_refused(PVID_BAD_MODEL);
+    assert_refused(PVID_BAD_FORMAT);
     config.lower[0] = 0; /* w is positive */
     assert_refused(PVID_BAD_BOUNDS);
     config.upper[3] = config.lower[3];

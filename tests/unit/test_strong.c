@@ -136,7 +136,7 @@ static void every_bad_field_has_its_own_status(void **state)
     }
     pvid_strong_config_f32 config = good_config();
     config.bank.half = 0;
-    assert_int_equal(pvid_strong_init_f32(&identifier, &config), PVID_BAD_BANK);
+    assert_int_equal(pvid_strong_init_f32(&identifier, &config), PVID_BAD_HALF);
 }
 
 static void absurd_samples_never_make_the_state_infinite(void **state)

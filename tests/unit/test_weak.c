@@ -254,29 +254,29 @@ static void every_bad_table_is_refused(void **state)
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config = good_config();
     config.design = &design;
-#define REFUSED(field, value)                                                                                         \
+#define REFUSED(field, value, status)                                                                                 \
     do {                                                                                                              \
         design = table_design;                                                                                        \
         design.field = (value);                                                                                       \
-        assert_int_equal(status_of(&config), PVID_BAD_DESIGN);                                                        \
+        assert_int_equal(status_of(&config), status);                                                                 \
     } while (0)
-    REFUSED(taps, 3);
-    REFUSED(taps, 6);
-    REFUSED(taps, PVID_MAX_TAPS + 2);
-    REFUSED(decimation, 0);
-    REFUSED(decimation, PVID_MAX_DECIMATION + 1);
-    REFUSED(window, 7);
-    REFUSED(window, 156);
-    REFUSED(window, PVID_MAX_WEAK_WINDOW + 2);
-    REFUSED(functions, 3);
-    REFUSED(functions, PVID_MAX_FUNCTIONS + 1);
-    REFUSED(smooth, NULL);
-    REFUSED(second, NULL);
-    REFUSED(chi, NULL);
-    REFUSED(gram, NULL);
-    REFUSED(overlap, 0.5f);
-    REFUSED(overlap, NOT_A_NUMBER);
-    REFUSED(lag, 0);
+    REFUSED(taps, 3, PVID_BAD_TAPS);
+    REFUSED(taps, 6, PVID_BAD_TAPS);
+    REFUSED(taps, PVID_MAX_TAPS + 2, PVID_BAD_TAPS);
+    REFUSED(decimation, 0, PVID_BAD_DECIMATION);
+    REFUSED(decimation, PVID_MAX_DECIMATION + 1, PVID_BAD_DECIMATION);
+    REFUSED(window, 7, PVID_BAD_WINDOW);
+    REFUSED(window, 156, PVID_BAD_WINDOW);
+    REFUSED(window, PVID_MAX_WEAK_WINDOW + 2, PVID_BAD_WINDOW);
+    REFUSED(functions, 3, PVID_BAD_FUNCTIONS);
+    REFUSED(functions, PVID_MAX_FUNCTIONS + 1, PVID_BAD_FUNCTIONS);
+    REFUSED(smooth, NULL, PVID_BAD_DESIGN);
+    REFUSED(second, NULL, PVID_BAD_DESIGN);
+    REFUSED(chi, NULL, PVID_BAD_DESIGN);
+    REFUSED(gram, NULL, PVID_BAD_DESIGN);
+    REFUSED(overlap, 0.5f, PVID_BAD_OVERLAP);
+    REFUSED(overlap, NOT_A_NUMBER, PVID_BAD_OVERLAP);
+    REFUSED(lag, 0, PVID_BAD_LAG);
 #undef REFUSED
     design = table_design;
     float *tables[4] = {table_smooth, table_second, &table_chi[1000], &table_gram[(6 * TABLE_PAIRS) - 1]};

@@ -41,8 +41,7 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
     estimator->row_sd = pvid_get_f32(&payload[PVID_CONFIGURE_ROW_SD]);
     estimator->forgetting_s = pvid_get_f32(&payload[PVID_CONFIGURE_FORGETTING_S]);
     estimator->feedback_hz = pvid_get_f32(&payload[PVID_CONFIGURE_FEEDBACK_HZ]);
-    estimator->law =
-        (payload[PVID_CONFIGURE_LAW] == (uint8_t)PVID_LAW_STATIONARY) ? PVID_LAW_STATIONARY : PVID_LAW_PSEUDOVELOCITY;
+    estimator->law = (pvid_law)payload[PVID_CONFIGURE_LAW]; /* whatever it is: init knows the two */
     estimator->divider = pvid_get_u16(&payload[PVID_CONFIGURE_DIVIDER]);
     return INIT(&identifier, &config);
 }

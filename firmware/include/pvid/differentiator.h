@@ -53,8 +53,8 @@ typedef struct {
     float history[PVID_MAX_WINDOW];
 } pvid_differentiator_f32;
 
-/* Prepares `self` for samples taken at sample_rate_hz. Fails iff the bank is not as described
- * above (PVID_BAD_BANK) or the rate is not in 1e-3..1e6 Hz (PVID_BAD_SAMPLE_RATE). */
+/* Prepares `self` for samples taken at sample_rate_hz. Fails iff the bank is not as described above (PVID_BAD_HALF,
+ * PVID_BAD_STRIDE, PVID_BAD_BANK for the weights) or the rate is not in 1e-3..1e6 Hz (PVID_BAD_SAMPLE_RATE). */
 pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
                                          float sample_rate_hz);
 

@@ -63,8 +63,8 @@ typedef struct {
     int32_t history[PVID_MAX_WINDOW][2]; /* phi, y */
 } pvid_differentiator_q31;
 
-/* Prepares `self`. Returns PVID_BAD_BANK iff the bank is not as described above or counts within full scale could
- * overflow it. */
+/* Prepares `self`. Fails iff the bank is not as described above; the status names the field. Where counts within full scale
+ * could overflow it that is PVID_BAD_FULL_SCALE for a product with a weight, PVID_BAD_SHIFT for their sum. */
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
 
 /* Empties the window: after a gap the samples no longer stand at equal distances. */

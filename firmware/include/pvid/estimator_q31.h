@@ -181,8 +181,8 @@ typedef struct {
     uint32_t weight;        /* rows remembered */
 } pvid_estimate_q31;
 
-/* Prepares `self`. Fails iff a field of config is not as described there; the status names it. PVID_BAD_MODEL also
- * where a format is out of range. */
+/* Prepares `self`. Fails iff a field of config is not as described there; the status names it:
+ * PVID_BAD_FORMAT for p_bits, n_bits and y_bits. */
 pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config);
 
 /* Moves p[index] to `value`, within its bounds, before the first row is taken in: a better start. */

@@ -7,8 +7,7 @@ typedef enum {
     PVID_OK = 0,
     PVID_BAD_MODEL,           /* NULL, or larger than the PVID_MAX_ bounds */
     PVID_BAD_SAMPLE_RATE,     /* not finite or outside 1e-3..1e6 Hz */
-    PVID_BAD_BANK,            /* NULL weights, half < 2, stride < 1, window over PVID_MAX_WINDOW,
-                                 or a weight that is not finite */
+    PVID_BAD_BANK,            /* weights of a bank: NULL, or one that is not finite */
     PVID_BAD_LENGTH,          /* l1 not finite or not positive */
     PVID_BAD_START,           /* start not finite, not positive where the model asks, or out of bounds */
     PVID_BAD_START_SD,        /* not finite or not positive */
@@ -22,9 +21,9 @@ typedef enum {
     PVID_BAD_STEP_LIMIT,      /* not finite or outside (0, 0.9] */
     PVID_BAD_KAPPA_MIN,       /* not finite or outside [0, 1) */
     PVID_BAD_CORRELATION,     /* not finite or below 1 */
-    PVID_BAD_DRIVE_MIN,       /* not finite or negative */
+    PVID_BAD_DRIVE_MIN,       /* not finite or negative; q31: or too large */
     PVID_BAD_ROW_WEIGHT,      /* not finite or outside (0, 1], or not 1 for a model that accumulates by itself */
-    PVID_BAD_DESIGN,          /* a weak-form design not as described in weak.h */
+    PVID_BAD_DESIGN,          /* NULL, or one of a design's tables is, or holds what is not finite or would overflow */
     PVID_BAD_ITERATIONS,      /* outside 1..PVID_MAX_ITERATIONS, or too many for the window's hop */
     PVID_BAD_NOISE_MARGIN,    /* not finite or outside 0..1e6 */
     PVID_BAD_PUBLISH_KAPPA,   /* kappa_min of trust.h not finite or outside [0, 1) */
@@ -36,7 +35,23 @@ typedef enum {
                                  friction with a known zero or with bounds too small for it */
     PVID_BAD_GATE_SIGMAS,     /* not finite, or neither 0 nor 2..1e3 */
     PVID_BAD_GATE_PATIENCE,   /* not finite or outside 0..1e12 s */
-    PVID_BAD_DEAD_ZONE        /* not finite or outside 0..100 */
+    PVID_BAD_DEAD_ZONE,       /* not finite or outside 0..100 */
+    PVID_BAD_HALF,            /* of a bank: below 2, or a window over PVID_MAX_WINDOW with any stride */
+    PVID_BAD_STRIDE,          /* of a bank: 0, or with this half a window over PVID_MAX_WINDOW */
+    PVID_BAD_CENTRE,          /* of a q31 bank: outside 1..2^30 */
+    PVID_BAD_TAPS,            /* of a design: even, or outside 5..PVID_MAX_TAPS */
+    PVID_BAD_DECIMATION,      /* of a design: outside 1..PVID_MAX_DECIMATION */
+    PVID_BAD_WINDOW,          /* of a design: even, or outside 9..PVID_MAX_WEAK_WINDOW */
+    PVID_BAD_FUNCTIONS,       /* of a design: outside 4..PVID_MAX_FUNCTIONS */
+    PVID_BAD_LAG,             /* of a design: 0 */
+    PVID_BAD_OVERLAP,         /* of a design: not finite or below 1 */
+    PVID_BAD_FULL_SCALE,      /* phi_max, y_max or u_max of a q31 bank or design: not positive, or too large, by itself
+                                 or for the bank's weights */
+    PVID_BAD_SHIFT,           /* a shift of a q31 bank, row or design: more than a 64-bit number has, or leaves too many
+                                 bits for what full scale can make */
+    PVID_BAD_U_MULTIPLIER,    /* of the q31 strong form: not positive */
+    PVID_BAD_DRIVE_TICKS,     /* of the q31 strong form: outside 1..2^30 */
+    PVID_BAD_FORMAT           /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */

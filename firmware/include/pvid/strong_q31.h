@@ -61,7 +61,7 @@ typedef struct {
 } pvid_strong_q31;
 
 /* Prepares `self`. Fails iff a field of config is out of its range or counts within full scale could overflow the bank
- * (PVID_BAD_BANK); the status names the field: PVID_BAD_DESIGN for row and u, PVID_BAD_DRIVE_MIN for the drive. */
+ * (differentiator_q31.h); the status names the field: PVID_BAD_SHIFT for those of the row and u_shift. */
 pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config);
 
 /* One tick: phi and y_A sampled together [counts]. Answers as pvid_strong_step_f32; PVID_REJECTED_SATURATED for a sample

@@ -251,8 +251,8 @@ typedef struct {
     pvid_trust_f32 trust;
 } pvid_weak_f32;
 
-/* Prepares `self`. Fails iff a field of config or of its design is out of its range, a table holds a
- * number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
+/* Prepares `self`. Fails iff a field of config or of its design is out of its range (the status names it), a table is
+ * missing or holds a number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
  * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for less than
  * 10 K + 35 stages, 19 a Gauss-Newton step and K / 6 + W / 4 + 3 a pass of the correction, at most four of them a
  * tick. */

@@ -173,8 +173,8 @@ typedef struct {
     pvid_trust_q31 trust;
 } pvid_weak_q31;
 
-/* Prepares `self`. Fails iff a field of config or of its design is out of its range (PVID_BAD_DESIGN,
- * PVID_BAD_DRIVE_MIN, those of the estimator), or a window cannot be worked off before the next one is complete
+/* Prepares `self`. Fails iff a field of config or of its design is out of its range (the status names it), a table is
+ * missing or would overflow (PVID_BAD_DESIGN, and PVID_BAD_SHIFT where fewer bits would do), or a window cannot be worked off before the next one is complete
  * (PVID_BAD_ITERATIONS, as in weak.h).
  *
  * Of the tables it checks, in one walk, what it costs no analysis to know: a weight of `smooth` or `second` times four

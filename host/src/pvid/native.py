@@ -87,6 +87,20 @@ class Status(IntEnum):
     BAD_GATE_SIGMAS = 28
     BAD_GATE_PATIENCE = 29
     BAD_DEAD_ZONE = 30
+    BAD_HALF = 31
+    BAD_STRIDE = 32
+    BAD_CENTRE = 33
+    BAD_TAPS = 34
+    BAD_DECIMATION = 35
+    BAD_WINDOW = 36
+    BAD_FUNCTIONS = 37
+    BAD_LAG = 38
+    BAD_OVERLAP = 39
+    BAD_FULL_SCALE = 40
+    BAD_SHIFT = 41
+    BAD_U_MULTIPLIER = 42
+    BAD_DRIVE_TICKS = 43
+    BAD_FORMAT = 44
 
 
 class Law(IntEnum):
