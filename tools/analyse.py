@@ -1,35 +1,52 @@
 #!/usr/bin/env python3
-"""Static analysis of the C core and the link: gcc -fanalyzer, clang-tidy, cppcheck with its MISRA C:2012 add-on.
+"""Static analysis of the firmware: gcc -fanalyzer, clang-tidy, cppcheck with its MISRA C:2012 add-on.
 
     tools/analyse.py            every finding, but for those that firmware/analysis.toml deviates from; exits 1 on one
+    tools/analyse.py FILE...    of these sources alone
     tools/analyse.py --update   writes firmware/MISRA.md too: the deviations, their reasons and how often each is used
 
 A deviation names a tool, a rule, a reason, and what it covers: files and a regular expression that the line of the
 finding has to match. One that covers nothing any more is an error; so is a required rule that is deviated from more
 often than MISRA.md says, until a person has looked and written it anew.
+
+Ports are read as their processor's compilers read them, the applications as for this machine; Debian's avr-gcc is too
+old to have -fanalyzer.
 """
 
 from __future__ import annotations
 
 import argparse
 import fnmatch
+import hashlib
 import re
 import shutil
 import subprocess
 import sys
 import tomllib
+from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from units import FIRMWARE, PORTS, ROOT, Unit, applications, core, ports
+
 DEVIATIONS = ROOT / "firmware" / "analysis.toml"
 PAGE = ROOT / "firmware" / "MISRA.md"
-FOLDERS = [ROOT / "firmware" / "src", ROOT / "firmware" / "link"]
-INCLUDES = [f"-I{ROOT / 'firmware' / name}" for name in ("include", "src", "link")]
+FOLDERS = [FIRMWARE / name for name in ("src", "link", "ports", "apps")]
 ASSERT = ["-include", "assert.h", "-DPVID_ASSERT(condition)=assert(condition)"]  # tells a tool what a caller owes
 BUILD = ROOT / "build" / "analysis"
-PACKAGES = {"gcc": "gcc", "clang-tidy": "clang-tidy", "cppcheck": "cppcheck"}
+GCC = {  # by family: the compiler, and what it needs to be told of the processor
+    "host": ("gcc",),
+    "cortex_m": ("arm-none-eabi-gcc", "-mcpu=cortex-m4"),
+    "riscv": ("riscv64-unknown-elf-gcc", "-march=rv32imac", "-mabi=ilp32"),
+}
+PLATFORMS = {"host": "unix64", "cortex_m": "unix32", "riscv": "unix32", "avr": "avr8"}  # cppcheck's
+PACKAGES = {
+    "gcc": "gcc",
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi",
+    "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf",
+    "clang-tidy": "clang-tidy",
+    "cppcheck": "cppcheck",
+}
 
 
 @dataclass(frozen=True, order=True)
@@ -72,8 +89,8 @@ class Deviation:
         return " ".join(filter(None, (self.tool, self.rule, ", ".join(self.files), self.line and f"`{self.line}`")))
 
 
-def sources() -> list[Path]:
-    return sorted(path for folder in FOLDERS for path in folder.glob("*.c"))
+def units() -> list[Unit]:
+    return core("host") + ports() + applications("host")
 
 
 def run(command: list[str]) -> str:
@@ -86,46 +103,57 @@ def located(tool: str, output: str, pattern: str) -> set[Finding]:
     found = set()
     for match in re.finditer(pattern, output, re.MULTILINE):
         path = (ROOT / match["file"]).resolve()
-        if path.is_relative_to(ROOT):
+        if path.is_relative_to(FIRMWARE):
             at = str(path.relative_to(ROOT))
             found.add(Finding(tool, match["rule"], at, int(match["line"]), match["text"]))
     return found
 
 
-def gcc(path: Path) -> set[Finding]:
-    options = ["-std=c99", "-O2", "-ffp-contract=off", "-fanalyzer", "-Wall", "-Wextra", *ASSERT, *INCLUDES]
-    output = run(["gcc", *options, "-c", str(path), "-o", "/dev/null"])
+def asserts(unit: Unit) -> list[str]:
+    """Not for a port, which is read as it stands: the host's says itself what it asks of the C library."""
+    return [] if PORTS in unit.source.parents else ASSERT
+
+
+def gcc(unit: Unit) -> set[Finding]:
+    if unit.machine not in GCC:
+        return set()
+    for_it = [*GCC[unit.machine], *unit.common, "-O2", "-fanalyzer", "-Wall", "-Wextra", *asserts(unit)]
+    output = run([*for_it, "-c", str(unit.source), "-o", "/dev/null"])
     if re.search(r"(?<!\w)error:", output):
-        raise SystemExit(f"gcc does not compile {path.name}:\n{output}")
+        raise SystemExit(f"gcc does not compile {unit.name}:\n{output}")
     return located(
         "gcc", output, r"^(?P<file>[^\s:]+):(?P<line>\d+):\d+: warning: (?P<text>.*) \[(?P<rule>-W[^\]]+)\]$"
     )
 
 
-def clang_tidy(path: Path) -> set[Finding]:
-    options = ["-std=c99", "-ffp-contract=off", *ASSERT, *INCLUDES]
-    output = run(["clang-tidy", "--quiet", str(path), "--", *options])
+def clang_tidy(unit: Unit) -> set[Finding]:
+    output = run(["clang-tidy", "--quiet", str(unit.source), "--", *unit.options, *asserts(unit)])
     if re.search(r"(?<!\w)error:", output):
-        raise SystemExit(f"clang-tidy does not read {path.name}:\n{output}")
+        raise SystemExit(f"clang-tidy does not read {unit.name}:\n{output}")
     return located(
         "clang-tidy", output, r"^(?P<file>/[^:]+):(?P<line>\d+):\d+: warning: (?P<text>.*) \[(?P<rule>[^\]]+)\]$"
     )
 
 
-def cppcheck(folders: list[Path]) -> set[Finding]:
-    """MISRA's rules have the tool's name "misra": their texts are not free, so that a number is all there is."""
-    BUILD.mkdir(parents=True, exist_ok=True)
+def cppcheck(alike: list[Unit]) -> set[Finding]:
+    """Of sources with the same options. MISRA's rules have the tool's name "misra": their texts are not free, so that a
+    number is all there is."""
+    first = alike[0]
+    options = [option for option in first.common if option.startswith(("-I", "-D"))]
+    folder = BUILD / hashlib.sha256("\n".join([first.machine, *options]).encode()).hexdigest()[:8]
+    folder.mkdir(parents=True, exist_ok=True)
     checks = [
         "--std=c99",
         "--enable=warning,style,performance,portability",
         "--inline-suppr",
         "--addon=misra",
         "--quiet",
+        f"--platform={PLATFORMS[first.machine]}",
     ]
     # A macro that a user may define as the name of a header; cppcheck would invent a value for it.
-    checks += ["-UPVID_CONFIG_HEADER", f"--cppcheck-build-dir={BUILD}", "-j2"]
+    checks += ["-UPVID_CONFIG_HEADER", f"--cppcheck-build-dir={folder}"]
     template = "--template={file}:{line}:{id}:{message}"
-    output = run(["cppcheck", *checks, template, *INCLUDES, *map(str, folders)])
+    output = run(["cppcheck", *checks, template, *options, *(str(unit.source) for unit in alike)])
     found = located("cppcheck", output, r"^(?P<file>/[^:]+):(?P<line>\d+):(?P<rule>[\w.-]+):(?P<text>.*)$")
     prefix = "misra-c2012-"
     return {
@@ -136,10 +164,13 @@ def cppcheck(folders: list[Path]) -> set[Finding]:
     }
 
 
-def all_findings() -> list[Finding]:
+def all_findings(chosen: list[Unit]) -> list[Finding]:
+    groups: dict[tuple[str, ...], list[Unit]] = defaultdict(list)
+    for unit in chosen:
+        groups[unit.options].append(unit)
     with ThreadPoolExecutor(2) as pool:
-        jobs = [pool.submit(cppcheck, FOLDERS)]
-        jobs += [pool.submit(tool, path) for tool in (clang_tidy, gcc) for path in sources()]
+        jobs = [pool.submit(cppcheck, alike) for alike in sorted(groups.values(), key=len, reverse=True)]
+        jobs += [pool.submit(tool, unit) for tool in (clang_tidy, gcc) for unit in chosen]
         return sorted(set().union(*(job.result() for job in jobs)))
 
 
@@ -191,7 +222,7 @@ def page_of(used: list[tuple[Deviation, int]]) -> str:
 # Static analysis: what is deviated from, and why
 
 `tools/analyse.py`, a layer of `./tools/test`, runs gcc's -fanalyzer, clang-tidy (the checks of `.clang-tidy`) and
-cppcheck with its MISRA C:2012 add-on over `firmware/src`, `firmware/link` and the headers they include. Whatever is
+cppcheck with its MISRA C:2012 add-on over the core, the link, the ports and the applications of `firmware`. Whatever is
 found fails the test, but for the deviations below. A number in the second column cannot grow unnoticed where
 the rule is required. cppcheck's add-on checks most of the decidable rules; this is no claim of compliance.
 
@@ -212,17 +243,27 @@ def natural(rule: str) -> tuple[float, float, str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--update", action="store_true", help="write firmware/MISRA.md")
-    update = parser.parse_args().update
+    parser.add_argument(
+        "files", nargs="*", metavar="FILE", help="from the top of the repository; all, if none is named"
+    )
+    given = parser.parse_args()
+    update, files = given.update, set(given.files)
+    chosen = [unit for unit in units() if not files or str(unit.source.relative_to(ROOT)) in files]
+    unknown = files - {str(unit.source.relative_to(ROOT)) for unit in chosen}
+    if unknown or (update and files):
+        parser.error(f"no source is {', '.join(sorted(unknown))}" if unknown else "--update is for all of them")
     missing = [package for tool, package in PACKAGES.items() if shutil.which(tool) is None]
     if missing:
         raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")
 
-    findings = all_findings()
+    findings = all_findings(chosen)
     known = deviations()
     faults = [str(finding) for finding in findings if not any(entry.covers(finding) for entry in known)]
     counted = [(entry, sum(entry.covers(finding) for finding in findings)) for entry in known]
     faults += [
-        f"{DEVIATIONS.name}: {entry.key()} covers nothing; take it out" for entry, count in counted if count == 0
+        f"{DEVIATIONS.name}: {entry.key()} covers nothing; take it out"
+        for entry, count in counted
+        if count == 0 and (not files or set(entry.files) <= files)
     ]
     if update:
         PAGE.write_text(page_of(counted), encoding="utf-8")

@@ -36,6 +36,13 @@ class Unit:
     options: tuple[str, ...]
 
     @property
+    def common(self) -> tuple[str, ...]:
+        """The options that are not clang's alone."""
+        return tuple(
+            option for option in self.options if option not in MACHINES[self.machine] or option in FREESTANDING
+        )
+
+    @property
     def name(self) -> str:
         return f"{self.source.relative_to(ROOT)} ({self.machine})"
 
@@ -60,7 +67,7 @@ def core(machine: str) -> list[Unit]:
 
 def ports() -> list[Unit]:
     """Every port: a board for each UART, and this machine's."""
-    found = _units("host", sorted((PORTS / "host").glob("*.c")), "-D_POSIX_C_SOURCE=200809L", "-D_DEFAULT_SOURCE")
+    found = _units("host", sorted((PORTS / "host").glob("*.c")))
     shared: set[tuple[str, Path]] = set()
     for name in ("mps2-an386", "netduinoplus2", "microbit", "virt-rv32imac", "atmega2560"):
         family, uart, definitions = _board(name)
@@ -86,7 +93,9 @@ def applications(machine: str) -> list[Unit]:
         if first:
             found += _units(machine, [replay / "report.c"], *kind)
         if machine != "avr":
-            found += _units(machine, [stream / "main.c", stream / f"identifier_{('f32', 'q31')[core_name]}.c"], *kind)
+            found += _units(machine, [stream / f"identifier_{('f32', 'q31')[core_name]}.c"], *kind)
+            if form != core_name:  # the program itself does not ask for the form
+                found += _units(machine, [stream / "main.c"], *kind)
             if first:
                 found += _units(machine, [stream / "answers.c", stream / "sensor.c"], *kind)
     return found

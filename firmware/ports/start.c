@@ -19,9 +19,10 @@ void pvid_start(uint32_t *top_of_rest)
     fill(pvid_stack_bottom, top_of_rest, PVID_PAINT);
     fill(pvid_bss_start, pvid_bss_end, 0u);
     const volatile uint32_t *source = pvid_data_load;
-    for (volatile uint32_t *word = pvid_data_start; word < pvid_data_end; word++) {
-        *word = *source;
-        source++;
+    volatile uint32_t *target = pvid_data_start;
+    const size_t words = ((uintptr_t)pvid_data_end - (uintptr_t)pvid_data_start) / sizeof *target;
+    for (size_t i = 0; i < words; i++) {
+        target[i] = source[i];
     }
     pvid_port_exit(main());
 }

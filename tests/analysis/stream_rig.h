@@ -16,7 +16,7 @@
     {                                                                                                                  \
         .steps = 8u, .step_squared = 1.0e-8f, .w = 30.0f, .ratio2 = 2.0f, .coupling = 1.0f, .phi1 = 0.1f,              \
         .phi = 0.1f, .counts_per_rad = 2600.0f, .counts_per_m = 2.0e5f, .tones = {                                     \
-            {0.0f, 0.0f, 0.0f, 0.0f}                                                                                   \
+            {0.0f, 0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f, 0.0f}                               \
         }                                                                                                              \
     }
 

@@ -126,7 +126,7 @@ void pvid_port_exit(int code)
 
 size_t pvid_port_stack_size(void)
 {
-    return (size_t)(&__stack - &__heap_start) + 1u;
+    return ((size_t)&__stack - (size_t)&__heap_start) + 1u;
 }
 
 size_t pvid_port_stack_used(void)
