@@ -119,7 +119,7 @@ def test_margins_are_positive_or_the_design_is_refused() -> None:
 def test_the_core_refuses_a_bank_that_could_overflow(native: Native) -> None:
     _, bank, _ = bank_of("241 points, degree 12")
     broken = FirBankQ31(**{**vars(bank), "phi_shift": (*bank.phi_shift[:4], bank.phi_shift[4] - 1)})
-    with pytest.raises(PvidError, match="refused the bank: bad bank"):
+    with pytest.raises(PvidError, match="refused the bank: bad shift"):
         derivatives_q31(native, broken, np.zeros(10), np.zeros(10))
 
 

@@ -273,8 +273,12 @@ def test_what_the_core_refuses_it_names(native: Native) -> None:
     tables = design(L1, 1000.0, NOMINAL).f32
     chi = tables.chi.copy()
     chi[7, 1, 3] = np.nan
-    for wrong_tables in (replace(tables, chi=chi), replace(tables, taps=70), replace(tables, overlap=0.5)):
-        with pytest.raises(PvidError, match="bad design"):
+    for wrong_tables, name in (
+        (replace(tables, chi=chi), "bad design"),
+        (replace(tables, taps=70), "bad taps"),
+        (replace(tables, overlap=0.5), "bad overlap"),
+    ):
+        with pytest.raises(PvidError, match=name):
             native.weak(replace(config, design=wrong_tables))
 
 
