@@ -158,11 +158,12 @@ def build_image(rig: StreamRig, board: Board | None) -> Path:
 
 
 def _build_for_host(folder: Path, tree: Path, core: Core, sizes: dict[str, str]) -> Path:
-    """With the options of the core (firmware/cmake/PvidCompile.cmake)."""
+    """With the options of the core (firmware/cmake/PvidCompile.cmake); what the other core alone needs is left out."""
     firmware = ROOT / "firmware"
     application = firmware / "apps" / "stream"
+    other = {Core.F32: "q31", Core.Q31: "f32"}[core]
     sources = [
-        *sorted((firmware / "src").glob("*.c")),
+        *sorted(one for one in (firmware / "src").glob("*.c") if not one.stem.endswith(f"_{other}")),
         firmware / "link" / "link.c",
         firmware / "ports" / "host" / "port.c",
         firmware / "ports" / "host" / "receiver.c",
