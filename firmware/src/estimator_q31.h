@@ -50,6 +50,9 @@ int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, in
 /* *e = Y - N^T theta of a row; whether N, Y and e fit, that is whether the row may be taken in. |e| < 2^45. */
 bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e);
 
+/* The same, and term[n_theta]: each N_i theta_i, |term| <= 2^40. */
+bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e);
+
 /* Takes a row in that fits, with its innovation e. */
 void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e);
 

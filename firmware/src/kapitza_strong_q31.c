@@ -49,6 +49,24 @@ bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *shifts, const int32_
            take_powers(phi[0], u[0], shifts->n_phi0, 5, &n[N_PHI0]);
 }
 
+/* sum k term[k], k < count: each is added as often as there is one above it. */
+static int64_t by_power(const int64_t term[], size_t count)
+{
+    int64_t above = 0;
+    int64_t sum = 0;
+    for (size_t k = count - 1u; k > 0u; k--) {
+        above += term[k];
+        sum += above;
+    }
+    return sum;
+}
+
+int64_t pvid_kapitza_strong_told_q31(const int64_t term[PVID_KAPITZA_STRONG_THETA])
+{
+    const int64_t alone = term[N_A] + (2 * term[N_E]);
+    return alone + by_power(&term[N_PHI2], 4) + by_power(&term[N_PHI0], 5);
+}
+
 /* ---- theta and C ---- */
 
 /* p has 31 bits: a single one is moved up to 58, a product of two down to 58; a product with a third comes back by 31.

@@ -13,6 +13,8 @@ static const uint32_t layout[] = {
     PLACE(row),
     PLACE(drive),
     PLACE(gate),
+    PLACE(misfit),
+    PLACE(misfit.block),
     PLACE(estimator),
     PLACE(estimator.information.sums),
     PLACE(estimator.p),

@@ -7,6 +7,7 @@
 #include "count.h"
 #include "estimator_q31.h"
 #include "integer_q31.h"
+#include "misfit_q31.h"
 #include "scaled_q31.h"
 
 #define SHIFT_MAX 62u
@@ -72,6 +73,7 @@ pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config
     if (status != PVID_OK) {
         return status;
     }
+    pvid_misfit_init_q31(&self->misfit, config->drive_ticks, config->estimator.forgetting_groups);
     return pvid_gate_init_q31(&self->gate, &config->gate, config->drive_ticks / GATE_MEMORY_PARTS,
                               gate_floor(&self->estimator));
 }
@@ -110,11 +112,37 @@ static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int3
     return true;
 }
 
-/* Whether a row with this innovation fits the estimate as well as rows usually do. */
-static bool passes(pvid_strong_q31 *self, int32_t e)
+/* Whether a row with an innovation of this square fits the estimate as well as rows usually do. */
+static bool passes(pvid_strong_q31 *self, int64_t square)
 {
-    return (self->gate.limit.m == 0) ||
-           pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(pvid_product_q31(e, e), 0));
+    return (self->gate.limit.m == 0) || pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(square, 0));
+}
+
+/* A row: judged, let in or not, and solved with. */
+static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
+{
+    pvid_estimator_q31 *estimator = &self->estimator;
+    int64_t term[PVID_KAPITZA_STRONG_THETA];
+    int64_t e;
+    if (!pvid_estimator_terms_q31(estimator, n, y, term, &e)) {
+        return refuse(self);
+    }
+    const int32_t innovation = (int32_t)e;
+    const int64_t square = pvid_product_q31(innovation, innovation);
+    if (pvid_misfit_take_q31(&self->misfit, square, pvid_kapitza_strong_told_q31(term))) {
+        self->alarm = pvid_misfit_judge_q31(&self->misfit);
+    }
+    if (!passes(self, square)) {
+        pvid_count_up(&estimator->counters.rejected_outlier);
+        return PVID_REJECTED_OUTLIER;
+    }
+    pvid_estimator_take_row_q31(estimator, n, innovation);
+    const pvid_reason reason = pvid_estimator_update_q31(estimator);
+    if ((reason != PVID_UPDATED) || !self->alarm) {
+        return reason;
+    }
+    pvid_count_up(&estimator->counters.misfits);
+    return PVID_MISFIT;
 }
 
 pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
@@ -144,15 +172,8 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
     }
     int32_t n[PVID_KAPITZA_STRONG_THETA];
     int32_t row_y;
-    int64_t e;
-    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n) ||
-        !pvid_estimator_innovation_q31(&self->estimator, n, row_y, &e)) {
+    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n)) {
         return refuse(self);
     }
-    if (!passes(self, (int32_t)e)) {
-        pvid_count_up(&self->estimator.counters.rejected_outlier);
-        return PVID_REJECTED_OUTLIER;
-    }
-    pvid_estimator_take_row_q31(&self->estimator, n, (int32_t)e);
-    return pvid_estimator_update_q31(&self->estimator);
+    return take_row(self, n, row_y);
 }

@@ -23,6 +23,7 @@
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/little_endian.h"
 #include "pvid/misfit.h"
+#include "pvid/misfit_q31.h"
 #include "pvid/model.h"
 #include "pvid/model_q31.h"
 #include "pvid/snapshot.h"

@@ -25,6 +25,7 @@
 #include "pvid/estimator_q31.h"
 #include "pvid/gate_q31.h"
 #include "pvid/kapitza_strong_q31.h"
+#include "pvid/misfit_q31.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -56,7 +57,9 @@ typedef struct {
     int64_t drive_min;        /* mean square below which no row is taken in */
     int32_t drive_forgetting; /* part of it that a tick replaces, Q31 */
     bool frozen;
+    bool alarm;               /* the last block of rows was a misfit: see misfit.h */
     pvid_gate_q31 gate;
+    pvid_misfit_q31 misfit;
     pvid_estimator_q31 estimator;
 } pvid_strong_q31;
 
@@ -66,7 +69,8 @@ pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config
 
 /* One tick: phi and y_A sampled together [counts]. Answers as pvid_strong_step_f32; PVID_REJECTED_SATURATED for a sample
  * beyond full scale, which empties the window, and for a row that does not fit, which does not; PVID_REJECTED_OUTLIER for
- * a row that the gate kept out. */
+ * a row that the gate kept out; PVID_MISFIT in place of PVID_UPDATED while the rows that fit leave more unexplained than
+ * they should. */
 pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y);
 
 /* Tells the identifier that samples are missing: the window starts again, nothing else is lost. */

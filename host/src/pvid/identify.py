@@ -61,7 +61,7 @@ class Identification:
     are the published ones (pvid/trust.h): `trusted_s` is when the last of them was trusted [s] (None: never, they are
     the start), `misfit` the variance of the residuals over what the sensors' noise explains, and `alarm` whether that
     is too much. In the strong form, which publishes whatever it has, they are the last ones, and None, None; `alarm` is
-    the float32 core's own (pvid/misfit.h).
+    the C cores' own (pvid/misfit.h); float64 has none.
     """
 
     value: dict[str, float]
@@ -352,16 +352,16 @@ def _in_q31(
     if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
         p[3] += float(np.mean(run.phi - phi * rig.sensor.phi_lsb))
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
-    gated = isinstance(identifier, WeakIdentifierQ31) and len(trusted) > 0
+    told = len(trusted) > 0
     counters = identifier.counters
     return _identification(
         rig,
         p=p,
         covariance=covariance_of(config, last),
         kappa=float(last["kappa"]) / 2**30,
-        trusted_s=float(run.t[trusted[-1]]) if gated else None,
+        trusted_s=float(run.t[trusted[-1]]) if told and isinstance(identifier, WeakIdentifierQ31) else None,
         misfit=identifier.misfit if isinstance(identifier, WeakIdentifierQ31) else None,
-        alarm=gated and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],

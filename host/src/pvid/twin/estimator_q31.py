@@ -179,10 +179,14 @@ class EstimatorQ31:
 
     def innovation(self, n: Int, y: Int) -> tuple[Int, Mask]:
         """e = Y - N^T theta of a row [lanes], and where the row fits; shapes as in `add`."""
+        return self.terms(n, y)[1:]
+
+    def terms(self, n: Int, y: Int) -> tuple[Int, Int, Mask]:
+        """N_i theta_i of a row [n_theta, lanes], and its innovation."""
         m, h = self.mantissas(self.theta)
         terms = clamp(scale(clamp(n, ROW_LIMIT) * m, integers(self.align)[:, None] - h), TERM_MAX)
         e = y - terms.sum(axis=0)
-        return e, (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
+        return terms, e, (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
 
     @property
     def expected_variance(self) -> Scaled:
@@ -191,8 +195,11 @@ class EstimatorQ31:
 
     def add(self, n: Int, y: Int) -> Reasons:
         """One row of a group: N [n_theta, lanes], Y [lanes]."""
-        e, fits = self.innovation(n, y)
-        e = np.where(fits, e, 0)
+        return self.take_row(n, *self.innovation(n, y))
+
+    def take_row(self, n: Int, innovation: Int, fits: Mask) -> Reasons:
+        """The same, its innovation known and where it fits."""
+        e = np.where(fits, innovation, 0)
         self.energy = clamp(self.energy + e * e, WIDE)
         e = round_shift(e, self.exponent)
         row = round_shift(np.where(fits, n, 0), self.exponent)
@@ -201,7 +208,7 @@ class EstimatorQ31:
         self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
         if self.is_rate:
             self.fresh = self.fresh + row * e
-        reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
+        reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
         self.counters["rows"] += fits
         self.counters["rejected_saturated"] += ~fits

@@ -18,6 +18,7 @@ W, D1, D2 = range(3)
 _UP = 27  # p of 31 bits becomes 58, as a product of two of them shifted right by 4
 _DOWN = 4
 _N_THETA = 11
+_POWERS_OF_W = np.array([1, 2, 0, 1, 2, 3, 0, 1, 2, 3, 4], np.int64)  # how often it is a factor of theta_i
 
 
 class _Taker:
@@ -56,6 +57,11 @@ def rows(shifts: RowShiftsQ31, phi: Int, u: Int) -> tuple[Int, Int, Mask]:
     for k, power in enumerate(taker.powers(phi[:, 0], u0, shifts.n_phi0)):
         n[:, 10 - k] = power
     return n, y, taker.fits
+
+
+def told(terms: Int) -> Int:
+    """w times the gradient in w of N^T theta, from N_i theta_i [11, lanes]."""
+    return np.asarray(_POWERS_OF_W @ terms)
 
 
 def _product(a: Int, b: Int) -> Int:

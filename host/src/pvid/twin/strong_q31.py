@@ -15,6 +15,7 @@ from pvid.twin.differentiator_q31 import derivatives
 from pvid.twin.estimator_q31 import EstimatorQ31
 from pvid.twin.gate_q31 import GateQ31
 from pvid.twin.integer_q31 import Int, integers, times_q31
+from pvid.twin.misfit_q31 import MisfitQ31
 from pvid.twin.scaled_q31 import scaled
 from pvid.twin.weak_q31 import TwinRecordQ31
 
@@ -33,6 +34,8 @@ class StrongTwinQ31:
         self.estimator = EstimatorQ31(estimators or [config.estimator], model.STRONG)
         floor = self.estimator.expected_variance.shifted(-20).plus(scaled(1, 0))
         self.gate = GateQ31(config.gate, config.drive_ticks // 4, floor)
+        forgetting = [one.forgetting_groups for one in estimators or [config.estimator]]
+        self.misfit = MisfitQ31(config.drive_ticks, forgetting)
 
     def rows(self, phi: Int, y: Int) -> tuple[Int, Int, Reasons]:
         """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
@@ -72,13 +75,15 @@ class StrongTwinQ31:
 
         Returns what every tick told, [ticks, lanes].
         """
-        return follow_rows(self.estimator, *self.rows(phi, y), after, self.gate)
+        return follow_rows(self.estimator, *self.rows(phi, y), after, self.gate, self.misfit)
 
     def run(
         self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
     ) -> TwinRecordQ31:
         """Steps all lanes through a run from its first sample: counts phi, y, both int64 [ticks]."""
-        return run_rows(self.estimator, *self.rows(phi, y), sums=sums, progress=progress, gate=self.gate)
+        return run_rows(
+            self.estimator, *self.rows(phi, y), sums=sums, progress=progress, gate=self.gate, misfit=self.misfit
+        )
 
 
 def run_rows(
@@ -90,6 +95,7 @@ def run_rows(
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
     gate: GateQ31 | None = None,
+    misfit: MisfitQ31 | None = None,
 ) -> TwinRecordQ31:
     """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share, each a group of its own.
 
@@ -109,7 +115,7 @@ def run_rows(
         if progress is not None and tick % 512 == 0:
             progress(tick)
 
-    reason = follow_rows(estimator, n, y, fate, record, gate)
+    reason = follow_rows(estimator, n, y, fate, record, gate, misfit)
     return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)
 
 
@@ -120,6 +126,7 @@ def follow_rows(
     fate: Reasons,
     after: Callable[[int, Reasons], None],
     gate: GateQ31 | None = None,
+    misfit: MisfitQ31 | None = None,
 ) -> Reasons:
     """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
 
@@ -132,7 +139,7 @@ def follow_rows(
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
         if fate[tick] == Reason.ACCUMULATED:
-            reason[tick] = _step(estimator, wide_n[tick], wide_y[tick], gate)
+            reason[tick] = _step(estimator, wide_n[tick], wide_y[tick], gate, misfit)
         else:
             reason[tick] = fate[tick]
             if fate[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
@@ -141,18 +148,20 @@ def follow_rows(
     return reason
 
 
-def _step(estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None) -> Reasons:
+def _step(estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None, misfit: MisfitQ31 | None) -> Reasons:
     """A row and the solve it may lead to; all lanes must let the same rows in."""
+    terms, e, fits = estimator.terms(n, y)
+    held = np.where(fits, e, 0)
+    if misfit is not None and fits.all():
+        misfit.take(held * held, model.told(terms))
     if gate is not None and gate.is_on:
-        e, fits = estimator.innovation(n, y)
-        held = np.where(fits, e, 0)
         passes = gate.passes(scaled(held * held, 0), fits)
         if passes.any() != passes.all():
             raise PvidError("lanes of one twin must let the same rows in: their estimates differ too much")
         if not passes.all():
             estimator.counters["rejected_outlier"] += 1
             return np.full(estimator.lanes, Reason.REJECTED_OUTLIER, np.uint8)
-    reason = estimator.add(n, y)
+    reason = estimator.take_row(n, e, fits)
     taken = reason == Reason.ACCUMULATED
     if not taken.any():
         return reason
@@ -160,4 +169,8 @@ def _step(estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None) -> Reas
         raise PvidError("lanes of one twin must take the same rows in: step those that do not apart")
     for told in estimator.solve(ends_group=True):
         reason = reason if told is None else told
-    return reason
+    if misfit is None:
+        return reason
+    doubted = misfit.alarm & (reason == Reason.UPDATED)
+    estimator.counters["misfits"] += doubted
+    return np.where(doubted, np.uint8(Reason.MISFIT), reason)
