@@ -9,6 +9,7 @@
 #include "scaled_q31.h"
 
 #define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
+#define TERM_DOWN 18                /* a shift that brings a row's limit times 30 bits there */
 #define FORMAT_MAX 64
 #define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
 #define DEAD_ZONE_MAX ((uint32_t)100 << 16)
@@ -180,14 +181,22 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
 
 /* ---- rows ---- */
 
+/* x 2^-shift within +-TERM_MAX, |x| <= 2^58. */
+static int64_t term_of(int64_t x, int32_t shift)
+{
+    return (shift >= TERM_DOWN) ? pvid_round_shift_q31(x, (uint32_t)shift)
+                                : pvid_clamp_q31(pvid_scale_q31(x, shift), TERM_MAX);
+}
+
 bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e)
 {
     bool fits = (y >= -PVID_ROW_LIMIT_Q31) && (y <= PVID_ROW_LIMIT_Q31);
     int64_t rest = y;
     for (size_t i = 0; i < self->model->n_theta; i++) {
         fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
-        const int32_t held = (int32_t)pvid_clamp_q31(n[i], PVID_ROW_LIMIT_Q31);
-        term[i] = pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(held, self->mantissa[i]), self->shift[i]), TERM_MAX);
+        const int32_t below = (n[i] > PVID_ROW_LIMIT_Q31) ? PVID_ROW_LIMIT_Q31 : n[i];
+        const int32_t held = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
+        term[i] = term_of(pvid_product_q31(held, self->mantissa[i]), self->shift[i]);
         rest -= term[i];
     }
     *e = rest;
@@ -200,9 +209,9 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
     return pvid_estimator_terms_q31(self, n, y, term, e);
 }
 
-void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e)
+void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
 {
-    self->energy = pvid_clamp_q31(self->energy + pvid_square_q31(e), PVID_WIDE);
+    self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
     pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);
 }
@@ -214,7 +223,7 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
-    pvid_estimator_take_row_q31(self, n, (int32_t)e);
+    pvid_estimator_take_row_q31(self, n, (int32_t)e, pvid_square_q31((int32_t)e));
     return PVID_ACCUMULATED;
 }
 

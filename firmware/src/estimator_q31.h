@@ -53,8 +53,8 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
 /* The same, and term[n_theta]: each N_i theta_i, |term| <= 2^40. */
 bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e);
 
-/* Takes a row in that fits, with its innovation e. */
-void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e);
+/* Takes a row in that fits, with its innovation e and e^2. */
+void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
 
 /* Sets theta = f(p), and what rows are multiplied with. */
 void pvid_estimator_take_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);

@@ -49,13 +49,20 @@ static pvid_scaled_q31 held(pvid_scaled_q31 scale, pvid_scaled_q31 floor)
     return ((scale.e > (scale_max.e + 1)) || pvid_scaled_exceeds_q31(scale, scale_max)) ? scale_max : scale;
 }
 
+/* Whether a square is at most limit times scale, whose mantissas' product is 2^58 at least: the exponents decide of most. */
+static bool is_usual(const pvid_gate_q31 *self, pvid_scaled_q31 square)
+{
+    return ((square.e + 30) <= ((self->limit.e + self->scale.e) + 58)) ||
+           !pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->scale));
+}
+
 bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
 {
     if (self->limit.m == 0) {
         return true;
     }
     const bool learning = self->judged < self->memory;
-    const bool passes = learning || !pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->scale));
+    const bool passes = learning || is_usual(self, square);
     pvid_scaled_q31 scale = self->scale;
     if (passes) {
         if (learning) {

@@ -16,8 +16,12 @@ enum { N_A = 0, N_E = 1, N_PHI2 = 2, N_PHI0 = 6 };
 static bool take(int64_t x, uint8_t shift, int32_t *out)
 {
     const int64_t rounded = pvid_round_shift_q31(x, shift);
-    *out = (int32_t)pvid_clamp_q31(rounded, PVID_ROW_LIMIT_Q31);
-    return rounded == *out;
+    if ((rounded > PVID_ROW_LIMIT_Q31) || (rounded < -PVID_ROW_LIMIT_Q31)) {
+        *out = (rounded > 0) ? PVID_ROW_LIMIT_Q31 : -PVID_ROW_LIMIT_Q31;
+        return false;
+    }
+    *out = (int32_t)rounded;
+    return true;
 }
 
 /* out[count - 1], .., out[0] = -x, -u x, -u^2 x .. */

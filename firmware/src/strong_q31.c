@@ -136,7 +136,7 @@ static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    pvid_estimator_take_row_q31(estimator, n, innovation);
+    pvid_estimator_take_row_q31(estimator, n, innovation, square);
     const pvid_reason reason = pvid_estimator_update_q31(estimator);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;
