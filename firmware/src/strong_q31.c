@@ -128,7 +128,7 @@ static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_
         return refuse(self);
     }
     const int32_t innovation = (int32_t)e;
-    const int64_t square = pvid_product_q31(innovation, innovation);
+    const int64_t square = pvid_square_q31(innovation);
     if (pvid_misfit_take_q31(&self->misfit, square, pvid_kapitza_strong_told_q31(term))) {
         self->alarm = pvid_misfit_judge_q31(&self->misfit);
     }
