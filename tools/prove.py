@@ -221,6 +221,24 @@ PROOFS = (
         taken=("pvid_scaled_of_q31", "pvid_scaled_over_q31"),
     ),
     Proof(
+        "weak_finish_q31",
+        "every stage on any state, with 4 and with 16 functions, any Gram tables that init takes, the tests' columns",
+        ("src/cholesky_q31.c", "src/scaled_q31.c", "src/integer_q31.c", "src/kapitza_weak_q31.c"),
+        (
+            *("-eva-min-loop-unroll", "17", "-eva-auto-loop-unroll", "300", "-eva-split-return", "full"),
+            *("-eva-slevel-function", "factor_diagonal:400,find_length:10", "-eva-subdivide-non-linear", "4"),
+            *("-inline-calls", "pvid_pivot_is_data_q31", "-eva-domains", "equality"),
+        ),
+        taken=(
+            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
+            *("pvid_to_block_q31", "pvid_half_exponent_q31", "pvid_scaled_of_q31", "pvid_scaled_plus_q31"),
+            *("pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+            *("pvid_estimator_innovation_q31", "pvid_estimator_add_q31", "pvid_estimator_begin_q31"),
+            *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_on_q31"),
+            *("pvid_gate_passes_q31", "pvid_trust_refuge_q31", "pvid_trust_judge_q31"),
+        ),
+    ),
+    Proof(
         "snapshot",
         "two slots with any bytes in them, any lengths and identities; sealing one",
         ("src/snapshot.c", "src/crc32.c", "src/fnv.c"),

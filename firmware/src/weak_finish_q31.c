@@ -60,6 +60,7 @@ enum {
 #define INVERSE_BITS 15
 #define INVERSE_LIMIT ((int32_t)1 << 26) /* 64 of them times an entry of L fit an int64 */
 #define ROW_BITS 12
+#define ROW_LIMIT 4096
 
 void pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self)
 {
@@ -110,7 +111,8 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_desi
     }
     common -= common & 1;
     for (size_t i = 0; i < PVID_WEAK_GRAMS; i++) {
-        self->combination[i] = (int32_t)pvid_scale_q31(part[i].m, part[i].bits - common);
+        const int64_t scaled = pvid_scale_q31(part[i].m, part[i].bits - common);
+        self->combination[i] = (int32_t)pvid_clamp_q31(scaled, PVID_ONE_Q30 / 2);
     }
     self->gram_bits = (int16_t)common;
     for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
@@ -201,7 +203,8 @@ static size_t parts_of_triangle(size_t functions, size_t parts)
     return whole + (parts * (functions - whole));
 }
 
-/* Entries first..last-1 of a row of L with L L^T = R0, in place. */
+/* Entries first..last-1 of a row of L with L L^T = R0, in place. Rows of L have a length below 1, and so no sum of
+ * theirs comes near PVID_WIDE, unless R0 cannot be factored: then the row's diagonal will tell, whatever its entries. */
 static void factor_entries(pvid_weak_finish_q31 *self, size_t row, size_t first, size_t last)
 {
     int32_t *l = &self->factor[row_start(row)];
@@ -209,7 +212,7 @@ static void factor_entries(pvid_weak_finish_q31 *self, size_t row, size_t first,
     for (size_t j = first; j < last; j++) {
         int64_t sum = (int64_t)l[j] * PVID_ONE_Q30;
         for (size_t i = 0; i < j; i++) {
-            sum -= pvid_product_q31(l[i], above[i]);
+            sum = pvid_clamp_q31(sum - pvid_product_q31(l[i], above[i]), PVID_WIDE);
         }
         l[j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
         above += j + 1u;
@@ -222,16 +225,21 @@ static void factor_diagonal(pvid_weak_finish_q31 *self, size_t row)
     const int32_t *l = &self->factor[row_start(row)];
     int64_t pivot = (int64_t)l[row] * PVID_ONE_Q30;
     for (size_t j = 0; j < row; j++) {
-        pivot -= pvid_product_q31(l[j], l[j]);
+        pivot = (pivot < 0) ? pivot : (pivot - pvid_square_q31(l[j]));
     }
-    self->whitened = self->whitened && pvid_pivot_is_data_q31(pivot, l[row]);
-    const uint64_t square = self->whitened ? (uint64_t)pivot : (uint64_t)((int64_t)1 << 60);
-    self->inverse[row] = pvid_reciprocal_of_q31(pvid_square_root_q31(square));
+    if (pvid_pivot_is_data_q31(pivot, l[row])) {
+        self->inverse[row] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
+    } else {
+        self->whitened = false;
+    }
 }
 
 /* The first of two parts of a row ends where it has cost as much as the second will, with its root. */
 static void factor_part(pvid_weak_finish_q31 *self, row_part part)
 {
+    if (!self->whitened) {
+        return;
+    }
     const size_t middle = part.row - (part.row / 4u);
     const bool completes = part.part + 1u == part.parts;
     factor_entries(self, part.row, (part.part == 0u) ? 0u : middle, completes ? part.row : middle);
@@ -266,7 +274,7 @@ static void weigh_row(pvid_weak_finish_q31 *self, size_t row)
     self->inverted_exponent = (int16_t)(largest - ROW_BITS);
     for (size_t j = 0; j < row + 1u; j++) {
         const int32_t shift = self->inverted_exponent + self->exponent[j];
-        self->inverted[j] = (int32_t)pvid_scale_q31(self->inverted[j], shift);
+        self->inverted[j] = (int32_t)pvid_clamp_q31(pvid_scale_q31(self->inverted[j], shift), ROW_LIMIT);
     }
 }
 
@@ -361,7 +369,7 @@ static void find_length(pvid_weak_finish_q31 *self, size_t functions, size_t col
     }
     (void)pvid_to_block_q31((uint32_t)functions, wide, DIRECTION_BITS, self->direction);
     for (size_t k = 0; k < functions; k++) {
-        square += (uint64_t)(pvid_product_q31(self->direction[k], self->direction[k]));
+        square += (uint64_t)pvid_square_q31(self->direction[k]);
     }
     const pvid_reciprocal_q31 none = {0, 0};
     self->length = (square > 0u) ? pvid_reciprocal_of_q31(pvid_square_root_q31(square)) : none;
@@ -372,7 +380,8 @@ static void find_direction(pvid_weak_finish_q31 *self, size_t functions)
 {
     for (size_t k = 0; k < functions; k++) {
         const int64_t product = (int64_t)self->direction[k] * self->length.m;
-        self->direction[k] = (int32_t)pvid_round_shift_q31(product, 31u - self->length.k);
+        const int64_t share = pvid_round_shift_q31(product, 31u - self->length.k);
+        self->direction[k] = (int32_t)pvid_clamp_q31(share, PVID_ONE_Q30);
     }
 }
 

@@ -57,6 +57,7 @@ pvid_scaled_q31 pvid_scaled_of_q31(int64_t x, int32_t exponent);
     requires -10000 <= a.e <= 10000 && -10000 <= b.e <= 10000;
     assigns \result \from a, b;
     ensures -0x40000000 <= \result.m <= 0x40000000;
+    ensures a.m >= 1 && b.m >= 0 ==> \result.m >= 1;
     ensures \result.e >= a.e - 60 || \result.e >= b.e - 60;
     ensures \result.e <= a.e + 4 || \result.e <= b.e + 4; */
 pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
@@ -66,6 +67,7 @@ pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
     assigns \result \from a, b;
     ensures -0x40000000 <= \result.m <= 0x40000000;
     ensures a.m >= 0 && b.m >= 0 ==> \result.m >= 0;
+    ensures a.m >= 1 && b.m >= 1 ==> \result.m >= 1;
     ensures a.e + b.e - 30 <= \result.e <= a.e + b.e + 34; */
 pvid_scaled_q31 pvid_scaled_times_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
 

@@ -9,7 +9,7 @@
 static const struct {
     uint16_t taps;
     uint16_t decimation;
-} geometry[] = {{71, 24}, {5, 1}, {7, 2}, {9, 3}};
+} geometry[] = {{71, 8}, {5, 1}, {7, 2}, {9, 3}};
 
 static pvid_weak_front_q31 front;
 static int64_t f_max;

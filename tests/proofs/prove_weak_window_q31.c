@@ -24,6 +24,11 @@ static void any_window(const pvid_weak_design_q31 *design, uint16_t first)
         pvid_weak_window_terms_q31(&window, design, f, u, &bend, term);
         pvid_weak_window_add_q31(&window, design, term, 0, design->functions, sums);
     }
+    for (size_t i = 0; i < PVID_WEAK_TERMS_Q31; i++) {
+        for (size_t k = 0; k < design->functions; k++) {
+            /*@ assert -largest_sum[i] <= sums[k][i] <= largest_sum[i]; */
+        }
+    }
     (void)pvid_weak_window_drive_q31(&window, design->window);
     for (uint16_t bends = 0; bends < design->window; bends++) { /* one that divides each time */
         window.bends = bends;

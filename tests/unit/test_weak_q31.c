@@ -208,6 +208,39 @@ static void what_a_gap_cuts_off_is_summed_no_further(void **state)
     }
 }
 
+/* A table of which init knows no more than that its entries fit, and whose matrix has no Cholesky factor: a row with nine
+ * entries that come out as 1, whose squares an int64 in Q60 cannot hold. */
+static void a_gram_table_without_a_factor_is_noticed_whatever_it_holds(void **state)
+{
+    (void)state;
+    enum { MANY = 10, TRIANGLE = (MANY * (MANY + 1)) / 2 };
+    static int16_t chi[3 * MANY * WINDOW];
+    static int32_t gram[6 * TRIANGLE];
+    for (int row = 0; row < MANY; row++) {
+        const int start = (row * (row + 1)) / 2;
+        gram[start + row] = (int32_t)1 << 26;
+        for (int j = 0; (row == MANY - 1) && (j < row); j++) {
+            gram[start + j] = (int32_t)1 << 28;
+        }
+    }
+    pvid_weak_design_q31 design = weak_unit_design;
+    design.functions = MANY;
+    design.chi = chi;
+    design.gram = gram;
+    for (int i = 0; i < PVID_WEAK_GRAMS; i++) {
+        design.gram_bits[i] = (int8_t)((i == 0) ? -128 : 127);
+    }
+    config.design = &design;
+    start();
+    plant_state plant = released_plant();
+    bool noticed = false;
+    for (int i = 0; i < FIRST_TICKS + HOP_TICKS; i++) {
+        (void)tick(&identifier, &plant, 0);
+        noticed = noticed || ((i > FIRST_TICKS) && !identifier.finish.whitened);
+    }
+    assert_true(noticed);
+}
+
 static void an_acceleration_beyond_its_range_is_refused(void **state)
 {
     (void)state;
@@ -403,6 +436,7 @@ int main(void)
         cmocka_unit_test_setup(what_lies_beyond_full_scale_restarts_the_windows_and_keeps_the_sums, start_again),
         cmocka_unit_test_setup(a_gap_is_a_sample_beyond_full_scale_without_the_sample, start_again),
         cmocka_unit_test_setup(what_a_gap_cuts_off_is_summed_no_further, start_again),
+        cmocka_unit_test_setup(a_gram_table_without_a_factor_is_noticed_whatever_it_holds, start_again),
         cmocka_unit_test_setup(an_acceleration_beyond_its_range_is_refused, start_again),
         cmocka_unit_test_setup(without_drive_the_start_is_held_and_the_reason_says_so, start_again),
         cmocka_unit_test_setup(laws_and_forgetting_take_their_settings, start_again),

@@ -94,9 +94,9 @@ def factor(packed: Int, functions: int) -> tuple[Int, Int, Int, Int, Mask]:
         for j in range(row):
             total = low[row, j] << 30
             for i in range(j):
-                total = total - low[row, i] * low[j, i]
+                total = clamp(total - low[row, i] * low[j, i], WIDE)
             low[row, j] = cholesky.divide(total, inverse[j], k[j], cholesky.ONE)
-            pivot = pivot - low[row, j] * low[row, j]
+            pivot = np.where(pivot < 0, pivot, pivot - low[row, j] * low[row, j])
         whitened = whitened & (diagonal >= 2**28) & (pivot >= (diagonal << (30 - cholesky.PIVOT_SHIFT)))
         inverse[row], k[row] = reciprocal(square_root(np.where(whitened, pivot, np.int64(1) << 60)))
     return low, inverse, k, exponents, whitened

@@ -1,0 +1,61 @@
+/* What the estimator, the gate and the verdict promise to who calls them, as contracts. */
+#ifndef ESTIMATOR_CONTRACTS_H
+#define ESTIMATOR_CONTRACTS_H
+
+#include "estimator_q31.h"
+#include "pvid/gate_q31.h"
+#include "pvid/trust_q31.h"
+
+/*@ requires \valid(e) && \valid_read(n + (0 .. self->model->n_theta - 1));
+    assigns *e, \result \from \nothing;
+    ensures \result == 0 || \result == 1;
+    ensures \initialized(e) && -0x200000000000 <= *e <= 0x200000000000; */
+bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e);
+
+/*@ requires \valid(self) && \valid_read(n + (0 .. self->model->n_theta - 1));
+    assigns \result \from \nothing;
+    ensures \result == PVID_ACCUMULATED || \result == PVID_REJECTED_SATURATED; */
+pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y);
+
+/*@ requires \valid(self) && \valid(solve);
+    assigns solve->energy \from \nothing;
+    ensures 0 <= solve->energy <= 0x4000000000000000; */
+void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group);
+
+/*@ requires \valid(self) && \valid(solve);
+    assigns \result, solve->reason, solve->size \from \nothing;
+    ensures \result == 0 || \result == 1;
+    ensures 0 <= solve->size && PVID_ACCUMULATED <= solve->reason <= PVID_HELD_PIVOT; */
+bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve);
+
+/*@ requires \valid_read(self) && \valid(solve) && \valid(estimate);
+    assigns solve->informed \from \nothing;
+    ensures solve->informed == 0 || solve->informed == 1; */
+void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                         pvid_estimate_q31 *estimate);
+
+/*@ requires \valid_read(self) && \valid(solve) && \valid(estimate);
+    assigns \result, solve->informed \from \nothing;
+    ensures \result == 0 || \result == 1;
+    ensures solve->informed == 0 || solve->informed == 1; */
+bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                  pvid_estimate_q31 *estimate);
+
+/*@ requires \valid(self) && square.m >= 0;
+    assigns \result \from \nothing;
+    ensures \result == 0 || \result == 1; */
+bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
+
+/*@ requires \valid_read(self);
+    assigns \result \from self;
+    ensures \result == \null || \result == &self->estimate.p[0]; */
+const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self);
+
+/*@ requires \valid(self) && \valid(estimator) && \valid_read(candidate);
+    requires size >= 0 && surplus >= 0;
+    assigns \result \from \nothing;
+    ensures PVID_WARMING_UP <= \result <= PVID_REJECTED_SATURATED; */
+pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
+                                 bool informed, int64_t surplus, const pvid_estimate_q31 *candidate);
+
+#endif
