@@ -60,4 +60,4 @@ def test_a_contract_that_is_not_kept_is_an_alarm(tmp_path: Path) -> None:
     scaled.write_text(text.replace("#define DIGITS 30\n", "#define DIGITS 31\n"), encoding="utf-8")
     done = prove(tmp_path, "scaled_of_q31")
     assert done.returncode == 1
-    assert "function pvid_scaled_of_q31: postcondition got status unknown" in done.stdout
+    assert "function pvid_scaled_of_q31: postcondition got status invalid" in done.stdout
