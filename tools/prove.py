@@ -173,6 +173,26 @@ PROOFS = (
         taken=TAKEN_IN_STAGES,
     ),
     Proof(
+        "strong_q31",
+        "any configuration; any tick on top of any state, whatever the bank's derivatives",
+        ("src/strong_q31.c", "src/gate_q31.c", "src/differentiator_q31.c", *ESTIMATOR),
+        (
+            *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
+            *("-inline-calls", "is_within", "-eva-domains", "equality", "-eva-slevel-function"),
+            "main:50,any_configuration:200,any_tick:200,pvid_strong_init_q31:100,pvid_gate_init_q31:50,row_is_valid:5,"
+            "shifts_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,pvid_kapitza_strong_row_q31:30,"
+            "take:4,take_powers:20,pvid_estimator_terms_q31:4,take_row:20,pvid_differentiator_step_q31:5,"
+            "pvid_gate_passes_q31:5",
+        ),
+        taken=(
+            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_scaled_plus_q31"),
+            *("pvid_scaled_times_q31", "pvid_scaled_over_q31", "pvid_gate_passes_q31"),
+            *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31"),
+            *("pvid_estimator_init_q31", "pvid_estimator_take_row_q31", "pvid_estimator_update_q31"),
+            *("pvid_misfit_init_q31", "pvid_misfit_take_q31", "pvid_misfit_judge_q31"),
+        ),
+    ),
+    Proof(
         "kapitza_physical_q31",
         "any estimate in any scale",
         ("src/kapitza_q31.c", "src/cholesky_q31.c", "src/integer_q31.c"),

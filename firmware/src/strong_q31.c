@@ -12,6 +12,7 @@
 
 #define SHIFT_MAX 62u
 #define DRIVE_TICKS_MAX ((uint32_t)1 << 30)
+#define DRIVE_MAX ((int64_t)PVID_DERIVATIVE_LIMIT_Q31 * PVID_DERIVATIVE_LIMIT_Q31) /* a mean of such squares */
 
 /* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
 #define GATE_MEMORY_PARTS 4u
@@ -162,7 +163,8 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
     if (!accelerations(self, d_y, u)) {
         return refuse(self);
     }
-    self->drive += pvid_times_q31(pvid_product_q31(u[0], u[0]) - self->drive, self->drive_forgetting);
+    const int64_t fresh = pvid_times_q31(pvid_square_q31(u[0]) - self->drive, self->drive_forgetting);
+    self->drive = pvid_clamp_q31(self->drive + fresh, DRIVE_MAX);
     if (self->frozen) {
         return PVID_HELD_FROZEN;
     }

@@ -2,7 +2,7 @@
  * until the ring has come round three times. */
 #include "prove.h"
 
-#include "pvid/differentiator_q31.h"
+#include "strong_contracts.h"
 
 #define FULL_SCALE ((int32_t)1 << 22)
 

@@ -14,7 +14,7 @@ from pvid.twin import kapitza_strong_q31 as model
 from pvid.twin.differentiator_q31 import derivatives
 from pvid.twin.estimator_q31 import EstimatorQ31
 from pvid.twin.gate_q31 import GateQ31
-from pvid.twin.integer_q31 import Int, integers, times_q31
+from pvid.twin.integer_q31 import Int, clamp, integers, times_q31
 from pvid.twin.misfit_q31 import MisfitQ31
 from pvid.twin.scaled_q31 import scaled
 from pvid.twin.weak_q31 import TwinRecordQ31
@@ -66,7 +66,7 @@ class StrongTwinQ31:
         mean_square = integers(0)
         driven = np.zeros(len(u), np.bool_)
         for tick in np.flatnonzero(usable):
-            mean_square = mean_square + times_q31(u[tick] * u[tick] - mean_square, forgetting)
+            mean_square = clamp(mean_square + times_q31(u[tick] * u[tick] - mean_square, forgetting), 1 << 60)
             driven[tick] = mean_square >= threshold
         return driven
 

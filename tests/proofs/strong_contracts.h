@@ -1,0 +1,65 @@
+/* What the parts of the strong form's identifier promise it. */
+#ifndef STRONG_CONTRACTS_H
+#define STRONG_CONTRACTS_H
+
+#include "estimator_q31.h"
+#include "misfit_q31.h"
+#include "pvid/differentiator_q31.h"
+#include "pvid/gate_q31.h"
+
+/* Of what they read but a number is named: a number made of pointers would be none. */
+
+/*@ requires -0x1000000 <= phi <= 0x1000000 && -0x1000000 <= y <= 0x1000000;
+    assigns self->head, self->filled, self->history[0 .. PVID_MAX_WINDOW - 1][0 .. 1] \from phi, y;
+    assigns \result, d_phi[0 .. 4], d_y[0 .. 2] \from phi, y;
+    ensures \result == 0 || \result == 1;
+    ensures \result != 0 ==> \initialized(d_phi + (0 .. 4)) && \initialized(d_y + (0 .. 2));
+    ensures \result != 0 ==> \subset(d_phi[0 .. 4], (-0x40000000 .. 0x40000000));
+    ensures \result != 0 ==> \subset(d_y[0 .. 2], (-0x40000000 .. 0x40000000)); */
+bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, int32_t y, int32_t d_phi[PVID_ORDERS],
+                                  int32_t d_y[PVID_Y_ORDERS_Q31]);
+
+/*@ requires 0 <= square.m <= 0x40000000 && -2000 <= square.e <= 200;
+    requires -0x40000000 <= self->scale.m <= 0x40000000 && -2001 <= self->scale.e <= 72;
+    assigns self->scale, self->judged, self->part \from *self, square;
+    assigns \result \from *self, square;
+    ensures \result == 0 || \result == 1;
+    ensures -0x40000000 <= self->scale.m <= 0x40000000 && -2001 <= self->scale.e <= 72; */
+bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
+
+/*@ assigns \result, *self \from bank->phi_max;
+    ensures 0 <= \result <= 100;
+    ensures \result == 0 || \result >= 1;
+    ensures \result == 0 ==> \initialized(&self->bank.phi_max) && 1 <= self->bank.phi_max <= 0x1000000;
+    ensures \result == 0 ==> \initialized(&self->bank.y_max) && 1 <= self->bank.y_max <= 0x1000000; */
+pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
+
+/*@ assigns \result, *self \from config->row_sd;
+    ensures 0 <= \result <= 100;
+    ensures \result == 0 || \result >= 1;
+    ensures \result == 0 ==> \initialized(&self->information.exponent) && self->information.exponent == 0;
+    ensures \result == 0 ==> \initialized(&self->row_sd) && 1 <= self->row_sd; */
+pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config);
+
+/*@ requires -0x10000000 <= e <= 0x10000000 && 0 <= square <= 0x100000000000000;
+    assigns *self \from n[0 .. 10], e, square; */
+void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
+
+/*@ requires 1 <= drive_ticks <= 0x40000000;
+    assigns *self \from drive_ticks, forgetting_groups; */
+void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups);
+
+/*@ requires 0 <= square <= 0x100000000000000;
+    assigns \result, *self \from *self, square, told;
+    ensures \result == 0 || \result == 1; */
+bool pvid_misfit_take_q31(pvid_misfit_q31 *self, int64_t square, int64_t told);
+
+/*@ assigns \result, *self \from *self;
+    ensures \result == 0 || \result == 1; */
+bool pvid_misfit_judge_q31(pvid_misfit_q31 *self);
+
+/* Any state that prove_estimator_solve_q31.c takes. */
+/*@ assigns \result, *self \from self->row_sd; */
+pvid_reason pvid_estimator_update_q31(pvid_estimator_q31 *self);
+
+#endif
