@@ -114,7 +114,7 @@ PROOFS = (
         ),
         why="what `init` itself finds by sums over the weights, and intervals forget: a weight times the largest "
         "difference fits 32 bits, hence the sum over all weights 55, and the sum that any counts can reach fits a "
-        "derivative. `differentiator_q31` shows it, bank by bank",
+        "derivative. `differentiator_q31` shows it for the bank of five points",
     ),
     Proof(
         "kapitza_q31",

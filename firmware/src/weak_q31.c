@@ -15,6 +15,7 @@
 #define COUNTS_LIMIT ((int32_t)1 << 24)
 #define EXPONENT_LIMIT 200
 #define TERM_LIMIT ((int64_t)1 << 20) /* of what a test function is multiplied with */
+#define MOST_FUNCTIONS ((PVID_MAX_FUNCTIONS < 32) ? PVID_MAX_FUNCTIONS : 32) /* form_of in weak_finish_q31.c */
 
 /* Windows that the gate's scale remembers; it stands relative to what noise explains, below which it never falls. */
 #define GATE_MEMORY 4u
@@ -97,7 +98,7 @@ static pvid_status design_is_valid(const pvid_weak_design_q31 *design)
     if (!pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW)) {
         return PVID_BAD_WINDOW;
     }
-    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
+    if ((design->functions < 4u) || (design->functions > MOST_FUNCTIONS)) {
         return PVID_BAD_FUNCTIONS;
     }
     if (design->lag < 1u) {

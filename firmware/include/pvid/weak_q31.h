@@ -47,7 +47,7 @@ typedef struct {
     uint16_t taps;       /* smoothing window [samples], odd, 5..PVID_MAX_TAPS */
     uint16_t decimation; /* D, 1..PVID_MAX_DECIMATION */
     uint16_t window;     /* W [decimated samples], odd, 9..PVID_MAX_WEAK_WINDOW */
-    uint8_t functions;   /* K, 4..PVID_MAX_FUNCTIONS */
+    uint8_t functions;   /* K, 4..PVID_MAX_FUNCTIONS, 32 at most: their forms are added up in 32 bits */
     uint8_t lag;         /* decimated samples between the three that F'' is taken from for the alarm, 1..255 */
     uint8_t smooth_bits; /* format of smooth */
     uint8_t phi_shift;   /* F = (centre 2^smooth_bits + sum smooth q) 2^-phi_shift */
