@@ -207,6 +207,16 @@ PROOFS = (
         taken=("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31"),
     ),
     Proof(
+        "misfit_q31",
+        "any configuration; any row and verdict on top of sums within 2^1000 (those of a block lie within 2^78)",
+        ("src/misfit_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+        (
+            *("-eva-slevel", "200", "-eva-auto-loop-unroll", "100", "-eva-split-return", "full"),
+            *("-eva-subdivide-non-linear", "4"),
+        ),
+        taken=("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+    ),
+    Proof(
         "trust_q31",
         "any configuration of the three models; any group on top of any state that a group leaves",
         ("src/trust_q31.c", "src/integer_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),

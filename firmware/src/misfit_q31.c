@@ -52,7 +52,7 @@ bool pvid_misfit_take_q31(pvid_misfit_q31 *self, int64_t square, int64_t told)
 {
     const int32_t held = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(told, TOLD_DOWN), TOLD_LIMIT);
     self->few_energy += square;
-    self->few_signal += pvid_product_q31(held, held);
+    self->few_signal += pvid_square_q31(held);
     self->left--;
     if ((self->left % PVID_MISFIT_FEW) == 0u) {
         self->energy = pvid_scaled_plus_q31(self->energy, pvid_scaled_of_q31(self->few_energy, 0));

@@ -88,6 +88,20 @@ static void what_is_not_positive_says_nothing_of_the_first(void **state)
     }
 }
 
+static void what_was_not_eliminated_is_not_read(void **state)
+{
+    (void)state;
+    int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        s[i][i] = (1 << 30) - 1;
+    }
+    s[PVID_MAX_P - 1][PVID_MAX_P - 1] = 0; /* the first to be eliminated */
+    pvid_cholesky_q31 factor;
+    memset(&factor, 0x80, sizeof factor); /* three squares of what stands there overflow an int64: the sanitizers tell */
+    assert_false(pvid_cholesky_factor_q31(&factor, PVID_MAX_P, (const int32_t(*)[PVID_MAX_P])s));
+    assert_int_equal(factor.first_pivot, 0);
+}
+
 static void a_block_keeps_its_largest_entry_in_so_many_bits(void **state)
 {
     (void)state;
@@ -131,6 +145,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solving_returns_what_was_multiplied),
         cmocka_unit_test(what_is_not_positive_says_nothing_of_the_first),
+        cmocka_unit_test(what_was_not_eliminated_is_not_read),
         cmocka_unit_test(a_block_keeps_its_largest_entry_in_so_many_bits),
         cmocka_unit_test(a_scale_ends_at_the_widest),
     };
