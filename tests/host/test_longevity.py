@@ -179,11 +179,15 @@ def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: c
     phi, y = samples(library, scenario, TWIN_TICKS["weak"], ENCODER)
     config = weak_config(rig_of(Lane("weak", 0.0)), RATE_HZ)
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in longevity.WEAK_FORGETTING_S]
-    expected = WeakTwin(config, lanes).run(phi, y)
-    for lane, estimator in enumerate(lanes):
+    try:
+        together = WeakTwin(config, lanes).run(phi, y)
+        expected = [(together, lane) for lane in range(len(lanes))]
+    except PvidError:  # their gates let different windows in: one by one
+        expected = [(WeakTwin(config, [alone]).run(phi, y), 0) for alone in lanes]
+    for estimator, (twin, lane) in zip(lanes, expected, strict=True):
         record = native.weak(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-        theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
-        assert first_difference(record, *theirs, expected.published[:, :, lane]) is None
+        theirs = (twin.p[:, :, lane], twin.sums[:, :, lane], twin.reason[:, lane])
+        assert first_difference(record, *theirs, twin.published[:, :, lane]) is None
 
 
 @pytest.mark.parametrize(

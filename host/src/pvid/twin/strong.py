@@ -155,8 +155,8 @@ def follow_rows(
     ticks = len(y)
     lanes = estimator.p.shape[1]
     reason = np.empty((ticks, lanes), np.uint8)
-    wide_n = np.broadcast_to(n.reshape(ticks, model.N_THETA, -1), (ticks, model.N_THETA, lanes))
-    wide_y = np.broadcast_to(y.reshape(ticks, -1), (ticks, lanes))
+    wide_n = np.broadcast_to(n if n.ndim == 3 else n[:, :, np.newaxis], (ticks, model.N_THETA, lanes))
+    wide_y = np.broadcast_to(y if y.ndim == 2 else y[:, np.newaxis], (ticks, lanes))
     for tick in range(ticks):
         if fate is None or fate[tick] == Reason.ACCUMULATED:
             reason[tick] = estimator.step(wide_n[tick], wide_y[tick], gate, misfit)
