@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -187,6 +188,16 @@ def test_a_patience_that_cannot_be_counted_is_refused() -> None:
     assert gate_config_q31(GateConfig(4.0, 2.0**20), 1024.0).patience_groups == 2**30
     with pytest.raises(PvidError, match=r"outlier_patience_s = 2e\+06 is too long for core q31"):
         strong_config_q31(rig_with(form="strong", stride=8, outlier_gate=4.0, outlier_patience_s=2e6), 1000.0)
+
+
+@pytest.mark.parametrize("form", ["weak", "strong"])
+@pytest.mark.parametrize(("forgetting_s", "sentence"), [(1e-9, "1e-09 is too short"), (1e9, "1e+09 is too long")])
+def test_a_forgetting_that_cannot_be_counted_is_refused_before_the_patience_that_follows_it(
+    form: str, forgetting_s: float, sentence: str
+) -> None:
+    config = {"weak": weak_config_q31, "strong": strong_config_q31}[form]
+    with pytest.raises(PvidError, match=re.escape(f"forgetting_s = {sentence} for core q31")):
+        config(rig_with(form=form, forgetting_s=forgetting_s), 1000.0)
 
 
 @pytest.mark.parametrize("form", ["weak", "strong"])

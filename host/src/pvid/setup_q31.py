@@ -29,6 +29,7 @@ Int64 = npt.NDArray[np.int64]
 ConfigQ31 = WeakConfigQ31 | StrongConfigQ31
 
 PATIENCE_MAX = 2**30  # groups of rows, of gate_q31.h
+FORGETTING_MIN, FORGETTING_MAX = 4, 2**24  # likewise, of estimator_q31.h
 
 
 def format_of(largest: float) -> int:
@@ -170,6 +171,18 @@ def _estimator_q31(
     )
 
 
+def forgetting_groups_q31(forgetting_s: float, groups_hz: float) -> int:
+    """The time constant of forgetting in rows or windows, which come at groups_hz; 0: none."""
+    groups = round(forgetting_s * groups_hz)
+    if forgetting_s > 0 and not FORGETTING_MIN <= groups <= FORGETTING_MAX:
+        wrong = "short" if groups < FORGETTING_MIN else "long"
+        raise PvidError(
+            f"[identifier] forgetting_s = {forgetting_s:g} is too {wrong} for core q31, which forgets within 4 to 2^24 "
+            f"rows or windows ({FORGETTING_MIN / groups_hz:.4g} to {FORGETTING_MAX / groups_hz:.4g} s here); 0 is never"
+        )
+    return groups
+
+
 def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
     """The gate of the float core in integers, for rows or windows that come at groups_hz."""
     patience = gate.patience_s * groups_hz
@@ -196,7 +209,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
         tables.column_bits[: 8 if n_p == 4 else 5],
         tables.column_bits[8],
         tables.f_unit,
-        forgetting_groups=round(e.forgetting_s * windows_hz),
+        forgetting_groups=forgetting_groups_q31(e.forgetting_s, windows_hz),
         gain=0 if e.law is Law.PSEUDOVELOCITY else 2**30,
         correlation=round(tables.overlap * 2**16),
         row_weight=round((functions - 2) / functions * 2**16),
@@ -240,7 +253,7 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
         design.n_bits,
         design.y_bits,
         design.angle_unit / design.dt**8,
-        forgetting_groups=round(e.forgetting_s * sample_rate),
+        forgetting_groups=forgetting_groups_q31(e.forgetting_s, sample_rate),
         gain=0 if e.law is Law.PSEUDOVELOCITY else round(min(gain, 1.0) * 2**30),
         correlation=round(e.correlation * 2**16),
     )
