@@ -4,6 +4,7 @@
 
 #include "differentiator_f32.h"
 #include "finite_f32.h"
+#include "fir_window.h"
 
 const float pvid_five_points_f32[PVID_ORDERS * 2] = {
     0.0f,         0.0f,          /* order 0: the centre itself */
@@ -15,11 +16,9 @@ const float pvid_five_points_f32[PVID_ORDERS * 2] = {
 
 static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
 {
-    if ((bank->half < 2u) || (bank->half > (PVID_MAX_WINDOW - 1u) / 2u)) {
-        return PVID_BAD_HALF;
-    }
-    if ((bank->stride < 1u) || ((2uL * bank->half * bank->stride) + 1uL > PVID_MAX_WINDOW)) {
-        return PVID_BAD_STRIDE;
+    const pvid_status window = pvid_fir_window(bank->half, bank->stride);
+    if (window != PVID_OK) {
+        return window;
     }
     if (bank->weights == NULL) {
         return PVID_BAD_BANK;

@@ -2,6 +2,7 @@
 
 #include <stddef.h>
 
+#include "fir_window.h"
 #include "integer_q31.h"
 
 enum { PHI = 0, Y = 1 };
@@ -74,11 +75,9 @@ static pvid_status channel_is_valid(const pvid_fir_bank_q31 *bank, size_t lowest
 
 static pvid_status bank_is_valid(const pvid_fir_bank_q31 *bank)
 {
-    if ((bank->half < 2u) || (bank->half > ((PVID_MAX_WINDOW - 1u) / 2u))) {
-        return PVID_BAD_HALF;
-    }
-    if ((bank->stride < 1u) || (((2u * (uint64_t)bank->half * bank->stride) + 1u) > PVID_MAX_WINDOW)) {
-        return PVID_BAD_STRIDE;
+    const pvid_status window = pvid_fir_window(bank->half, bank->stride);
+    if (window != PVID_OK) {
+        return window;
     }
     if (bank->weights == NULL) {
         return PVID_BAD_BANK;

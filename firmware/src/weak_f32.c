@@ -36,20 +36,10 @@ static pvid_status design_is_valid(const pvid_weak_design_f32 *design)
     if (design == NULL) {
         return PVID_BAD_DESIGN;
     }
-    if (!pvid_is_odd_within(design->taps, 5, PVID_MAX_TAPS)) {
-        return PVID_BAD_TAPS;
-    }
-    if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
-        return PVID_BAD_DECIMATION;
-    }
-    if (!pvid_is_odd_within(design->window, 9, PVID_MAX_WEAK_WINDOW)) {
-        return PVID_BAD_WINDOW;
-    }
-    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
-        return PVID_BAD_FUNCTIONS;
-    }
-    if (design->lag < 1u) {
-        return PVID_BAD_LAG;
+    const pvid_status sizes = pvid_weak_sizes(design->taps, design->decimation, design->window, design->functions,
+                                              PVID_MAX_FUNCTIONS, design->lag);
+    if (sizes != PVID_OK) {
+        return sizes;
     }
     if (!pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
         return PVID_BAD_OVERLAP;

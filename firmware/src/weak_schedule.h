@@ -10,6 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "pvid/config.h"
+#include "pvid/status.h"
 #include "pvid/weak_job.h"
 
 /* Most stages of a complete window that a tick may take: more than one only where decimation is so low that every
@@ -19,6 +21,25 @@
 static inline bool pvid_is_odd_within(uint16_t n, uint16_t low, uint16_t high)
 {
     return ((n % 2u) == 1u) && (n >= low) && (n <= high);
+}
+
+/* What a design says of its sizes: the status names the first that is out of range. */
+static inline pvid_status pvid_weak_sizes(uint16_t taps, uint16_t decimation, uint16_t window, uint8_t functions,
+                                          uint8_t most_functions, uint8_t lag)
+{
+    if (!pvid_is_odd_within(taps, 5, PVID_MAX_TAPS)) {
+        return PVID_BAD_TAPS;
+    }
+    if ((decimation < 1u) || (decimation > PVID_MAX_DECIMATION)) {
+        return PVID_BAD_DECIMATION;
+    }
+    if (!pvid_is_odd_within(window, 9, PVID_MAX_WEAK_WINDOW)) {
+        return PVID_BAD_WINDOW;
+    }
+    if ((functions < 4u) || (functions > most_functions)) {
+        return PVID_BAD_FUNCTIONS;
+    }
+    return (lag < 1u) ? PVID_BAD_LAG : PVID_OK;
 }
 
 /* Decimated samples from the start of a window to the start of the next. */

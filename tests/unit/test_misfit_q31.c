@@ -1,13 +1,8 @@
 /* The fixed-point strong form's verdict on itself: blocks, what they are held against, what nothing is said of, ends of
  * the range. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 
-#include <cmocka.h>
-
+#include "misfit_cases.h"
 #include "misfit_q31.h"
 #include "pvid/pvid.h"
 #include "scaled_q31.h"
@@ -16,7 +11,7 @@
 
 static pvid_misfit_q31 misfit;
 
-/* A block of rows that are all alike: e and told [UNIT]. */
+/* e and told [UNIT] */
 static bool block(double e, double told)
 {
     const int64_t innovation = (int64_t)(e * UNIT);
@@ -67,61 +62,11 @@ static void the_squares_of_a_block_add_up(void **state)
     assert_int_equal(misfit.few_signal, 0);
 }
 
-static void the_first_block_only_teaches(void **state)
-{
-    (void)state;
-    assert_false(block(1.0, 1.0)); /* q = 1 */
-    assert_true(block(1.0, 1.0));
-}
-
-static void beyond_the_most_is_a_misfit_however_it_was_before(void **state)
-{
-    (void)state;
-    (void)block(0.0632, 1.0); /* q = 0.003994 */
-    assert_false(block(0.0632, 1.0));
-    assert_true(block(0.0633, 1.0));  /* 0.004007 */
-    assert_false(block(0.0632, 1.0)); /* over with the block */
-}
-
-static void three_times_the_quietest_in_both_is_a_misfit(void **state)
-{
-    (void)state;
-    (void)block(0.01, 1.0);
-    assert_false(block(0.01732, 1.0)); /* 2.9998 times */
-    assert_true(block(0.01733, 1.0));  /* 3.003 times */
-    assert_true(block(0.0176, 1.0));   /* the quietest stays the quietest */
-    assert_false(block(0.0176, 1.1));  /* 3.1 times the energy, 2.6 times the part */
-    assert_false(block(0.0170, 0.5));  /* 2.9 times the energy, 11.6 times the part */
-    assert_false(block(0.1, 10.0));    /* a larger drive: the part is the same */
-}
-
-static void a_quieter_block_becomes_the_measure(void **state)
-{
-    (void)state;
-    (void)block(0.05, 1.0);
-    assert_false(block(0.02, 1.0));
-    assert_true(block(0.05, 1.0));
-}
-
-static void below_the_least_nothing_is_a_misfit(void **state)
-{
-    (void)state;
-    (void)block(1.0e-6, 1.0);
-    assert_false(block(4.472e-3, 1.0)); /* q = 1.99988e-5 */
-    assert_true(block(4.473e-3, 1.0));  /* 2.0008e-5 */
-}
-
 static void a_measure_is_forgotten_with_the_sums(void **state)
 {
     (void)state;
     pvid_misfit_init_q31(&misfit, 50, 500); /* 1.1 a block */
-    (void)block(0.01, 1.0);
-    unsigned blocks = 0;
-    while (block(0.02, 1.0)) { /* 4 times */
-        blocks++;
-        assert_true(blocks < 10u);
-    }
-    assert_int_equal(blocks, 4); /* before the fifth it is 1.1^4 = 1.46 times as large: 4 < 3 * 1.46 */
+    grows_by_a_tenth_a_block();
     pvid_misfit_init_q31(&misfit, 50, 4);
     assert_int_equal(pvid_scaled_fixed_q31(misfit.growth, 20), 2 << 20);
     pvid_misfit_init_q31(&misfit, 50, 0);
@@ -161,16 +106,6 @@ static void the_largest_rows_do_not_overflow(void **state)
     assert_false(pvid_misfit_judge_q31(&misfit));
 }
 
-static void where_nothing_moves_nothing_is_said(void **state)
-{
-    (void)state;
-    assert_false(block(0.0, 0.0));
-    assert_false(block(1.0, 0.0));
-    assert_false(block(0.01, 1.0)); /* still the first that teaches */
-    assert_false(block(0.0, 0.0));
-    assert_false(block(0.01, 0.4)); /* the quietest is not silence: 1 times the energy */
-}
-
 /* What the strong form tells of a row: every term as often as w is a factor of it. */
 static void a_term_counts_by_its_power_of_w(void **state)
 {
@@ -188,15 +123,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_block_is_four_seconds_of_rows, start_again),
         cmocka_unit_test_setup(the_squares_of_a_block_add_up, start_again),
-        cmocka_unit_test_setup(the_first_block_only_teaches, start_again),
-        cmocka_unit_test_setup(beyond_the_most_is_a_misfit_however_it_was_before, start_again),
-        cmocka_unit_test_setup(three_times_the_quietest_in_both_is_a_misfit, start_again),
-        cmocka_unit_test_setup(a_quieter_block_becomes_the_measure, start_again),
-        cmocka_unit_test_setup(below_the_least_nothing_is_a_misfit, start_again),
         cmocka_unit_test_setup(a_measure_is_forgotten_with_the_sums, start_again),
         cmocka_unit_test_setup(what_grows_stays_within_the_range, start_again),
         cmocka_unit_test_setup(the_largest_rows_do_not_overflow, start_again),
-        cmocka_unit_test_setup(where_nothing_moves_nothing_is_said, start_again),
+        MISFIT_CASES,
         cmocka_unit_test(a_term_counts_by_its_power_of_w),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
