@@ -19,7 +19,6 @@ import argparse
 import fnmatch
 import hashlib
 import re
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -27,7 +26,7 @@ from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from units import FIRMWARE, PORTS, ROOT, Unit, applications, core, ports
+from units import FIRMWARE, PORTS, ROOT, Unit, applications, chosen, core, demand, ports, take_files
 
 DEVIATIONS = ROOT / "firmware" / "analysis.toml"
 PAGE = ROOT / "firmware" / "MISRA.md"
@@ -164,13 +163,13 @@ def cppcheck(alike: list[Unit]) -> set[Finding]:
     }
 
 
-def all_findings(chosen: list[Unit]) -> list[Finding]:
+def all_findings(among: list[Unit]) -> list[Finding]:
     groups: dict[tuple[str, ...], list[Unit]] = defaultdict(list)
-    for unit in chosen:
+    for unit in among:
         groups[unit.options].append(unit)
     with ThreadPoolExecutor(2) as pool:
         jobs = [pool.submit(cppcheck, alike) for alike in sorted(groups.values(), key=len, reverse=True)]
-        jobs += [pool.submit(tool, unit) for tool in (clang_tidy, gcc) for unit in chosen]
+        jobs += [pool.submit(tool, unit) for tool in (clang_tidy, gcc) for unit in among]
         return sorted(set().union(*(job.result() for job in jobs)))
 
 
@@ -243,20 +242,15 @@ def natural(rule: str) -> tuple[float, float, str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--update", action="store_true", help="write firmware/MISRA.md")
-    parser.add_argument(
-        "files", nargs="*", metavar="FILE", help="from the top of the repository; all, if none is named"
-    )
+    take_files(parser)
     given = parser.parse_args()
     update, files = given.update, set(given.files)
-    chosen = [unit for unit in units() if not files or str(unit.source.relative_to(ROOT)) in files]
-    unknown = files - {str(unit.source.relative_to(ROOT)) for unit in chosen}
-    if unknown or (update and files):
-        parser.error(f"no source is {', '.join(sorted(unknown))}" if unknown else "--update is for all of them")
-    missing = [package for tool, package in PACKAGES.items() if shutil.which(tool) is None]
-    if missing:
-        raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")
+    if update and files:
+        parser.error("--update is for all of them")
+    among = chosen(units(), files, parser)
+    demand(PACKAGES)
 
-    findings = all_findings(chosen)
+    findings = all_findings(among)
     known = deviations()
     faults = [str(finding) for finding in findings if not any(entry.covers(finding) for entry in known)]
     counted = [(entry, sum(entry.covers(finding) for finding in findings)) for entry in known]

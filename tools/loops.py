@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -28,7 +27,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 
-from units import ROOT, Unit, everything
+from units import ROOT, Unit, chosen, demand, everything, take_files
 
 LISTED = ROOT / "tests" / "loops.toml"
 COMPILE = "-O1 -g -fno-finite-loops -fno-discard-value-names -Xclang -disable-llvm-passes -S -emit-llvm -o -".split()
@@ -117,9 +116,8 @@ def run(command: list[str], stdin: str = "") -> subprocess.CompletedProcess[str]
 
 def functions(code: str) -> dict[str, str]:
     """Bodies by name, first line and all."""
-    bodies = re.findall(r"^define [^\n]*?@([\w.$]+)\([^\n]*\n(?:.*\n)*?\}$", code, re.MULTILINE)
-    starts = re.finditer(r"^define .*?^\}$", code, re.MULTILINE | re.DOTALL)
-    return dict(zip(bodies, (match[0] for match in starts), strict=True))
+    found = re.finditer(r"^define [^\n]*?@([\w.$]+)\(.*?^\}$", code, re.MULTILINE | re.DOTALL)
+    return {match[1]: match[0] for match in found}
 
 
 def bounded(said: str) -> dict[str, dict[str, bool]]:
@@ -150,8 +148,9 @@ def place_of(body: str, head: str, debug: Debug, written: set[tuple[Loop, Loop]]
     return None
 
 
-def shape_of(result: str, arguments: str) -> str:
-    """The type of a function's result and the number of its arguments."""
+def shape_of(before: str, arguments: str) -> str:
+    """The type of a function's result, which ends what stands before its name, and the number of its arguments."""
+    result = re.sub(r"\b(addrspace\(\d+\)|\w+\(\d*\))", "", before).strip()
     depth, commas = 0, 0
     for character in arguments:
         depth += character in "([{<"
@@ -181,8 +180,7 @@ def read_calls(code: str, bodies: dict[str, str], file: str, found: Found) -> No
 
     shape: dict[str, str] = {}
     for match in re.finditer(r"^(?:define|declare) (.*?)@([\w.$]+)(\(.*)$", code, re.MULTILINE):
-        result = re.sub(r"\b(addrspace\(\d+\)|\w+\(\d*\))", "", match[1]).strip()
-        shape[match[2]] = shape_of(result, inside_parentheses(match[3]))
+        shape[match[2]] = shape_of(match[1], inside_parentheses(match[3]))
     outside = re.sub(r"^(?:define|declare) .*$|^![^\n]*$|^attributes .*$", "", code, flags=re.MULTILINE)
     for name, body in bodies.items():
         found.calls.setdefault(named(name), set())
@@ -195,9 +193,8 @@ def read_calls(code: str, bodies: dict[str, str], file: str, found: Found) -> No
                 if not target[2].startswith("llvm."):
                     found.calls[named(name)].add(named(target[2]))
             else:
-                result = re.sub(r"\b(addrspace\(\d+\)|\w+\(\d*\))", "", call[1][: target.start()]).strip()
                 arguments = inside_parentheses(call[1][target.end() - 1 :])
-                found.calls[named(name)].add(f"*{shape_of(result, arguments)}")
+                found.calls[named(name)].add(f"*{shape_of(call[1][: target.start()], arguments)}")
     for match in re.finditer(r"(call [^\n]*?)?@([\w.$]+)(\()?", outside):
         if match[2] in shape and not match[2].startswith("llvm.") and not (match[1] and match[3]):
             found.shapes[named(match[2])] = shape[match[2]]
@@ -253,17 +250,10 @@ def cycles(all_found: list[Found]) -> list[str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "files", nargs="*", metavar="FILE", help="from the top of the repository; all, if none is named"
-    )
-    chosen = parser.parse_args().files
-    missing = [package for tool, package in {"clang": "clang", "opt": "llvm"}.items() if shutil.which(tool) is None]
-    if missing:
-        raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")
-    units = [unit for unit in everything() if not chosen or str(unit.source.relative_to(ROOT)) in chosen]
-    unknown = set(chosen) - {str(unit.source.relative_to(ROOT)) for unit in units}
-    if unknown:
-        parser.error(f"no source of firmware/ is {', '.join(sorted(unknown))}")
+    take_files(parser)
+    files = set(parser.parse_args().files)
+    demand({"clang": "clang", "opt": "llvm"})
+    units = chosen(everything(), files, parser)
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(read, units))
     with LISTED.open("rb") as file:
@@ -278,7 +268,7 @@ def main() -> int:
     faults += [
         f"{LISTED.name}: {entry.file} `{entry.line}` covers no loop that is open; take it out"
         for entry in listed
-        if not chosen and not any(entry.covers(loop) for loop in unproved)
+        if not files and not any(entry.covers(loop) for loop in unproved)
     ]
     machines = {unit.machine for unit in units}
     for machine in sorted(machines):

@@ -58,16 +58,23 @@ ESTIMATOR = (
     *("src/estimator_assess_q31.c", "src/information_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
     *("src/cholesky_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
 )
-IN_STAGES = (  # paths are kept apart where the factor is positive and where it is not
-    *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
-    "-eva-slevel-function",
-    "main:200,asks_for_noise:5,eliminate_part:30,inform_stage:30,factor_stage:60,look:60,solve_stage:30,"
-    "pvid_estimator_advance_q31:100,pvid_estimator_assess_on_q31:100,kappa_stage:60,widen_stage:60,"
-    "pvid_estimator_invert_q31:20,pvid_cholesky_eliminate_q31:20",
-)
+
+
+def in_stages(program: str) -> tuple[str, ...]:
+    """Options for stages: paths are kept apart where the factor is positive and where it is not."""
+    return (
+        *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
+        "-eva-slevel-function",
+        "main:200,asks_for_noise:5,eliminate_part:30,inform_stage:30,factor_stage:60,look:60,solve_stage:30,"
+        "pvid_estimator_advance_q31:100,pvid_estimator_assess_on_q31:100,kappa_stage:60,widen_stage:60,"
+        f"pvid_estimator_invert_q31:20,pvid_cholesky_eliminate_q31:20,{program}:5000",
+    )
+
+
+SCALED = ("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31")
 TAKEN_IN_STAGES = (
     *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_root_of_q31", "pvid_half_exponent_q31", "pvid_to_block_q31"),
-    *("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+    *SCALED,
     *("pvid_cholesky_eliminate_q31", "pvid_cholesky_least_pivot_q31", "pvid_cholesky_lower_q31"),
     "pvid_cholesky_solve_q31",
 )
@@ -162,14 +169,14 @@ PROOFS = (
         "estimator_solve_q31",
         "every stage of a solve from any state of the three models, which leaves such a state",
         ESTIMATOR,
-        (*IN_STAGES[:-1], f"{IN_STAGES[-1]},any_solve:5000"),
+        in_stages("any_solve"),
         taken=TAKEN_IN_STAGES,
     ),
     Proof(
         "estimator_assess_q31",
         "every stage of an assessment of any such state",
         ESTIMATOR,
-        (*IN_STAGES[:-1], f"{IN_STAGES[-1]},any_assessment:5000"),
+        in_stages("any_assessment"),
         taken=TAKEN_IN_STAGES,
     ),
     Proof(
@@ -185,8 +192,7 @@ PROOFS = (
             "pvid_gate_passes_q31:5",
         ),
         taken=(
-            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_scaled_plus_q31"),
-            *("pvid_scaled_times_q31", "pvid_scaled_over_q31", "pvid_gate_passes_q31"),
+            *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
             *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31"),
             *("pvid_estimator_init_q31", "pvid_estimator_take_row_q31", "pvid_estimator_update_q31"),
             *("pvid_misfit_init_q31", "pvid_misfit_take_q31", "pvid_misfit_judge_q31"),
@@ -204,7 +210,7 @@ PROOFS = (
         "any configuration and floor; any residual on top of any scale that a residual leaves",
         ("src/gate_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
         ("-eva-slevel", "100", "-eva-split-return", "full"),
-        taken=("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+        taken=SCALED,
     ),
     Proof(
         "misfit_q31",
@@ -214,7 +220,7 @@ PROOFS = (
             *("-eva-slevel", "200", "-eva-auto-loop-unroll", "100", "-eva-split-return", "full"),
             *("-eva-subdivide-non-linear", "4"),
         ),
-        taken=("pvid_scaled_of_q31", "pvid_scaled_plus_q31", "pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+        taken=SCALED,
     ),
     Proof(
         "trust_q31",
@@ -261,8 +267,7 @@ PROOFS = (
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
-            *("pvid_to_block_q31", "pvid_half_exponent_q31", "pvid_scaled_of_q31", "pvid_scaled_plus_q31"),
-            *("pvid_scaled_times_q31", "pvid_scaled_over_q31"),
+            *("pvid_to_block_q31", "pvid_half_exponent_q31", *SCALED),
             *("pvid_estimator_innovation_q31", "pvid_estimator_add_q31", "pvid_estimator_begin_q31"),
             *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_on_q31"),
             *("pvid_gate_passes_q31", "pvid_trust_refuge_q31", "pvid_trust_judge_q31"),
@@ -399,11 +404,10 @@ def main() -> int:
     unknown = set(names) - {proof.name for proof in chosen}
     if unknown:
         parser.error(f"no proof is called {', '.join(sorted(unknown))}")
-    if shutil.which("frama-c") is None:
-        raise SystemExit("missing: frama-c-base (Debian's name); ./tools/test installs it")
-    for tool in ("why3", "z3"):
-        if shutil.which(tool) is None:
-            raise SystemExit(f"missing: {tool} (Debian's name, too); ./tools/test installs it")
+    packages = {"frama-c": "frama-c-base", "why3": "why3", "z3": "z3"}
+    missing = [package for tool, package in packages.items() if shutil.which(tool) is None]
+    if missing:
+        raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")
     with ThreadPoolExecutor(2) as pool:
         results = list(zip(chosen, pool.map(prove, chosen), strict=True))
     for proof, result in results:

@@ -7,7 +7,10 @@ a rig: tests/analysis has headers that stand for those which `pvid.stream_image`
 
 from __future__ import annotations
 
+import argparse
 import re
+import shutil
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,3 +108,28 @@ def everything() -> list[Unit]:
     """Every source for every machine."""
     machines = ("host", "cortex_m", "avr")
     return [unit for machine in machines for unit in core(machine) + applications(machine)] + ports()
+
+
+# ---- what the tools share on their command lines ----
+
+
+def take_files(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "files", nargs="*", metavar="FILE", help="from the top of the repository; all, if none is named"
+    )
+
+
+def chosen(units: Iterable[Unit], files: set[str], parser: argparse.ArgumentParser) -> list[Unit]:
+    """Those of these files, or all; ends the program where there is no such source."""
+    among = [unit for unit in units if not files or str(unit.source.relative_to(ROOT)) in files]
+    unknown = files - {str(unit.source.relative_to(ROOT)) for unit in among}
+    if unknown:
+        parser.error(f"no source of firmware/ is {', '.join(sorted(unknown))}")
+    return among
+
+
+def demand(packages: Mapping[str, str]) -> None:
+    """Ends the program where a tool is not there; packages: by the tool's name, Debian's."""
+    missing = [package for tool, package in packages.items() if shutil.which(tool) is None]
+    if missing:
+        raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")

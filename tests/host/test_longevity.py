@@ -379,7 +379,7 @@ def kept_outcomes(disturbance: Disturbance, columns: Sequence[str], ticks: int) 
         if column == "peers":
             lanes["RLS, 0.1 s"] |= {"ticks": ticks // 2}
         task = longevity_tables.Task(disturbance, column, ticks)
-        longevity_tables.keep(task.key, column, ticks, task.made_with, {"lanes": lanes})
+        longevity_tables.keep(task.disturbance.title, column, ticks, task.made_with, {"lanes": lanes})
 
 
 def test_the_tables_say_what_is_silent(results: Path) -> None:

@@ -16,48 +16,44 @@ def prove(top: Path, name: str = "link") -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def copy_link(tmp_path: Path) -> None:
-    for name in ("firmware/include", "firmware/link", "tests/proofs"):
-        shutil.copytree(ROOT / name, tmp_path / name)
-    for name in ("tools/prove.py", "firmware/src/crc32.c"):
-        (tmp_path / name).parent.mkdir(parents=True)
-        shutil.copy(ROOT / name, tmp_path / name)
+def copy(top: Path, *names: str) -> None:
+    """These files and folders of the repository, what proves them, and the contracts."""
+    for name in ("firmware/include", "tests/proofs", "tools/prove.py", *names):
+        (top / name).parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, top / name)
+        else:
+            shutil.copy(ROOT / name, top / name)
+
+
+def change(place: Path, old: str, new: str) -> None:
+    text = place.read_text(encoding="utf-8")
+    assert old in text
+    place.write_text(text.replace(old, new), encoding="utf-8")
 
 
 def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
-    copy_link(tmp_path)
+    copy(tmp_path, "firmware/link", "firmware/src/crc32.c")
     assert prove(tmp_path).returncode == 0
     link = tmp_path / "firmware" / "link" / "link.c"
-    text = link.read_text(encoding="utf-8")
-    assert "if (self->filled == sizeof self->raw) {" in text
-    text = text.replace("if (self->filled == sizeof self->raw) {", "if (self->filled > sizeof self->raw) {")
-    link.write_text(text, encoding="utf-8")
+    change(link, "if (self->filled == sizeof self->raw) {", "if (self->filled > sizeof self->raw) {")
     done = prove(tmp_path)
     assert done.returncode == 1
     assert "link.c" in done.stdout and "out of bounds index" in done.stdout
 
 
 def test_room_that_is_a_byte_short_is_not_proved(tmp_path: Path) -> None:
-    copy_link(tmp_path)
-    header = tmp_path / "firmware" / "link" / "link.h"
-    text = header.read_text(encoding="utf-8")
-    assert "(PVID_LINK_RAW_BYTES(n) / 254u) + 2u)" in text
-    text = text.replace("(PVID_LINK_RAW_BYTES(n) / 254u) + 2u)", "(PVID_LINK_RAW_BYTES(n) / 254u) + 1u)")
-    header.write_text(text, encoding="utf-8")
+    copy(tmp_path, "firmware/link", "firmware/src/crc32.c")
+    room = "(PVID_LINK_RAW_BYTES(n) / 254u) + "
+    change(tmp_path / "firmware" / "link" / "link.h", f"{room}2u)", f"{room}1u)")
     done = prove(tmp_path, "encoder")
     assert done.returncode == 1
     assert "Goal typed_pvid_link_encode_call_stuff" in done.stdout
 
 
 def test_a_contract_that_is_not_kept_is_an_alarm(tmp_path: Path) -> None:
-    for name in ("firmware/include", "firmware/src", "tests/proofs"):
-        shutil.copytree(ROOT / name, tmp_path / name)
-    (tmp_path / "tools").mkdir()
-    shutil.copy(ROOT / "tools" / "prove.py", tmp_path / "tools")
-    scaled = tmp_path / "firmware" / "src" / "scaled_q31.c"
-    text = scaled.read_text(encoding="utf-8")
-    assert "#define DIGITS 30\n" in text
-    scaled.write_text(text.replace("#define DIGITS 30\n", "#define DIGITS 31\n"), encoding="utf-8")
+    copy(tmp_path, "firmware/src")
+    change(tmp_path / "firmware" / "src" / "scaled_q31.c", "#define DIGITS 30\n", "#define DIGITS 31\n")
     done = prove(tmp_path, "scaled_of_q31")
     assert done.returncode == 1
     assert "function pvid_scaled_of_q31: postcondition got status invalid" in done.stdout

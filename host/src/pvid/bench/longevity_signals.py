@@ -60,6 +60,11 @@ class Disturbance:
     drive: tuple[Tone, ...] = STANDARD_DRIVE
     seed: int = 1
 
+    @property
+    def title(self) -> str:
+        """As the tables name it; no two have the same."""
+        return f"{self.kind}: {self.meaning}"
+
 
 def _named(*disturbances: Disturbance) -> dict[str, Disturbance]:
     return {one.kind: one for one in disturbances}

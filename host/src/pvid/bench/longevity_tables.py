@@ -103,18 +103,13 @@ class Task:
     ticks: int
 
     @property
-    def key(self) -> str:
-        """By which its result is kept."""
-        return f"{self.disturbance.kind}: {self.disturbance.meaning}"
-
-    @property
     def made_with(self) -> str:
         """What its result depends on."""
         return measured_with(_core_of(self.column), self.disturbance, COLUMNS[self.column])
 
     def stored(self) -> dict[str, Any] | None:
         """Its result, where there is one."""
-        return load(self.key, self.column, self.ticks, self.made_with)
+        return load(self.disturbance.title, self.column, self.ticks, self.made_with)
 
 
 def tasks_of(disturbances: Iterable[Disturbance], columns: Iterable[str], ticks: int) -> list[Task]:
@@ -142,7 +137,7 @@ def run_missing(tasks: Sequence[Task], folder: Path, processes: int, progress: C
         work = {pool.submit(_measure_alone, folder / LIBRARY, task): task for task in missing}
         for number, done in enumerate(as_completed(work), start=1):
             task = work[done]
-            keep(task.key, task.column, task.ticks, task.made_with, done.result())
+            keep(task.disturbance.title, task.column, task.ticks, task.made_with, done.result())
             progress(there + number)
 
 
@@ -173,7 +168,7 @@ def tables(ticks: int = 0) -> Iterator[Table]:
                 continue
             done = stored["ticks"]
             cells = [_cell(lane, Outcome(**stored["lanes"][lane.label]), done) for lane in lanes]
-            rows.append((task.key, f"{done:.0e}".replace("e+0", "e"), *cells))
+            rows.append((one.title, f"{done:.0e}".replace("e+0", "e"), *cells))
         yield f"longevity-{column}", ("disturbance", "ticks", *(lane.label for lane in lanes)), rows
 
 
@@ -205,7 +200,7 @@ def held_out_table(ticks: int = HELD_OUT_TICKS) -> Table:
                 for label, one in outcomes.items()
                 if _fate(one) in ("silent", "broken")
             ]
-        rows.append((f"{disturbance.kind}: {disturbance.meaning}", *cells, "; ".join(wrong)))
+        rows.append((disturbance.title, *cells, "; ".join(wrong)))
     sums = ["/".join(str(total[column, fate]) for fate in ("right", "told", "silent")) for column in OURS]
     rows.append(("**all**", *sums, ""))
     return "longevity-held-out", ("disturbance", *(column.replace("-", " ") for column in OURS), "silent"), rows

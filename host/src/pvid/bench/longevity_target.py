@@ -112,7 +112,7 @@ class OnBoard:
         )
         return (
             self.board,
-            f"{self.scenario}: {SCENARIOS[self.scenario].meaning}",
+            SCENARIOS[self.scenario].title,
             f"{self.form}, {self.core}",
             str(self.ticks),
             str(self.compared),
@@ -161,7 +161,7 @@ def run_missing_on(
     library, native = build_library(folder), Native()
     rows = []
     for number, (scenario, form, core) in enumerate(among, start=1):
-        name, key = f"{form}, {core} on {board.name}", f"{scenario}: {SCENARIOS[scenario].meaning}"
+        name, key = f"{form}, {core} on {board.name}", SCENARIOS[scenario].title
         made_with = measured_with(core, SCENARIOS[scenario])
         asked = ticks // SLOW if (form, core) == ("strong", "q31") else ticks
         stored = load(key, name, asked, made_with)
