@@ -16,7 +16,7 @@
 
 /* Most stages of a complete window that a tick may take: more than one only where decimation is so low that every
  * tick has two windows to fill as well. */
-#define PVID_STAGES_TOGETHER 4u
+#define PVID_STAGES_TOGETHER 32u
 
 static inline bool pvid_is_odd_within(uint16_t n, uint16_t low, uint16_t high)
 {

@@ -16,6 +16,7 @@ from pvid.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31,
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, config_of, weak_design_of
 from pvid.setup_q31 import config_for_run, counts_of, covariance_of, p_of
+from pvid.survey import fitted
 from pvid.weak_oracle import WeakSettings, identify_weak
 
 Float = npt.NDArray[np.float64]
@@ -149,7 +150,7 @@ def identify(
     native
         The C core, used by cores "f32" and "q31".
     start
-        p = (w, d1, d2) to start from; the rig file's nominal by default.
+        p = (w, d1, d2) to start from; by default what the run's survey finds (pvid.survey).
     points
         Number of points of the trajectory.
 
@@ -158,6 +159,8 @@ def identify(
     PvidError
         When the run is shorter than the window, or the settings do not fit the core.
     """
+    if start is None:
+        rig = fitted(rig, run)
     config = config_of(rig, run.sample_rate, start)
     needed = _ticks_needed(config)
     if len(run.t) < needed:

@@ -29,8 +29,8 @@ Law = Literal["stationary", "pseudovelocity"]
 Core = Literal["f32", "q31", "f64"]
 Differentiator = Literal["savitzky-golay", "finite-difference"]
 
-# The weak form wants about one slow period; the strong form is least wrong here with degree 12 and 20 bits.
-_WINDOW_S: dict[Form, float] = {"weak": 1.25, "strong": 0.241}
+# The strong form is least wrong with degree 12 and 20 bits on a window this long.
+_STRONG_WINDOW_S = 0.241
 
 # What the gate keeps out where the file does not say [times the usual]: windows are alike, rows follow the motion.
 _GATE: dict[Form, float] = {"weak": 4.0, "strong": 6.0}
@@ -101,18 +101,22 @@ class Identifier:
     form : "weak" (integrals, for real encoders) or "strong" (the paper's derivatives, for 20 bits and more)
     law : "stationary" (with feedback, converges) or "pseudovelocity" (the paper's equation (5), literally)
     core : "f32", "q31" (fixed point) or "f64" (the oracle)
-    window_s : window of the weak form or of the differentiator [s]; 0: the form's own, see `window`
+    window_s : window of the weak form or of the differentiator [s]; 0: 1.3 slow periods of the nominal pendulum (weak
+        form), 0.241 s (strong form)
     differentiator : of the strong form
     degree : of its Savitzky-Golay polynomial
     stride : samples between the differentiator's points
-    test_functions : of the weak form, per window
-    decimation : of the weak form, samples in per sample used; 0: what comes nearest to 125 Hz
-    smoothing_s : of the weak form, length of the smoothing filter before decimation [s]; 0: 0.071 s
+    test_functions : of the weak form, per window; 0: up to 1.5 times the nominal fast mode, 8 to 16
+    decimation : of the weak form, samples in per sample used; 0: what leaves about 200 a window
+    smoothing_s : of the weak form, length of the filters before decimation [s]; 0: the shortest that serve
+    pass_hz : of the weak form, up to which frequency these filters leave the motion as it is [Hz]; 0: 4.5 times the
+        nominal fast mode
     forgetting_s : time constant of forgetting [s]; 0: nothing is forgotten
     feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at
         every solve
     divider : ticks (strong form) or windows (weak form) a solve
-    full_angle : correct the weak form for sines and cosines
+    survey : identify a recorded run from what the whole of it says of p (start and design), not from the nominal
+    full_angle : correct the weak form for sines and cosines; float32 only
     damping : two regressors more, for viscous friction
     zero : the encoder's zero is unknown, a fourth parameter of the weak form
     kappa_min : hold the estimate while less than this part of w's information is its own
@@ -130,13 +134,15 @@ class Identifier:
     differentiator: Differentiator = _choice("savitzky-golay", Differentiator)
     degree: int = _number(12, "", 4, 12)
     stride: int = _number(1, "samples", 1, 65535)
-    test_functions: int = _number(12, "", 4, 16)
-    decimation: int = _number(0, "samples", 0, 32)
+    test_functions: int = _number(0, "", 0, 16)
+    decimation: int = _number(0, "samples", 0, 64)
     smoothing_s: float = _number(0.0, "s", 0.0, 1e6)
+    pass_hz: float = _number(0.0, "Hz", 0.0, 1e6)
     forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
     feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)
     divider: int = _number(1, "", 1, 65535)
-    full_angle: bool = False
+    survey: bool = True
+    full_angle: bool = True
     damping: bool = False
     zero: bool = True
     kappa_min: float = _number(1e-5, "", 0.0, 0.999)
@@ -148,9 +154,9 @@ class Identifier:
         _check_fields(self, "[identifier] ")
 
     @property
-    def window(self) -> float:
-        """Length of the window [s]: window_s, or the form's own length when that is 0."""
-        return self.window_s if self.window_s > 0.0 else _WINDOW_S[self.form]
+    def strong_window_s(self) -> float:
+        """Length of the differentiator's window [s]."""
+        return self.window_s if self.window_s > 0.0 else _STRONG_WINDOW_S
 
     @property
     def gate(self) -> float:

@@ -12,6 +12,7 @@ from pvid.native import MAX_WINDOW, EstimatorConfig, GateConfig, Law, StrongConf
 from pvid.rigfile import RigFile
 from pvid.weak_design import WeakDesign, design
 from pvid.weak_oracle import VALID_ANGLE
+from pvid.weak_sizing import Sizes
 
 # The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
 START_RELATIVE_SD = 0.5
@@ -34,7 +35,7 @@ def bank_of(rig: RigFile, sample_rate: float) -> FirBank:
     if settings.differentiator == "finite-difference":
         bank = finite_difference(settings.stride)
     else:
-        points = max(round(settings.window * sample_rate / settings.stride), settings.degree + 1)
+        points = max(round(settings.strong_window_s * sample_rate / settings.stride), settings.degree + 1)
         bank = savitzky_golay(points | 1, settings.degree, settings.stride)
     if bank.window > MAX_WINDOW:
         raise PvidError(
@@ -118,25 +119,26 @@ WEAK_KAPPA_MIN = 5e-6
 def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
     """The tables a rig file asks for at `sample_rate` [Hz], whitened at its nominal p."""
     settings = rig.identifier
-    return design(
-        rig.l1,
-        sample_rate,
-        nominal_start(rig),
-        window_s=settings.window,
-        functions=settings.test_functions,
+    sizes = Sizes(
+        window_s=settings.window_s or None,
+        functions=settings.test_functions or None,
         decimation=settings.decimation or None,
         taps=round(min(settings.smoothing_s * sample_rate, 1e9)) | 1 if settings.smoothing_s > 0 else None,
+        pass_hz=settings.pass_hz or None,
     )
+    return design(rig.l1, sample_rate, nominal_start(rig), sizes)
 
 
-def weak_drive_threshold(rig: RigFile, second: npt.NDArray[np.float64], sample_rate: float) -> float:
-    """Rms of u [1/s^2] below which a window counts as undriven: ten times the noise of a still pivot's u.
+# A window counts as driven when the rms of u exceeds the noise of a still pivot's so many times: in all, and in the
+# rows' band, where noise passes for drive and draws the estimate towards less of it (a hundredth of its variance).
+_STILL = 1.3
+_STILL_IN_BAND = 10.0
 
-    `second` is the folded second derivative of the front end, `WeakDesign.second`.
-    """
-    white_gain = np.sqrt(2 * np.sum(second**2) + 4 * np.sum(second) ** 2)
-    noise = NOISE_LSB * rig.sensor.y_lsb * white_gain * sample_rate**2 / rig.l1
-    return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
+
+def weak_drive_threshold(rig: RigFile, tables: WeakDesign) -> float:
+    """Rms of u [1/s^2] below which a window counts as undriven."""
+    whole, band = tables.drive_noise(NOISE_LSB * rig.sensor.y_lsb)
+    return float(max(np.hypot(_STILL * whole, _STILL_IN_BAND * band), 1e-3 * nominal_start(rig)[0]))
 
 
 def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfig:
@@ -163,7 +165,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
         full_angle=settings.full_angle,
         friction=settings.damping,
         angle_limit=VALID_ANGLE if settings.full_angle else 0.0,
-        drive_min=weak_drive_threshold(rig, tables.second, sample_rate),
+        drive_min=weak_drive_threshold(rig, tables),
         pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
         trust=TrustConfig(misfit_max=CORRECTED_MISFIT) if corrected else TrustConfig(),
         gate=gate_config(rig),

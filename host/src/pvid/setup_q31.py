@@ -105,8 +105,8 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
     if rig.identifier.form == "strong":
         strong = strong_config_q31(rig, run.sample_rate, start)
         return replace(strong, y_offset=_first(counts_of(rig, run)[1], strong.design.bank.y_max // 2))
-    if rig.identifier.full_angle or rig.identifier.damping:
-        raise PvidError("core q31 has neither full_angle nor damping: use --core f32")
+    if rig.identifier.damping:
+        raise PvidError("core q31 has no damping: use --core f32")
     config = weak_config_q31(rig, run.sample_rate, start)
     phi, y = counts_of(rig, run)
     design = config.design

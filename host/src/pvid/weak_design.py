@@ -22,21 +22,18 @@ import numpy.typing as npt
 from numpy.polynomial import legendre
 
 from pvid.ctables import float_array, float_literal
-from pvid.differentiation import savitzky_golay
 from pvid.errors import PvidError
+from pvid.weak_sizing import HOST, Bounds, Sizes, modes_hz, sized
 
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
 
-# Measured on the standard rig: 125 Hz and 71 ms lose nothing against 1 kHz at 14 bits.
-_DECIMATED_RATE_HZ = 125.0
-_SMOOTHING_S = 0.071
 # chi'''' must vanish at the window's ends, where the core reads no table: it has a factor
 # (1 - x^2)^(exponent - 4).
 _MIN_EXPONENT = 5
 _MAX_EXPONENT = 12
-# Below this the equilibrated Gram matrix's smallest eigenvalue leaves float32 no digits for re-whitening.
-_MIN_EIGENVALUE = 1e-5
+# Below this the equilibrated Gram matrix's smallest eigenvalue leaves float64 no digits for the whitening.
+_MIN_EIGENVALUE = 1e-11
 
 # How the Gram tables combine into R0(p): orders of the derivatives in each of the six, in the core's order.
 GRAM_PAIRS: tuple[tuple[tuple[int, int], ...], ...] = (
@@ -47,16 +44,6 @@ GRAM_PAIRS: tuple[tuple[tuple[int, int], ...], ...] = (
     ((2, 0), (0, 2)),
     ((0, 0),),
 )
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """Compile-time bounds of the core (pvid/config.h); pass others when the core was built with others."""
-
-    taps: int = 81
-    decimation: int = 32
-    window: int = 251
-    functions: int = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +71,7 @@ class WeakDesign:
     l1 : length of rod 1 [m]
     sample_rate : [Hz]
     nominal : (w, d1, d2) of the whitening, shape [3]
-    taps : smoothing window [samples], odd
-    degree : of the smoothing polynomial
+    taps : length of the front end's filters [samples], odd
     decimation : D, samples per decimated sample
     window : W [decimated samples], odd
     functions : K
@@ -100,7 +86,6 @@ class WeakDesign:
     sample_rate: float
     nominal: Float
     taps: int
-    degree: int
     decimation: int
     window: int
     functions: int
@@ -155,8 +140,7 @@ class WeakDesign:
     @property
     def fast_rad_s(self) -> float:
         """Angular frequency of the fast mode at the nominal p [rad/s]."""
-        w, d1, d2 = self.nominal
-        return math.sqrt(w * (d1 + math.sqrt(max(d1 * d1 - 4 * d2, 0.0))) / 2)
+        return 2 * math.pi * modes_hz(self.nominal)[1]
 
     @property
     def lag(self) -> int:
@@ -176,21 +160,37 @@ class WeakDesign:
         bend = np.gradient(slope, self.dt, axis=0)
         omega = self.fast_rad_s
         inner = np.sum((bend - omega**2 * g) ** 2 + (2 * omega * slope) ** 2) / self.decimation
-        band_hz = omega / (2 * math.pi) + self.functions / (2 * self.window_s)
-        outer = float(np.sum(g**2)) * self._folded_gain(band_hz)
+        outer = float(np.sum(g**2)) * self._folded_gain(self.band_hz)
         return float((inner + outer) / self.functions * (y_sd / (self.l1 * w)) ** 2)
+
+    @property
+    def band_hz(self) -> float:
+        """Edge of the band in which a row takes the pivot's noise in, beside motion at the fast mode [Hz]."""
+        return self.fast_rad_s / (2 * math.pi) + self.functions / (2 * self.window_s)
+
+    def drive_noise(self, y_sd: float) -> tuple[float, float]:
+        """Rms of u [1/s^2] that white noise of y_sd [m] on the pivot's samples makes: in all, and in the rows' band."""
+        f, response = self._second_response(4096)
+        scale = y_sd / self.l1
+        within = f < self.band_hz
+        whole, band = float(np.mean(response**2)), float(np.mean(np.where(within, response**2, 0.0)))
+        return scale * math.sqrt(whole), scale * math.sqrt(band)
 
     def _folded_gain(self, band_hz: float) -> float:
         """Variance of y'' [1/s^4] that noise of 1 on y has after decimation, as its density below band_hz says."""
         rate = self.sample_rate / self.decimation
-        f = (np.arange(4096) + 0.5) * self.sample_rate / 8192
+        f, response = self._second_response(4096)
         folded = np.abs(f - rate * np.round(f / rate))
         beyond = (folded < band_hz) & (f > rate / 2)
         if not beyond.any():
             return 0.0
-        phase = 2 * math.pi * np.outer(f[beyond], np.arange(1, len(self.second) + 1)) / self.sample_rate
-        response = 2 * (np.cos(phase) - 1) @ self.second * self.sample_rate**2
-        return float(np.mean(response**2) * (self.decimation - 1) / self.decimation)
+        return float(np.mean(response[beyond] ** 2) * (self.decimation - 1) / self.decimation)
+
+    def _second_response(self, points: int) -> tuple[Float, Float]:
+        """Frequencies up to half the sample rate [Hz] and the response of `second` there [1/s^2]."""
+        f = (np.arange(points) + 0.5) * self.sample_rate / (2 * points)
+        phase = 2 * math.pi * np.outer(f, np.arange(1, len(self.second) + 1)) / self.sample_rate
+        return f, np.asarray(2 * (np.cos(phase) - 1) @ self.second * self.sample_rate**2)
 
     @property
     def flash_bytes(self) -> int:
@@ -243,13 +243,9 @@ def design(
     l1: float,
     sample_rate: float,
     nominal_p: Sequence[float] | Float,
-    window_s: float = 1.25,
-    functions: int = 12,
-    decimation: int | None = None,
-    taps: int | None = None,
-    degree: int = 6,
+    sizes: Sizes | None = None,
     exponent: int = 6,
-    bounds: Bounds | None = None,
+    bounds: Bounds = HOST,
 ) -> WeakDesign:
     """Tables for a rig.
 
@@ -258,11 +254,7 @@ def design(
     l1 : length of rod 1 [m]
     sample_rate : [Hz]
     nominal_p : rough (w [1/s^2], d1, d2); may be wrong by a factor of 2
-    window_s : length of a window [s]; best at 0.75 to 1.5 times the slowest modal period
-    functions : test functions a window, K
-    decimation : samples per decimated sample; None: about 125 Hz
-    taps : smoothing window [samples], odd; None: about 71 ms
-    degree : of the smoothing polynomial, 4..12
+    sizes : those that are fixed; the others follow from the modes of nominal_p (pvid.weak_sizing)
     exponent : of (1 - x^2) in the test functions, 5..12
     bounds : of the core the tables are for
 
@@ -271,30 +263,12 @@ def design(
     PvidError
         Naming the setting that makes no sense or exceeds the core's bounds.
     """
-    bounds = bounds or Bounds()
     nominal = _checked_rig(l1, sample_rate, nominal_p)
-    if decimation is None:
-        decimation = max(1, round(sample_rate / _DECIMATED_RATE_HZ))
-    if taps is None:
-        # Two points more than the polynomial's coefficients: else it interpolates and smooths nothing.
-        taps = max(round(_SMOOTHING_S * sample_rate) | 1, (degree + 2) | 1)
-        taps = min(taps, (bounds.taps - 1) | 1)
-    _require("decimation", decimation, 1, bounds.decimation, "PVID_MAX_DECIMATION")
-    _require("taps", taps, 5, bounds.taps, "PVID_MAX_TAPS")
-    _require("functions", functions, 4, bounds.functions, "PVID_MAX_FUNCTIONS")
-    _require("exponent", exponent, _MIN_EXPONENT, _MAX_EXPONENT)
-    if taps % 2 == 0:
-        raise PvidError(f"taps must be odd, not {taps}")
-    if not (math.isfinite(window_s) and window_s > 0):
-        raise PvidError(f"window_s must be a positive number of seconds, not {window_s:g}")
+    if not _MIN_EXPONENT <= exponent <= _MAX_EXPONENT:
+        raise PvidError(f"exponent must be {_MIN_EXPONENT} to {_MAX_EXPONENT}, not {exponent}")
+    size = sized(nominal, sample_rate, sizes or Sizes(), bounds)
+    window, functions, decimation = size.window, size.functions, size.decimation
     dt = decimation / sample_rate
-    window = 2 * round(min(window_s / (2 * dt), 1e9)) + 1
-    if not 9 <= window <= bounds.window:
-        raise PvidError(
-            f"window_s = {window_s:g} s is {window} samples after decimation by {decimation}, and the core "
-            f"takes 9 to {bounds.window} (PVID_MAX_WEAK_WINDOW): change window_s or decimation"
-        )
-    bank = savitzky_golay(taps, degree)
     chi = _whitened(_test_functions(window, functions, exponent, dt), nominal)
     w, d1, d2 = nominal
     residual = chi[:, 2] + d1 * w * chi[:, 1] + d2 * w**2 * chi[:, 0]
@@ -307,14 +281,13 @@ def design(
         l1=float(l1),
         sample_rate=float(sample_rate),
         nominal=_frozen(nominal),
-        taps=taps,
-        degree=degree,
+        taps=size.front.taps,
         decimation=decimation,
         window=window,
         functions=functions,
         exponent=exponent,
-        smooth=_frozen(bank.weights[0].copy()),
-        second=_frozen(bank.weights[2].copy()),
+        smooth=size.front.smooth.weights,
+        second=size.front.second.weights,
         chi=_frozen(chi),
         gram=_frozen(_gram_tables(chi)),
         overlap=float(1 + 2 * np.linalg.eigvalsh((shared + shared.T) / 2).max()),
@@ -349,7 +322,7 @@ def to_c_header(design: WeakDesign, name: str, made_by: str = "pvid.weak_design.
             f"/* Generated by `{made_by}`: do not edit.",
             f" * l1 {design.l1:g} m, {design.sample_rate:g} Hz, nominal w {w:.9g} 1/s^2, d1 {d1:.9g}, d2 {d2:.9g};",
             f" * window {design.window_s:g} s, {k} functions (1 - x^2)^{design.exponent} P_k, "
-            f"smoothing of degree {design.degree}.",
+            f"filters of {design.taps} taps.",
             f" * Flash: {design.flash_bytes} bytes. */",
             f"#ifndef {guard}",
             f"#define {guard}",
@@ -388,12 +361,6 @@ def _checked_rig(l1: float, sample_rate: float, nominal_p: Sequence[float] | Flo
     if nominal.shape != (3,) or not (np.isfinite(nominal).all() and (nominal > 0).all()):
         raise PvidError(f"nominal_p must be three positive numbers (w, d1, d2), not {nominal_p}")
     return nominal
-
-
-def _require(name: str, value: int, low: int, high: int, macro: str = "") -> None:
-    if not low <= value <= high:
-        limit = f" ({macro} of the core)" if macro and value > high else ""
-        raise PvidError(f"{name} must be {low} to {high}{limit}, not {value}")
 
 
 @lru_cache(maxsize=256)
@@ -453,8 +420,8 @@ def _whitened(chi: Float, p: Float) -> Float:
         gram *= np.outer(scale, scale)
         if not np.isfinite(gram).all() or np.linalg.eigvalsh(gram)[0] < _MIN_EIGENVALUE:
             raise PvidError(
-                f"functions = {chi.shape[2]} cannot be told apart on {chi.shape[0]} decimated samples: "
-                f"choose fewer functions, a longer window_s or a smaller decimation"
+                f"{chi.shape[2]} test functions are not independent on {chi.shape[0]} decimated samples: "
+                f"choose fewer functions or a smaller decimation"
             )
         factor = np.linalg.cholesky(gram)
         mixing = np.linalg.solve(factor, np.diag(scale))
