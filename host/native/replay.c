@@ -107,7 +107,9 @@ void pvid_replay_weak_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[]
         record_tick(record, tick, &self->estimator, reason);
         if (record->published != NULL) {
             const uint32_t n_p = self->estimator.model->n_p;
-            memcpy(&record->published[(size_t)tick * n_p], pvid_weak_estimate_f32(self)->p, n_p * sizeof(float));
+            const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(self);
+            memcpy(&record->published[(size_t)tick * n_p], estimate->p, n_p * sizeof(float));
+            memcpy(&record->published_se[(size_t)tick * n_p], estimate->se, n_p * sizeof(float));
         }
     }
 }

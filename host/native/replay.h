@@ -10,6 +10,7 @@
 typedef struct {
     float *p;               /* [ticks][n_p] */
     float *published;       /* [ticks][n_p] of the weak form */
+    float *published_se;    /* likewise: its standard errors */
     float *sums;            /* [ticks][n_moments + n_theta + 2] */
     uint8_t *reason;        /* [ticks] */
     uint32_t *hash;         /* [ticks] running hash after the tick */

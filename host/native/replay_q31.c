@@ -94,6 +94,7 @@ void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi
         if (record->published != NULL) {
             const size_t n_p = self->estimator.model->n_p;
             memcpy(&record->published[tick * n_p], estimate->p, n_p * sizeof estimate->p[0]);
+            memcpy(&record->published_se[tick * n_p], estimate->se, n_p * sizeof estimate->se[0]);
         }
         if (is_estimate_due(record, tick)) {
             record->estimate[tick / record->estimate_every] = *estimate;

@@ -15,6 +15,7 @@ typedef struct {
     uint32_t *hash;         /* [ticks] running hash after the tick */
     uint32_t *running_hash; /* in and out; needed with hash */
     int32_t *published;     /* [ticks][n_p] of the weak form */
+    int32_t *published_se;  /* likewise: its standard errors */
     pvid_estimate_q31 *estimate; /* [ticks / estimate_every, rounded up]; the published one in the weak form */
     uint32_t estimate_every;
 } pvid_record_q31;

@@ -15,7 +15,7 @@ from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdent
 from pvid.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, config_of, weak_design_of
-from pvid.setup_q31 import config_for_run, counts_of, covariance_of, p_of
+from pvid.setup_q31 import config_for_run, counts_of, covariance_of, p_of, se_of
 from pvid.survey import fitted
 from pvid.weak_oracle import WeakSettings, identify_weak
 
@@ -54,6 +54,22 @@ class Trajectory:
 
 
 @dataclass(frozen=True)
+class Publications:
+    """Every estimate that was published during a run: t [n] in s, p = (w, d1, d2) and its standard errors [n, 3], and
+    whether the alarm stood beside it [n]."""
+
+    t: Float
+    p: Float
+    se: Float
+    alarm: npt.NDArray[np.bool_]
+
+    @classmethod
+    def none(cls) -> Publications:
+        """Of a run in which nothing was published, or of a form that publishes nothing."""
+        return cls(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.bool_))
+
+
+@dataclass(frozen=True)
 class Identification:
     """What a run told.
 
@@ -62,7 +78,7 @@ class Identification:
     are the published ones (pvid/trust.h): `trusted_s` is when the last of them was trusted [s] (None: never, they are
     the start), `misfit` the variance of the residuals over what the sensors' noise explains, and `alarm` whether that
     is too much. In the strong form, which publishes whatever it has, they are the last ones, and None, None; `alarm` is
-    the C cores' own (pvid/misfit.h); float64 has none.
+    the C cores' own (pvid/misfit.h); float64 has none. `publications` are those of the weak form's C cores.
     """
 
     value: dict[str, float]
@@ -81,6 +97,7 @@ class Identification:
     law: str
     on: str
     trajectory: Trajectory
+    publications: Publications
 
     @property
     def identified(self) -> bool:
@@ -204,6 +221,14 @@ def _in_float32(
         estimates["kappa"].astype(np.float64),
     )
     n_p = min(record.p.shape[1], NAMED)
+    publications = Publications.none()
+    if publishes:
+        publications = Publications(
+            t=run.t[trusted],
+            p=record.published[trusted, :3].astype(np.float64),
+            se=record.published_se[trusted, :3].astype(np.float64),
+            alarm=record.reason[trusted] == Reason.MISFIT,
+        )
     return _identification(
         rig,
         p=last["p"][:n_p].astype(np.float64),
@@ -218,6 +243,7 @@ def _in_float32(
         lost=counters["rejected_not_finite"] + counters["rejected_saturated"],
         running_hash=identifier.running_hash,
         trajectory=trajectory,
+        publications=publications,
     )
 
 
@@ -357,6 +383,14 @@ def _in_q31(
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
     told = len(trusted) > 0
     counters = identifier.counters
+    publications = Publications.none()
+    if isinstance(identifier, WeakIdentifierQ31):
+        publications = Publications(
+            t=run.t[trusted],
+            p=p_of(config, record.published[trusted])[:, :3],
+            se=se_of(config, record.published_se[trusted])[:, :3],
+            alarm=record.reason[trusted] == Reason.MISFIT,
+        )
     return _identification(
         rig,
         p=p,
@@ -377,6 +411,7 @@ def _in_q31(
             rig.l1,
             record.estimate["kappa"] / 2**30,
         ),
+        publications=publications,
     )
 
 
@@ -435,6 +470,7 @@ def _identification(
     lost: int,
     running_hash: int | None,
     trajectory: Trajectory,
+    publications: Publications | None = None,
 ) -> Identification:
     names = (*LINEAR, ZERO)[: len(p)]
     values = dict(zip(names, map(float, p), strict=True))
@@ -460,4 +496,5 @@ def _identification(
         law=rig.identifier.law,
         on="host",
         trajectory=trajectory,
+        publications=Publications.none() if publications is None else publications,
     )

@@ -257,6 +257,7 @@ class RecordStruct(ctypes.Structure):
     _fields_ = [
         ("p", ctypes.c_void_p),
         ("published", ctypes.c_void_p),
+        ("published_se", ctypes.c_void_p),
         ("sums", ctypes.c_void_p),
         ("reason", ctypes.c_void_p),
         ("hash", ctypes.c_void_p),
@@ -403,13 +404,14 @@ class WeakConfig:
 class Record:
     """What a replay left, one entry a tick.
 
-    p float32 [ticks, n_p], the estimator's; published likewise, of the weak form (else empty);
+    p float32 [ticks, n_p], the estimator's; published and its standard errors likewise, of the weak form (else empty);
     sums float32 [ticks, n_moments + n_theta + 2] (M, B, yy, weight);
     reason uint8 [ticks]; hash uint32 [ticks]; estimate: structured [ticks / estimate_every].
     """
 
     p: Float32
     published: Float32
+    published_se: Float32
     sums: Float32
     reason: npt.NDArray[np.uint8]
     hash: npt.NDArray[np.uint32]
@@ -728,6 +730,7 @@ class _FloatStepper(Stepper[Record]):
         record = Record(
             p=np.empty((ticks, self.n_p), np.float32),
             published=np.empty((ticks if self.publishes else 0, self.n_p), np.float32),
+            published_se=np.empty((ticks if self.publishes else 0, self.n_p), np.float32),
             sums=np.empty((ticks if sums else 0, self.n_sums), np.float32),
             reason=np.empty(ticks, np.uint8),
             hash=np.empty(ticks if hashes else 0, np.uint32),
@@ -737,6 +740,7 @@ class _FloatStepper(Stepper[Record]):
         struct = RecordStruct(
             p=record.p.ctypes.data,
             published=record.published.ctypes.data if self.publishes else None,
+            published_se=record.published_se.ctypes.data if self.publishes else None,
             sums=record.sums.ctypes.data if sums else None,
             reason=record.reason.ctypes.data,
             hash=record.hash.ctypes.data if hashes else None,

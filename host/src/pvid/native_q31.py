@@ -255,7 +255,10 @@ class RecordStruct(ctypes.Structure):
 
     _fields_ = [
         (name, ctypes.c_void_p)
-        for name in ("p", "sums", "exponent", "reason", "hash", "running_hash", "published", "estimate")
+        for name in (
+            *("p", "sums", "exponent", "reason", "hash", "running_hash"),
+            *("published", "published_se", "estimate"),
+        )
     ] + [("estimate_every", ctypes.c_uint32)]
 
 
@@ -309,7 +312,8 @@ def physical_q31(native: Native, estimate: npt.NDArray[np.void], scale: ScaleQ31
 @dataclass
 class RecordQ31:
     """What a replay left, one entry a tick: p int32 [ticks, n_p], sums int64 [ticks, n_sums] and their exponent,
-    reason, hash; published: p as published, like p, of the weak form (else empty); estimate: structured
+    reason, hash; published and published_se: p as published and its standard errors, like p, of the weak form (else
+    empty); estimate: structured
     [ticks / estimate_every], the published one in the weak form."""
 
     p: Int32
@@ -318,6 +322,7 @@ class RecordQ31:
     reason: npt.NDArray[np.uint8]
     hash: npt.NDArray[np.uint32]
     published: Int32
+    published_se: Int32
     estimate: npt.NDArray[np.void]
 
 
@@ -407,6 +412,7 @@ class _IntegerStepper(Stepper[RecordQ31]):
             reason=np.empty(ticks, np.uint8),
             hash=np.empty(ticks if hashes else 0, np.uint32),
             published=np.empty((ticks if self.publishes else 0, self.n_p), np.int32),
+            published_se=np.empty((ticks if self.publishes else 0, self.n_p), np.int32),
             estimate=np.empty(estimates, ESTIMATE_DTYPE),
         )
         struct = RecordStruct(
@@ -417,6 +423,7 @@ class _IntegerStepper(Stepper[RecordQ31]):
             hash=record.hash.ctypes.data if hashes else None,
             running_hash=self._hash.ctypes.data,
             published=record.published.ctypes.data if self.publishes else None,
+            published_se=record.published_se.ctypes.data if self.publishes else None,
             estimate=record.estimate.ctypes.data if estimates else None,
             estimate_every=estimate_every,
         )

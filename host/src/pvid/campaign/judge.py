@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pvid.campaign.truth import SimulatedRig
 from pvid.errors import PvidError
-from pvid.identify import LINEAR, Identification, identify
+from pvid.identify import LINEAR, Identification, Publications, identify
 from pvid.native import Native
 from pvid.rigfile import Core, RigFile
 
@@ -88,9 +88,13 @@ def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: st
     for name in LINEAR:
         record.update({name: None, f"{name}_se": None, f"{name}_error": None, f"{name}_z": None})
     record.update(warning=None, misfit=None, status=None, reason=refusal, worst_error=None)
+    record.update(
+        first_s=None, publications=0, publications_wrong=0, publications_right=0, publications_right_alarmed=0
+    )
     if result is None:
         return record
     record.update(status=result.status, misfit=_finite(result.misfit))
+    record.update(_of_publications(result.publications, simulated))
     if not published:
         record["reason"] = result.verdict
         return record
@@ -113,6 +117,21 @@ def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: st
         answered=bool(judgement.answers),
     )
     return record
+
+
+def _of_publications(publications: Publications, simulated: SimulatedRig) -> Record:
+    """Seconds to the first publication; how many there were, how many of them silently wrong, right, right but with
+    the alarm."""
+    if len(publications.t) == 0:
+        return {}
+    judgement = Judgement.of(publications.p, publications.se, simulated.p)
+    return {
+        "first_s": float(publications.t[0] - simulated.run.t[0]),
+        "publications": len(publications.t),
+        "publications_wrong": int((judgement.wrong & ~publications.alarm).sum()),
+        "publications_right": int(judgement.right.sum()),
+        "publications_right_alarmed": int((judgement.right & publications.alarm).sum()),
+    }
 
 
 def _of_rig(simulated: SimulatedRig) -> Record:

@@ -55,7 +55,7 @@ def step_of(
 
 def accelerations(motion: PivotMotion, steps: int, step_s: float) -> Float:
     """y'' at every half step, shape (2 steps + 1,) [m/s^2]."""
-    return motion.acceleration(np.arange(2 * steps + 1) * (step_s / 2))
+    return motion.acceleration(np.arange(2 * steps + 1, dtype=np.float64) * (step_s / 2))
 
 
 def integrate(
@@ -89,7 +89,9 @@ def integrate(
     try:
         run = native.library.pvid_pendulum_run
     except AttributeError as error:
-        raise PvidError("the C core was built without the campaign's pendulum: build it again with ./tools/pvid") from error
+        raise PvidError(
+            "the C core was built without the campaign's pendulum: build it again with ./tools/pvid"
+        ) from error
     run.restype = ctypes.c_uint32
     written = run(
         ctypes.byref(rig),

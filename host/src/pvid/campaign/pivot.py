@@ -116,4 +116,3 @@ def draw_motion(
     unscaled = float(np.sqrt(np.mean(motion.acceleration(t) ** 2)))
     factor = min(acceleration_rms / unscaled, travel / float(np.ptp(motion.position(t))))
     return motion.scaled(factor) if factor * unscaled >= least_rms else None
-

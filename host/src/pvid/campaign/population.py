@@ -111,7 +111,7 @@ class RandomRig:
     @property
     def phi_lsb(self) -> float:
         """Resolution of the encoder [rad]."""
-        return 2 * math.pi / 2**self.bits
+        return 2 * math.pi / float(2**self.bits)
 
     @property
     def modes_hz(self) -> tuple[float, float]:

@@ -16,7 +16,6 @@ from pvid.campaign.population import Population, RandomRig
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.native import Native
-from pvid.rig import Pendulum
 from pvid.rigfile import Identifier, Nominal, RigFile, Sensor
 
 Float = npt.NDArray[np.float64]
@@ -78,8 +77,12 @@ def simulate_rig(native: Native, population: Population, seed: int, index: int) 
 def _assembled(
     rig: RandomRig, phi: npt.NDArray[np.int32], y: npt.NDArray[np.int32], bound: Float, largest: float
 ) -> SimulatedRig:
-    t = np.arange(len(phi)) / rig.sample_rate
-    run = Run(t=t, phi=rig.phi_lsb * phi, y=rig.y_lsb * y, sample_rate=rig.sample_rate)
+    run = Run(
+        t=np.arange(len(phi)) / rig.sample_rate,
+        phi=rig.phi_lsb * phi.astype(np.float64),
+        y=rig.y_lsb * y.astype(np.float64),
+        sample_rate=rig.sample_rate,
+    )
     return SimulatedRig(rig, run, rig_file(rig), rig.pendulum.linear, bound, largest)
 
 
@@ -104,8 +107,8 @@ def _moving(native: Native, population: Population, seed: int, index: int) -> tu
         if found is not None:
             return rig, *found
     raise PvidError(
-        f"rig {index} of condition {population.condition_of(seed, index)} cannot be drawn: of {_ATTEMPTS} attempts none "
-        f"has a sample rate and a drive that fit and a motion of the angle wanted"
+        f"rig {index} of condition {population.condition_of(seed, index)} cannot be drawn: of {_ATTEMPTS} attempts "
+        f"none has a sample rate and a drive that fit and a motion of the angle wanted"
     )
 
 
@@ -118,9 +121,7 @@ def _released(native: Native, rig: RandomRig) -> tuple[Float, float, float] | No
     scale = rig.angle
     for _ in range(_SCALINGS):
         start = [scale * rig.release[0], scale * rig.release[1], 0.0, 0.0]
-        state = integrate(
-            native, rig.pendulum, start, acceleration, step_s, dry=rig.dry, slip=slip, slant=rig.slant
-        )
+        state = integrate(native, rig.pendulum, start, acceleration, step_s, dry=rig.dry, slip=slip, slant=rig.slant)
         if state is None:
             scale *= 0.2
             continue
@@ -133,9 +134,7 @@ def _released(native: Native, rig: RandomRig) -> tuple[Float, float, float] | No
     return None
 
 
-def measure(
-    rig: RandomRig, state: Float, step_s: float
-) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+def measure(rig: RandomRig, state: Float, step_s: float) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
     """Counts of the encoder and of the pivot's sensor, at a steady sample rate as they believe.
 
     Every random number is drawn whatever the imperfections, so that one seed gives one noise for all of them.
