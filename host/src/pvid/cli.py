@@ -22,6 +22,7 @@ from rich.table import Table
 
 from pvid import __version__
 from pvid.capture import Run, read_run, write_run
+from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
 from pvid.compare import Comparison
 from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
@@ -74,7 +75,7 @@ def commands() -> None:
     """Identifies the parameters of a mechanism, and proves the C core bit for bit."""
 
 
-for _command in LOG_COMMANDS:
+for _command in (*LOG_COMMANDS, *CAMPAIGN_COMMANDS):
     commands.add_command(_command)
 
 

@@ -25,6 +25,22 @@ SUFFICES = 0.01
 Value = float | int | bool | str | None
 Record = dict[str, Value]
 
+# Columns of a record, with their types; numbers and texts are None where there is nothing to say.
+COLUMNS: dict[str, type] = {
+    **dict.fromkeys(("seed", "rig"), int),
+    **dict.fromkeys(("condition", "combined", "drive"), str),
+    **dict.fromkeys(("l1", "w_true", "d1_true", "d2_true", "slow_hz", "fast_hz"), float),
+    **dict.fromkeys(("sample_rate", "duration", "phi_lsb", "y_lsb", "largest_phi", "gain"), float),
+    **dict.fromkeys(("bound_w", "bound_d1", "bound_d2"), float),
+    **dict.fromkeys(("suffices", "published", "answered", "within_1", "within_5"), bool),
+    **dict.fromkeys(("warned", "silently_wrong", "right", "missed", "crashed"), bool),
+    **{f"{name}{what}": float for name in LINEAR for what in ("", "_se", "_error", "_z")},
+    **dict.fromkeys(("worst_error", "misfit", "first_s"), float),
+    **dict.fromkeys(("publications", "publications_wrong", "publications_right", "publications_right_alarmed"), int),
+    **dict.fromkeys(("status", "reason", "warning"), str),
+    "seconds": float,
+}
+
 
 @dataclass(frozen=True)
 class Judgement:
@@ -60,13 +76,19 @@ class Judgement:
 def identify_rig(
     native: Native, simulated: SimulatedRig, core: Core = "f32", *, tuned: bool = False
 ) -> tuple[Record, Identification | None]:
-    """Identifies a rig as `pvid identify` (and, before it, `pvid tune`) does; the record of `judge`, and the answer."""
+    """Identifies a rig as `pvid identify` (and, before it, `pvid tune`) does; the record of `judge`, and the answer.
+
+    A crash is no refusal: it is recorded as one, with its exception as the reason.
+    """
     file = replace(simulated.file, identifier=replace(simulated.file.identifier, core=core))
     began = time.perf_counter()
     try:
         result = identify(simulated.run, _tuned(native, simulated, file) if tuned else file, native)
     except PvidError as error:
         return judge(simulated, None, refusal=str(error), seconds=time.perf_counter() - began), None
+    except Exception as error:  # one rig must not end the campaign, nor be taken for a refusal
+        record = judge(simulated, None, refusal=f"{type(error).__name__}: {error}", seconds=time.perf_counter() - began)
+        return {**record, "crashed": True}, None
     return judge(simulated, result, refusal=None, seconds=time.perf_counter() - began), result
 
 
@@ -83,7 +105,7 @@ def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: st
     published = result is not None and result.identified
     record["published"] = published
     record["missed"] = suffices and not published
-    for name in ("warned", "within_1", "within_5", "silently_wrong", "right", "answered"):
+    for name in ("warned", "within_1", "within_5", "silently_wrong", "right", "answered", "crashed"):
         record[name] = False
     for name in LINEAR:
         record.update({name: None, f"{name}_se": None, f"{name}_error": None, f"{name}_z": None})

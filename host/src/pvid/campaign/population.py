@@ -41,6 +41,8 @@ _RANGES: dict[str, tuple[str, ...]] = {
     "eccentricity": ("log",),
     "slant": ("log", "sign"),
 }
+# Nothing without them; the others may be [0, 0].
+_POSITIVE = ("l1", "l2_over_l1", "rho2_over_l2", "bits", "y_lsb", "duration", "angle", "drive_rms")
 _NUMBERS = ("tilted", "phi_noise", "y_noise", "travel")
 _LISTS = ("sample_rate", "drive")
 _KEYS = (*_RANGES, *_NUMBERS, *_LISTS)
@@ -334,6 +336,10 @@ def _check_range(key: str, value: Any, place: str) -> None:
     if not (isinstance(value, list) and len(value) == 2 and all(_is_number(bound) for bound in value)):
         raise PvidError(f"{place} {key} must be a range [low, high], not {value!a}")
     low, high = value
+    if key == "guess" and low < 1:
+        raise PvidError(f"{place} guess must be a range of factors from 1 on, not {value!a}")
+    if key in _POSITIVE and not low > 0:
+        raise PvidError(f"{place} {key} must be a range [low, high] above 0, not {value!a}")
     if not 0 <= low <= high or (low == 0 < high and "log" in _RANGES[key]):
         above = "above 0 (or [0, 0] for none)" if "log" in _RANGES[key] else "from 0 on"
         raise PvidError(f"{place} {key} must be a range [low, high] {above}, low <= high, not {value!a}")
