@@ -28,7 +28,7 @@ _COLUMNS = 11
 
 # The full-angle correction leaves out terms of the fourth order: measured bias in w at 0.13 rad 0.02 % and
 # growing fast (0.3 % at 0.16 rad).
-VALID_ANGLE = 0.12  # rad
+VALID_ANGLE = 0.2  # rad
 
 # The correction needs an estimate that has settled (from the first window on it diverges): these many
 # windows, a move of p below this a window, and standard errors below this, both relative. It goes off again
