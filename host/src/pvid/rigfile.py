@@ -115,6 +115,8 @@ class Identifier:
     feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at
         every solve
     divider : ticks (strong form) or windows (weak form) a solve
+    disturbance : of the joints' angular accelerations, white [rad/s^2/sqrt(Hz)]: rows are weighted by it beside the
+        encoder's noise; a survey finds it from the residuals
     survey : identify a recorded run from what the whole of it says of p (start and design), not from the nominal
     full_angle : correct the weak form for sines and cosines; float32 only
     damping : two regressors more, for viscous friction
@@ -141,6 +143,7 @@ class Identifier:
     forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
     feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)
     divider: int = _number(1, "", 1, 65535)
+    disturbance: float = _number(0.0, "rad/s^2/sqrt(Hz)", 0.0, 1e9)
     survey: bool = True
     full_angle: bool = True
     damping: bool = False

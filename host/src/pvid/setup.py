@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,7 +14,7 @@ from pvid.native import MAX_WINDOW, EstimatorConfig, GateConfig, Law, StrongConf
 from pvid.rigfile import RigFile
 from pvid.weak_design import WeakDesign, design
 from pvid.weak_oracle import VALID_ANGLE
-from pvid.weak_sizing import Sizes
+from pvid.weak_sizing import Sizes, decimation_of
 
 # The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
 START_RELATIVE_SD = 0.5
@@ -126,7 +128,20 @@ def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
         taps=round(min(settings.smoothing_s * sample_rate, 1e9)) | 1 if settings.smoothing_s > 0 else None,
         pass_hz=settings.pass_hz or None,
     )
-    return design(rig.l1, sample_rate, nominal_start(rig), sizes)
+    nominal = nominal_start(rig)
+    if settings.disturbance == 0:
+        return design(rig.l1, sample_rate, nominal, sizes)
+    dt = decimation_of(nominal, sample_rate, sizes) / sample_rate
+    ratio = settings.disturbance / math.sqrt(dt) / row_sd_of(rig, round(dt * sample_rate))
+    return design(rig.l1, sample_rate, nominal, sizes, ratio)
+
+
+def row_sd_of(rig: RigFile, decimation: int) -> float:
+    """Noise of a decimated angle [rad]: the rows listen where the filters pass, at the density of the samples' noise.
+
+    An exact sensor has float32's noise.
+    """
+    return max(rig.sensor.phi_lsb * NOISE_LSB, 1e-8) / math.sqrt(decimation)
 
 
 # A window counts as driven when the rms of u exceeds the noise of a still pivot's so many times: in all, and in the
@@ -147,9 +162,6 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
     tables = weak_design_of(rig, sample_rate)
     p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
     zero = 1 if settings.zero else 0
-    # An exact sensor has float32's noise. The rows listen where
-    # the smoother passes, at the density of the samples' noise: what D samples average to.
-    sample_sd = max(rig.sensor.phi_lsb * NOISE_LSB, 1e-8)
     # the zero c [rad], then the frictions c1 and c2 [m^2/s]: what they may be, and how far they are expected
     extra_sd = [ZERO_SD] * zero + [FRICTION_SD] * (2 * settings.damping)
     extra_bound = [ZERO_BOUND] * zero + [FRICTION_BOUND] * (2 * settings.damping)
@@ -174,7 +186,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
             start_sd=np.concatenate([START_RELATIVE_SD * p, extra_sd]).astype(np.float32),
             lower=np.concatenate([p / BOUND_FACTOR, np.negative(extra_bound)]).astype(np.float32),
             upper=np.concatenate([p * BOUND_FACTOR, extra_bound]).astype(np.float32),
-            row_sd=float(sample_sd / np.sqrt(tables.decimation)),
+            row_sd=row_sd_of(rig, tables.decimation),
             forgetting_s=settings.forgetting_s,
             feedback_hz=0.0,
             kappa_min=min(settings.kappa_min, WEAK_KAPPA_MIN),

@@ -78,7 +78,8 @@ class WeakDesign:
     exponent : of (1 - x^2) in the test functions
     smooth, second : folded FIR tables of order 0 and 2 (per sample^2), shape [(taps - 1) / 2]
     chi : chi, chi'' [1/s^2] and chi'''' [1/s^4] at the window's samples, shape [W, 3, K]
-    gram : lower triangles, by rows, of the six Gram matrices of GRAM_PAIRS, shape [6, K (K + 1) / 2]
+    gram : lower triangles, by rows, of the six Gram matrices of GRAM_PAIRS, shape [6, K (K + 1) / 2]; the first holds
+        the disturbance's share, too
     overlap : inflation of variances because half-overlapping windows share noise
     """
 
@@ -244,6 +245,7 @@ def design(
     sample_rate: float,
     nominal_p: Sequence[float] | Float,
     sizes: Sizes | None = None,
+    disturbance: float = 0.0,
     exponent: int = 6,
     bounds: Bounds = HOST,
 ) -> WeakDesign:
@@ -255,6 +257,8 @@ def design(
     sample_rate : [Hz]
     nominal_p : rough (w [1/s^2], d1, d2); may be wrong by a factor of 2
     sizes : those that are fixed; the others follow from the modes of nominal_p (pvid.weak_sizing)
+    disturbance : white disturbance of the joints' accelerations [rad/s^2 a decimated sample] over the noise of a
+        decimated angle [rad]: rows are weighted by both (`disturbance_gram`)
     exponent : of (1 - x^2) in the test functions, 5..12
     bounds : of the core the tables are for
 
@@ -289,7 +293,7 @@ def design(
         smooth=size.front.smooth.weights,
         second=size.front.second.weights,
         chi=_frozen(chi),
-        gram=_frozen(_gram_tables(chi)),
+        gram=_frozen(_with_disturbance(_gram_tables(chi), nominal, disturbance)),
         overlap=float(1 + 2 * np.linalg.eigvalsh((shared + shared.T) / 2).max()),
     )
 
@@ -440,6 +444,25 @@ def _gram_tables(chi: Float) -> Float:
         packed[opposite] = 0.0
         tables.append(packed)
     return np.stack(tables)
+
+
+def disturbance_gram(gram: Float, p: Float) -> Float:
+    """Covariance of a window's rows, packed, for white disturbances of 1 of both joints' angular accelerations.
+
+    With e1 and e2 the disturbances, phi'' = G q + k e2 - (k + 1) e1, k = L2 (1 + L1) = d1 - 1, and
+    q'' = -d1 phi'' - d2 G phi + d2 (e2 - e1): a row takes chi'' times the first and, but for u, w chi times the second.
+    """
+    w, d1, d2 = p[:3]
+    k = d1 - 1
+    of_22, of_20, of_00 = gram[3], gram[4], gram[5]
+    return np.asarray((k**2 + (k + 1) ** 2) * of_22 + d2 * (2 * k + 1) * w * of_20 + 2 * (d2 * w) ** 2 * of_00)
+
+
+def _with_disturbance(gram: Float, nominal: Float, disturbance: float) -> Float:
+    """The tables with the disturbance's share in the first, whose coefficient is 1 at every p."""
+    if disturbance > 0:
+        gram[0] += disturbance**2 * disturbance_gram(gram, nominal)
+    return gram
 
 
 def _frozen(array: Float) -> Float:

@@ -134,8 +134,13 @@ def noise_gram(design: WeakDesign, p: Float) -> Float:
     """R0(p) [K, K], from the design's Gram tables: covariance of a window's rows for noise of 1."""
     w, d1, d2 = p[:3]
     two, zero = d1 * w, d2 * w**2
-    packed = np.array([1.0, two, zero, two**2, two * zero, zero**2]) @ design.gram
-    return np.asarray(packed[_places_in_triangle(design.functions)])
+    return packed_to_square(np.array([1.0, two, zero, two**2, two * zero, zero**2]) @ design.gram)
+
+
+def packed_to_square(packed: Float) -> Float:
+    """A symmetric matrix [n, n] from its lower triangle by rows [n (n + 1) / 2]."""
+    functions = (math.isqrt(8 * len(packed) + 1) - 1) // 2
+    return np.asarray(packed[_places_in_triangle(functions)])
 
 
 @cache

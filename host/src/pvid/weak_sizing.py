@@ -127,6 +127,11 @@ def sized(p: npt.ArrayLike, sample_rate: float, given: Sizes, bounds: Bounds = H
     return Sized(functions, decimation, window, _front(decimation, edge, given.taps, bounds))
 
 
+def decimation_of(p: npt.ArrayLike, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> int:
+    """Samples per decimated sample of `sized`."""
+    return sized(p, sample_rate, given, bounds).decimation
+
+
 def window_for_run(p: npt.ArrayLike, duration_s: float, bounds: Bounds = HOST) -> float | None:
     """Length of a window [s] that a run of `duration_s` [s] holds often enough; None where the modes' own does."""
     longest = duration_s / _WINDOWS_A_RUN

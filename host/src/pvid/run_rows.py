@@ -1,0 +1,228 @@
+"""Rows of the weak form for all windows of a run at once, in float64, and the least squares over them.
+
+    samples -> RunRows (columns of every driven window) -> corrected for large angles at p -> whitened at p -> Fit
+
+Source: theory, 4 (constrained least squares) and 5 (weak form); the same rows as `weak_oracle`, which takes them window
+by window as the core does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.capture import Run
+from pvid.errors import PvidError
+from pvid.rigfile import RigFile
+from pvid.setup import row_sd_of, weak_drive_threshold
+from pvid.weak_design import WeakDesign, disturbance_gram
+from pvid.weak_oracle import A, B, columns, frames, front_end, jacobian, noise_gram, packed_to_square, remainder, theta
+
+Float = npt.NDArray[np.float64]
+
+# Windows with this many times the median residual energy hold a jolt or a lost sample, not the mechanism.
+_JOLT = 25.0
+_WHITENINGS = 3
+_STEPS = 40
+_LONGEST_STEP = 0.5  # of log w, log d1, log d2
+_DONE = 1e-8
+_PASSES = 3  # of the correction for large angles
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Least squares over whitened rows, at p = (w, d1, d2, c).
+
+    Attributes
+    ----------
+    p : the estimate
+    chi2 : variance of the rows over what the encoder's noise, and the disturbance where there is one, explain
+    information : S = C^T M C [4, 4]
+    scores : C^T N e of each window [windows, 4]; they sum to 0 at the least squares
+    energy, signal : sums of squares of e and of Y over each window's rows [windows]
+    row_sd : noise of a row [rad]
+    """
+
+    p: Float
+    chi2: float
+    information: Float
+    scores: Float
+    energy: Float
+    signal: Float
+    row_sd: float
+
+    @property
+    def clustered_se(self) -> Float:
+        """Standard errors of p [4] from the scatter of the windows' scores, whatever makes it.
+
+        S^-1 (sum g g^T) S^-1 with the products of neighbours, which share samples, counted; never less than without
+        them, and inflated for the few windows of a short run.
+        """
+        windows = len(self.scores)
+        inverse = np.linalg.pinv(self.information, hermitian=True)
+        own = self.scores.T @ self.scores
+        shared = self.scores[:-1].T @ self.scores[1:]
+        variance = np.diag(inverse @ own @ inverse)
+        with_neighbours = np.diag(inverse @ (own + shared + shared.T) @ inverse)
+        few = windows / max(windows - 2, 1)
+        return np.asarray(np.sqrt(np.maximum(variance, with_neighbours) * few))
+
+
+@dataclass(frozen=True)
+class RunRows:
+    """Columns Y, N1..N8, a, b [windows, 11, K] of the driven windows, their angle and u [windows, W]."""
+
+    design: WeakDesign
+    row_sd: float
+    columns: Float
+    phi: Float
+    u: Float
+
+    @classmethod
+    def of(cls, rig: RigFile, run: Run, design: WeakDesign) -> RunRows:
+        """Of the windows that are driven and lack no sample.
+
+        Raises
+        ------
+        PvidError
+            When there is none.
+        """
+        present = np.isfinite(run.phi) & np.isfinite(run.y)
+        phi, y = (_bridged(x, present) for x in (run.phi, run.y))
+        smooth, u = front_end(phi, y, design)
+        phi_frames, u_frames = frames(smooth, design), frames(u, design)
+        usable = np.var(u_frames, axis=1) >= weak_drive_threshold(rig, design) ** 2
+        if not present.all():
+            usable &= _whole(present, design, len(phi_frames))
+        if not usable.any():
+            raise PvidError("the pivot stands still in every window of the run")
+        phi_frames, u_frames = phi_frames[usable], u_frames[usable]
+        return cls(
+            design, row_sd_of(rig, design.decimation), columns(phi_frames, u_frames, design), phi_frames, u_frames
+        )
+
+    def thinned(self, most: int) -> RunRows:
+        """At most so many windows, evenly spread over the run."""
+        every = -(-len(self.phi) // most)
+        return replace(self, columns=self.columns[::every], phi=self.phi[::every], u=self.u[::every])
+
+    def corrected(self, p: Float) -> RunRows:
+        """With what the linear rows lack at large angles taken off Y, at p."""
+        corrected = self.columns.copy()
+        nothing = np.zeros(2)
+        with np.errstate(over="ignore", invalid="ignore"):  # passes diverge where p is far off
+            for window, (one, phi, u) in enumerate(zip(self.columns, self.phi, self.u, strict=True)):
+                lack = remainder(p, nothing, one, phi, u, self.design, _PASSES).y
+                corrected[window, 0] -= np.where(np.isfinite(lack).all(), lack, 0.0)
+        return replace(self, columns=corrected)
+
+    def covariance(self, p: Float) -> Float:
+        """Of a window's rows at p for noise of 1 of the decimated angle [K, K]."""
+        return noise_gram(self.design, p)
+
+    def covariance_of_disturbance(self, p: Float) -> Float:
+        """Of a window's rows at p for a disturbance of 1 [K, K]."""
+        return packed_to_square(disturbance_gram(self.design.gram, p))
+
+    def whitened(self, p: Float, disturbance: float = 0.0) -> Float:
+        """Rows (Y, N) [windows, 9, K] whose noise is white at p, without what a and b explain.
+
+        `disturbance` is that of `weak_design.design`.
+        """
+        gram = self.covariance(p)
+        if disturbance > 0:
+            gram = gram + disturbance**2 * self.covariance_of_disturbance(p)
+        inverse = np.linalg.inv(np.linalg.cholesky(gram))
+        white = self.columns @ inverse.T
+        for column in (A, B):
+            direction = white[:, column]
+            length = np.linalg.norm(direction, axis=1, keepdims=True)
+            direction = np.divide(direction, length, out=np.zeros_like(direction), where=length > 0)
+            white = white - np.einsum("wik,wk->wi", white, direction)[:, :, None] * direction[:, None, :]
+        return np.asarray(white[:, :A])
+
+    def fitted(self, p: Float, disturbance: float = 0.0) -> Fit:
+        """The least squares from p on, whitened at the estimate itself; windows with a jolt are left out."""
+        kept = np.ones(len(self.columns), np.bool_)
+        white = self.whitened(p, disturbance)
+        for turn in range(_WHITENINGS):
+            if turn > 0:
+                white = self.whitened(p, disturbance)
+                energy = np.sum(_residuals(white, p) ** 2, axis=1)
+                kept = energy <= _JOLT * np.median(energy)
+            p = least_squares(np.einsum("wik,wjk->ij", white[kept], white[kept]), p)
+        return self.judged(p, disturbance, kept)
+
+    def judged(self, p: Float, disturbance: float = 0.0, kept: npt.NDArray[np.bool_] | None = None) -> Fit:
+        """What the rows say of a p that may come from elsewhere."""
+        white = self.whitened(p, disturbance)
+        if kept is not None:
+            white = white[kept]
+        e, n, c = _residuals(white, p), white[:, 1:], jacobian(p)
+        energy = np.sum(e**2, axis=1)
+        freedom = len(white) * (self.design.functions - 2) - len(p)
+        return Fit(
+            p=p,
+            chi2=float(energy.sum()) / max(freedom, 1) / self.row_sd**2,
+            information=c.T @ np.einsum("wik,wjk->ij", n, n) @ c,
+            scores=np.einsum("wik,wk->wi", n, e) @ c,
+            energy=energy,
+            signal=np.sum(white[:, 0] ** 2, axis=1),
+            row_sd=self.row_sd,
+        )
+
+
+def _residuals(white: Float, p: Float) -> Float:
+    """Y - N^T theta(p) [windows, K]."""
+    return np.asarray(white[:, 0] - np.einsum("j,wjk->wk", theta(p), white[:, 1:]))
+
+
+def _bridged(x: Float, present: npt.NDArray[np.bool_]) -> Float:
+    if present.all():
+        return x
+    at = np.flatnonzero(present)
+    if len(at) == 0:
+        raise PvidError("the run has no sample that is a number")
+    return np.interp(np.arange(len(x)), at, x[at])
+
+
+def _whole(present: npt.NDArray[np.bool_], design: WeakDesign, windows: int) -> npt.NDArray[np.bool_]:
+    """Which windows lack no sample."""
+    missing = np.concatenate([[0], np.cumsum(~present)])
+    first = design.decimation * design.hop * np.arange(windows)
+    last = first + design.taps + design.decimation * (design.window - 1)
+    return np.asarray(missing[np.minimum(last, len(present))] == missing[first])
+
+
+def energy_at(moments: Float, p: Float) -> float:
+    """Sum of squares of Y - N^T theta(p), from the moments of (Y, N) [9, 9]."""
+    weights = np.append(1.0, -theta(p))
+    return float(weights @ moments @ weights)
+
+
+def least_squares(moments: Float, p: Float) -> Float:
+    """Constrained least squares of theta(p) by damped Gauss-Newton steps in (log w, log d1, log d2, c), from p on."""
+    m, b = moments[1:, 1:], moments[1:, 0]
+    damping, energy = 1e-3, energy_at(moments, p)
+    for _ in range(_STEPS):
+        c = jacobian(p) * np.array([*p[:3], 1.0])
+        information, force = c.T @ m @ c, c.T @ (b - m @ theta(p))
+        scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+        normal = information * np.outer(scale, scale)
+        step, there, better = np.zeros(4), p, False
+        while not better and damping < 1e12:
+            step = scale * np.linalg.solve(normal + damping * np.eye(4), scale * force)
+            step[:3] = np.clip(step[:3], -_LONGEST_STEP, _LONGEST_STEP)
+            there = np.append(p[:3] * np.exp(step[:3]), p[3] + step[3])
+            now = energy_at(moments, there)
+            better = math.isfinite(now) and now <= energy
+            damping *= 1 / 8 if better else 4
+        if not better:
+            break
+        p, energy = there, energy_at(moments, there)
+        if np.abs(step[:3]).max() < _DONE:
+            break
+    return p
