@@ -193,7 +193,7 @@ def _checked(table: Table) -> Table:
 def _run(table: Table, rate: float | None) -> Run:
     clocked = uniform(table, rate)
     firsts, ends = bridge(clocked.phi, clocked.y, clocked.sample_rate)
-    notes = (*table.notes, *clocked.notes, *_gap_notes(clocked, firsts, ends))
+    notes = (*clocked.notes, *_gap_notes(clocked, firsts, ends))
     return Run(clocked.t, clocked.phi, clocked.y, clocked.sample_rate, notes)
 
 

@@ -13,13 +13,12 @@ gets its tick, so that missing samples are seen, and one of two things holds:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.errors import PvidError
-from pvid.run_gaps import roughness
 from pvid.run_table import Table
 
 FloatArray = npt.NDArray[np.float64]
@@ -39,13 +38,22 @@ _RATE_TOLERANCE = 1e-4
 # has another unit, or the rig file is another one's.
 _RATE_LIMIT = 0.05
 _RATE_RANGE_HZ = (1e-3, 1e9)
+_LONGEST_S = 1e20  # nanoseconds taken for seconds, since 1970, are 2e18
 # Rows on either side of a gap that their mean tells the number of missing ticks from: jitter averages out.
 _ROWS_BESIDE_GAP = 20
+# So few gaps in exact stamps are no rounding.
+_CERTAIN_GAPS = 2
+_REPEATED_SHARE = 0.01
 # Stamps that come in bursts (a PC's, of what a serial port hands over) are late by up to this [s].
 _LATE_S = 0.05
 _BURST_SHARE = 0.1
 # Ticks that may be missing, of all: what is left is less than a recording.
 _MISSING_SHARE = 0.5
+# A polynomial of this degree follows a motion of 20 rad/s for so long, to 1e-4 of it.
+_FOLLOWED_S, _DEGREE = 0.128, 5
+_LEAST_ROWS = 32
+_BLOCKS, _LEAST_BLOCKS = 1000, 8
+_CLEARLY = 4.0  # standard errors
 _CHUNK = 1 << 18
 
 
@@ -87,37 +95,56 @@ def uniform(table: Table, promised: float | None) -> Uniform:
     t = table.t
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # times near the end of float64's range
         period = float(t[-1] - t[0]) / (t.size - 1)
-        if not np.isfinite(period):
+        if not abs(period) < _LONGEST_S / t.size:
             raise table.error(t.size - 1, "t", f"{t[-1]!s} s is too far from the first time, {t[0]!s} s")
         if period > 0 and _largest_departure(t, period) <= _JITTER_PERIODS:
             rate, note = _rate(table, 1 / period, _end_error(t, period), promised)
-            return Uniform(t, table.phi, table.y, rate, note)
+            return Uniform(t, table.phi, table.y, rate, (*table.notes, *note))
         return _from_stamps(table, promised)
 
 
 def _from_stamps(table: Table, promised: float | None) -> Uniform:
-    t = table.t
-    steps = np.diff(t)
+    steps = np.diff(table.t)
     if (steps < 0).any():
         row = int(np.argmax(steps < 0)) + 1
-        raise table.error(
-            row, "t", f"{t[row]!s} s runs back from the time before it, {t[row - 1]!s} s (two recordings in one file?)"
-        )
-    if t[-1] == t[0]:
-        raise table.error(1, "t", f"{t[1]!s} s repeats the time before it, as all times do")
-    quantum = _quantum(t)
-    fits = [_fit(t)]
-    if fits[0].largest > _JITTER_PERIODS + _ROUNDING * quantum / fits[0].period:
-        fits = _fits_with_gaps(table, steps, quantum, fits[0])
+        before = f"the time before it, {table.t[row - 1]!s} s (two recordings in one file?)"
+        raise table.error(row, "t", f"{table.t[row]!s} s runs back from {before}")
+    if table.t[-1] == table.t[0]:
+        raise table.error(1, "t", f"{table.t[1]!s} s repeats the time before it, as all times do")
+    table, steps = _without_repeated_rows(table, steps)
+    quantum = _quantum(table.t)
+    fit = _chosen(_fits(table, steps, quantum), quantum)
     repeats = steps == 0
     del steps  # 8 bytes a row, in front of what takes more
-    fit = min(fits, key=lambda one: one.largest * one.period)
     rate, note = _rate(table, 1 / fit.period, fit.error, promised)
-    if fit.largest <= _JITTER_PERIODS + _ROUNDING * quantum / fit.period:
+    note = (*table.notes, *note)
+    if fit.keeps_time(quantum):
         if fit.largest > _JITTER_PERIODS:
             note += (f"t is rounded to {quantum:g} s: the samples are taken as uniform at {rate:g} Hz",)
-        return _placed(table, fit.ticks, rate, note)
-    return _with_jitter(table, repeats, fit, rate, promised, note)
+        placed = _placed(table, fit.ticks, rate, note)
+    else:
+        placed = _with_jitter(table, repeats, fit, rate, promised, note)
+    return placed
+
+
+def _without_repeated_rows(table: Table, steps: FloatArray) -> tuple[Table, FloatArray]:
+    """Rows that a logger wrote twice are left out; not where t is rounded so coarsely that it repeats anyway."""
+    again = np.flatnonzero(steps == 0) + 1
+    if not 0 < again.size < _REPEATED_SHARE * table.t.size:
+        return table, steps
+    if any((signal[again] != signal[again - 1]).any() for signal in (table.phi, table.y)):
+        return table, steps
+    kept = np.delete(np.arange(table.t.size), again)
+    note = f"{again.size} rows repeat the row before them and are left out (first: {table.place(int(again[0]))})"
+    less = replace(
+        table,
+        t=table.t[kept],
+        phi=table.phi[kept],
+        y=table.y[kept],
+        place=lambda row: table.place(int(kept[row])),
+        notes=(*table.notes, note),
+    )
+    return less, np.diff(less.t)
 
 
 def _with_jitter(
@@ -149,7 +176,7 @@ def _with_jitter(
     rate = promised if promised is not None else _shortest_decimal(1 / fit.period, 1e-3)
     t, phi, y = _interpolated(table, rate, fit.period)
     told = f"t jitters {size}: phi and y are interpolated at {rate:g} Hz from the recorded times"
-    return Uniform(t, phi, y, rate, (told,))
+    return Uniform(t, phi, y, rate, (*table.notes, told))
 
 
 def _placed(table: Table, ticks: IntArray | None, rate: float, notes: tuple[str, ...]) -> Uniform:
@@ -208,16 +235,21 @@ def _quantum(t: FloatArray) -> float:
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """A uniform clock through the stamps: tick of each row [n], None where each row is one; period [s], its relative
-    standard error, the largest departure of a stamp [periods] and its row."""
+    standard error, the largest departure of a stamp [periods] and its row; the number of gaps."""
 
     ticks: IntArray | None
     period: float
     error: float
     largest: float
     worst: int
+    gaps: int
+
+    def keeps_time(self, quantum: float) -> bool:
+        """Whether no stamp departs by more than what is usual, and what t is rounded to [s]."""
+        return self.largest <= _JITTER_PERIODS + _ROUNDING * quantum / self.period
 
 
-def _fit(t: FloatArray, ticks: IntArray | None = None) -> _Fit:
+def _fit(t: FloatArray, ticks: IntArray | None = None, gaps: int = 0) -> _Fit:
     """By least squares; each row is a tick where none are given. In pieces, to save memory."""
 
     def pieces() -> Iterator[tuple[int, FloatArray, FloatArray]]:
@@ -240,27 +272,27 @@ def _fit(t: FloatArray, ticks: IntArray | None = None) -> _Fit:
         row = int(np.argmax(np.abs(departure)))
         if abs(departure[row]) > largest:
             largest, worst = float(abs(departure[row])), first + row
-    return _Fit(ticks, period, float(np.sqrt(squares / t.size / energy)), largest, worst)
+    return _Fit(ticks, period, float(np.sqrt(squares / t.size / energy)), largest, worst, gaps)
 
 
-def _fits_with_gaps(table: Table, steps: FloatArray, quantum: float, without: _Fit) -> list[_Fit]:
-    """Clocks that leave ticks out where t steps far; `without` is the one that leaves out none.
+def _fits(table: Table, steps: FloatArray, quantum: float) -> list[_Fit]:
+    """Clocks that leave ticks out where t steps far, the one without gaps first.
 
-    There are two: where t is rounded as coarsely as its period, a long step may be rounding or a missing sample.
+    There are two with gaps: where t is rounded as coarsely as its period, a long step may be rounding or a missing
+    sample.
     """
+    fits = [_fit(table.t)]
     some = steps[:: -(-steps.size // _CHUNK)]
-    usual = float(np.median(some[some > 0])) if (some > 0).any() else without.period
-    fits = []
-    for longest in [_GAP_PERIODS * usual, _GAP_PERIODS * usual + quantum][: 2 if quantum > 0.1 * usual else 1]:
+    usual = float(np.median(some[some > 0])) if (some > 0).any() else fits[0].period
+    for longest in [_GAP_PERIODS * usual + quantum, _GAP_PERIODS * usual][0 if quantum > 0.1 * usual else 1 :]:
         period = float(steps.mean(where=steps <= longest))
         gaps = np.flatnonzero(steps > max(longest, _GAP_PERIODS * period))
         if not gaps.size:
-            fits.append(without)
             continue
         lengths = steps[gaps] / period
         if float(lengths.sum()) > _MISSING_SHARE / (1 - _MISSING_SHARE) * table.t.size + gaps.size:
-            if without.largest * without.period <= _LATE_S:
-                return [without]  # stamps in bursts
+            if any(one.keeps_time(quantum) for one in fits) or fits[0].largest * fits[0].period <= _LATE_S:
+                continue
             worst = int(gaps[np.argmax(lengths)])
             raise table.error(
                 worst + 1,
@@ -271,8 +303,20 @@ def _fits_with_gaps(table: Table, steps: FloatArray, quantum: float, without: _F
         ticks = np.ones(table.t.size, np.int64)
         ticks[0] = 0
         ticks[gaps + 1] = _ticks_across(table.t, gaps, period)
-        fits.append(_fit(table.t, np.cumsum(ticks, out=ticks)))
+        fits.append(_fit(table.t, np.cumsum(ticks, out=ticks), gaps.size))
     return fits
+
+
+def _chosen(fits: list[_Fit], quantum: float) -> _Fit:
+    """Of those that keep time the one with the fewest gaps, else the one that departs least.
+
+    One or two long steps in stamps that are exact else are missing samples rather than rounding, which would make many.
+    """
+    exact = [one for one in fits if one.largest <= _JITTER_PERIODS and one.gaps <= _CERTAIN_GAPS]
+    keeping = [one for one in fits if one.keeps_time(quantum)]
+    if exact or keeping:
+        return (exact or keeping)[0]
+    return min(fits, key=lambda one: one.largest * one.period)
 
 
 def _ticks_across(t: FloatArray, gaps: IntArray, period: float) -> IntArray:
@@ -293,12 +337,12 @@ def _ticks_across(t: FloatArray, gaps: IntArray, period: float) -> IntArray:
 def _rate(table: Table, measured: float, error: float, promised: float | None) -> tuple[float, tuple[str, ...]]:
     """The run's sample rate [Hz], and a note where it is not the promised one."""
     name = table.columns["t"].name
-    low, high = _RATE_RANGE_HZ
-    if not low <= measured <= high:
-        raise PvidError(
-            f"{table.path}, column {name}: a sample rate of {measured:.6g} Hz is out of range (is t in seconds?)."
-        )
     if promised is None:
+        low, high = _RATE_RANGE_HZ
+        if not low <= measured <= high:
+            raise PvidError(
+                f"{table.path}, column {name}: a sample rate of {measured:.6g} Hz is out of range (is t in seconds?)."
+            )
         return _shortest_decimal(measured, 1e-9 + 3 * error), ()
     off = measured / promised - 1
     # t is trusted only to within the jitter at each end
@@ -336,17 +380,31 @@ def _shortest_decimal(value: float, tolerance: float) -> float:
 def _smoother_when_uniform(table: Table, fit: _Fit) -> bool:
     """Whether phi and y are clearly smoother at uniform times than at the recorded ones.
 
-    Noise alone makes no difference.
+    Blocks of rows all over the run are compared with a polynomial, by least squares, at either times.
     """
-    rows = min(table.t.size, _CHUNK)
-    ticks = (np.arange(rows) if fit.ticks is None else fit.ticks[:rows]).astype(np.float64)
-    stamps = (table.t[:rows] - table.t[0]) / fit.period
-    score = 0.0
-    for signal in (table.phi[:rows], table.y[:rows]):
-        uniform_energy, stamped_energy = roughness(signal, ticks), roughness(signal, stamps)
-        if uniform_energy > 0 and stamped_energy > 0:
-            score += float(np.log(uniform_energy / stamped_energy))
-    return bool(score < -6 / np.sqrt(rows))  # some three standard deviations of the score of noise
+    length = max(_LEAST_ROWS, int(_FOLLOWED_S / fit.period))
+    blocks = table.t.size // length
+    chosen = np.unique(np.linspace(0, blocks - 1, min(blocks, _BLOCKS)).astype(int)) if blocks else np.zeros(0, int)
+    rows = (chosen * length)[:, None] + np.arange(length)
+    ticks = rows.astype(np.float64) if fit.ticks is None else fit.ticks[rows].astype(np.float64)
+    stamps = table.t[rows] / fit.period
+    scores = np.zeros(len(rows))
+    for signal in (table.phi[rows], table.y[rows]):
+        scores += np.log(_unexplained(signal, ticks) / _unexplained(signal, stamps))
+    scores = scores[np.isfinite(scores)]
+    if scores.size < _LEAST_BLOCKS:
+        return False
+    return bool(scores.mean() < -_CLEARLY * scores.std() / np.sqrt(scores.size))
+
+
+def _unexplained(x: FloatArray, t: FloatArray) -> FloatArray:
+    """Energy of each row of x [blocks, n] that a polynomial in its times t [blocks, n] does not explain."""
+    begin, end = t[:, :1], t[:, -1:]
+    powers = ((2 * t - begin - end) / (end - begin))[:, :, None] ** np.arange(_DEGREE + 1)
+    explained = np.linalg.qr(powers)[0]
+    coefficients = explained.transpose(0, 2, 1) @ x[:, :, None]
+    energy: FloatArray = np.sum((x - (explained @ coefficients)[:, :, 0]) ** 2, axis=1)
+    return energy
 
 
 def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -376,4 +434,5 @@ def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray,
         nearest = np.minimum(np.abs(times[right] - at), np.abs(at - times[right - 1]))
         within = (times[right] - times[right - 1] > _GAP_PERIODS * period) & (nearest > period / 2)
         piece[:, within] = np.nan
-    return t, out[0], out[1]
+    end = t.size - int(np.argmax(np.isfinite(out[0, ::-1])))
+    return t[:end], out[0, :end], out[1, :end]
