@@ -188,7 +188,7 @@ make_environment() {
 }
 
 install_requirements() { # install_requirements PROFILE
-    local pinned stamp extras=campaign,parquet,web
+    local pinned stamp extras=campaign,web
     pinned=$(sha256sum <"$root/host/pyproject.toml")
     for stamp in "$venv/installed-test" "$venv/installed-$1"; do
         [[ -f $stamp && $(<"$stamp") == "$pinned" ]] && return

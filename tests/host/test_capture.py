@@ -23,14 +23,13 @@ SUFFIXES = (".csv", ".csv.gz", ".npz", ".parquet")
 relaxed = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
-def run_of(rows: int = 50, rate: float = 1000.0, **columns: Float) -> Run:
+def run_of(rows: int = 50, rate: float = 1000.0) -> Run:
     random = np.random.default_rng(rows)
     return Run(
         t=np.arange(rows) / rate,
         phi=0.1 * random.standard_normal(rows),
         y=1e-3 * random.standard_normal(rows),
         sample_rate=rate,
-        columns=columns,
     )
 
 
@@ -53,7 +52,7 @@ def refused(path: Path, content: str | bytes) -> str:
     assert sentence.startswith(str(path))
     assert "\n" not in sentence
     assert sentence.isprintable()
-    assert len(sentence) < len(str(path)) + 250
+    assert len(sentence) < len(str(path)) + 350
     return sentence.removeprefix(str(path))
 
 
@@ -68,18 +67,14 @@ def changed(line: int, cells: str) -> str:
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_format_gives_every_bit_back(suffix: str, tmp_path: Path) -> None:
     extreme = np.resize([5e-324, -0.0, 1.7976931348623157e308, 0.1, 1 / 3, -1e-300], 50)
-    run = Run(
-        np.arange(50) / 1000.0, extreme, -extreme, 1000.0, {"phi1": extreme[::-1].copy(), "gaps": np.full(50, np.nan)}
-    )
+    run = Run(np.arange(50) / 1000.0, extreme, -extreme, 1000.0)
     path = tmp_path / f"run{suffix}"
     write_run(path, run)
     again = read_run(path)
     for name in ("t", "phi", "y"):
         assert getattr(again, name).tobytes() == getattr(run, name).tobytes()
-    assert list(again.columns) == ["phi1", "gaps"]
-    np.testing.assert_array_equal(again.columns["phi1"], run.columns["phi1"])
-    assert np.isnan(again.columns["gaps"]).all()
     assert again.sample_rate == 1000.0
+    assert again.notes == ()
 
 
 @given(
@@ -133,8 +128,7 @@ def test_columns_in_any_order_and_further_ones(tmp_path: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
     run = read_run(path)
     np.testing.assert_array_equal(run.phi, run_of().phi)
-    assert list(run.columns) == ["motor"]
-    np.testing.assert_array_equal(run.columns["motor"], np.arange(50.0))
+    np.testing.assert_array_equal(run.y, run_of().y)
 
 
 def test_forty_thousand_rows_load_at_once(tmp_path: Path) -> None:
@@ -158,27 +152,21 @@ def test_forty_thousand_rows_load_at_once(tmp_path: Path) -> None:
         (changed(1, "time,angle,pos"), ["line 1", "t", "phi", "y", "angle"]),
         (changed(1, "t,phi,phi"), ["line 1", "phi", "2 times"]),
         (changed(1, "T,PHI,Y"), ["line 1", "'PHI'"]),
-        ("\n".join(GOOD[1:]), ["line 1", "header"]),
-        ("\n".join(GOOD).replace(",", ";"), ["line 1", "semicolons"]),
-        ("\n".join(GOOD).replace(",", "\t"), ["line 1", "tabs"]),
+        ("\n".join(GOOD[1:]), ["no column", "'1', '2', '3'", "--columns t=1:s,phi=2:rad,y=3:m"]),
         (changed(12, "0.01,0.1"), ["line 12", "2 columns", "3"]),
         (changed(12, "0.01,0.1,0,0"), ["line 12", "4 columns"]),
-        (changed(12, ""), ["line 12", "empty"]),
         (changed(12, "0.01,broken,0.0"), ["line 12", "column phi", "'broken'"]),
-        (changed(12, "0.01,,0.0"), ["line 12", "column phi", "empty"]),
+        (changed(12, ",0.1,0.0"), ["line 12", "column t", "empty"]),
+        (changed(12, "0.01,-,0.1e"), ["line 12", "column y", "'0.1e'"]),
         (changed(12, "0.01,1_0,0.0"), ["line 12", "column phi", "'1_0'"]),
         (changed(12, '0.01,"0.1,0.0'), ["line 12", "quoted"]),
-        (changed(12, "0.01,nan,0.0"), ["line 12", "column phi", "nan"]),
         (changed(12, "0.01,0.1,-inf"), ["line 12", "column y", "-inf"]),
         (changed(12, "nan,0.1,0"), ["line 12", "column t", "nan"]),
         (changed(12, "0.01,1e999,0"), ["line 12", "column phi", "inf"]),
         (changed(12, "0.009,0.1,0"), ["line 12", "column t", "repeats"]),
         (changed(12, "0.005,0.1,0"), ["line 12", "column t", "back"]),
-        ("\n".join([*GOOD[:20], *GOOD[23:]]) + "\n", ["line 21", "column t", "gap", "0.004 s", "4 periods"]),
-        (changed(12, "0.0103,0.1,0"), ["line 12", "column t", "not uniform"]),
+        ("\n".join([*GOOD[:20], "9,0,0", "9.001,0,0"]), ["line 21", "column t", "a gap of 8.982 s", "8982 periods"]),
         ("\n".join(GOOD[:MIN_ROWS]) + "\n", [f"{MIN_ROWS - 1} rows", f"at least {MIN_ROWS}"]),
-        ("\n".join(GOOD)[:-30], ["line 51", "truncated"]),
-        ("\n".join(GOOD[:-1]) + "\n0.049,0.0123456789,1", ["line 51", "column y", "truncated"]),
     ],
 )
 def test_faults_of_a_csv_file_are_named(content: str, parts: list[str], tmp_path: Path) -> None:
@@ -187,18 +175,11 @@ def test_faults_of_a_csv_file_are_named(content: str, parts: list[str], tmp_path
         assert part in sentence, sentence
 
 
-def test_a_clock_that_changes_its_rate_is_refused(tmp_path: Path) -> None:
-    t = np.concatenate([np.arange(200) / 1000.0, 0.2 + np.arange(200) / 960.0])
-    lines = ["t,phi,y", *(f"{value!r},0.1,0.0" for value in t.tolist())]
-    sentence = refused(tmp_path / "run.csv", "\n".join(lines) + "\n")
-    assert "column t" in sentence and "not uniform" in sentence
-
-
 def test_time_in_milliseconds_contradicts_the_rig(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text("t,phi,y\n" + "".join(f"{k},0.1,0\n" for k in range(50)))
     assert read_run(path).sample_rate == 1.0
-    with pytest.raises(PvidError, match="column t.* 1 Hz.* 1000 Hz"):
+    with pytest.raises(PvidError, match="column t.* 1 Hz.* 1000 Hz: t looks like ms: use --columns t=t:ms"):
         read_run(path, 1000.0)
 
 
@@ -217,7 +198,7 @@ def test_what_is_no_file(tmp_path: Path) -> None:
 
 def test_binary_content_is_no_csv(tmp_path: Path) -> None:
     assert "zero byte" in refused(tmp_path / "a.csv", b"t,phi\x00,y\n")
-    assert "UTF-8" in refused(tmp_path / "b.csv", "t,phi,y\n0,é,1\n".encode("latin-1"))
+    assert "line 2, column phi" in refused(tmp_path / "b.csv", "t,phi,y\n0,é,1\n".encode("latin-1"))
     assert "UTF-16" in refused(tmp_path / "c.csv", "t,phi,y\n".encode("utf-16"))
     refused(tmp_path / "d.csv", bytes(range(256)) * 40)
 
@@ -236,8 +217,8 @@ def test_faults_of_archives_are_named(tmp_path: Path) -> None:
     assert "column y" in refused(path, whole_npz(t=t, phi=t, y=np.array(["a"] * 50)))
     assert "column y" in refused(path, whole_npz(t=t, phi=t, y=np.array([1j] * 50)))
     assert "50, 50 and 49" in refused(path, whole_npz(t=t, phi=t, y=t[1:]))
-    assert "row 8, column phi" in refused(path, whole_npz(t=t, phi=np.where(np.arange(50) == 7, np.nan, t), y=t))
-    assert "row 21, column t" in refused(path, whole_npz(t=np.delete(np.arange(60) / 1e3, slice(20, 30)), phi=t, y=t))
+    assert "row 8, column phi" in refused(path, whole_npz(t=t, phi=np.where(np.arange(50) == 7, np.inf, t), y=t))
+    assert "row 21, column t" in refused(path, whole_npz(t=np.where(np.arange(50) < 20, t, t + 1.0), phi=t, y=t))
     refused(path, whole_npz(t=t, phi=t, y=np.array([{}] * 50, dtype=object)))
     single = io.BytesIO()
     np.save(single, t)
@@ -262,7 +243,10 @@ def run_or_sentence(path: Path) -> None:
         return
     assert len(run) >= MIN_ROWS
     for signal in (run.t, run.phi, run.y):
-        assert signal.dtype == np.float64 and np.all(np.isfinite(signal)) and signal.shape == run.t.shape
+        assert signal.dtype == np.float64 and signal.shape == run.t.shape
+    assert np.all(np.isfinite(run.t))
+    assert np.array_equal(np.isnan(run.phi), np.isnan(run.y))  # a missing tick lacks both
+    assert run.notes or np.all(np.isfinite(run.phi))
     assert np.all(np.diff(run.t) > 0.0)
     assert math.isfinite(run.sample_rate) and run.sample_rate > 0.0
 
@@ -321,8 +305,8 @@ def test_a_run_that_could_not_be_read_back_is_not_written(tmp_path: Path) -> Non
     bad = Run(good.t, np.where(np.arange(50) == 3, np.nan, good.phi), good.y, 1000.0)
     with pytest.raises(PvidError, match="row 4, column phi"):
         write_run(tmp_path / "run.csv", bad)
-    with pytest.raises(PvidError, match="name"):
-        write_run(tmp_path / "run.csv", run_of(50, 1000.0, **{"a,b": good.t}))
+    with pytest.raises(PvidError, match="is not written: t runs at 1000 Hz"):
+        write_run(tmp_path / "run.csv", Run(good.t, good.phi, good.y, 1010.0))
     with pytest.raises(PvidError, match="must end in"):
         write_run(tmp_path / "run.txt", good)
     with pytest.raises(PvidError, match="cannot be written"):

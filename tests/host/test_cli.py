@@ -157,10 +157,9 @@ BAD_RUNS = {
     "header only": "t,phi,y\n",
     "wrong columns": "time,angle,pivot\n0,0,0\n0.001,0,0\n",
     "text in numbers": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,fast,0\n",
-    "not a number": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,nan,0\n",
-    "gap": "t,phi,y\n" + "".join(f"{(k + (k > 200) * 50) / 1000},0.1,0\n" for k in range(400)),
-    "clock not uniform": "t,phi,y\n" + "".join(f"{(k + 0.3 * (k % 2)) / 1000},0.1,0\n" for k in range(400)),
-    "truncated": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,0.",
+    "not a number": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,inf,0\n",
+    "gap": "t,phi,y\n" + "".join(f"{(k + (k > 200) * 500) / 1000},0.1,0\n" for k in range(400)),
+    "clock runs back": "t,phi,y\n" + "".join(f"{k % 200 / 1000},0.1,0\n" for k in range(400)),
     "too short": "t,phi,y\n0,0.1,0\n0.001,0.1,0\n0.002,0.1,0\n",
 }
 
@@ -182,7 +181,9 @@ def test_a_bad_run_is_one_sentence_and_exit_code_2(case: str, place: Path, tmp_p
     [
         (("identify", "absent.csv", "--rig", "run.toml"), "absent.csv"),
         (("identify", "run.csv", "--rig", "absent.toml"), "absent.toml"),
-        (("identify", "run.csv"), "--rig"),
+        (("identify", "lone.csv"), "lone.csv does not exist"),
+        (("identify", "run.csv", "--set", "l3=1"), "--set 'l3' is not a key"),
+        (("identify", "run.csv", "--columns", "phi=angle:grad"), "'grad' is no unit of phi"),
         (("identify", "run.csv", "--rig", "run.toml", "--core", "f16"), "f16"),
         (("simulate", "out.csv", "--tone", "loud"), "loud"),
         (("simulate", "out.csv", "--duration", "-1"), "-1 s"),

@@ -236,7 +236,8 @@ def test_identify_and_export_take_a_log(tmp_path: Path, log: Path) -> None:
     exported = pvid(tmp_path, "export", "a.pvlog", "--to", "npz", "-o", "b")
     assert (exported.returncode, exported.stdout) == (0, "b.npz\n")
     missing = pvid(tmp_path, "identify", "run.csv")
-    assert (missing.returncode, missing.stderr) == (2, "pvid: no rig file: name it with --rig\n")
+    assert (missing.returncode, missing.stderr.count("\n")) == (2, 1)
+    assert missing.stderr.endswith("is all that is needed: use --set l1=0.25\n")
 
 
 def test_an_exported_segment_without_gaps_is_a_run(tmp_path: Path, log: Path) -> None:

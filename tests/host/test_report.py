@@ -161,7 +161,10 @@ def test_plot_of_a_run_identifies_it_first(tmp_path: Path) -> None:
     assert CliRunner().invoke(commands, arguments, standalone_mode=False).return_value == 0
     text = shown(tmp_path / "a.svg")
     assert "run.csv: weak form, stationary law, core f32" in text and "20000 samples" in text
-    with pytest.raises(PvidError, match="no rig file: name it with --rig"):
+    assert CliRunner().invoke(commands, arguments[:2], standalone_mode=False).return_value == 0  # run.toml is there
+    assert (tmp_path / "run.png").is_file()
+    (tmp_path / "run.toml").unlink()
+    with pytest.raises(PvidError, match="no rig file, and l1, .* is all that is needed: use --set l1=0.25"):
         CliRunner().invoke(commands, arguments[:2], standalone_mode=False, catch_exceptions=False)
 
 

@@ -123,7 +123,7 @@ def test_a_drive_that_goes_away_leaves_the_answer(native: Native) -> None:
     rig = RigFile.standard()
     parts = []
     for end in (15.0, 45.0, 60.0):
-        part = replace(run, t=run.t[run.t < end], phi=run.phi[run.t < end], y=run.y[run.t < end], columns={})
+        part = replace(run, t=run.t[run.t < end], phi=run.phi[run.t < end], y=run.y[run.t < end])
         result = identify(part, rig, native, start=standard_start(2))
         parts.append(np.array([result.value[name] for name in ("w", "d1", "d2")]))
     assert np.abs(parts[1] / parts[0] - 1).max() < 0.01

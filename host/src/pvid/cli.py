@@ -21,8 +21,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from pvid import __version__
-from pvid.capture import Run, read_run, write_run
+from pvid.capture import write_run
 from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
+from pvid.cli_input import columns_option, read_input, rig_options
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
 from pvid.compare import Comparison
 from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
@@ -30,7 +31,6 @@ from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
 from pvid.identify import LINEAR, PHYSICAL, UNITS, ZERO, Identification, identify
-from pvid.logrig import LOG_SUFFIX, rig_of_log, run_of_log
 from pvid.native import Native
 from pvid.rig import (
     STANDARD_DRIVE,
@@ -43,7 +43,9 @@ from pvid.rig import (
     standard_sensors,
     standard_start,
 )
+from pvid.rig_settings import rig_for, rig_path_of
 from pvid.rigfile import RigFile, load
+from pvid.run_columns import Columns
 from pvid.setup import weak_design_of
 from pvid.setup_q31 import strong_config_q31, tables_of, weak_config_q31
 from pvid.strong_header_q31 import strong_header_q31
@@ -244,7 +246,7 @@ def simulate_command(**options: Any) -> int:
     )
     out: Path = options["out"]
     write_run(out, simulation.run)
-    rig_path: Path = options["rig_out"] or _rig_path(out)
+    rig_path: Path = options["rig_out"] or rig_path_of(out)
     standard = RigFile.standard()
     rig = replace(
         standard,
@@ -258,47 +260,28 @@ def simulate_command(**options: Any) -> int:
     return DONE
 
 
-def _rig_path(out: Path) -> Path:
-    name = out.name.removesuffix(".gz")
-    return out.with_name(Path(name).stem + ".toml")
-
-
 # ---- identify and compare
 
 
-def _rig_options(function: Callable[..., int]) -> Callable[..., int]:
-    options = [
-        click.option(
-            "--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file (TOML).  [default: a log's own]"
-        ),
-        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."),
+def _form_options(function: Callable[..., int]) -> Callable[..., int]:
+    for option in (
         click.option("--form", type=click.Choice(["weak", "strong"]), help="Overrides the rig file."),
-    ]
-    for option in reversed(options):
+        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."),
+        columns_option,
+        rig_options,
+    ):
         function = option(function)
     return function
 
 
-def _is_log(path: Path) -> bool:
-    return path.suffix == LOG_SUFFIX
-
-
-def _read(path: Path, rig: RigFile) -> Run:
-    return run_of_log(path) if _is_log(path) else read_run(path, rig.sample_rate)
-
-
-def _load_rig(path: Path | None, run_path: Path, **overrides: str | None) -> RigFile:
-    """The rig file of that name, or the one in a log."""
-    rig = load(path) if path is not None else rig_of_log(run_path) if _is_log(run_path) else None
-    if rig is None:
-        raise PvidError("no rig file: name it with --rig")
+def _with(rig: RigFile, **overrides: str | None) -> RigFile:
     given = {name: value for name, value in overrides.items() if value is not None}
     return replace(rig, identifier=replace(rig.identifier, **given)) if given else rig  # type: ignore[arg-type]
 
 
 @commands.command(name="identify")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
-@_rig_options
+@_form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Overrides the rig file.")
 @click.option(
     "--on", "target", metavar="TARGET", help="An emulator, stream-host or a serial port: computed there, too."
@@ -308,6 +291,8 @@ def _load_rig(path: Path | None, run_path: Path, **overrides: str | None) -> Rig
 def identify_command(
     run_path: Path,
     rig_path: Path | None,
+    settings: tuple[str, ...],
+    columns: Columns | None,
     law: str | None,
     form: str | None,
     core: str | None,
@@ -315,13 +300,16 @@ def identify_command(
     as_json: bool,
     figure: Path | None,
 ) -> int:
-    """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m].
+    """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m], or what --columns names.
+
+    A rig file is not needed: --set l1=0.25, the length of rod 1, is enough. Missing samples and a clock that is not
+    uniform are bridged, and told.
 
     With --on the run is streamed to a target as well, and the answer is given only if the target reached the same
     bits at every tick that it reported and at the end.
     """
-    rig = _load_rig(rig_path, run_path, law=law, form=form, core=core)
-    run = _read(run_path, rig)
+    rig = _with(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
+    run = read_input(run_path, rig, columns, whole=rig.identifier.core == "f64")
     native = Native()
     result = identify(run, rig, native)
     if target is not None:
@@ -337,7 +325,7 @@ def identify_command(
             return DIFFERENT
         result = replace(result, on=target)
     if as_json:
-        click.echo(json.dumps(result.as_json()))
+        click.echo(json.dumps({**result.as_json(), "input": list(run.notes)}))
     else:
         _print_result(result)
     if figure is not None:
@@ -351,11 +339,18 @@ def identify_command(
 
 @commands.command(name="compare")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
-@_rig_options
+@_form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "all"]), help="Which arithmetic.  [default: the rig file's]")
 @click.option("--on", "targets", metavar="TARGET", multiple=True, help="Also there: emulator, serial port, all.")
 def compare_command(
-    run_path: Path, rig_path: Path | None, law: str | None, form: str | None, core: str | None, targets: tuple[str, ...]
+    run_path: Path,
+    rig_path: Path | None,
+    settings: tuple[str, ...],
+    columns: Columns | None,
+    law: str | None,
+    form: str | None,
+    core: str | None,
+    targets: tuple[str, ...],
 ) -> int:
     """Compares the C core with its numpy twin on RUN, after every tick, in every bit.
 
@@ -364,8 +359,8 @@ def compare_command(
     from pvid.compare_on import Outcome, compare_here, compare_there
     from pvid.target import targets_of
 
-    rig = _load_rig(rig_path, run_path, form=form)
-    run = _read(run_path, rig)
+    rig = _with(rig_for(run_path, rig_path, settings), form=form)
+    run = read_input(run_path, rig, columns)
     native = Native()
     own = "q31" if rig.identifier.core == "q31" else "f32"
     outcomes: list[Outcome] = []
@@ -389,9 +384,12 @@ def compare_command(
 
 @commands.command(name="tune")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
-@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file.  [default: RUN with .toml]")
+@rig_options
+@columns_option
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Rig file to write.  [default: RUN-tuned.toml]")
-def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int:
+def tune_command(
+    run_path: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
+) -> int:
     """Picks window, test functions, decimation, smoothing and forgetting of the weak form for a recorded RUN.
 
     Candidates are judged by what can be seen without the truth: standard errors from the run's own information, how
@@ -401,12 +399,12 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
     from pvid.tune import STEPS, tune
     from pvid.tune_table import candidates_table
 
-    rig = load(rig_path or _rig_path(run_path))
-    run = read_run(run_path, rig.sample_rate)
+    rig = rig_for(run_path, rig_path, settings)
+    run = read_input(run_path, rig, columns, whole=True)
     native = Native()
     with progress_bar("tuning", STEPS) as advance:
         tuned = tune(run, rig, native, advance)
-    out = out or run_path.with_name(_rig_path(run_path).stem + "-tuned.toml")
+    out = out or run_path.with_name(rig_path_of(run_path).stem + "-tuned.toml")
     tuned.rig.write(out)
     Console(width=None if sys.stdout.isatty() else 160).print(candidates_table(tuned))
     if tuned.default_refusal is not None:
@@ -502,8 +500,9 @@ def strong_table(rig_path: Path, name: str, check: Path | None) -> int:
 
 
 @commands.command(name="design")
-@click.option("--rig", "rig_path", type=click.Path(path_type=Path), required=True, help="The rig file (TOML).")
+@rig_options
 @click.option("--run", "run_path", type=click.Path(path_type=Path), help="Predict for the drive of this recorded run.")
+@columns_option
 @click.option(
     "--tone",
     "tones",
@@ -515,8 +514,10 @@ def strong_table(rig_path: Path, name: str, check: Path | None) -> int:
 @click.option("--duration", type=float, help="Length to predict for [s].  [default: the run's, else 40]")
 @click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
 def design_command(
-    rig_path: Path,
+    rig_path: Path | None,
+    settings: tuple[str, ...],
     run_path: Path | None,
+    columns: Columns | None,
     tones: tuple[str, ...],
     release: tuple[float, float] | None,
     duration: float | None,
@@ -529,16 +530,18 @@ def design_command(
     """
     from pvid.design_report import report_for_run, report_for_tones
 
-    rig = load(rig_path)
+    rig = rig_for(run_path, rig_path, settings)
     if duration is not None and not 0 < duration < float("inf"):
         raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
     if run_path is None:
+        if columns is not None:
+            raise PvidError("--columns is for the run: name it with --run")
         drive = tuple(_tone(text) for text in tones) or STANDARD_DRIVE
         report = report_for_tones(rig, drive, release or STANDARD_RELEASE, duration or 40.0)
     elif tones or release:
         raise PvidError("--run says how the rig was driven: leave --tone and --release out")
     else:
-        report = report_for_run(rig, read_run(run_path, rig.sample_rate), duration)
+        report = report_for_run(rig, read_input(run_path, rig, columns, whole=True), duration)
     if as_json:
         click.echo(json.dumps(report.as_json()))
         return DONE

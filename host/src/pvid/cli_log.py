@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from pvid.cli_input import columns_option, print_notes, rig_options
 from pvid.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
 from pvid.errors import PvidError
 from pvid.link import Configuration, Source
@@ -20,7 +21,9 @@ from pvid.logreader import Account, LogReader, Observer
 from pvid.logrig import refuse_to_append, rig_of_log
 from pvid.logstatus import StatusLine
 from pvid.logview import LiveView
+from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile, load
+from pvid.run_columns import Columns
 from pvid.stream_image import settings_number
 from pvid.stream_rig import StreamRig, stream_rig
 from pvid.target import EMULATORS, HOST_TARGET, open_target
@@ -207,16 +210,20 @@ def export_command(log: Path, rig_path: Path | None, form: str, out: Path | None
 
 @click.command(name="plot")
 @click.argument("log", metavar="LOG|RUN", type=click.Path(path_type=Path))
-@_RIG
+@rig_options
+@columns_option
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="png, svg or pdf.  [default: LOG with .png]")
-def plot_command(log: Path, rig_path: Path | None, out: Path | None) -> int:
+def plot_command(
+    log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
+) -> int:
     """Draws a report of a LOG: convergence, residuals and their autocorrelation, spectra, phase plot.
 
-    A run (.csv, .csv.gz, .npz, .parquet), or a log without estimates, is identified on this machine first.
+    A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first.
     """
     from pvid.report import recording_of, write_report  # matplotlib and scipy, which others need not wait for
 
-    recording = recording_of(log, None if rig_path is None else load(rig_path))
+    recording = recording_of(log, rig_for(log, rig_path, settings), columns)
+    print_notes(recording.run)
     out = out or log.with_suffix(".png")
     write_report(recording, out)
     click.echo(out)

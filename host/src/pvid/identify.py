@@ -379,7 +379,7 @@ def _in_q31(
     n_p = record.p.shape[1]
     p = p_of(config, last["p"][:n_p])
     if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
-        p[3] += float(np.mean(run.phi - phi * rig.sensor.phi_lsb))
+        p[3] += float(np.nanmean(run.phi - phi * rig.sensor.phi_lsb))
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
     told = len(trusted) > 0
     counters = identifier.counters

@@ -19,23 +19,24 @@ from scipy.signal import savgol_filter, welch
 
 from pvid.appearing import appearing
 from pvid.axis_limits import interesting
-from pvid.capture import Run, read_run
+from pvid.capture import Run, is_run, read_run
 from pvid.errors import PvidError
 from pvid.figures import LABELS
 from pvid.identify import LINEAR, PHYSICAL, ZERO, identify
 from pvid.link import Estimate, Form, Hello
 from pvid.logreader import LogReader
-from pvid.logrig import rig_of_log, run_of_log
+from pvid.logrig import run_of_log
 from pvid.logvalues import Values
 from pvid.logwords import KAPPA_MIN, reason_words, with_error
 from pvid.native import Native
 from pvid.residuals import Residuals, residuals_of
+from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile
+from pvid.run_columns import Columns
 
 Float = npt.NDArray[np.float64]
 
 _UNITS = {"g": "m/s²", "l2": "m", "rho2": "m"}
-_RUNS = (".csv", ".csv.gz", ".npz", ".parquet")
 _LAGS = 24
 _RESOLUTION_HZ = 0.05  # of the spectra, where the run is long enough
 _LEAST_SHOWN_HZ = 10.0
@@ -69,26 +70,25 @@ class Recording:
     account: str
 
 
-def recording_of(path: Path, rig: RigFile | None) -> Recording:
+def recording_of(path: Path, rig: RigFile | None, columns: Columns | None = None) -> Recording:
     """What a log holds, or what a run or a log without estimates gives when it is identified here.
 
     Parameters
     ----------
     rig
-        None: the one in the log.
+        None: the one in the log, or beside the run.
+    columns
+        Which columns of a run are t, phi and y.
 
     Raises
     ------
     PvidError
         When the file cannot be read, has too few samples, or there is no rig file.
     """
-    is_run = path.name.endswith(_RUNS)
-    if rig is None and not is_run:
-        rig = rig_of_log(path)
     if rig is None:
-        raise PvidError("no rig file: name it with --rig")
-    if is_run:
-        return _of_run(path, read_run(path, rig.sample_rate), rig)
+        rig = rig_for(path, None)
+    if is_run(path):
+        return _of_run(path, read_run(path, rig.sample_rate, columns), rig)
     return _of_log(path, rig) or _of_run(path, run_of_log(path), rig)
 
 
@@ -140,7 +140,8 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
 
 
 def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
-    result = identify(run, rig, Native())
+    whole = run.whole()  # residuals and spectra have no place for a missing sample
+    result = identify(whole if rig.identifier.core == "f64" else run, rig, Native())
     names = [name for name in (*LINEAR, ZERO) if name in result.value]
     identifier = rig.identifier
     return Recording(
@@ -148,7 +149,7 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
         "second",
         clock="of the run",
         rig=rig,
-        run=run,
+        run=whole,
         t=result.trajectory.t,
         physical=result.trajectory.physical,
         physical_se=result.trajectory.physical_se,

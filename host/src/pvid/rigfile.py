@@ -203,8 +203,14 @@ class RigFile:
         return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sample_rate=1000.0)
 
     @classmethod
-    def parse(cls, text: str) -> RigFile:
-        """From TOML text; PvidError names the key that is unknown, missing, of wrong type or out of range."""
+    def parse(cls, text: str, settings: Mapping[str, Any] | None = None) -> RigFile:
+        """From TOML text; PvidError names the key that is unknown, missing, of wrong type or out of range.
+
+        Parameters
+        ----------
+        settings
+            Keys and tables that come before those of the text.
+        """
         try:
             document = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -213,7 +219,7 @@ class RigFile:
             raise PvidError("is not a rig file: a number in it has thousands of digits") from error
         except RecursionError as error:
             raise PvidError("is not a rig file: its tables are nested too deeply") from error
-        top = _known(cls, document, "")
+        top = _known(cls, _merged(document, settings or {}), "")
         if "l1" not in top:
             raise PvidError("l1 is missing: the length of rod 1 [m]")
         tables = {name: _table(top.pop(name, {}), name) for name in _TABLES}
@@ -243,8 +249,8 @@ class RigFile:
             raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def load(path: str | Path) -> RigFile:
-    """Reads a rig file; PvidError names the file and the key."""
+def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile:
+    """Reads a rig file; PvidError names the file and the key. `settings` come before what it holds."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -252,12 +258,47 @@ def load(path: str | Path) -> RigFile:
     except ValueError as error:
         raise PvidError(f"{path}: is not UTF-8 text") from error
     try:
-        return RigFile.parse(text)
+        return RigFile.parse(text, settings)
     except PvidError as error:
         raise PvidError(f"{path}: {error}") from error
 
 
+def check_setting(table: str, key: str, value: Any) -> Any:
+    """One value as a rig file holds it; PvidError names a key that is unknown, or has the wrong type or range.
+
+    Parameters
+    ----------
+    table
+        Name of the table; "" for the keys above them.
+    """
+    name = f"{table}.{key}" if table else key
+    if table and table not in _TABLES:
+        raise PvidError(f"{name!a}: a rig file has no table {table!a}; it has {', '.join(_TABLES)}")
+    owner = _TABLES[table] if table else RigFile
+    keys = [one.name for one in fields(owner) if one.name not in _TABLES]
+    if key not in keys:
+        within = [f"{other}.{key}" for other, one in _TABLES.items() if key in (f.name for f in fields(one))]
+        hint = f"it is {within[0]}" if within and not table else f"known are {', '.join(keys)}"
+        raise PvidError(f"{name!a} is not a key of a rig file; {hint}")
+    value = _without_integers(owner, {key: value})[key]
+    field_of = _field(owner, key)
+    _check_value(field_of, value, f"{table}." if table else "")
+    return value
+
+
 _TABLES: dict[str, type] = {"sensor": Sensor, "nominal": Nominal, "identifier": Identifier}
+
+
+def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The document with the settings in place of its own; a table takes them key by key."""
+    merged = dict(document)
+    for key, value in settings.items():
+        held = merged.get(key, {})
+        if key not in _TABLES:
+            merged[key] = value
+        elif isinstance(held, dict):  # else it is refused as what it is
+            merged[key] = {**held, **value}
+    return merged
 
 
 def _field(owner: type, name: str) -> Field[Any]:

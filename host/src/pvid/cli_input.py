@@ -1,0 +1,88 @@
+"""What commands share that read a run: options for the rig and the columns, and what was done to the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pvid.capture import Run, read_run
+from pvid.errors import PvidError
+from pvid.logrig import LOG_SUFFIX, run_of_log
+from pvid.rigfile import RigFile
+from pvid.run_columns import Columns
+
+Command = Callable[..., Any]
+
+
+def rig_options(command: Command) -> Command:
+    """Adds --rig and --set: parameters rig_path and settings."""
+    rig = click.option(
+        "--rig",
+        "rig_path",
+        type=click.Path(path_type=Path),
+        help="The rig file (TOML).  [default: a log's own, or RUN.toml beside RUN.csv]",
+    )
+    settings = click.option(
+        "--set",
+        "settings",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="A key of the rig file, before what the file holds, as l1=0.25 or sensor.phi_lsb=0.0015; repeatable. "
+        "l1 is all that is needed.",
+    )
+    return rig(settings(command))
+
+
+def columns_option(command: Command) -> Command:
+    """Adds --columns: parameter columns."""
+    return click.option(
+        "--columns",
+        metavar="MAP",
+        type=ColumnsType(),
+        help="Which columns of RUN are t, phi and y, and their units: t=time_ms:ms,phi=angle_deg:deg,y=h:mm. A number "
+        "is the column's place; units are s ms us ns min, rad mrad deg rev turn, m cm mm um in, a number of SI units, "
+        "or one of them divided (rev/4096) or turned (-mm).",
+    )(command)
+
+
+class ColumnsType(click.ParamType[Columns]):
+    """Text of --columns."""
+
+    name = "columns"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Columns:
+        """See click."""
+        return value if isinstance(value, Columns) else Columns.parse(value)
+
+
+def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whole: bool = False) -> Run:
+    """The run in a file or a log; prints what was done to it.
+
+    Parameters
+    ----------
+    whole
+        Only the longest stretch without a missing tick.
+
+    Raises
+    ------
+    PvidError
+        When it cannot be read.
+    """
+    if path.suffix == LOG_SUFFIX:
+        if columns is not None:
+            raise PvidError(f"{path} is a log, whose columns are known: leave --columns out")
+        return run_of_log(path)
+    run = read_run(path, rig.sample_rate, columns)
+    if whole:
+        run = run.whole()
+    print_notes(run)
+    return run
+
+
+def print_notes(run: Run) -> None:
+    """What was done to a run, on standard error."""
+    for note in run.notes:
+        click.echo(f"pvid: input: {note}", err=True)

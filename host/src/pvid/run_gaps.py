@@ -1,0 +1,84 @@
+"""Missing ticks of a run: short gaps are interpolated, long ones stay empty, and both are told."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+_BRIDGED_S = 0.02
+_DEGREE = 5
+_BESIDE = 6
+# The rms departure of the samples beside a gap from its polynomial that is taken for noise, in units of the noise.
+_FITTING = 2.0
+_NOISE_SAMPLES = 1 << 18
+
+
+def stretches(flags: npt.NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
+    """First and last + 1 of each stretch of true flags."""
+    outside = np.zeros(1, np.int8)
+    edges = np.flatnonzero(np.diff(np.concatenate([outside, flags.view(np.int8), outside])))
+    return edges[::2], edges[1::2]
+
+
+def bridge(phi: FloatArray, y: FloatArray, sample_rate: float) -> tuple[IntArray, IntArray]:
+    """Interpolates the short gaps in place; returns first and last + 1 of all gaps.
+
+    A tick is missing when phi or y is NaN there. A gap takes the polynomial of degree 5, by least squares, through as
+    many samples on either side as are missing, at least 6. It stays NaN, in both signals, when it is longer than 20 ms
+    and than one tick, or when the polynomial misses those samples by more than their noise.
+
+    Parameters
+    ----------
+    phi, y : ndarray, shape (n,)
+        [rad], [m]; the first and the last sample are there.
+    sample_rate : float
+        [Hz].
+    """
+    missing = np.isnan(phi) | np.isnan(y)
+    firsts, ends = stretches(missing)
+    if not firsts.size:
+        return firsts, ends
+    longest = max(1, int(_BRIDGED_S * sample_rate + 1e-9))
+    noise = [_FITTING * _noise(signal[:_NOISE_SAMPLES]) for signal in (phi, y)]
+    for first, end in zip(firsts.tolist(), ends.tolist(), strict=True):
+        gap = slice(first, end)
+        if end - first > longest:
+            phi[gap] = y[gap] = np.nan
+            continue
+        beside = max(_BESIDE, end - first)
+        low, high = max(0, first - beside), min(phi.size, end + beside)
+        known = np.arange(low, high)[~missing[low:high]]
+        middle, scale = (first + end - 1) / 2, (high - low) / 2
+        powers = np.vander((known - middle) / scale, min(_DEGREE + 1, known.size), increasing=True)
+        inverse = np.linalg.pinv(powers)
+        within = np.vander((np.arange(first, end) - middle) / scale, powers.shape[1], increasing=True)
+        free = known.size - powers.shape[1]
+        found = []
+        for signal, largest in zip((phi, y), noise, strict=True):
+            coefficients = inverse @ signal[known]
+            residual = signal[known] - powers @ coefficients
+            if free > 0 and float(residual @ residual) > free * largest**2:
+                break
+            found.append(within @ coefficients)
+        phi[gap], y[gap] = found if len(found) == 2 else (np.nan, np.nan)
+    return firsts, ends
+
+
+def _noise(x: FloatArray) -> float:
+    """Standard deviation of the noise in x [n], and at least what float64 rounds."""
+    return max(math.sqrt(_variance(x)), 1e-12 * float(np.nanmax(np.abs(x))))
+
+
+def _variance(x: FloatArray) -> float:
+    """Mean square of the departures of x [n] from the cubics through their neighbours, in units of what noise gives.
+
+    Each sample is compared with the cubic through its two neighbours on either side. NaN is left out.
+    """
+    departure = x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - x[:-4] - x[4:]) / 6
+    square = departure[np.isfinite(departure)] ** 2 / (1 + (2 * 4**2 + 2) / 36)
+    return float(square.mean()) if square.size else 0.0

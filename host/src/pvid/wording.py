@@ -1,0 +1,14 @@
+"""What a sentence quotes: text from a file, and the reason of an error."""
+
+from __future__ import annotations
+
+
+def shown(text: str, longest: int = 40) -> str:
+    """``text`` quoted for a sentence, on one line and of bounded length."""
+    return ascii(text if len(text) <= longest else text[: longest - 3] + "...")
+
+
+def reason(error: BaseException) -> str:
+    """What an error tells, on one line and without its full stop."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return " ".join(str(text).split()).rstrip(".")
