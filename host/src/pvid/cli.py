@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid import __version__
+from pvid import __version__, answer
 from pvid.capture import Run, read_run, write_run
 from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
@@ -29,7 +29,7 @@ from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, message
 from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
-from pvid.identify import LINEAR, PHYSICAL, UNITS, ZERO, Identification, identify
+from pvid.identify import UNITS, ZERO, Identification, identify
 from pvid.logrig import LOG_SUFFIX, rig_of_log, run_of_log
 from pvid.native import Native
 from pvid.rig import (
@@ -114,7 +114,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     with progress_bar(f"streaming to {on.target}, comparing with the twins", len(rigs) * len(run.t)) as advance:
         parts = play_demo(on, rigs, run, Native(), start, advance)
     for played in parts:
-        _print_result(played.result, truths)
+        _print_result(played.result, rig, truths)
         _print_warning(played.result)
         _print_comparison(played.comparison, f"core {played.result.core} here against its numpy twin")
         playback = played.verdict.playback
@@ -138,29 +138,13 @@ def _truths(pendulum: Pendulum) -> dict[str, float]:
     return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2, "c": 0.0}
 
 
-def _print_result(result: Identification, truths: dict[str, float] | None = None) -> None:
-    table = Table(title=f"{result.form} form, {result.law} law, core {result.core} on {result.on}")
-    table.add_column("parameter")
-    if truths:
-        table.add_column("truth", justify="right")
-    table.add_column("estimate", justify="right")
-    table.add_column("standard error", justify="right")
-    if truths:
-        table.add_column("error %", justify="right")
-    for name in (*PHYSICAL, *LINEAR, ZERO):
-        if name not in result.value:
-            continue
-        label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
-        cells = [f"{result.value[name]:.6g}", f"{result.se[name]:.2g}"]
-        if truths:
-            cells.insert(0, f"{truths[name]:.6g}")
-            cells.append(f"{100 * (result.value[name] / truths[name] - 1):+.4f}" if truths[name] else "")
-        table.add_row(label, *cells)
-    Console().print(table)
-    click.echo(
-        f"status {result.status}; kappa {result.kappa:.2g}; {result.ticks} ticks, {result.updates} updates, "
-        f"{result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"
-    )
+def _print_result(result: Identification, rig: RigFile, truths: dict[str, float] | None = None) -> None:
+    table = answer.table(result, truths)
+    if table is not None:
+        Console().print(table)
+    for line in (answer.error_line(result, rig.sensor.y_gain_sd, rig.l1_sd), answer.status_line(result)):
+        if line is not None:
+            click.echo(line)
 
 
 def _print_warning(result: Identification) -> None:
@@ -337,9 +321,9 @@ def identify_command(
             return DIFFERENT
         result = replace(result, on=target)
     if as_json:
-        click.echo(json.dumps(result.as_json()))
+        click.echo(json.dumps(answer.as_json(result)))
     else:
-        _print_result(result)
+        _print_result(result, rig)
     if figure is not None:
         _write_figure(result, figure, None)
     _print_warning(result)
@@ -419,8 +403,7 @@ def tune_command(run_path: Path, rig_path: Path | None, out: Path | None) -> int
     click.echo(f"chosen: {tuned.reason}")
     in_core = replace(tuned.rig, identifier=replace(tuned.rig.identifier, core="f32"))
     result = identify(run, in_core, native)
-    found = ", ".join(f"{name} {result.value[name]:.6g} +- {result.se[name]:.2g}" for name in result.value)
-    click.echo(f"with it the C core identifies {found if result.identified else 'nothing: ' + result.verdict}")
+    click.echo(f"with it the C core identifies {answer.one_line(result)}")
     _print_warning(result)
     click.echo(f"rig file: {out}")
     return DONE
