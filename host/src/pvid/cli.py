@@ -307,7 +307,7 @@ def identify_command(
     rig = _load_rig(rig_path, run_path, law=law, form=form, core=core)
     run = _read(run_path, rig)
     native = Native()
-    result = identify(run, rig, native)
+    result = _identified(run, rig, native)
     if target is not None:
         from pvid.stream_rig import played_samples, stream_rig
         from pvid.target import verify
@@ -329,8 +329,20 @@ def identify_command(
     _print_warning(result)
     if not result.identified:
         click.echo(f"pvid: nothing identified: {result.verdict}", err=True)
-        return NOTHING_IDENTIFIED
-    return DONE
+    for sentence in result.advice:
+        click.echo(f"pvid: advice: {sentence}", err=True)
+    return DONE if result.identified else NOTHING_IDENTIFIED
+
+
+def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
+    """The answer with advice; a refusal has the advice behind its sentence."""
+    from pvid.advice import advice, advice_on_refusal
+
+    try:
+        result = identify(run, rig, native)
+    except PvidError as error:
+        raise PvidError("; ".join((str(error), *advice_on_refusal(run, rig, native)))) from error
+    return replace(result, advice=advice(run, rig, result, native))
 
 
 @commands.command(name="compare")

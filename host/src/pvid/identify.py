@@ -11,6 +11,7 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
+from pvid.excitation import excitation_of
 from pvid.modes import modes_hz
 from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
 from pvid.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
@@ -41,6 +42,8 @@ MISFIT_WINDOWS = 16
 
 # Status of a run that gave nothing because samples lay beyond the fixed-point core's ranges.
 SATURATED = "saturated"
+# Of a run that is driven and moves, and in which the core sees no drive: its equations do not explain it.
+UNEXPLAINED = "held not explained"
 
 PHYSICAL = ("g", "l2", "rho2")
 UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", "rho2": "m"}
@@ -585,6 +588,8 @@ def _identification(
         se = {name: float(np.sqrt(one.noise**2 + one.y_gain**2 + one.l1**2)) for name, one in parts.items()}
     elif beyond is not None and beyond.share >= _BEYOND_FATAL:
         status = SATURATED
+    elif rig.identifier.form == "weak" and status == Reason.HELD_NOT_EXCITED.text and not excitation_of(run, rig).weak:
+        status = UNEXPLAINED
     return Identification(
         value=value,
         se=se,

@@ -22,6 +22,7 @@ _MARGIN = 1.25
 # One sample in a thousand may lie anywhere: what is further than this times the others is a fault of the sensor, which
 # the core is to leave out, not to make room for.
 _ORDINARY = 0.999
+_ORDINARY_ACCELERATION = 0.99  # a jump of y by one fault is spread by the smoother
 _FAULT = 3.0
 _SMOOTHING_S = 0.05  # of the pivot's acceleration
 
@@ -47,7 +48,7 @@ def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
         "phi_range": given.phi_range or max(default.phi_range, _MARGIN * reach(run.phi, rest)),
         "y_range": given.y_range or max(default.y_range, _MARGIN * reach(run.y)),
         "acceleration_range": given.acceleration_range
-        or max(default.acceleration_range, _MARGIN * reach(pivot_acceleration(run), 0.0)),
+        or max(default.acceleration_range, _MARGIN * reach(pivot_acceleration(run), 0.0, _ORDINARY_ACCELERATION)),
     }
     return replace(rig, sensor=replace(default, **ranges))
 
@@ -62,13 +63,13 @@ def middle_of_travel(x: npt.ArrayLike) -> float:
     return float(low + high) / 2.0
 
 
-def reach(x: Float, middle: float | None = None) -> float:
+def reach(x: Float, middle: float | None = None, ordinary: float = _ORDINARY) -> float:
     """The furthest of x [n] from `middle`, None: that of its travel, but for its faults."""
     values = x[np.isfinite(x)]
     if not len(values):
         return 0.0
     distance = np.abs(values - (middle_of_travel(values) if middle is None else middle))
-    return min(float(distance.max()), _FAULT * float(np.quantile(distance, _ORDINARY)))
+    return min(float(distance.max()), _FAULT * float(np.quantile(distance, ordinary)))
 
 
 def pivot_acceleration(run: Run) -> Float:

@@ -58,6 +58,7 @@ class Sensor:
     ----------
     phi_lsb : angle sensor [rad]; default 14 bits a turn
     y_lsb : pivot sensor [m]
+    phi_zero : what the encoder reads at rest, roughly [rad]: needed where that is beyond 1 rad, a half turn say
     y_gain_sd : standard deviation of the gain of y, relative: enters the standard errors, since no run shows it
     phi_range : largest angle from rest that the fixed-point core takes in [rad]; 0: 0.5, or more where the run at hand
         needs it
@@ -69,6 +70,7 @@ class Sensor:
 
     phi_lsb: float = _number(2.0 * math.pi / 2**14, "rad", 0.0, 1.0)
     y_lsb: float = _number(5e-6, "m", 0.0, 1.0)
+    phi_zero: float = _number(0.0, "rad", -1e3, 1e3)
     y_gain_sd: float = _number(0.003, "relative", 0.0, 1.0)
     phi_range: float = _number(0.0, "rad", 0.0, 10.0)
     y_range: float = _number(0.0, "m", 0.0, 1e6)

@@ -107,14 +107,17 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
     if isinstance(config, StrongConfigQ31):
         return replace(config, y_offset=_offset(y, config.design.bank.y_max))
     design = config.design
-    return replace(config, phi_offset=_offset(phi, design.phi_max), y_offset=_offset(y, design.y_max))
+    return replace(
+        config, phi_offset=_offset(phi, design.phi_max, config.phi_offset), y_offset=_offset(y, design.y_max)
+    )
 
 
-def _offset(counts: Int64, limit: int) -> int:
-    """Where a sensor's travel has its middle; 0 where that is within half of the full scale `limit` [counts] and the
-    whole travel fits about 0."""
+def _offset(counts: Int64, limit: int, given: int = 0) -> int:
+    """Where a sensor's travel has its middle; the one that is given where that is within half of the full scale `limit`
+    and the whole travel fits about it [counts]."""
     middle = round(middle_of_travel(counts))
-    return middle if abs(middle) > limit // 2 or reach(counts.astype(np.float64), 0.0) > limit else 0
+    fits = abs(middle - given) <= limit // 2 and reach(counts.astype(np.float64), float(given)) <= limit
+    return given if fits else middle
 
 
 def beyond_range(config: ConfigQ31, phi: Int64, y: Int64, rejected: int) -> Beyond:
@@ -203,8 +206,13 @@ def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
 
 
 def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
-    """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p."""
+    """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p.
+
+    What the encoder reads at rest becomes the offset of its counts, and c is counted from there.
+    """
     tables = tables_of(rig, sample_rate)
+    offset = round(rig.sensor.phi_zero / rig.sensor.phi_lsb)
+    rig = replace(rig, sensor=replace(rig.sensor, phi_zero=0.0))
     float_config = weak_config(rig, sample_rate, start)
     windows_hz = sample_rate / (tables.decimation * float_config.hop)
     e = float_config.estimator
@@ -227,6 +235,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
     return WeakConfigQ31(
         design=tables,
         estimator=estimator,
+        phi_offset=offset,
         zero_unknown=float_config.zero_unknown,
         iterations=float_config.iterations,
         drive_min=round(float_config.drive_min * tables.dt**2 * 2.0**tables.u_bits),
