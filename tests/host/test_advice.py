@@ -23,7 +23,7 @@ from pvid.rig import STANDARD_DRIVE, Pendulum, Tone, simulate, standard_sensors
 from pvid.rigfile import Nominal, RigFile
 
 LSB = 2 * np.pi / 2**12
-RIG = RigFile.parse(f"l1 = 0.25\n[sensor]\nphi_lsb = {LSB!r}\n[identifier]\nfull_angle = true\n")
+RIG = RigFile.parse(f"l1 = 0.25\n[sensor]\nphi_lsb = {LSB!r}\n")
 
 
 @cache
@@ -49,6 +49,8 @@ def with_identifier(**changed: object) -> RigFile:
 
 def advised(run: Run, rig: RigFile, native: Native) -> tuple[Identification | None, tuple[str, ...]]:
     """What `identify` gives and the advice on it, as the command has it."""
+    if rig.l1 > 3:  # the design for a rod this long takes the command some seconds, and the advice needs none
+        return None, advice_on_refusal(run, rig, native)
     try:
         result = identify(run, rig, native)
     except PvidError:
@@ -127,19 +129,19 @@ MISTAKES = {
         "--columns t=t:ms",
         lambda run, rig: (run_of(), rig),
     ),
-    "a clock four times too fast": Mistake(
-        lambda: (replace(run_of(), t=run_of().t / 4, sample_rate=2000.0), RIG),
-        "t seems 4 times too small",
-        "--columns t=t:4",
+    "a clock ten times too slow": Mistake(
+        lambda: (replace(run_of(), t=run_of().t * 10, sample_rate=50.0), RIG),
+        "t seems 10 times too large",
+        "--columns t=t:0.1",
         lambda run, rig: (run_of(), rig),
     ),
-    "a clock four times too slow": Mistake(
+    "a clock four times too slow": Mistake(  # which explains the run as well, with another gravity
         lambda: (replace(run_of(), t=run_of().t * 4, sample_rate=125.0), RIG),
-        "t seems 4 times too large",
+        "unless the plane is tilted by 86 degrees, t is 4 times too large",
         "--columns t=t:0.25",
         lambda run, rig: (run_of(), rig),
     ),
-    "a clock that is half of it": Mistake(  # which explains the run as well, with another gravity
+    "a clock twice too fast": Mistake(
         lambda: (replace(run_of(), t=run_of().t / 2, sample_rate=1000.0), RIG),
         "m/s^2 is 4 times gravity: t is 2 times too small",
         "--columns t=t:2",
@@ -168,12 +170,6 @@ MISTAKES = {
         "angles go to 0.096 rad, and sin phi is not phi there",
         "--set identifier.full_angle=true",
         lambda run, rig: (run, RIG),
-    ),
-    "a guess far off": Mistake(
-        lambda: (run_of(), replace(RIG, nominal=Nominal(l2=0.02, rho2=0.2))),
-        "the guess of l2 and rho2 is far off",
-        "--set nominal.l2=0.09",
-        lambda run, rig: (run, replace(rig, nominal=Nominal(l2=0.091, rho2=0.06))),
     ),
 }
 
@@ -207,6 +203,14 @@ def test_a_healthy_run_of_small_angles_gets_none_in_any_core(native: Native, cor
     assert result is not None and result.identified and said == ()
 
 
+def test_fixed_point_is_advised_to_be_float32_where_angles_are_large(native: Native) -> None:
+    result, said = advised(run_of(release=1.2), with_identifier(core="q31"), native)
+    assert result is not None and result.alarm
+    assert said == (
+        "angles go to 0.11 rad, and fixed point does not correct sines and cosines: use --core f32, or smaller angles",
+    )
+
+
 def test_two_mistakes_get_two_sentences(native: Native) -> None:
     run = run_of()
     _, said = advised(replace(run, phi=np.degrees(run.phi), y=-1e3 * run.y), RIG, native)
@@ -237,7 +241,7 @@ def test_fixed_point_is_advised_to_let_the_run_set_its_ranges(native: Native) ->
     ("drive", "said"),
     [
         (0.1, "the drive is weak: the pivot's acceleration (rms) is 2.1 % of gravity"),
-        (0.01, "the pivot's acceleration hardly stands out of its sensor's noise"),
+        (0.001, "the pivot's acceleration hardly stands out of its sensor's noise"),
         (0.0, "the pivot does not move"),
     ],
 )
@@ -260,7 +264,8 @@ def test_an_angle_that_stands_still_is_told(native: Native, size: float, said: s
     run = run_of()
     still = LSB * np.rint(size * (run.phi - 0.01) / LSB)
     still[::3] += LSB * (size > 0)
-    _, advices = advised(replace(run, phi=still), RIG, native)
+    rig = with_identifier(survey=False)  # which searches a run without motion for long
+    _, advices = advised(replace(run, phi=still), rig, native)
     assert len(advices) == 1 and advices[0].startswith(said)
 
 
@@ -327,7 +332,7 @@ def test_a_refusal_has_the_advice_behind_it(tmp_path: Path) -> None:
     run = run_of()
     write_run(tmp_path / "run.csv", replace(run, t=1e3 * run.t, sample_rate=0.5))
     RIG.write(tmp_path / "run.toml")
-    with pytest.raises(PvidError, match="window_s = 1.25 s is 1 samples.*; t looks like milliseconds .*use --columns"):
+    with pytest.raises(PvidError, match="window_s = .* s is 1 samples.*; t looks like milliseconds .*use --columns"):
         CliRunner().invoke(
             commands,
             ["identify", str(tmp_path / "run.csv"), "--rig", str(tmp_path / "run.toml")],

@@ -18,10 +18,12 @@ from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.excitation import excitation_of
 from pvid.identify import Identification, identify
+from pvid.modes import modes_hz
 from pvid.native import Native, Reason
 from pvid.ranges_q31 import pivot_acceleration, reach
-from pvid.rigfile import Nominal, RigFile
+from pvid.rigfile import RigFile
 from pvid.sensor_steps import resolution_of
+from pvid.setup import nominal_start
 from pvid.weak_oracle import VALID_ANGLE
 
 GRAVITY = 9.81  # m/s^2
@@ -35,6 +37,7 @@ _LIKELY_RODS = (0.03, 2.0)  # m
 _MOST_ACCELERATION = 3.0  # of the pivot [gravity], rms
 _LIKELY_ACCELERATION = (0.005, 2.0)
 _WIDE_SWING = 1.0  # rad: a swing of a few degrees looks like it when it is read as radians
+_SMALL_ANGLE = 0.05  # rad: below, what sines leave is within a 14-bit encoder's noise
 _FULL_TURN = 2 * math.pi
 _FAR_REST = 1.5  # rad
 _LSB_OFF = 0.3
@@ -45,9 +48,7 @@ _FADING = 2.5  # rms of the swing in the first fifth of a run, over that in the 
 _MOST_SAMPLES = 200_000  # of a run, for trials
 _BETTER = 0.5  # chi^2 of a trial that is believed, over that without it
 _MOST_ROUNDS = 4
-_CLOCKS = (2.0, 0.5, 4.0, 0.25, 8.0, 0.125)
 _CLOCK_OFF = 0.3  # less does not keep a run from being answered
-_GUESSES = tuple((l2, rho2) for l2 in (0.15, 0.3, 0.6, 1.0) for rho2 in (0.4, 0.6, 0.9))  # l2/l1, rho2/l2
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,8 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
         return (*(cure.sentence for cure in cures), *_clock_of(result, case))
     if result.beyond_words is not None and not result.identified:
         return (_wider_ranges(result),)
-    found, case, now = _put_right(case, native)
+    plain = (result.core, result.form, result.law) == ("f32", "weak", "stationary") and case.run is run
+    found, case, now = _put_right(case, native, result if plain else None)
     if not found:
         found = list(_remaining(case, result, now))
     if now is not None and now.identified:
@@ -95,18 +97,25 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
 
 def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]:
     """Sentences on a run whose rig file's settings were refused."""
-    return tuple(_put_right(Case(_shortened(run), rig), native)[0])
+    return tuple(_put_right(Case(_shortened(run), rig), native, None)[0])
 
 
-def _put_right(case: Case, native: Native) -> tuple[list[str], Case, Identification | None]:
-    """What is found, the case without it, and what this gives."""
+def _put_right(
+    case: Case, native: Native, known: Identification | None
+) -> tuple[list[str], Case, Identification | None]:
+    """What is found, the case without it, and what this gives; `known` is what the case as it is gives, where a trial
+    has been made."""
     found: list[str] = []
-    now = _trial(case, native)
-    for search in (_unit_mistakes, _steps_of, _equation_mistakes):
+    for _ in range(_MOST_ROUNDS):
+        cure = _unit_mistake(case, native)
+        if cure is None or cure.sentence in found:
+            break
+        found.append(cure.sentence)
+        case, known = cure.case, None
+    now = known if known is not None else _trial(case, native)
+    for search in (_step_of, _equation_mistake):
         for _ in range(_MOST_ROUNDS):
-            if _is_good(now):
-                break
-            cure = search(case, now, native)
+            cure = None if _is_good(now) else search(case, now, native)
             if cure is None or cure.sentence in found:
                 break
             found.append(cure.sentence)
@@ -161,8 +170,8 @@ def _is_better(trial: Identification | None, now: Identification | None) -> bool
 # ---- units
 
 
-def _unit_mistakes(case: Case, now: Identification | None, native: Native) -> Cure | None:
-    """The first mistake of a unit that magnitudes show."""
+def _unit_mistake(case: Case, native: Native) -> Cure | None:
+    """The first mistake of a unit that magnitudes show; of several units the one that answers."""
     for cures in (
         _time_unit(case),
         _angle_in_counts(case),
@@ -171,10 +180,10 @@ def _unit_mistakes(case: Case, now: Identification | None, native: Native) -> Cu
         _rod_units(case),
         _height_units(case),
     ):
+        if len(cures) > 1:
+            return next((cure for cure in cures if _answers(_trial(cure.case, native))), cures[0])
         if cures:
-            trials = [(cure, _trial(cure.case, native)) for cure in cures] if len(cures) > 1 else []
-            answered = [cure for cure, trial in trials if _is_better(trial, now)]
-            return (answered or cures)[0]
+            return cures[0]
     return None
 
 
@@ -296,7 +305,7 @@ def _height_units(case: Case) -> list[Cure]:
 # ---- sensors
 
 
-def _steps_of(case: Case, now: Identification | None, native: Native) -> Cure | None:
+def _step_of(case: Case, now: Identification | None, native: Native) -> Cure | None:
     return next(iter(_steps(case)), None)
 
 
@@ -324,7 +333,7 @@ def _steps(case: Case) -> list[Cure]:
 # ---- equations
 
 
-def _equation_mistakes(case: Case, now: Identification | None, native: Native) -> Cure | None:
+def _equation_mistake(case: Case, now: Identification | None, native: Native) -> Cure | None:
     """The one that a trial confirms best."""
     best: tuple[Cure, Identification] | None = None
     for cure in _suspected(case, now):
@@ -360,13 +369,8 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
 
 
 def _first_answered(case: Case, now: Identification | None, native: Native) -> Cure | None:
-    """Another clock, or another guess, with which a run is answered that was not."""
-    if now is not None and now.identified:
-        return None
-    for cures in (_clocks(case, native), _guesses(case, native)):
-        for cure in cures:
-            return cure
-    return None
+    """Another clock with which a run is answered that was not."""
+    return None if now is not None and now.identified else _clock(case, native)
 
 
 def _at_rate(case: Case, factor: float) -> Case:
@@ -374,21 +378,33 @@ def _at_rate(case: Case, factor: float) -> Case:
     return Case(run, replace(case.rig, sample_rate=None))
 
 
-def _clocks(case: Case, native: Native) -> Iterator[Cure]:
-    """A clock that runs `factor` times too slow: every one explains the run, and gravity tells which is right."""
-    for tried in _CLOCKS:
-        trial = _trial(_at_rate(case, tried), native)
-        if trial is None or not trial.identified or "g" not in trial.value:
-            continue
-        factor = tried * math.sqrt(GRAVITY / trial.value["g"])
-        right = _at_rate(case, factor)
-        if abs(math.log(factor)) > math.log(1 + _CLOCK_OFF) and _answers(_trial(right, native)):
-            rate = case.run.sample_rate
-            yield Cure(
-                f"t seems {_size(factor)} (gravity is 9.8 m/s^2 with {rate * factor:.3g} samples a second, not "
-                f"{rate:.4g}): if so, use --columns t=t:{1 / factor:.3g}",
-                right,
-            )
+def _clock(case: Case, native: Native) -> Cure | None:
+    """A clock that runs too slow or too fast. Any explains a run, with another gravity: one is tried that brings what
+    phi does most to the nominal slow mode, and gravity tells which is right."""
+    slow = (modes_hz(nominal_start(case.rig)) or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
+    tried = slow / _dominant_hz(case.run)
+    if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
+        return None
+    trial = _trial(_at_rate(case, tried), native)
+    if trial is None or not _answers(trial):
+        return None
+    factor = tried * math.sqrt(GRAVITY / trial.value["g"])
+    right = _at_rate(case, factor)
+    if abs(math.log(factor)) < math.log(1 + _CLOCK_OFF) or not _answers(_trial(right, native)):
+        return None
+    rate = case.run.sample_rate
+    return Cure(
+        f"t seems {_size(factor)} (gravity is 9.8 m/s^2 with {rate * factor:.3g} samples a second, not {rate:.4g}): "
+        f"if so, use --columns t=t:{1 / factor:.3g}",
+        right,
+    )
+
+
+def _dominant_hz(run: Run) -> float:
+    """Where phi's spectrum is largest [Hz]; at least two periods a run."""
+    phi = np.where(np.isfinite(run.phi), run.phi, np.nanmedian(run.phi))
+    power = np.abs(np.fft.rfft((phi - phi.mean()) * np.hanning(len(phi)))) ** 2
+    return float(max(2, int(np.argmax(power[2:])) + 2)) * run.sample_rate / len(phi)
 
 
 def _size(ratio: float) -> str:
@@ -412,24 +428,6 @@ def _clock_of(result: Identification, case: Case) -> tuple[str, ...]:
     )
 
 
-def _guesses(case: Case, native: Native) -> Iterator[Cure]:
-    rig = case.rig
-    for of_l1, of_l2 in _GUESSES:
-        l2 = of_l1 * rig.l1
-        guess = Nominal(g=rig.nominal.g, l2=l2, rho2=of_l2 * l2)
-        trial = _trial(Case(case.run, replace(rig, nominal=guess)), native)
-        if not _answers(trial) or trial is None:
-            continue
-        better = replace(guess, l2=float(f"{trial.value['l2']:.2g}"), rho2=float(f"{trial.value['rho2']:.2g}"))
-        right = Case(case.run, replace(rig, nominal=better))
-        if _answers(_trial(right, native)):
-            yield Cure(
-                f"the guess of l2 and rho2 is far off: use --set nominal.l2={better.l2:g} and "
-                f"--set nominal.rho2={better.rho2:g}",
-                right,
-            )
-
-
 # ---- what remains
 
 
@@ -449,6 +447,11 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
             yield "the strong form needs an encoder of 20 bits and more: use --form weak, which explains this run"
         elif result.law != "stationary":
             yield "equation (5) does not arrive from this guess: use --law stationary, which explains this run"
+        elif result.core == "q31" and result.largest_angle > _SMALL_ANGLE:
+            yield (
+                f"angles go to {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
+                f"--core f32, or smaller angles"
+            )
         elif result.core == "q31":
             yield "fixed point does not resolve this run: use --core f32, which explains it"
         return
@@ -472,7 +475,7 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
         yield "the standard errors are still too wide: record longer, drive the pivot harder, or use a finer encoder"
     else:
         yield (
-            "the run does not follow the equations of a pendulum on a moving pivot, with any unit, sign, clock or "
-            "guess that was tried: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
+            "the run does not follow the equations of a pendulum on a moving pivot, with any unit, sign or clock "
+            "that was tried: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
             "sampled at the same time, and does nothing rub or hit?"
         )

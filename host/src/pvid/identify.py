@@ -187,7 +187,7 @@ class Identification:
             )
         elif self.trusted_s is not None and self.status not in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
             words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
-        if self.beyond_words is not None and self.beyond is not None and self.beyond.share >= _BEYOND_WARNED:
+        if self.identified and self.beyond is not None and self.beyond.share >= _BEYOND_WARNED:
             words.append(f"{self.beyond_words}: those samples were left out")
         return "; ".join(words) or None
 

@@ -113,11 +113,13 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
 
 
 def _offset(counts: Int64, limit: int, given: int = 0) -> int:
-    """Where a sensor's travel has its middle; the one that is given where that is within half of the full scale `limit`
-    and the whole travel fits about it [counts]."""
-    middle = round(middle_of_travel(counts))
-    fits = abs(middle - given) <= limit // 2 and reach(counts.astype(np.float64), float(given)) <= limit
-    return given if fits else middle
+    """Where a sensor's travel has its middle, or its median where the travel is longer than the full scale `limit`; the
+    one that is given where that is within half of the full scale and the whole travel fits about it [counts]."""
+    ordinary = counts[np.abs(counts) < 2**31 - 1]
+    middle, median = round(middle_of_travel(ordinary)), round(float(np.median(ordinary))) if len(ordinary) else 0
+    if abs(median - given) <= limit // 2 and reach(ordinary.astype(np.float64), float(given)) <= limit:
+        return given
+    return max((middle, median, given), key=lambda at: int((np.abs(ordinary - at) <= limit).sum()))
 
 
 def beyond_range(config: ConfigQ31, phi: Int64, y: Int64, rejected: int) -> Beyond:
