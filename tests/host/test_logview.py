@@ -28,8 +28,9 @@ from pvid.loghistory import NUMBERS, History, Thinned, envelope
 from pvid.logreader import Account, LogReader, LogStream, Record
 from pvid.logvalues import Rows, Values
 from pvid.logview import LiveView, sparkline
-from pvid.logwords import kappa_share, kappa_words, reason_words, with_error
+from pvid.logwords import kappa_share, kappa_words, reason_words
 from pvid.native import Native, Reason
+from pvid.rounding import with_error
 
 TICKS = 12_000
 

@@ -17,8 +17,9 @@ from pvid.errors import PvidError
 from pvid.logfile import LogWriter
 from pvid.logreader import LogReader
 from pvid.logvalues import Values
+from pvid.modes import modes_hz
 from pvid.native import Native
-from pvid.report import modes, recording_of, write_report
+from pvid.report import recording_of, write_report
 from pvid.residuals import Residuals, residuals_of
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
@@ -104,11 +105,11 @@ def test_residuals_of_the_strong_form() -> None:
 
 
 def test_modes_of_the_standard_rig() -> None:
-    assert modes(P) == pytest.approx((0.742, 2.56), rel=2e-3)  # MATH.md section 6
+    assert modes_hz(P) == pytest.approx((0.742, 2.56), rel=2e-3)  # MATH.md section 6
 
 
-def test_parameters_outside_the_physical_region_have_no_modes() -> None:
-    assert modes(np.array([11.56, 0.25, 0.2])) == modes(np.array([-1.0, 9.0, 5.0])) == ()
+def test_parameters_outside_the_physical_region_have_no_modes_hz() -> None:
+    assert modes_hz(np.array([11.56, 0.25, 0.2])) == modes_hz(np.array([-1.0, 9.0, 5.0])) == ()
 
 
 # ---- the report

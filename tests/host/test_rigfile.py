@@ -25,7 +25,9 @@ def test_the_example_of_the_design_is_the_standard_rig() -> None:
         """
         l1 = 0.30                 # m
         sample_rate = 1000        # Hz; must agree with t
+        l1_sd = 0.0
         [sensor]
+        y_gain_sd = 0.0
         phi_lsb = 3.834951969714103e-4
         y_lsb = 5e-6
         [nominal]

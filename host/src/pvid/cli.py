@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid import __version__
+from pvid import __version__, answer
 from pvid.capture import write_run
 from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
 from pvid.cli_input import columns_option, read_input, rig_options
@@ -30,7 +30,7 @@ from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, message
 from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
-from pvid.identify import LINEAR, PHYSICAL, UNITS, ZERO, Identification, identify
+from pvid.identify import UNITS, ZERO, Identification, identify
 from pvid.native import Native
 from pvid.rig import (
     STANDARD_DRIVE,
@@ -116,7 +116,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     with progress_bar(f"streaming to {on.target}, comparing with the twins", len(rigs) * len(run.t)) as advance:
         parts = play_demo(on, rigs, run, Native(), start, advance)
     for played in parts:
-        _print_result(played.result, truths)
+        _print_result(played.result, rig, truths)
         _print_warning(played.result)
         _print_comparison(played.comparison, f"core {played.result.core} here against its numpy twin")
         playback = played.verdict.playback
@@ -140,29 +140,13 @@ def _truths(pendulum: Pendulum) -> dict[str, float]:
     return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2, "c": 0.0}
 
 
-def _print_result(result: Identification, truths: dict[str, float] | None = None) -> None:
-    table = Table(title=f"{result.form} form, {result.law} law, core {result.core} on {result.on}")
-    table.add_column("parameter")
-    if truths:
-        table.add_column("truth", justify="right")
-    table.add_column("estimate", justify="right")
-    table.add_column("standard error", justify="right")
-    if truths:
-        table.add_column("error %", justify="right")
-    for name in (*PHYSICAL, *LINEAR, ZERO):
-        if name not in result.value:
-            continue
-        label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
-        cells = [f"{result.value[name]:.6g}", f"{result.se[name]:.2g}"]
-        if truths:
-            cells.insert(0, f"{truths[name]:.6g}")
-            cells.append(f"{100 * (result.value[name] / truths[name] - 1):+.4f}" if truths[name] else "")
-        table.add_row(label, *cells)
-    Console().print(table)
-    click.echo(
-        f"status {result.status}; kappa {result.kappa:.2g}; {result.ticks} ticks, {result.updates} updates, "
-        f"{result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"
-    )
+def _print_result(result: Identification, rig: RigFile, truths: dict[str, float] | None = None) -> None:
+    table = answer.table(result, truths)
+    if table is not None:
+        Console().print(table)
+    for line in (answer.error_line(result, rig.sensor.y_gain_sd, rig.l1_sd), answer.status_line(result)):
+        if line is not None:
+            click.echo(line)
 
 
 def _print_warning(result: Identification) -> None:
@@ -311,7 +295,7 @@ def identify_command(
     rig = _with(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
     run = read_input(run_path, rig, columns, whole=rig.identifier.core == "f64")
     native = Native()
-    result = identify(run, rig, native)
+    result = _identified(run, rig, native)
     if target is not None:
         from pvid.stream_rig import played_samples, stream_rig
         from pvid.target import verify
@@ -325,16 +309,28 @@ def identify_command(
             return DIFFERENT
         result = replace(result, on=target)
     if as_json:
-        click.echo(json.dumps({**result.as_json(), "input": list(run.notes)}))
+        click.echo(json.dumps(answer.as_json(result)))
     else:
-        _print_result(result)
+        _print_result(result, rig)
     if figure is not None:
         _write_figure(result, figure, None)
     _print_warning(result)
     if not result.identified:
         click.echo(f"pvid: nothing identified: {result.verdict}", err=True)
-        return NOTHING_IDENTIFIED
-    return DONE
+    for sentence in result.advice:
+        click.echo(f"pvid: advice: {sentence}", err=True)
+    return DONE if result.identified else NOTHING_IDENTIFIED
+
+
+def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
+    """The answer with advice; a refusal has the advice behind its sentence."""
+    from pvid.advice import advice, advice_on_refusal
+
+    try:
+        result = identify(run, rig, native)
+    except PvidError as error:
+        raise PvidError("; ".join((str(error), *advice_on_refusal(run, rig, native)))) from error
+    return replace(result, advice=advice(run, rig, result, native))
 
 
 @commands.command(name="compare")
@@ -417,8 +413,7 @@ def tune_command(
     click.echo(f"chosen: {tuned.reason}")
     in_core = replace(tuned.rig, identifier=replace(tuned.rig.identifier, core="f32"))
     result = identify(run, in_core, native)
-    found = ", ".join(f"{name} {result.value[name]:.6g} +- {result.se[name]:.2g}" for name in result.value)
-    click.echo(f"with it the C core identifies {found if result.identified else 'nothing: ' + result.verdict}")
+    click.echo(f"with it the C core identifies {answer.one_line(result)}")
     _print_warning(result)
     click.echo(f"rig file: {out}")
     return DONE

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +11,15 @@ import numpy.typing as npt
 from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
+from pvid.excitation import excitation_of
+from pvid.modes import modes_hz
 from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
 from pvid.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.ranges_q31 import Beyond, with_ranges_of
 from pvid.rigfile import RigFile
+from pvid.scale_errors import added_covariance, scale_errors
 from pvid.setup import bank_of, config_of, weak_design_of
-from pvid.setup_q31 import config_for_run, counts_of, covariance_of, p_of, se_of
+from pvid.setup_q31 import beyond_range, config_for_run, counts_of, covariance_of, p_of, se_of
 from pvid.survey import fitted
 from pvid.weak_oracle import WeakSettings, identify_weak
 
@@ -36,14 +40,25 @@ _FADING = 4  # windows after the correction's switch (weak_oracle)
 # Windows that the float64 core's alarm wants to have seen.
 MISFIT_WINDOWS = 16
 
+# Status of a run that gave nothing because samples lay beyond the fixed-point core's ranges.
+SATURATED = "saturated"
+# Of a run that is driven and moves, and in which the core sees no drive: its equations do not explain it.
+UNEXPLAINED = "held not explained"
+
 PHYSICAL = ("g", "l2", "rho2")
 UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", "rho2": "m"}
+
+
+# Samples beyond the fixed-point core's ranges: of an answer, from this share on they are worth a warning.
+_BEYOND_WARNED = 0.01
+# Each of them costs a window: with so many, one or two a second at 1 kHz, nothing else needs to be wrong.
+_BEYOND_FATAL = 1e-3
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """Estimates over time, for a figure: t [n] in s, p and se [n, 3]; physical and its errors [n, 3], NaN outside
-    the physical region; kappa [n]."""
+    the physical region; kappa [n]. Standard errors contain those of the scales, as Identification.se does."""
 
     t: Float
     p: Float
@@ -70,22 +85,59 @@ class Publications:
 
 
 @dataclass(frozen=True)
-class Identification:
-    """What a run told.
+class ErrorParts:
+    """What a standard error is made of, in the parameter's unit: the core's own, from the run; the gain of y; l1."""
 
-    `value` and `se` map w, d1, d2 [1/s^2, -, -] and, inside the physical region, g, l2, rho2 [m/s^2, m, m].
-    `lost` counts samples that were rejected; `hash` is None where the core has none (f64). In the weak form the values
-    are the published ones (pvid/trust.h): `trusted_s` is when the last of them was trusted [s] (None: never, they are
-    the start), `misfit` the variance of the residuals over what the sensors' noise explains, and `alarm` whether that
-    is too much. In the strong form, which publishes whatever it has, they are the last ones, and None, None; `alarm` is
-    the C cores' own (pvid/misfit.h); float64 has none. `publications` are those of the weak form's C cores.
+    noise: float
+    y_gain: float
+    l1: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a run gave.
+
+    value, se
+        w, d1, d2 [1/s^2, -, -], c [rad] where it is estimated and, inside the physical region, g, l2, rho2
+        [m/s^2, m, m], with their standard errors. Where `identified` is false they are the start, not an estimate.
+    parts
+        of the standard errors, where something is identified
+    friction
+        c1, c2 [m^2/s] of pivot and joint, where they are estimated; else ()
+    kappa
+        part of w's information that d1 and d2 cannot imitate
+    trusted_s, first_publication_s
+        when the core published last and first [s]; None: never. In the strong form, which publishes whatever it has,
+        trusted_s is None
+    chi2
+        variance of the residuals over what the sensors' noise explains; None: not judged yet, or the strong form
+    alarm
+        whether that is too much. The strong form's is its own (pvid/misfit.h); float64 has none
+    status
+        the last tick's reason in words; of a run that the fixed-point core could not take in, that
+    ticks, updates, lost
+        samples; steps of the estimate; samples that were rejected
+    reasons
+        how often each reason came, in ticks (core f64: in windows or rows)
+    largest_angle
+        of phi from its rest [rad]
+    beyond
+        samples beyond the ranges of the fixed-point core, and `beyond_words`, a clause on them; None in other cores
+    notes
+        on how the run was read
+    advice
+        sentences on what is likely to be wrong, and its cure (pvid.advice)
+    publications
+        of the weak form's C cores; their standard errors contain those of the scales, too
+    hash
+        None where the core has none (f64)
     """
 
     value: dict[str, float]
     se: dict[str, float]
     kappa: float
     trusted_s: float | None
-    misfit: float | None
+    chi2: float | None
     alarm: bool
     status: str
     ticks: int
@@ -98,61 +150,59 @@ class Identification:
     on: str
     trajectory: Trajectory
     publications: Publications
+    parts: dict[str, ErrorParts] = field(default_factory=dict)
+    friction: tuple[float, ...] = ()
+    first_publication_s: float | None = None
+    reasons: Mapping[str, int] = field(default_factory=dict)
+    largest_angle: float = 0.0
+    beyond: Beyond | None = None
+    beyond_words: str | None = None
+    notes: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ()
 
     @property
     def identified(self) -> bool:
         """Whether this is an answer: one that was trusted; in the strong form, whose last word is no refusal and whose
         w is known."""
-        if self.form == "weak":
-            return self.trusted_s is not None
-        return self.updates > 0 and self.status in _GOOD and self.se["w"] <= WORST_SE * abs(self.value["w"])
+        return _is_answer(self.form, self.trusted_s, self.updates, self.status, self.se["w"], self.value["w"])
+
+    @property
+    def modes_hz(self) -> tuple[float, ...]:
+        """The slow and the fast mode of the estimate [Hz]; () where nothing is identified."""
+        return modes_hz(np.array([self.value[name] for name in LINEAR])) if self.identified else ()
 
     @property
     def warning(self) -> str | None:
         """What makes the answer doubtful, in words; None if nothing does."""
-        if self.alarm and self.misfit is not None:
-            return (
-                f"the residuals have {self.misfit:.1f} times the variance that the sensors' noise explains: large "
+        words = []
+        if self.alarm and self.chi2 is not None:
+            words.append(
+                f"the residuals have {self.chi2:.1f} times the variance that the sensors' noise explains: large "
                 f"angles, friction, or a wrong phi_lsb; the errors are larger than the standard errors say"
             )
-        if self.alarm:
-            return (
+        elif self.alarm:
+            words.append(
                 "the rows leave more unexplained than they should: too coarse an encoder for the strong form, a jolt "
                 "in sums that do not forget it, or a mechanism that has changed; the estimate is not to be believed"
             )
-        if self.trusted_s is not None and self.status not in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
-            return f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}"
-        return None
+        elif self.trusted_s is not None and self.status not in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
+            words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
+        if self.identified and self.beyond is not None and self.beyond.share >= _BEYOND_WARNED:
+            words.append(f"{self.beyond_words}: those samples were left out")
+        return "; ".join(words) or None
 
     @property
     def verdict(self) -> str:
         """Why nothing was identified, in words."""
         if self.form == "strong" and self.updates and self.status in _GOOD:
             return f"the standard error of w is {100 * self.se['w'] / abs(self.value['w']):.0f} % of it"
-        return self.status
+        return f"{self.status}: {self.beyond_words}" if self.status == SATURATED else self.status
 
-    def as_json(self) -> dict[str, Any]:
-        """The object of `identify --json` (DESIGN.md)."""
-        names = (*LINEAR, *PHYSICAL, ZERO)
-        parameters: dict[str, Any] = {
-            name: {"value": self.value[name], "se": self.se[name]} if name in self.value else None for name in names
-        }
-        return {
-            **parameters,
-            "kappa": self.kappa,
-            "trusted_s": self.trusted_s,
-            "misfit": self.misfit,
-            "warning": self.warning,
-            "status": self.status,
-            "ticks": self.ticks,
-            "updates": self.updates,
-            "lost": self.lost,
-            "hash": None if self.hash is None else f"{self.hash:08x}",
-            "core": self.core,
-            "form": self.form,
-            "law": self.law,
-            "on": self.on,
-        }
+
+def _is_answer(form: str, trusted_s: float | None, updates: int, status: str, se_w: float, w: float) -> bool:
+    if form == "weak":
+        return trusted_s is not None
+    return updates > 0 and status in _GOOD and se_w <= WORST_SE * abs(w)
 
 
 def identify(
@@ -217,7 +267,7 @@ def _in_float32(
         run.t[::every],
         estimates["p"][:, :3].astype(np.float64),
         estimates["covariance"][:, :3, :3].astype(np.float64),
-        rig.l1,
+        rig,
         estimates["kappa"].astype(np.float64),
     )
     n_p = min(record.p.shape[1], NAMED)
@@ -231,11 +281,15 @@ def _in_float32(
         )
     return _identification(
         rig,
+        run,
         p=last["p"][:n_p].astype(np.float64),
+        friction=tuple(map(float, last["p"][NAMED : record.p.shape[1]])),
         covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
         kappa=float(last["kappa"]),
         trusted_s=float(run.t[trusted[-1]]) if told and publishes else None,
-        misfit=identifier.misfit if isinstance(identifier, WeakIdentifier) else None,
+        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        reasons=_counted(record.reason),
+        chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifier) else None,
         alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
@@ -281,13 +335,15 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
     moved_at_end = bool(driven[-1] and result.updated[-settings.divider :].any())
     return _identification(
         rig,
+        run,
         p=result.last.p,
         covariance=result.last.covariance,
         kappa=result.last.kappa,
         trusted_s=None,
-        misfit=None,
+        chi2=None,
         alarm=False,
         status=(Reason.UPDATED if moved_at_end else Reason.HELD_NOT_EXCITED).text,
+        reasons=_windows_counted(result.updated, result.updated),
         ticks=len(run.t),
         updates=int(result.updated.sum()),
         lost=0,
@@ -296,7 +352,7 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
             times,
             np.array([estimate.p for _, estimate in result.estimates]),
             np.array([estimate.covariance for _, estimate in result.estimates]),
-            rig.l1,
+            rig,
             np.array([estimate.kappa for _, estimate in result.estimates]),
         ),
     )
@@ -336,34 +392,36 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
             settings.start[:n_p].astype(np.float64),
             np.diag(settings.start_sd[:n_p].astype(np.float64) ** 2),
         )
-        status, misfit, alarm = Reason.HELD_NOT_EXCITED, None, False
+        status, chi2, alarm = Reason.HELD_NOT_EXCITED, None, False
     else:
         p, covariance = result.p[trusted[-1], :n_p], result.covariance[trusted[-1], :n_p, :n_p]
         # rows that are corrected later than the first publication are judged once the uncorrected past has faded
         judged = result.misfit[
             max(trusted[0], _FADING * int(result.corrected.any()) + int(np.argmax(result.corrected))) :
         ]
-        misfit = float(np.nanmean(judged))
-        alarm = trust.misfit_max > 0 and np.isfinite(judged).sum() >= MISFIT_WINDOWS and misfit > trust.misfit_max
+        chi2 = _judged(float(np.mean(judged[np.isfinite(judged)]))) if np.isfinite(judged).any() else None
+        enough = np.isfinite(judged).sum() >= MISFIT_WINDOWS
+        alarm = bool(trust.misfit_max > 0 and enough and chi2 is not None and chi2 > trust.misfit_max)
         status = Reason.MISFIT if alarm else Reason.UPDATED
         if not good[-1]:
             status = Reason.HELD_UNCERTAIN if result.updated[-1] else Reason.HELD_NOT_EXCITED
     return _identification(
         rig,
+        run,
         p=p,
         covariance=covariance,
         kappa=float(result.kappa[trusted[-1]]) if len(trusted) else result.last.kappa,
         trusted_s=float(run.t[0] + result.t[trusted[-1]]) if len(trusted) else None,
-        misfit=misfit,
+        first_publication_s=float(run.t[0] + result.t[trusted[0]]) if len(trusted) else None,
+        reasons=_windows_counted(result.updated, good),
+        chi2=chi2,
         alarm=alarm,
         status=status.text,
         ticks=len(run.t),
         updates=config.iterations * int(result.updated.sum()),
         lost=0,
         running_hash=None,
-        trajectory=_trajectory(
-            run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig.l1, result.kappa
-        ),
+        trajectory=_trajectory(run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig, result.kappa),
     )
 
 
@@ -391,13 +449,19 @@ def _in_q31(
             se=se_of(config, record.published_se[trusted])[:, :3],
             alarm=record.reason[trusted] == Reason.MISFIT,
         )
+    beyond = beyond_range(config, phi, y, counters["rejected_saturated"])
     return _identification(
         rig,
+        run,
         p=p,
         covariance=covariance_of(config, last),
         kappa=float(last["kappa"]) / 2**30,
         trusted_s=float(run.t[trusted[-1]]) if told and isinstance(identifier, WeakIdentifierQ31) else None,
-        misfit=identifier.misfit if isinstance(identifier, WeakIdentifierQ31) else None,
+        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        reasons=_counted(record.reason),
+        beyond=beyond,
+        beyond_words=beyond.words(with_ranges_of(rig, run).sensor),
+        chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifierQ31) else None,
         alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
@@ -408,7 +472,7 @@ def _in_q31(
             run.t[::every],
             p_of(config, record.estimate["p"][:, :n_p])[:, :3],
             covariance_of(config, record.estimate)[:, :3, :3],
-            rig.l1,
+            rig,
             record.estimate["kappa"] / 2**30,
         ),
         publications=publications,
@@ -421,30 +485,33 @@ def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
     covariance = np.diag(config.estimator.start_sd.astype(np.float64) ** 2)
     return _identification(
         rig,
+        run,
         p=p,
         covariance=covariance,
         kappa=0.0,
         trusted_s=None,
-        misfit=None,
+        chi2=None,
         alarm=False,
         status=Reason.HELD_NOT_EXCITED.text,
+        reasons={Reason.HELD_NOT_EXCITED.text: len(run.t)},
         ticks=len(run.t),
         updates=0,
         lost=0,
         running_hash=None,
-        trajectory=_trajectory(
-            run.t[[0, -1]], np.stack([p, p]), np.stack([covariance, covariance]), rig.l1, np.zeros(2)
-        ),
+        trajectory=_trajectory(run.t[[0, -1]], np.stack([p, p]), np.stack([covariance, covariance]), rig, np.zeros(2)),
     )
 
 
-def _trajectory(t: Float, p: Float, covariance: Float, l1: float, kappa: Float) -> Trajectory:
+def _trajectory(t: Float, p: Float, covariance: Float, rig: RigFile, kappa: Float) -> Trajectory:
+    wide = covariance + added_covariance(p, rig.sensor.y_gain_sd, rig.l1_sd)
+    scales = scale_errors(p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
+    noise = oracle.physical_errors(p, covariance, rig.l1)
     return Trajectory(
         t=t,
         p=p,
-        se=np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)),
-        physical=oracle.physical(p, l1),
-        physical_se=oracle.physical_errors(p, covariance, l1),
+        se=np.sqrt(np.diagonal(wide, axis1=-2, axis2=-1)),
+        physical=oracle.physical(p, rig.l1),
+        physical_se=np.sqrt(noise**2 + scales.y_gain_physical**2 + scales.l1_physical**2),
         kappa=kappa,
     )
 
@@ -455,46 +522,115 @@ def _final_status(reasons: npt.NDArray[np.uint8]) -> str:
     return Reason(int(solved[-1])).text if len(solved) else Reason.ACCUMULATED.text
 
 
+def _counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:
+    """How often each reason came."""
+    counts = np.bincount(reasons)
+    return {Reason(int(one)).text: int(counts[one]) for one in np.flatnonzero(counts)}
+
+
+def _windows_counted(updated: npt.NDArray[np.bool_], good: npt.NDArray[np.bool_]) -> dict[str, int]:
+    """Of the float64 core's windows: `updated` moved p [n], `good` were published, too [n]."""
+    counts = {
+        Reason.UPDATED.text: int(good.sum()),
+        Reason.HELD_UNCERTAIN.text: int((updated & ~good).sum()),
+        Reason.HELD_NOT_EXCITED.text: int((~updated).sum()),
+    }
+    return {name: count for name, count in counts.items() if count}
+
+
+def _judged(misfit: float) -> float | None:
+    """A core's misfit, which is 0 until it has been judged."""
+    return misfit if np.isfinite(misfit) and misfit > 0.0 else None
+
+
+def largest_angle(run: Run, rest: float | None) -> float:
+    """Of phi from its rest [rad]; where that is not known, from the median."""
+    phi = run.phi[np.isfinite(run.phi)]
+    if not len(phi):
+        return 0.0
+    return float(np.abs(phi - (np.median(phi) if rest is None else rest)).max())
+
+
 def _identification(
     rig: RigFile,
+    run: Run,
     *,
     p: Float,
     covariance: Float,
     kappa: float,
     trusted_s: float | None,
-    misfit: float | None,
+    first_publication_s: float | None = None,
+    chi2: float | None,
     alarm: bool,
     status: str,
+    reasons: Mapping[str, int],
     ticks: int,
     updates: int,
     lost: int,
     running_hash: int | None,
     trajectory: Trajectory,
     publications: Publications | None = None,
+    friction: tuple[float, ...] = (),
+    beyond: Beyond | None = None,
+    beyond_words: str | None = None,
 ) -> Identification:
     names = (*LINEAR, ZERO)[: len(p)]
-    values = dict(zip(names, map(float, p), strict=True))
-    errors = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    value = dict(zip(names, map(float, p), strict=True))
+    noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     physical = oracle.physical(p[:3], rig.l1)
     if np.isfinite(physical).all():
-        values.update(zip(PHYSICAL, map(float, physical), strict=True))
-        errors.update(zip(PHYSICAL, map(float, oracle.physical_errors(p[:3], covariance[:3, :3], rig.l1)), strict=True))
+        value.update(zip(PHYSICAL, map(float, physical), strict=True))
+        noise.update(zip(PHYSICAL, map(float, oracle.physical_errors(p[:3], covariance[:3, :3], rig.l1)), strict=True))
+    se, parts = noise, {}
+    answered = _is_answer(rig.identifier.form, trusted_s, updates, status, noise["w"], value["w"])
+    if answered:
+        parts = _parts(noise, p[:3], rig)
+        se = {name: float(np.sqrt(one.noise**2 + one.y_gain**2 + one.l1**2)) for name, one in parts.items()}
+    elif beyond is not None and beyond.share >= _BEYOND_FATAL:
+        status = SATURATED
+    elif rig.identifier.form == "weak" and status == Reason.HELD_NOT_EXCITED.text and not excitation_of(run, rig).weak:
+        status = UNEXPLAINED
     return Identification(
-        value=values,
-        se=errors,
+        value=value,
+        se=se,
+        parts=parts,
+        friction=friction,
         kappa=kappa,
         trusted_s=trusted_s,
-        misfit=misfit,
+        first_publication_s=first_publication_s,
+        chi2=chi2,
         alarm=alarm,
         status=status,
+        reasons=reasons,
         ticks=ticks,
         updates=updates,
         lost=lost,
+        largest_angle=largest_angle(run, value.get(ZERO) if answered else None),
+        beyond=beyond,
+        beyond_words=beyond_words,
         hash=running_hash,
         core=rig.identifier.core,
         form=rig.identifier.form,
         law=rig.identifier.law,
         on="host",
         trajectory=trajectory,
-        publications=Publications.none() if publications is None else publications,
+        publications=Publications.none() if publications is None else _widened(publications, rig),
     )
+
+
+def _widened(published: Publications, rig: RigFile) -> Publications:
+    """With the scales' errors in the standard errors."""
+    scales = scale_errors(published.p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
+    se = np.sqrt(published.se**2 + scales.y_gain_p**2 + scales.l1_p**2)
+    return Publications(published.t, published.p, se, published.alarm)
+
+
+def _parts(noise: Mapping[str, float], p: Float, rig: RigFile) -> dict[str, ErrorParts]:
+    """Of the standard errors of every parameter whose own is in `noise`."""
+    scales = scale_errors(p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
+    gain = dict(zip((*LINEAR, *PHYSICAL), (*scales.y_gain_p, *scales.y_gain_physical), strict=True))
+    rod = dict(zip((*LINEAR, *PHYSICAL), (*scales.l1_p, *scales.l1_physical), strict=True))
+    return {
+        name: ErrorParts(one, abs(float(gain.get(name, 0.0))), abs(float(rod.get(name, 0.0))))
+        for name, one in noise.items()
+    }

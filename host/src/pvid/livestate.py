@@ -26,9 +26,9 @@ from pvid.logwords import (
     reason_words,
     received_words,
     residual_words,
-    with_error,
 )
 from pvid.rigfile import RigFile
+from pvid.rounding import with_error
 
 Float = npt.NDArray[np.float64]
 

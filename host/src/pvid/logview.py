@@ -28,8 +28,8 @@ from pvid.logwords import (
     reason_words,
     received_words,
     residual_words,
-    with_error,
 )
+from pvid.rounding import with_error
 
 _PERIOD_S = 0.25
 _BAR, _SHORT_BAR = 30, 18  # in a terminal of 100 columns and more, and in a narrower one

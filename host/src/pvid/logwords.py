@@ -111,13 +111,3 @@ def residual_words(hello: Hello | None) -> str:
     """What the residuals are so many times of."""
     weak = hello is not None and hello.form == Form.WEAK
     return "times the encoder's noise" if weak else "times the row_sd that was configured"
-
-
-def with_error(value: float, error: float) -> tuple[str, str]:
-    """Value and standard error to the error's second digit: 9.50069, 0.0011 is ("9.5007", "0.0011")."""
-    if not (math.isfinite(error) and error > 0):
-        return f"{value:.6g}", f"{error:.2g}"
-    decimals = 1 - math.floor(math.log10(error))
-    if not 0 <= decimals <= 6:
-        return f"{value:.3g}", f"{error:.2g}"
-    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"

@@ -44,10 +44,9 @@ def physical(p: npt.ArrayLike, l1: float) -> Float:
     return out
 
 
-def physical_errors(p: npt.ArrayLike, covariance: npt.ArrayLike, l1: float) -> Float:
-    """Standard errors of (g, l2, rho2) by the delta method from the covariance of p, [..., 3] and [..., 3, 3]."""
+def physical_gradient(p: npt.ArrayLike, l1: float) -> Float:
+    """d (g, l2, rho2) / d (w, d1, d2) at p = (w, d1, d2), [..., 3, 3]."""
     _, d1, d2 = np.moveaxis(np.asarray(p, np.float64), -1, 0)
-    cov = np.asarray(covariance, np.float64)
     with np.errstate(all="ignore"):
         big_l2 = d1 - d2 - 1
         root = np.sqrt(big_l2)
@@ -57,7 +56,14 @@ def physical_errors(p: npt.ArrayLike, covariance: npt.ArrayLike, l1: float) -> F
         gradient[..., 1, 2] = -l1 * (d2 + big_l2) / d2**2
         gradient[..., 2, 1] = l1 / (2 * root * d2)
         gradient[..., 2, 2] = -l1 / (2 * root * d2) - l1 * root / d2**2
-        variance = np.einsum("...ia,...ab,...ib->...i", gradient, cov, gradient)
+    return gradient
+
+
+def physical_errors(p: npt.ArrayLike, covariance: npt.ArrayLike, l1: float) -> Float:
+    """Standard errors of (g, l2, rho2) by the delta method from the covariance of p, [..., 3] and [..., 3, 3]."""
+    gradient = physical_gradient(p, l1)
+    with np.errstate(all="ignore"):
+        variance = np.einsum("...ia,...ab,...ib->...i", gradient, np.asarray(covariance, np.float64), gradient)
         return np.asarray(np.sqrt(variance))
 
 

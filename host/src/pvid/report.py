@@ -27,11 +27,13 @@ from pvid.link import Estimate, Form, Hello
 from pvid.logreader import LogReader
 from pvid.logrig import run_of_log
 from pvid.logvalues import Values
-from pvid.logwords import KAPPA_MIN, reason_words, with_error
+from pvid.logwords import KAPPA_MIN, reason_words
+from pvid.modes import modes_hz
 from pvid.native import Native
 from pvid.residuals import Residuals, residuals_of
 from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile
+from pvid.rounding import with_error
 from pvid.run_columns import Columns
 
 Float = npt.NDArray[np.float64]
@@ -163,15 +165,6 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     )
 
 
-def modes(p: Float) -> tuple[float, ...]:
-    """Frequencies at rest [Hz], the slow one first, of s^4 + d1 w s^2 + d2 w^2; none if there are none."""
-    w, d1, d2 = p[:3]
-    if d1**2 < 4 * d2 or min(w, d1, d2) <= 0:
-        return ()
-    root = math.sqrt(d1**2 - 4 * d2)
-    return tuple(math.sqrt(w * (d1 + sign * root) / 2) / (2 * math.pi) for sign in (-1, 1))
-
-
 def write_report(recording: Recording, path: Path) -> None:
     """Draws it; the format follows the suffix of `path` (png, svg, pdf).
 
@@ -286,7 +279,7 @@ def _spectra(recording: Recording, axis: Axes) -> None:
     length = min(len(run.t), round(run.sample_rate / _RESOLUTION_HZ))
     frequency, height = welch(run.y - run.y.mean(), run.sample_rate, "hann", length)
     _, angle = welch(run.phi - run.phi.mean(), run.sample_rate, "hann", length)
-    found = modes(recording.p)
+    found = modes_hz(recording.p)
     shown = (frequency > 0) & (frequency <= max((_LEAST_SHOWN_HZ, *(4 * one for one in found))))
     acceleration = np.sqrt(height) * (2 * np.pi * frequency) ** 2
     drive = axis.semilogy(frequency[shown], acceleration[shown], color="C0", label="pivot's acceleration")

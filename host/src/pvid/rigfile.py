@@ -58,14 +58,21 @@ class Sensor:
     ----------
     phi_lsb : angle sensor [rad]; default 14 bits a turn
     y_lsb : pivot sensor [m]
-    phi_range : largest angle from rest that the fixed-point core takes in [rad]
-    y_range : largest height of the pivot about the middle of its travel likewise [m]; 0: a tenth of l1
-    acceleration_range : largest acceleration of the pivot likewise [m/s^2]; 0: four times the nominal g
+    phi_zero : what the encoder reads at rest, roughly [rad]: needed where that is beyond 1 rad, a half turn say
+    y_gain_sd : standard deviation of the gain of y, relative: enters the standard errors, since no run shows it
+    phi_range : largest angle from rest that the fixed-point core takes in [rad]; 0: 0.5, or more where the run at hand
+        needs it
+    y_range : largest height of the pivot about the middle of its travel likewise [m]; 0: a tenth of l1, or more
+        likewise
+    acceleration_range : largest acceleration of the pivot likewise [m/s^2]; 0: four times the nominal g, or more
+        likewise
     """
 
     phi_lsb: float = _number(2.0 * math.pi / 2**14, "rad", 0.0, 1.0)
     y_lsb: float = _number(5e-6, "m", 0.0, 1.0)
-    phi_range: float = _number(0.5, "rad", 1e-6, 10.0)
+    phi_zero: float = _number(0.0, "rad", -1e3, 1e3)
+    y_gain_sd: float = _number(0.003, "relative", 0.0, 1.0)
+    phi_range: float = _number(0.0, "rad", 0.0, 10.0)
     y_range: float = _number(0.0, "m", 0.0, 1e6)
     acceleration_range: float = _number(0.0, "m/s^2", 0.0, 1e9)
 
@@ -186,6 +193,7 @@ class RigFile:
     l1 : length of rod 1 [m]
     nominal, sensor, identifier : the file's tables
     sample_rate : [Hz]; None: whatever the run says
+    l1_sd : standard deviation of l1, relative: enters the standard errors, since no run shows it
     """
 
     l1: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
@@ -193,14 +201,17 @@ class RigFile:
     sensor: Sensor = field(default_factory=Sensor)
     identifier: Identifier = field(default_factory=Identifier)
     sample_rate: float | None = _number(None, "Hz", 1e-3, 1e6)
+    l1_sd: float = _number(0.001, "relative", 0.0, 1.0)
 
     def __post_init__(self) -> None:
         _check_fields(self, "")
 
     @classmethod
     def standard(cls) -> RigFile:
-        """The standard rig of MATH.md 6, as a user who knows only l1 and the sensors would write it."""
-        return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sample_rate=1000.0)
+        """The standard rig of MATH.md 6, as a user who knows only l1 and the sensors would write it, and both exactly:
+        a simulation has no error of l1 or of the gain of y."""
+        sensor = Sensor(y_gain_sd=0.0)
+        return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sensor=sensor, sample_rate=1000.0, l1_sd=0.0)
 
     @classmethod
     def parse(cls, text: str, settings: Mapping[str, Any] | None = None) -> RigFile:

@@ -165,7 +165,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
     # the zero c [rad], then the frictions c1 and c2 [m^2/s]: what they may be, and how far they are expected
     extra_sd = [ZERO_SD] * zero + [FRICTION_SD] * (2 * settings.damping)
     extra_bound = [ZERO_BOUND] * zero + [FRICTION_BOUND] * (2 * settings.damping)
-    none = np.zeros(len(extra_sd))
+    extra = np.array([rig.sensor.phi_zero] * zero + [0.0] * (2 * settings.damping))
     if settings.damping and not settings.zero:
         raise PvidError("[identifier] damping needs zero = true: friction is estimated beside the encoder's zero")
     corrected = settings.full_angle or settings.damping
@@ -182,10 +182,10 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
         trust=TrustConfig(misfit_max=CORRECTED_MISFIT) if corrected else TrustConfig(),
         gate=gate_config(rig),
         estimator=EstimatorConfig(
-            start=np.concatenate([p, none]).astype(np.float32),
+            start=np.concatenate([p, extra]).astype(np.float32),
             start_sd=np.concatenate([START_RELATIVE_SD * p, extra_sd]).astype(np.float32),
-            lower=np.concatenate([p / BOUND_FACTOR, np.negative(extra_bound)]).astype(np.float32),
-            upper=np.concatenate([p * BOUND_FACTOR, extra_bound]).astype(np.float32),
+            lower=np.concatenate([p / BOUND_FACTOR, extra - extra_bound]).astype(np.float32),
+            upper=np.concatenate([p * BOUND_FACTOR, extra + extra_bound]).astype(np.float32),
             row_sd=row_sd_of(rig, tables.decimation),
             forgetting_s=settings.forgetting_s,
             feedback_hz=0.0,

@@ -19,6 +19,7 @@ from pvid.native_q31 import (
     TrustConfigQ31,
     WeakConfigQ31,
 )
+from pvid.ranges_q31 import Beyond, beyond_ranges, middle_of_travel, reach, with_default_ranges, with_ranges_of
 from pvid.rigfile import RigFile, Sensor
 from pvid.setup import bank_of, nominal_start, strong_config, weak_config, weak_design_of
 from pvid.strong_design_q31 import StrongDesignQ31, strong_design_q31
@@ -38,18 +39,14 @@ def format_of(largest: float) -> int:
 
 
 def _counting(rig: RigFile) -> Sensor:
-    """The sensors of a rig, which must count in something."""
-    sensor = rig.sensor
+    """The sensors of a rig, which must count in something, with a range each."""
+    sensor = with_default_ranges(rig)
     for name, lsb in (("phi_lsb", sensor.phi_lsb), ("y_lsb", sensor.y_lsb)):
         if not lsb > 0:
             raise PvidError(
                 f"[sensor] {name} is 0, and the fixed-point core counts in it: say what the sensor resolves"
             )
-    return replace(
-        sensor,
-        y_range=sensor.y_range or rig.l1 / 10,
-        acceleration_range=sensor.acceleration_range or 4 * rig.nominal.g,
-    )
+    return sensor
 
 
 def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
@@ -97,25 +94,41 @@ def counts_of_samples(values: npt.NDArray[np.float64], lsb: float) -> Int64:
 
 
 def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> ConfigQ31:
-    """Settings of the form the rig file asks for.
+    """Settings of the form the rig file asks for, with ranges that hold the run where the file leaves them open.
 
-    In the weak form a run's first sample is taken for rest where that is nearer than 0; the strong form takes the
-    encoder's zero for the equilibrium, and of the pivot only what changes counts.
+    A run that does not fit about 0 is counted about the middle of its travel; the strong form takes the encoder's zero
+    for the equilibrium, and of the pivot only what changes counts.
     """
-    if rig.identifier.form == "strong":
-        strong = strong_config_q31(rig, run.sample_rate, start)
-        return replace(strong, y_offset=_first(counts_of(rig, run)[1], strong.design.bank.y_max // 2))
-    if rig.identifier.damping:
+    if rig.identifier.form == "weak" and rig.identifier.damping:
         raise PvidError("core q31 has no damping: use --core f32")
-    config = weak_config_q31(rig, run.sample_rate, start)
+    rig = with_ranges_of(rig, run)
+    config = config_of_q31(rig, run.sample_rate, start)
     phi, y = counts_of(rig, run)
+    if isinstance(config, StrongConfigQ31):
+        return replace(config, y_offset=_offset(y, config.design.bank.y_max))
     design = config.design
-    return replace(config, phi_offset=_first(phi, design.phi_max // 2), y_offset=_first(y, design.y_max // 2))
+    return replace(
+        config, phi_offset=_offset(phi, design.phi_max, config.phi_offset), y_offset=_offset(y, design.y_max)
+    )
 
 
-def _first(counts: Int64, limit: int) -> int:
-    """The first of the counts where it is beyond the limit, else 0."""
-    return int(counts[0]) if len(counts) and abs(int(counts[0])) > limit else 0
+def _offset(counts: Int64, limit: int, given: int = 0) -> int:
+    """Where a sensor's travel has its middle, or its median where the travel is longer than the full scale `limit`; the
+    one that is given where that is within half of the full scale and the whole travel fits about it [counts]."""
+    ordinary = counts[np.abs(counts) < 2**31 - 1]
+    middle, median = round(middle_of_travel(ordinary)), round(float(np.median(ordinary))) if len(ordinary) else 0
+    if abs(median - given) <= limit // 2 and reach(ordinary.astype(np.float64), float(given)) <= limit:
+        return given
+    return max((middle, median, given), key=lambda at: int((np.abs(ordinary - at) <= limit).sum()))
+
+
+def beyond_range(config: ConfigQ31, phi: Int64, y: Int64, rejected: int) -> Beyond:
+    """Which of the counts phi, y [n] a core of this configuration could not take in; `rejected` of them in all."""
+    if isinstance(config, StrongConfigQ31):
+        bank = config.design.bank
+        return beyond_ranges(phi, y - config.y_offset, bank.phi_max, bank.y_max, 0)
+    design = config.design
+    return beyond_ranges(phi - config.phi_offset, y - config.y_offset, design.phi_max, design.y_max, rejected)
 
 
 def _estimator_q31(
@@ -195,8 +208,13 @@ def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
 
 
 def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
-    """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p."""
+    """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p.
+
+    What the encoder reads at rest becomes the offset of its counts, and c is counted from there.
+    """
     tables = tables_of(rig, sample_rate)
+    offset = round(rig.sensor.phi_zero / rig.sensor.phi_lsb)
+    rig = replace(rig, sensor=replace(rig.sensor, phi_zero=0.0))
     float_config = weak_config(rig, sample_rate, start)
     windows_hz = sample_rate / (tables.decimation * float_config.hop)
     e = float_config.estimator
@@ -219,6 +237,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
     return WeakConfigQ31(
         design=tables,
         estimator=estimator,
+        phi_offset=offset,
         zero_unknown=float_config.zero_unknown,
         iterations=float_config.iterations,
         drive_min=round(float_config.drive_min * tables.dt**2 * 2.0**tables.u_bits),

@@ -115,7 +115,7 @@ def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: st
     )
     if result is None:
         return record
-    record.update(status=result.status, misfit=_finite(result.misfit))
+    record.update(status=result.status, misfit=_finite(result.chi2))
     record.update(_of_publications(result.publications, simulated))
     if not published:
         record["reason"] = result.verdict

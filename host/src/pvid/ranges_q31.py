@@ -1,0 +1,123 @@
+"""Full scales of the fixed-point core: what the rig file says, else its defaults, or more where a run needs more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.capture import Run
+from pvid.rigfile import RigFile, Sensor
+
+Float = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+DEFAULT_PHI_RANGE = 0.5  # rad
+_Y_RANGE_OF_L1 = 0.1
+_ACCELERATION_OF_G = 4.0
+
+# Of the largest value in a run: the next run of the same rig may go a little further.
+_MARGIN = 1.25
+# One sample in a thousand may lie anywhere: what is further than this times the others is a fault of the sensor, which
+# the core is to leave out, not to make room for.
+_ORDINARY = 0.999
+_ORDINARY_ACCELERATION = 0.99  # a jump of y by one fault is spread by the smoother
+_FAULT = 3.0
+_SMOOTHING_S = 0.05  # of the pivot's acceleration
+
+
+def with_default_ranges(rig: RigFile) -> Sensor:
+    """The sensors of a rig with a range each, those that the file leaves open by default."""
+    sensor = rig.sensor
+    return replace(
+        sensor,
+        phi_range=sensor.phi_range or DEFAULT_PHI_RANGE,
+        y_range=sensor.y_range or _Y_RANGE_OF_L1 * rig.l1,
+        acceleration_range=sensor.acceleration_range or _ACCELERATION_OF_G * rig.nominal.g,
+    )
+
+
+def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
+    """The rig with a range each; where the file leaves one open and the run goes beyond the default, what holds the
+    run and a quarter more."""
+    default = with_default_ranges(rig)
+    given = rig.sensor
+    rest = 0.0 if rig.identifier.form == "strong" else None  # what the strong form counts angles from
+    ranges = {
+        "phi_range": given.phi_range or max(default.phi_range, _MARGIN * reach(run.phi, rest)),
+        "y_range": given.y_range or max(default.y_range, _MARGIN * reach(run.y)),
+        "acceleration_range": given.acceleration_range
+        or max(default.acceleration_range, _MARGIN * reach(pivot_acceleration(run), 0.0, _ORDINARY_ACCELERATION)),
+    }
+    return replace(rig, sensor=replace(default, **ranges))
+
+
+def middle_of_travel(x: npt.ArrayLike) -> float:
+    """Half way between the ends of x [n], but for its faults; 0 of nothing."""
+    values = np.asarray(x, np.float64)
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return 0.0
+    low, high = np.quantile(values, [1.0 - _ORDINARY, _ORDINARY])
+    return float(low + high) / 2.0
+
+
+def reach(x: Float, middle: float | None = None, ordinary: float = _ORDINARY) -> float:
+    """The furthest of x [n] from `middle`, None: that of its travel, but for its faults."""
+    values = x[np.isfinite(x)]
+    if not len(values):
+        return 0.0
+    distance = np.abs(values - (middle_of_travel(values) if middle is None else middle))
+    return min(float(distance.max()), _FAULT * float(np.quantile(distance, ordinary)))
+
+
+def pivot_acceleration(run: Run) -> Float:
+    """y'' [n, m/s^2] behind a smoother of 50 ms, cubic."""
+    from scipy.signal import savgol_filter  # takes a quarter of a second that a float core need not wait for
+
+    points = max(7, round(_SMOOTHING_S * run.sample_rate)) | 1
+    if len(run.y) < points:
+        return np.zeros(0)
+    height = np.nan_to_num(run.y - middle_of_travel(run.y), nan=0.0, posinf=0.0, neginf=0.0)
+    return np.asarray(savgol_filter(height, points, 4, deriv=2, delta=1.0 / run.sample_rate))
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """Samples of a run that the core could not take in: `phi` and `y` beyond their ranges, `acceleration` with a
+    pivot that was thrown faster than its range or with a neighbour that was; of `samples` in all."""
+
+    phi: int
+    y: int
+    acceleration: int
+    samples: int
+
+    @property
+    def share(self) -> float:
+        """Of the samples, 0 to 1: the largest of the three."""
+        return max(self.phi, self.y, self.acceleration) / max(self.samples, 1)
+
+    def words(self, sensor: Sensor) -> str | None:
+        """Which samples are beyond what, a clause each; None if none are."""
+        parts = [
+            f"{_percent(count / max(self.samples, 1))} of the samples are beyond {name} = {value:.3g} {unit}"
+            for count, name, value, unit in (
+                (self.phi, "phi_range", sensor.phi_range, "rad"),
+                (self.y, "y_range", sensor.y_range, "m"),
+                (self.acceleration, "acceleration_range", sensor.acceleration_range, "m/s^2"),
+            )
+            if count
+        ]
+        return " and ".join(parts) or None
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.01 else f"{100 * share:.2g} %"
+
+
+def beyond_ranges(phi: Int64, y: Int64, phi_max: int, y_max: int, rejected: int) -> Beyond:
+    """Of counts about their offsets [n] and full scales [counts]; `rejected` by the core in all."""
+    outside_phi, outside_y = np.abs(phi) > phi_max, np.abs(y) > y_max
+    thrown = max(0, rejected - int((outside_phi | outside_y).sum()))
+    return Beyond(int(outside_phi.sum()), int(outside_y.sum()), thrown, len(phi))

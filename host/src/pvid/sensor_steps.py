@@ -1,0 +1,70 @@
+"""What a sensor resolves, seen from what it recorded."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+
+_MOST_SAMPLES = 200_000
+_LEAST_LEVELS = 4
+# Of values that are whole numbers of steps the resultant of their phases is 1; of steps rounded to decimals of a third
+# of a step it is 0.83; of values that lie anywhere it is below this, whatever step is tried.
+_LEAST_RESULTANT = 0.7
+_LEAST_PART = 1e-6  # of the travel: float32's own steps are finer
+_NEAR = 12  # levels
+_TRIED = np.linspace(0.7, 1.4, 701)
+
+
+def resolution_of(values: npt.ArrayLike) -> float | None:
+    """The step between the values that a sensor gives, in their unit.
+
+    Parameters
+    ----------
+    values
+        As recorded, with any offset [n]; NaN and infinities are left out.
+
+    Returns
+    -------
+    The step; None where none can be seen: values that lie anywhere, or fewer than four different ones.
+    """
+    given = np.asarray(values, np.float64)[:_MOST_SAMPLES]
+    given = given[np.isfinite(given)]
+    levels = np.unique(given)
+    if len(levels) < _LEAST_LEVELS:
+        return None
+    gaps = np.diff(levels)
+    # decimals of text, or float32, leave copies of one level beside each other
+    copies = gaps < 1e-3 * np.median(gaps)
+    if copies.any():
+        levels = levels[np.concatenate([[True], ~copies])]
+        gaps = np.diff(levels)
+    if len(levels) < _LEAST_LEVELS:
+        return None
+    for guess in (float(np.quantile(gaps, 0.25)), float(gaps.min())):
+        step = _refined(levels, guess)
+        if step is not None and step > _LEAST_PART * (levels[-1] - levels[0]):
+            return step
+    return None
+
+
+def _refined(levels: Float, guess: float) -> float | None:
+    """The step near a guess that most levels are whole numbers of; None if there is none."""
+    middle = len(levels) // 2
+    from_middle = levels - levels[middle]
+    near = from_middle[max(0, middle - _NEAR) : middle + _NEAR + 1]  # further away a rough guess has lost count
+    steps = guess * _TRIED
+    resultant = np.abs(np.exp(2j * np.pi * near[None, :] / steps[:, None]).mean(axis=1))
+    best = int(np.argmax(resultant))
+    if resultant[best] < _LEAST_RESULTANT:
+        return None
+    counts = np.rint(from_middle / steps[best])
+    # the whole range tells the step to more digits, as long as the count is not lost
+    for reach in (30, 300, len(levels)):
+        inner = np.abs(counts) <= reach
+        if (counts[inner] ** 2).sum() > 0:
+            step = float((counts[inner] * from_middle[inner]).sum() / (counts[inner] ** 2).sum())
+            counts = np.rint(from_middle / step)
+    whole = abs(np.exp(2j * np.pi * from_middle / step).mean())
+    return step if whole >= _LEAST_RESULTANT else None
