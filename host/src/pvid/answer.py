@@ -25,6 +25,7 @@ def as_json(result: Identification) -> dict[str, Any]:
         "parameters": parameters,
         **parameters,
         "chi2": result.chi2,
+        "unexplained": result.unexplained,
         "kappa": result.kappa,
         "largest_angle": result.largest_angle,
         "modes_hz": list(result.modes_hz) or None,

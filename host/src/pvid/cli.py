@@ -21,7 +21,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pvid import __version__, answer
-from pvid.capture import write_run
+from pvid.capture import Run, write_run
 from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
 from pvid.cli_input import columns_option, read_input, rig_options
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
@@ -89,7 +89,7 @@ for _command in (*LOG_COMMANDS, *CAMPAIGN_COMMANDS):
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
 @click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
-@click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
+@click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
 def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     """Simulates the standard rig and streams it into the firmware on an emulated board; compares every bit."""
     from pvid.demo import play_demo, stage

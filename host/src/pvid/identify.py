@@ -21,6 +21,7 @@ from pvid.scale_errors import added_covariance, scale_errors
 from pvid.setup import bank_of, config_of, weak_design_of
 from pvid.setup_q31 import beyond_range, config_for_run, counts_of, covariance_of, p_of, se_of
 from pvid.survey import fitted
+from pvid.verdict import DISAGREES, verdict
 from pvid.weak_oracle import WeakSettings, identify_weak
 
 Float = npt.NDArray[np.float64]
@@ -55,6 +56,10 @@ _BEYOND_WARNED = 0.01
 _BEYOND_FATAL = 1e-3
 
 
+# Share of the motion from which on a warning tells what is left unexplained.
+_UNEXPLAINED_TOLD = 1e-3
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """Estimates over time, for a figure: t [n] in s, p and se [n, 3]; physical and its errors [n, 3], NaN outside
@@ -86,7 +91,8 @@ class Publications:
 
 @dataclass(frozen=True)
 class ErrorParts:
-    """What a standard error is made of, in the parameter's unit: the core's own, from the run; the gain of y; l1."""
+    """What a standard error is made of, in the parameter's unit: the larger of the core's own and of the scatter of the
+    run's windows; the gain of y; l1."""
 
     noise: float
     y_gain: float
@@ -111,8 +117,13 @@ class Identification:
         trusted_s is None
     chi2
         variance of the residuals over what the sensors' noise explains; None: not judged yet, or the strong form
+    unexplained
+        share of the motion that the equations leave unexplained, rms; None in the strong form
+    parts_disagree
+        the run's windows, corrected for large angles, want another estimate than the one published, or scatter, by
+        much more than the core's standard errors say
     alarm
-        whether that is too much. The strong form's is its own (pvid/misfit.h); float64 has none
+        whether chi2 is too much. The strong form's is its own (pvid/misfit.h); float64 has none
     status
         the last tick's reason in words; of a run that the fixed-point core could not take in, that
     ticks, updates, lost
@@ -150,6 +161,8 @@ class Identification:
     on: str
     trajectory: Trajectory
     publications: Publications
+    unexplained: float | None = None
+    parts_disagree: bool = False
     parts: dict[str, ErrorParts] = field(default_factory=dict)
     friction: tuple[float, ...] = ()
     first_publication_s: float | None = None
@@ -185,8 +198,15 @@ class Identification:
                 "the rows leave more unexplained than they should: too coarse an encoder for the strong form, a jolt "
                 "in sums that do not forget it, or a mechanism that has changed; the estimate is not to be believed"
             )
+        elif self.parts_disagree:
+            words.append(
+                "the windows of the run disagree with the estimate or with one another: friction, large angles or a "
+                "mechanism that has changed; the standard errors cover the disagreement"
+            )
         elif self.trusted_s is not None and self.status not in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
             words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
+        if words and self.unexplained is not None and self.unexplained >= _UNEXPLAINED_TOLD:
+            words.append(f"the equations leave {100 * self.unexplained:.2g} % of the motion unexplained")
         if self.identified and self.beyond is not None and self.beyond.share >= _BEYOND_WARNED:
             words.append(f"{self.beyond_words}: those samples were left out")
         return "; ".join(words) or None
@@ -576,6 +596,12 @@ def _identification(
 ) -> Identification:
     names = (*LINEAR, ZERO)[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
+    unexplained, parts_disagree = None, False
+    if rig.identifier.form == "weak" and trusted_s is not None:
+        over_run = verdict(rig, run, p)
+        wider = np.maximum(over_run.se[: len(p)] / np.sqrt(np.diag(covariance)), 1.0)
+        covariance = covariance * np.outer(wider, wider)
+        unexplained, parts_disagree = over_run.unexplained, bool(wider[:3].max() > DISAGREES)
     noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     physical = oracle.physical(p[:3], rig.l1)
     if np.isfinite(physical).all():
@@ -600,6 +626,8 @@ def _identification(
         first_publication_s=first_publication_s,
         chi2=chi2,
         alarm=alarm,
+        unexplained=unexplained,
+        parts_disagree=parts_disagree,
         status=status,
         reasons=reasons,
         ticks=ticks,

@@ -80,6 +80,7 @@ class RunRows:
     columns: Float
     phi: Float
     u: Float
+    part: float = 1.0  # of the run's windows
 
     @classmethod
     def of(cls, rig: RigFile, run: Run, design: WeakDesign) -> RunRows:
@@ -107,7 +108,16 @@ class RunRows:
     def thinned(self, most: int) -> RunRows:
         """At most so many windows, evenly spread over the run."""
         every = -(-len(self.phi) // most)
-        return replace(self, columns=self.columns[::every], phi=self.phi[::every], u=self.u[::every])
+        columns, phi, u = self.columns[::every], self.phi[::every], self.u[::every]
+        return replace(self, columns=columns, phi=phi, u=u, part=self.part * len(phi) / len(self.phi))
+
+    def within(self, zero: float, angle: float, fewest: int) -> RunRows:
+        """The windows whose angle stays within +-`angle` of `zero` [rad]; all of them where those are too few."""
+        inside = np.abs(self.phi - zero).max(axis=1) <= angle
+        if int(inside.sum()) < fewest:
+            return self
+        columns, phi, u = self.columns[inside], self.phi[inside], self.u[inside]
+        return replace(self, columns=columns, phi=phi, u=u)
 
     def corrected(self, p: Float) -> RunRows:
         """With what the linear rows lack at large angles taken off Y, at p."""

@@ -23,7 +23,7 @@ from numpy.polynomial import legendre
 
 from pvid.ctables import float_array, float_literal
 from pvid.errors import PvidError
-from pvid.weak_sizing import HOST, Bounds, Sizes, modes_hz, sized
+from pvid.weak_sizing import HOST, Bounds, Sizes, sized, slow_and_fast_hz
 
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
@@ -141,7 +141,7 @@ class WeakDesign:
     @property
     def fast_rad_s(self) -> float:
         """Angular frequency of the fast mode at the nominal p [rad/s]."""
-        return 2 * math.pi * modes_hz(self.nominal)[1]
+        return 2 * math.pi * slow_and_fast_hz(self.nominal)[1]
 
     @property
     def lag(self) -> int:

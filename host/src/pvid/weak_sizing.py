@@ -8,7 +8,7 @@ so far apart that the functions would be too many, the window is shortened, but 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from pvid import decimator
 from pvid.decimator import Decimator
 from pvid.errors import PvidError
+from pvid.modes import modes_hz
 
 Float = npt.NDArray[np.float64]
 
@@ -77,15 +78,16 @@ class Sized:
     front: Decimator
 
 
-def modes_hz(p: npt.ArrayLike) -> tuple[float, float]:
-    """Frequencies of the slow and of the fast mode at rest [Hz], of s^4 + d1 w s^2 + d2 w^2 (theory, 1)."""
-    w, d1, d2 = np.asarray(p, np.float64)[:3]
-    root = math.sqrt(max(d1 * d1 - 4 * d2, 0.0))
-    slow = max(d1 - root, 1e-9 * d1)
-    return math.sqrt(w * slow / 2) / (2 * math.pi), math.sqrt(w * (d1 + root) / 2) / (2 * math.pi)
+def slow_and_fast_hz(p: npt.NDArray[np.float64]) -> tuple[float, float]:
+    """The modes of p = (w, d1, d2) [Hz]; where p is no pendulum's, both in the middle."""
+    both = modes_hz(p)
+    if len(both) == 2 and both[0] > 0:
+        return both[0], both[1]
+    middle = math.sqrt(abs(p[0] * p[1]) / 2) / (2 * math.pi)
+    return middle, middle
 
 
-def sized(p: npt.ArrayLike, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> Sized:
+def sized(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> Sized:
     """Sizes for a rig, of which `given` fixes some.
 
     Parameters
@@ -100,7 +102,7 @@ def sized(p: npt.ArrayLike, sample_rate: float, given: Sizes, bounds: Bounds = H
     PvidError
         Naming the size that exceeds the core's bounds.
     """
-    slow, fast = modes_hz(p)
+    slow, fast = slow_and_fast_hz(p)
     window_s = given.window_s if given.window_s is not None else _window_s(slow, fast, bounds)
     if not (math.isfinite(window_s) and window_s > 0):
         raise PvidError(f"window_s must be a positive number of seconds, not {window_s:g}")
@@ -127,15 +129,15 @@ def sized(p: npt.ArrayLike, sample_rate: float, given: Sizes, bounds: Bounds = H
     return Sized(functions, decimation, window, _front(decimation, edge, given.taps, bounds))
 
 
-def decimation_of(p: npt.ArrayLike, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> int:
+def decimation_of(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> int:
     """Samples per decimated sample of `sized`."""
     return sized(p, sample_rate, given, bounds).decimation
 
 
-def window_for_run(p: npt.ArrayLike, duration_s: float, bounds: Bounds = HOST) -> float | None:
+def window_for_run(p: Float, duration_s: float, bounds: Bounds = HOST) -> float | None:
     """Length of a window [s] that a run of `duration_s` [s] holds often enough; None where the modes' own does."""
     longest = duration_s / _WINDOWS_A_RUN
-    return longest if longest < _window_s(*modes_hz(p), bounds) else None
+    return longest if longest < _window_s(*slow_and_fast_hz(p), bounds) else None
 
 
 def _window_s(slow: float, fast: float, bounds: Bounds) -> float:
