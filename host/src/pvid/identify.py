@@ -198,18 +198,24 @@ class Identification:
                 "the rows leave more unexplained than they should: too coarse an encoder for the strong form, a jolt "
                 "in sums that do not forget it, or a mechanism that has changed; the estimate is not to be believed"
             )
-        elif self.parts_disagree:
+        if self.parts_disagree:
             words.append(
                 "the windows of the run disagree with the estimate or with one another: friction, large angles or a "
                 "mechanism that has changed; the standard errors cover the disagreement"
             )
-        elif self.trusted_s is not None and self.status not in (Reason.UPDATED.text, Reason.ACCUMULATED.text):
+        if self.parts_disagree and self.is_old:
             words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
         if words and self.unexplained is not None and self.unexplained >= _UNEXPLAINED_TOLD:
             words.append(f"the equations leave {100 * self.unexplained:.2g} % of the motion unexplained")
         if self.identified and self.beyond is not None and self.beyond.share >= _BEYOND_WARNED:
             words.append(f"{self.beyond_words}: those samples were left out")
         return "; ".join(words) or None
+
+    @property
+    def is_old(self) -> bool:
+        """Whether the run's last windows published nothing: the estimate is that of trusted_s."""
+        new = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
+        return self.trusted_s is not None and self.status not in new
 
     @property
     def verdict(self) -> str:
