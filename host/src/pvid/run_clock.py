@@ -52,9 +52,9 @@ _MISSING_SHARE = 0.5
 # A polynomial of this degree follows a motion of 20 rad/s for so long, to 1e-4 of it.
 _FOLLOWED_S, _DEGREE = 0.128, 5
 _LEAST_ROWS = 32
-_BLOCKS, _LEAST_BLOCKS = 1000, 8
+_BLOCKS, _LEAST_BLOCKS = 400, 8
 _CLEARLY = 4.0  # standard errors
-_CHUNK = 1 << 18
+_CHUNK = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
