@@ -130,7 +130,7 @@ def _shortened(run: Run) -> Run:
     if len(run.t) <= _MOST_SAMPLES:
         return run
     first = slice(_MOST_SAMPLES)
-    return replace(run, t=run.t[first], phi=run.phi[first], y=run.y[first], columns={})
+    return replace(run, t=run.t[first], phi=run.phi[first], y=run.y[first])
 
 
 def _trial(case: Case, native: Native) -> Identification | None:
