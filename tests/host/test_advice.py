@@ -272,7 +272,7 @@ def test_an_angle_that_stands_still_is_told(native: Native, size: float, said: s
 def test_a_swing_beyond_what_the_equations_hold_for_is_told(native: Native) -> None:
     _, said = advised(run_of(release=3.0), RIG, native)
     assert len(said) == 1
-    assert said[0].startswith("angles go to 0.25 rad, and the equations are corrected up to 0.12 rad")
+    assert said[0].startswith("angles go to 0.25 rad, and the equations are corrected up to 0.2 rad")
 
 
 def test_a_swing_that_dies_away_is_told(native: Native) -> None:

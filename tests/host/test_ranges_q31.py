@@ -14,7 +14,7 @@ from pvid.capture import Run, write_run
 from pvid.cli import commands
 from pvid.identify import identify
 from pvid.native import Native
-from pvid.ranges_q31 import DEFAULT_PHI_RANGE, beyond_ranges, middle_of_travel, pivot_acceleration, with_ranges_of
+from pvid.ranges_q31 import DEFAULT_PHI_RANGE, beyond_ranges, pivot_acceleration, with_ranges_of
 from pvid.rig import Pendulum, Tone, simulate, standard_sensors
 from pvid.rigfile import RigFile, Sensor
 from pvid.setup_q31 import config_for_run

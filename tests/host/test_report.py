@@ -14,6 +14,7 @@ from pvid import link
 from pvid.capture import Run, write_run
 from pvid.cli import commands
 from pvid.errors import PvidError
+from pvid.identify import identify
 from pvid.logfile import LogWriter
 from pvid.logreader import LogReader
 from pvid.logvalues import Values
@@ -23,6 +24,7 @@ from pvid.report import recording_of, write_report
 from pvid.residuals import Residuals, residuals_of
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
+from pvid.simulated_angle import simulated_angle
 
 TICKS = 30_000
 P = np.array([*STANDARD_PENDULUM.linear, 0.0])
@@ -125,7 +127,10 @@ def test_a_report_says_what_it_shows_with_units(log: Path, tmp_path: Path) -> No
     text = shown(tmp_path / "a.svg")
     for words in (
         "field.pvlog: board field, weak form, 1000 samples per second",
-        "last estimate: g = 9.50",
+        "estimate: g = 9.",
+        "Measured against simulated angle: R² = 0.9999",
+        "simulated with the estimate",
+        "angle phi [rad]",
         f"{TICKS} samples in 1 segment; lost 0 frames",
         "Convergence",
         "gravity in the plane g* [m/s²]",
@@ -183,11 +188,85 @@ def test_plot_of_a_log_without_estimates_identifies_it_first(native: Native, tmp
 def test_a_report_of_an_estimate_outside_the_physical_region(log: Path, tmp_path: Path) -> None:
     recording = recording_of(log, None)
     nowhere = np.full_like(recording.physical, np.nan)
-    wild = replace(recording, physical=nowhere, physical_se=nowhere, p=np.array([11.56, 0.25, 0.2, 0.0]))
+    p = np.array([11.56, 0.25, 0.2, 0.0])
+    estimate = {name: (float(value), 0.01) for name, value in zip(("w", "d1", "d2"), p, strict=False)}
+    wild = replace(recording, physical=nowhere, physical_se=nowhere, p=p, estimate=estimate)
     write_report(wild, tmp_path / "wild.svg")
     text = shown(tmp_path / "wild.svg")
-    assert "last estimate: outside the physical region: w = 11.56, d1 = 0.25, d2 = 0.2" in text and "nan" not in text
-    assert "mode at" not in text
+    assert "estimate: outside the physical region: w = 11.560 ± 0.010, d1 = 0.250 ± 0.010, d2 = 0.200 ± 0.010" in text
+    assert "no pendulum has these parameters" in text
+    assert "mode at" not in text and "nan" not in text
+
+
+def test_a_report_of_a_held_run_says_that_nothing_is_identified_and_why(tmp_path: Path) -> None:
+    run = simulate(sensors=standard_sensors(14), truth="full", duration=15, seed=3).run
+    turned = replace(run, y=-run.y)
+    write_run(tmp_path / "run.csv", turned)
+    recording = recording_of(tmp_path / "run.csv", RigFile.standard())
+    assert recording.estimate == {}
+    write_report(recording, tmp_path / "held.svg")
+    text = shown(tmp_path / "held.svg")
+    assert "nothing identified: held not explained" in text
+    assert "advice: y is counted downwards" in text and "columns y=y:" in text  # XML comments hold no two dashes
+    assert "Measured angle (nothing is identified to simulate with)" in text
+    for false in ("outside the physical region", "too little", "R²", "simulated with", "last estimate"):
+        assert false not in text, false
+
+
+def test_a_report_and_identify_give_the_same_estimate(native: Native, tmp_path: Path) -> None:
+    run = simulate(sensors=standard_sensors(14), truth="full", duration=15, seed=3).run
+    write_run(tmp_path / "run.csv", run)
+    recording, result = (
+        recording_of(tmp_path / "run.csv", RigFile.standard()),
+        identify(run, RigFile.standard(), native),
+    )
+    assert recording.estimate == {name: (result.value[name], result.se[name]) for name in result.value}
+
+
+# ---- measured against simulated
+
+
+def test_a_simulation_with_the_truth_leaves_the_encoders_noise() -> None:
+    sensors = replace(standard_sensors(14), random_offset=False)
+    for release in ((0.06, 0.14), (0.12, 0.28)):  # 0.1 and 0.22 rad
+        run = simulate(sensors=sensors, truth="full", duration=15, release=release, seed=1).run
+        seen = simulated_angle(run, P, 0.3)
+        assert seen is not None
+        # rounding and half an LSB of noise: 0.58 LSB, less what the starts take in
+        assert 0.4 < seen.rms / sensors.phi_lsb < 0.62
+        assert seen.unexplained == pytest.approx(seen.rms**2 / float(np.var(run.phi)), rel=0.1)
+
+
+def test_a_simulation_with_wrong_parameters_does_not_fit() -> None:
+    run = simulate(sensors=SENSORS, truth="full", duration=15, seed=1).run
+    right = simulated_angle(run, P, 0.3)
+    assert right is not None and right.r2_words.startswith("0.9999")
+    for i in range(3):
+        wrong = simulated_angle(run, P * (1 + 0.02 * (np.arange(4) == i)), 0.3)
+        assert wrong is not None and wrong.unexplained > 5 * right.unexplained
+
+
+def test_a_simulation_takes_friction_and_an_offset_in() -> None:
+    body = replace(STANDARD_PENDULUM, damping1=4e-4, damping2=2e-4)
+    run = simulate(body, sensors=replace(SENSORS, phi_zero=0.5), truth="full", duration=15, seed=1).run
+    p = P + [0, 0, 0, 0.5]
+    with_it, without = simulated_angle(run, p, 0.3, (4e-4, 2e-4)), simulated_angle(run, p, 0.3)
+    assert with_it is not None and without is not None
+    assert with_it.rms < 0.65 * SENSORS.phi_lsb < without.rms / 2
+
+
+def test_a_simulation_at_100_samples_a_second_and_through_missing_ones() -> None:
+    run = simulate(sensors=SENSORS, truth="full", duration=15, sample_rate=100.0, seed=1).run
+    phi, y = run.phi.copy(), run.y.copy()
+    phi[500:510], y[700] = np.nan, np.nan
+    seen = simulated_angle(replace(run, phi=phi, y=y), P, 0.3)
+    assert seen is not None and seen.unexplained < 1e-3
+
+
+def test_what_cannot_be_simulated_is_not() -> None:
+    run = simulate(sensors=SENSORS, truth="full", duration=2, seed=1).run
+    assert simulated_angle(run, np.array([11.56, 0.25, 0.2, 0.0]), 0.3) is None
+    assert simulated_angle(run, P, 0.3) is None  # less than a block of two slow periods
 
 
 def test_a_board_that_began_anew_is_marked(native: Native, tmp_path: Path) -> None:

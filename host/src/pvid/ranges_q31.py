@@ -79,7 +79,10 @@ def pivot_acceleration(run: Run) -> Float:
     points = max(7, round(_SMOOTHING_S * run.sample_rate)) | 1
     if len(run.y) < points:
         return np.zeros(0)
-    height = np.nan_to_num(run.y - middle_of_travel(run.y), nan=0.0, posinf=0.0, neginf=0.0)
+    finite, clock = np.isfinite(run.y), np.arange(len(run.y))
+    if not finite.any():
+        return np.zeros(0)
+    height = np.interp(clock, clock[finite], run.y[finite] - middle_of_travel(run.y))
     return np.asarray(savgol_filter(height, points, 4, deriv=2, delta=1.0 / run.sample_rate))
 
 

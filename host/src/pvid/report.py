@@ -1,8 +1,10 @@
-"""A recording on one page: how the estimate converged, what it leaves unexplained, what excited it, how it moved."""
+"""A recording on one page: measured against simulated angle, how the estimate converged, what it leaves unexplained,
+what excited it, how it moved."""
 
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from scipy.signal import savgol_filter, welch
 
+from pvid.advice import advice
 from pvid.appearing import appearing
 from pvid.axis_limits import interesting
 from pvid.capture import Run, is_run, read_run
@@ -29,12 +32,14 @@ from pvid.logrig import run_of_log
 from pvid.logvalues import Values
 from pvid.logwords import KAPPA_MIN, reason_words
 from pvid.modes import modes_hz
-from pvid.native import Native
+from pvid.native import Native, Reason
 from pvid.residuals import Residuals, residuals_of
 from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
+from pvid.simulated_angle import simulated_angle
+from pvid.survey import fitted
 
 Float = npt.NDArray[np.float64]
 
@@ -45,6 +50,9 @@ _LEAST_SHOWN_HZ = 10.0
 _SMOOTHING_S = 0.071  # of the angle's rate, as in the weak form's front end
 _MOST_DOTS = 20_000
 _LAST_S = 5.0  # of the motion, drawn dark
+_SHOWN_S = 12.0  # of measured and simulated angle
+_LINE = 150  # characters of the title
+_PUBLISHED = (Reason.UPDATED.text, Reason.MISFIT.text)
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,10 @@ class Recording:
     """What is drawn.
 
     t : of the estimates, `clock` says since when [n, s];  physical, physical_se : g, l2, rho2 [n, 3];  kappa [n]
-    p : the last estimate, as residuals_of takes it;  reasons : how many estimates came with each;  state : the last
+    p : the last estimate, as residuals_of takes it, or the start;  estimate : value and standard error by name; empty
+        where nothing is identified
+    reasons : how many estimates came with each;  state : the last, with what it means
+    remarks : sentences on the answer
     breaks : when the board began anew or the link came up again [s];  account : what was recorded and lost
     run : the longest stretch of samples without a gap
     """
@@ -66,8 +77,10 @@ class Recording:
     physical_se: Float
     kappa: Float
     p: Float
+    estimate: dict[str, tuple[float, float]]
     reasons: dict[str, int]
     state: str
+    remarks: tuple[str, ...]
     breaks: tuple[float, ...]
     account: str
 
@@ -97,8 +110,8 @@ def recording_of(path: Path, rig: RigFile | None, columns: Columns | None = None
 def _of_log(path: Path, rig: RigFile) -> Recording | None:
     """What the board said; None when that was no estimate."""
     reader, values = LogReader(path), Values(rig.l1)
-    columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason", *LINEAR, ZERO)}
-    columns |= {name: [] for one in PHYSICAL for name in (one, f"{one}_se")}
+    columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason")}
+    columns |= {name: [] for one in (*LINEAR, ZERO, *PHYSICAL) for name in (one, f"{one}_se")}
     hello, began = None, None
     friction: tuple[float, ...] = ()
     for record in reader:
@@ -134,35 +147,49 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         physical_se=np.stack([told[f"{name}_se"] for name in PHYSICAL], axis=1),
         kappa=told["kappa"],
         p=np.array([*(told[name][-1] for name in (*LINEAR, ZERO)[:n_core]), *friction]),
+        estimate={
+            name: (float(told[name][-1]), float(told[f"{name}_se"][-1]))
+            for name in (*PHYSICAL, *LINEAR)
+            if np.isin(told["reason"], _PUBLISHED).any() and np.isfinite(told[name][-1])
+        },
         reasons={str(reason): int(count) for reason, count in counts},
-        state=str(told["reason"][-1]),
+        state=_with_words(str(told["reason"][-1])),
+        remarks=(),
         breaks=tuple(t[1:][np.diff(told["run"]) > 0]),
         account=reader.account.text,
     )
 
 
 def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
+    native = Native()
     whole = run.whole()  # residuals and spectra have no place for a missing sample
-    result = identify(whole if rig.identifier.core == "f64" else run, rig, Native())
+    given = whole if rig.identifier.core == "f64" else run
+    result = identify(given, rig, native)
     names = [name for name in (*LINEAR, ZERO) if name in result.value]
-    identifier = rig.identifier
+    advices = tuple(f"advice: {sentence}" for sentence in advice(given, rig, result, native))
     return Recording(
         title=f"{path.name}: {result.form} form, {result.law} law, core {result.core}, {run.sample_rate:g} samples per "
         "second",
         clock="of the run",
-        rig=rig,
+        rig=fitted(rig, given),  # as it was identified
         run=whole,
         t=result.trajectory.t,
         physical=result.trajectory.physical,
         physical_se=result.trajectory.physical_se,
         kappa=result.trajectory.kappa,
-        p=np.array([result.value[name] for name in names]),
+        p=np.array([*(result.value[name] for name in names), *result.friction]),
+        estimate={name: (result.value[name], result.se[name]) for name in result.value if result.identified},
         reasons={},
-        state=result.status,
+        state=_with_words(result.status) if result.identified else result.verdict,
+        remarks=advices if result.warning is None else (f"warning: {result.warning}", *advices),
         breaks=(),
-        account=f"{result.ticks} samples, {result.updates} updates, {result.lost} samples rejected"
-        + ("; residuals without the friction that was estimated" if identifier.damping else ""),
+        account=f"{result.ticks} samples, {result.updates} updates, {result.lost} samples rejected",
     )
+
+
+def _with_words(reason: str) -> str:
+    words = reason_words(reason)
+    return f"{reason}: {words}" if words else reason
 
 
 def write_report(recording: Recording, path: Path) -> None:
@@ -174,16 +201,26 @@ def write_report(recording: Recording, path: Path) -> None:
         When the run is too short for the residuals, or the file cannot be written.
     """
     residuals = residuals_of(recording.run, recording.rig, recording.p)
-    figure, axes = plt.subplots(4, 2, figsize=(15, 13), layout="constrained")
+    figure = plt.figure(figsize=(15, 17), layout="constrained")
     try:
-        _converge(recording, axes[:, 0])
-        _residuals(residuals, recording.run, axes[0, 1])
-        _autocorrelation(residuals, axes[1, 1])
-        _spectra(recording, axes[2, 1])
-        _phase(recording.run, axes[3, 1])
-        figure.align_ylabels(axes[:, 0])
-        figure.align_ylabels(axes[:, 1])
-        figure.suptitle("\n".join([recording.title, _last(recording), recording.account]), fontsize=12)
+        rows: list[Any] = [["angle", "angle"], ["difference", "difference"]]
+        rows += [[f"left{k}", f"right{k}"] for k in range(4)]
+        axes = figure.subplot_mosaic(
+            rows,
+            height_ratios=[1.0, 0.45, 1.0, 1.0, 1.0, 1.0],
+        )
+        left, right = (np.array([axes[f"{side}{k}"] for k in range(4)]) for side in ("left", "right"))
+        _overlay(recording, axes["angle"], axes["difference"])
+        _converge(recording, left)
+        _residuals(recording, residuals, right[0])
+        _autocorrelation(residuals, right[1])
+        _spectra(recording, right[2])
+        _phase(recording.run, right[3])
+        figure.align_ylabels([axes["angle"], axes["difference"], *left])
+        figure.align_ylabels(right)
+        lines = [recording.title, *_last(recording), recording.account]
+        folded = [part for line in lines for part in textwrap.wrap(line, _LINE) or [""]]
+        figure.suptitle("\n".join(folded), fontsize=12)
         with appearing(path) as temporary:
             figure.savefig(temporary, dpi=110, format=path.suffix[1:] or "png")
     except OSError as error:
@@ -194,19 +231,66 @@ def write_report(recording: Recording, path: Path) -> None:
         plt.close(figure)
 
 
-def _last(recording: Recording) -> str:
-    """The last estimate in words."""
-    parts = []
-    for name, value, error in zip(PHYSICAL, recording.physical[-1], recording.physical_se[-1], strict=True):
-        told, spread = with_error(float(value), float(error))
-        parts.append(f"{name} = {told} ± {spread} {_UNITS[name]}")
-    if not np.isfinite(recording.physical[-1]).all():
-        linear = ", ".join(f"{name} = {value:.4g}" for name, value in zip(LINEAR, recording.p, strict=False))
-        parts = [f"outside the physical region: {linear}"]
+def _last(recording: Recording) -> list[str]:
+    """The last estimate in words, why it is the last, and what is to be said of it."""
+    known = recording.estimate
+    if not known:
+        told = f"nothing identified: {recording.state}"
+    else:
+        physical = all(name in known for name in PHYSICAL)
+        names = PHYSICAL if physical else LINEAR
+        parts = []
+        for name in names:
+            value, error = with_error(*known[name])
+            parts.append(f"{name} = {value} ± {error} {_UNITS.get(name, '')}".rstrip())
+        where = "" if physical else "outside the physical region: "
+        told = f"estimate: {where}{', '.join(parts)}  (± standard error)"
     reasons = ", ".join(f"{count} {reason}" for reason, count in recording.reasons.items())
-    told = f"last estimate: {', '.join(parts)}" + ("" if len(parts) == 1 else "  (± standard error)")
-    state = f"{recording.state}: {reason_words(recording.state)}"
-    return "\n".join([told, state, f"estimates: {reasons}"] if reasons else [told, state])
+    return [
+        told,
+        *([recording.state] if known else []),
+        *([f"estimates: {reasons}"] if reasons else []),
+        *recording.remarks,
+    ]
+
+
+def _overlay(recording: Recording, angle: Axes, difference: Axes) -> None:
+    """Measured against simulated angle, and their difference, over the last seconds of the run."""
+    n_core = 4 if recording.rig.identifier.zero and recording.rig.identifier.form == "weak" else 3
+    p, friction = recording.p[:n_core], tuple(map(float, recording.p[n_core:]))
+    run = recording.run
+    simulated = simulated_angle(run, p, recording.rig.l1, friction) if recording.estimate else None
+    end = run.t[-1] if simulated is None else simulated.t[-1]
+    shown = (run.t >= end - _SHOWN_S) & (run.t <= end)
+    angle.plot(run.t[shown], run.phi[shown], color="0.6", linewidth=2.5, label="measured")
+    angle.set_ylabel("angle phi [rad]")
+    difference.set_ylabel("difference\n[mrad]")
+    (angle if simulated is None else difference).set_xlabel(_clock(recording))
+    if simulated is None:
+        why = "no pendulum has these parameters" if recording.estimate else "nothing is identified to simulate with"
+        angle.set_title(f"Measured angle ({why})")
+        difference.set_visible(False)
+    else:
+        late = simulated.t >= end - _SHOWN_S
+        t, fit = simulated.t[late], simulated.simulated[late]
+        angle.plot(t, fit, color="C1", linewidth=1.2, label="simulated with the estimate")
+        difference.plot(t, 1e3 * (simulated.measured[late] - fit), color="C0", linewidth=0.9)
+        angle.set_title(
+            f"Measured against simulated angle: R² = {simulated.r2_words}, rms difference {1e3 * simulated.rms:.2g} "
+            f"mrad over the run (full equations, a start fitted every {simulated.block_s:.2g} s)"
+        )
+    for axis in (angle, difference):
+        axis.set_xlim(max(float(run.t[0]), float(end) - _SHOWN_S), float(end))
+        axis.grid(alpha=0.3)
+    low, high = angle.get_ylim()
+    angle.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
+    angle.legend(loc="upper right", fontsize=9, ncols=2)
+    angle.tick_params(labelbottom=simulated is None)
+
+
+def _clock(recording: Recording) -> str:
+    """Of the samples, as a label."""
+    return "time on the board [s]" if recording.reasons else "time of the run [s]"
 
 
 def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
@@ -214,7 +298,7 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     for column, (name, axis) in enumerate(zip(PHYSICAL, axes, strict=False)):
         value, band = recording.physical[:, column], 2 * recording.physical_se[:, column]
         axis.fill_between(t, value - band, value + band, alpha=0.25, color="C0", label="±2 standard errors")
-        axis.plot(t, value, color="C0", linewidth=1.2, label="estimate")
+        axis.plot(t, value, color="C0", linewidth=1.2, label="estimate" if recording.estimate else "not published")
         low, high = interesting(value, band)
         if math.isfinite(low) and low < high:
             axis.set_ylim(low, high)
@@ -234,7 +318,8 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
         axis.legend(loc="best", fontsize=9)
 
 
-def _residuals(residuals: Residuals, run: Run, axis: Axes) -> None:
+def _residuals(recording: Recording, residuals: Residuals, axis: Axes) -> None:
+    run = recording.run
     t, e = np.repeat(residuals.t, residuals.e.shape[1]), residuals.e.ravel()
     every = max(1, len(e) // _MOST_DOTS)
     axis.plot(t[::every], e[::every], ".", markersize=3, color="0.6", label="one row")
@@ -246,9 +331,9 @@ def _residuals(residuals: Residuals, run: Run, axis: Axes) -> None:
         unit = "its standard deviation"
     reach = 1.15 * max(float(np.quantile(np.abs(e), 0.999)), 1.0)
     axis.set_ylim(-reach, 1.45 * reach)  # room for the legend
-    axis.set_title("Residuals of the rows at the last estimate")
+    axis.set_title(f"Residuals of the rows at the {'last estimate' if recording.estimate else 'guess'}")
     axis.set_ylabel(f"residual [1 = {unit}]")
-    axis.set_xlabel("time on the board [s]")
+    axis.set_xlabel(_clock(recording))
     axis.set_xlim(run.t[0], run.t[-1])
     axis.grid(alpha=0.3)
     axis.legend(loc="upper right", fontsize=9, ncols=3)
@@ -294,7 +379,7 @@ def _spectra(recording: Recording, axis: Axes) -> None:
         low, high = scale.get_ylim()
         scale.set_ylim(low, high * (high / low) ** 0.35)
     axis.set_xlim(0, float(frequency[shown][-1]))
-    axis.set_title("Excitation and answer against the modes of the estimate")
+    axis.set_title(f"Excitation and answer against the modes of the {'estimate' if recording.estimate else 'guess'}")
     axis.set_xlabel("frequency [Hz]")
     axis.grid(alpha=0.3)
     axis.legend(handles=lines, loc="upper right", fontsize=9, ncols=2)
