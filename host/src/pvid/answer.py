@@ -100,7 +100,7 @@ def one_line(result: Identification) -> str:
 def status_line(result: Identification) -> str:
     """What the core reported besides the parameters."""
     chi2 = "" if result.chi2 is None else f" chi2 {result.chi2:.2g};"
-    since = f" since {result.trusted_s:.1f} s, when this estimate was published" if result.is_old else ""
+    since = f" since the estimate of {result.trusted_s:.1f} s" if result.is_old else ""
     return (
         f"status {result.status}{since};{chi2} kappa {result.kappa:.2g}; {result.ticks} ticks, {result.updates} updates, "
         f"{result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"

@@ -116,7 +116,7 @@ class Identifier:
     test_functions : of the weak form, per window; 0: up to 1.5 times the nominal fast mode, 8 to 16
     decimation : of the weak form, samples in per sample used; 0: what leaves about 200 a window
     smoothing_s : of the weak form, length of the filters before decimation [s]; 0: the shortest that serve
-    pass_hz : of the weak form, up to which frequency these filters leave the motion as it is [Hz]; 0: 4.5 times the
+    pass_hz : of the weak form, up to which frequency these filters leave the motion as it is [Hz]; 0: 7 times the
         nominal fast mode
     forgetting_s : time constant of forgetting [s]; 0: nothing is forgotten
     feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at

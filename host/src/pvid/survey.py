@@ -25,7 +25,7 @@ from pvid.errors import PvidError
 from pvid.rigfile import Nominal, RigFile
 from pvid.run_rows import Fit, RunRows
 from pvid.setup import nominal_start, weak_design_of
-from pvid.weak_sizing import window_for_run
+from pvid.weak_sizing import pass_hz_of, window_for_run
 
 Float = npt.NDArray[np.float64]
 
@@ -82,8 +82,9 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     found = survey(rig, run)
     if found is not None:
         rig = with_nominal(rig, found.p)
-        if rig.identifier.disturbance == 0:
-            rig = replace(rig, identifier=replace(rig.identifier, disturbance=found.disturbance))
+        own = rig.identifier
+        own = replace(own, disturbance=own.disturbance or found.disturbance, pass_hz=own.pass_hz or pass_hz_of(found.p))
+        rig = replace(rig, identifier=own)
     return sized_for(replace(rig, identifier=replace(rig.identifier, survey=False)), run)
 
 

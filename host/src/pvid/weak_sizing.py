@@ -25,7 +25,9 @@ _LEAST_PERIODS = 0.8
 _BAND = 1.5  # frequency of the last test function over that of the fast mode
 _FEWEST = 8
 _SAMPLES = 200
-_PASS = 4.5  # edge of the pass band over the fast mode's frequency
+# Edge of the pass band over the fast mode's frequency: of a guess, which may be 1.5 times too slow, and of an estimate.
+_PASS = 7.0
+_PASS_KNOWN = 4.5
 _PASS_MOST = 0.3  # and over the decimated rate
 # A run must hold this many windows' lengths, so that at least four half-overlapping ones are judged.
 _WINDOWS_A_RUN = 2.6
@@ -132,6 +134,11 @@ def sized(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> 
 def decimation_of(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> int:
     """Samples per decimated sample of `sized`."""
     return sized(p, sample_rate, given, bounds).decimation
+
+
+def pass_hz_of(p: Float) -> float:
+    """Edge of the pass band [Hz] for a p that is known to a few per cent."""
+    return _PASS_KNOWN * slow_and_fast_hz(p)[1]
 
 
 def window_for_run(p: Float, duration_s: float, bounds: Bounds = HOST) -> float | None:
