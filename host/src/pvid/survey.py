@@ -90,6 +90,8 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
 
 def survey(rig: RigFile, run: Run) -> Survey | None:
     """Searches a run for p; None where no start leads to a pendulum."""
+    if not np.isfinite(run.phi).any():
+        return None
     outcomes: list[tuple[RigFile, Fit]] = []
     tried = 0
     for start in _starts(rig):
