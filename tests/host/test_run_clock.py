@@ -103,7 +103,7 @@ def test_a_sample_missing_among_rounded_stamps_is_seen(tmp_path: Path) -> None:
     t = np.delete(uniform(20.0, 700.0), [5000, 9000])
     run = read(tmp_path, t, *measured(t), digits=".3f")
     assert len(run) == 14_000 and run.sample_rate == pytest.approx(700.0, rel=1e-6)
-    assert "2 of 14000 samples are missing in 2 gaps" in run.notes[-1]
+    assert "missing samples: 2 of 14000, in 2 gaps" in run.notes[-1]
 
 
 # ---- missing samples
@@ -117,7 +117,7 @@ def test_a_dropped_sample_is_interpolated_and_told(tmp_path: Path) -> None:
     kept = np.delete(np.arange(t.size), gone)
     assert run.phi[kept].tobytes() == phi[kept].tobytes() and run.y[kept].tobytes() == y[kept].tobytes()
     np.testing.assert_allclose(run.t, t, atol=1e-12)
-    assert run.notes == ("1 of 10000 samples are missing in 1 gap (first at 1.234 s, longest 0.001 s), interpolated",)
+    assert run.notes == ("missing samples: 1 of 10000, in 1 gap (first at 1.234 s, longest 0.001 s), interpolated",)
     # 5 standard deviations of the fit's own noise, which is a third of a sample's
     assert abs(run.phi[1234] - phi_at(t)[1234]) < 5 / 3 * 0.6 * LSB
 
@@ -131,8 +131,8 @@ def test_empty_and_nan_cells_are_missing_samples(tmp_path: Path) -> None:
     run = read_run(tmp_path / "run.csv")
     assert len(run) == 1999 and np.isfinite(run.phi).all() and np.isfinite(run.y).all()
     assert run.phi[0] == phi[1] and run.t[0] == t[1]
-    assert run.notes[0] == "1 rows without numbers at the ends are left out"
-    assert run.notes[1].startswith("3 of 1999 samples are missing in 2 gaps")
+    assert run.notes[0] == "rows without numbers at the ends, left out: 1"
+    assert run.notes[1].startswith("missing samples: 3 of 1999, in 2 gaps")
 
 
 def test_long_gaps_stay_empty(tmp_path: Path) -> None:
@@ -145,8 +145,8 @@ def test_long_gaps_stay_empty(tmp_path: Path) -> None:
     missing = np.isnan(run.phi)
     np.testing.assert_array_equal(np.flatnonzero(missing), np.arange(4000, 4300))
     np.testing.assert_array_equal(np.isnan(run.y), missing)
-    assert "5 of 10000 samples are missing in 1 gap (first at 2 s, longest 0.005 s), interpolated" in run.notes
-    assert any("300 of 10000 samples" in note and "starts its windows again" in note for note in run.notes)
+    assert "missing samples: 5 of 10000, in 1 gap (first at 2 s, longest 0.005 s), interpolated" in run.notes
+    assert any("missing samples: 300 of 10000" in note and "starts its windows again" in note for note in run.notes)
     whole = run.whole()
     assert len(whole) == 5700 and whole.t[0] == pytest.approx(4.3) and np.isfinite(whole.phi).all()
     assert whole.notes[-1] == "used is the longest stretch without a gap: 4.3 s to 9.999 s"
@@ -184,7 +184,7 @@ def test_a_row_that_was_written_twice_is_left_out(tmp_path: Path) -> None:
     twice = np.sort(np.append(np.arange(t.size), [77, 5000]))
     run = read(tmp_path, t[twice], phi[twice], y[twice])
     assert run.phi.tobytes() == phi.tobytes() and run.sample_rate == 1000.0
-    assert run.notes == ("2 rows repeat the row before them and are left out (first: line 80)",)
+    assert run.notes == ("rows that repeat the one before them, left out: 2 (first: line 80)",)
 
 
 # ---- jitter
@@ -241,7 +241,8 @@ def test_samples_missing_from_a_jittering_run_are_seen(tmp_path: Path) -> None:
     kept[8000:8200] = False
     run = read(tmp_path, t[kept], *measured(t[kept]))
     assert len(run) == pytest.approx(10_000, abs=1)
-    assert any(re.match(r"4 of 1?\d{4} samples are missing in 3 gaps", note) for note in run.notes), run.notes
+    assert "steps longer than 1.5 periods, of late samples or missing ones: 4" in run.notes[0]
+    assert re.match(r"missing samples: 2 of \d+, in 1 gap .* interpolated", run.notes[1])
     missing = np.flatnonzero(np.isnan(run.phi))
     assert missing.size == pytest.approx(200, abs=1) and abs(missing[0] - 8000) <= 1
     assert rms(run.phi - phi_at(run.t)) < 1.05 * rms(measured(t)[0] - phi_at(t))

@@ -150,7 +150,7 @@ def test_dropped_samples_and_jitter_leave_the_answer(run: Run, tmp_path: Path) -
     kept = np.delete(np.arange(len(run)), random.choice(np.arange(1, len(run) - 1), 20, replace=False))
     dropped = answer(write(tmp_path / "dropped.csv", run, kept))
     late = answer(write(tmp_path / "late.csv", run, t=run.t + 2e-4 * random.uniform(-1, 1, len(run))))
-    for found, told in ((dropped, "20 of 20000 samples are missing in 20 gaps"), (late, "smoother without that")):
+    for found, told in ((dropped, "missing samples: 20 of 20000, in 20 gaps"), (late, "smoother without that")):
         assert told in str(found["input"])
         for name in ("w", "d1", "d2"):
             # other noise at 20 of 20 000 samples
@@ -170,7 +170,7 @@ def test_a_long_gap_costs_windows_and_no_answer(core: str, run: Run, tmp_path: P
     rows = np.delete(np.arange(len(run)), np.arange(6000, 6500))
     clean = answer(write(tmp_path / "clean.csv", run), "--core", core)
     found = answer(write(tmp_path / "run.csv", run, rows), "--core", core)
-    assert "500 of 20000 samples are missing in 1 gap (first at 6 s, longest 0.5 s)" in found["input"][0]
+    assert "missing samples: 500 of 20000, in 1 gap (first at 6 s, longest 0.5 s)" in found["input"][0]
     assert len(found["input"]) == (2 if core == "f64" else 1)  # float64 uses the longest stretch, and tells
     for name in ("w", "d1", "d2"):
         # two windows of 16 less, in float64 a third of them: well below the errors that both share

@@ -179,7 +179,7 @@ def _checked(table: Table) -> Table:
     if (first, last) == (0, there.size - 1):
         return table
     part = slice(first, last + 1)
-    note = f"{there.size - (last + 1 - first)} rows without numbers at the ends are left out"
+    note = f"rows without numbers at the ends, left out: {there.size - (last + 1 - first)}"
     return replace(
         table,
         t=table.t[part],
@@ -204,7 +204,7 @@ def _gap_notes(clocked: Uniform, firsts: npt.NDArray[np.int64], ends: npt.NDArra
     notes = []
     for chosen, done in (
         (filled, "interpolated"),
-        (~filled, "too long to be interpolated: the identifier starts its windows again behind each"),
+        (~filled, "which cannot be interpolated: the identifier starts its windows again behind each"),
     ):
         if chosen.any():
             count = int(np.count_nonzero(chosen))
@@ -212,7 +212,7 @@ def _gap_notes(clocked: Uniform, firsts: npt.NDArray[np.int64], ends: npt.NDArra
             at = float(clocked.t[firsts[chosen][0]])
             longest = float(lengths[chosen].max()) / rate
             notes.append(
-                f"{samples} of {clocked.t.size} samples are missing in {count} gap{'s' if count > 1 else ''} (first at "
+                f"missing samples: {samples} of {clocked.t.size}, in {count} gap{'s' if count > 1 else ''} (first at "
                 f"{at:.6g} s, longest {longest:.3g} s), {done}"
             )
     return tuple(notes)

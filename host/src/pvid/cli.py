@@ -330,7 +330,7 @@ def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
         result = identify(run, rig, native)
     except PvidError as error:
         raise PvidError("; ".join((str(error), *advice_on_refusal(run, rig, native)))) from error
-    return replace(result, advice=advice(run, rig, result, native))
+    return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
 
 
 @commands.command(name="compare")
@@ -761,6 +761,16 @@ def bench_noise(update: Path | None) -> int:
     with progress_bar("noise in the rows", len(noise.CASES)) as advance:
         rows = list(noise.noise_table(Native(), progress=advance))
     _update_readme(update, "noise", _markdown(noise.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="reading")
+@_UPDATE
+def bench_reading(update: Path | None) -> int:
+    """Processor time and memory of reading runs of ten minutes at 1 kHz and of 10^7 samples."""
+    from pvid.bench import reading
+
+    _update_readme(update, "reading", _markdown(reading.HEADER, list(reading.reading_table())))
     return DONE
 
 

@@ -22,13 +22,16 @@ from pvid.errors import PvidError
 from pvid.run_table import Table
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+IntArray = npt.NDArray[np.integer]
 
 # Largest departure of t from a uniform clock that is left as it is [periods]. On the standard rig at 1 kHz (phi' up to
 # 1 rad/s) it is 1e-4 rad, half the encoder's noise, and it leaves room for time stamps with few decimals.
 _JITTER_PERIODS = 0.1
 # A step of t longer than this many periods is a gap: a sample is missing.
 _GAP_PERIODS = 1.5
+# Between jittering stamps a longer step is empty; in a shorter one, of a late sample or a missing one, the cubic through
+# the samples around it lets 0.8 times their noise through.
+_EMPTY_PERIODS = 2.5
 # Half of what t is rounded to, and a little more.
 _ROUNDING = 0.55
 # w is proportional to the square of the sample rate: 1e-4 changes it by 0.02 %, a good run's standard error. So much
@@ -135,7 +138,7 @@ def _without_repeated_rows(table: Table, steps: FloatArray) -> tuple[Table, Floa
     if any((signal[again] != signal[again - 1]).any() for signal in (table.phi, table.y)):
         return table, steps
     kept = np.delete(np.arange(table.t.size), again)
-    note = f"{again.size} rows repeat the row before them and are left out (first: {table.place(int(again[0]))})"
+    note = f"rows that repeat the one before them, left out: {again.size} (first: {table.place(int(again[0]))})"
     less = replace(
         table,
         t=table.t[kept],
@@ -156,9 +159,9 @@ def _with_jitter(
     note: tuple[str, ...],
 ) -> Uniform:
     size = f"by up to {fit.largest:.2g} periods ({fit.largest * fit.period:.2g} s, {table.place(fit.worst)})"
-    late = fit.largest * fit.period <= _LATE_S
+    stamped_late = fit.largest * fit.period <= _LATE_S
     if repeats.any():
-        if not late or np.count_nonzero(repeats) < _BURST_SHARE * repeats.size:
+        if not stamped_late or np.count_nonzero(repeats) < _BURST_SHARE * repeats.size:
             row = int(np.argmax(repeats)) + 1
             raise table.error(row, "t", f"{table.t[row]!s} s repeats the time before it")
         note += (
@@ -166,7 +169,7 @@ def _with_jitter(
             f"{rate:g} Hz, and a missing one would not be seen",
         )
         return _placed(table, None, rate, note)
-    if late and _smoother_when_uniform(table, fit):
+    if stamped_late and _smoother_when_uniform(table, fit):
         note += (
             f"t departs from a uniform clock {size}, but phi and y are smoother without that: the samples are taken as "
             f"uniform at {rate:g} Hz",
@@ -176,6 +179,9 @@ def _with_jitter(
     rate = promised if promised is not None else _shortest_decimal(1 / fit.period, 1e-3)
     t, phi, y = _interpolated(table, rate, fit.period)
     told = f"t jitters {size}: phi and y are interpolated at {rate:g} Hz from the recorded times"
+    long = int(np.count_nonzero(np.diff(table.t) > _GAP_PERIODS * fit.period))
+    if long:
+        told += f"; steps longer than {_GAP_PERIODS:g} periods, of late samples or missing ones: {long}"
     return Uniform(t, phi, y, rate, (*table.notes, told))
 
 
@@ -300,7 +306,7 @@ def _fits(table: Table, steps: FloatArray, quantum: float) -> list[_Fit]:
                 f"a gap of {steps[worst]:.6g} s, {lengths.max():.4g} periods, comes before it, and more of the run is "
                 f"missing than there (several recordings in one file?)",
             )
-        ticks = np.ones(table.t.size, np.int64)
+        ticks = np.ones(table.t.size, np.int32)  # half the memory; 2^31 of them would be 25 days at 1 kHz
         ticks[0] = 0
         ticks[gaps + 1] = _ticks_across(table.t, gaps, period)
         fits.append(_fit(table.t, np.cumsum(ticks, out=ticks), gaps.size))
@@ -432,7 +438,7 @@ def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray,
             piece[1] += weight * y[start + i]
         # a sample within half a period is as good as one at the tick
         nearest = np.minimum(np.abs(times[right] - at), np.abs(at - times[right - 1]))
-        within = (times[right] - times[right - 1] > _GAP_PERIODS * period) & (nearest > period / 2)
+        within = (times[right] - times[right - 1] > _EMPTY_PERIODS * period) & (nearest > period / 2)
         piece[:, within] = np.nan
     end = t.size - int(np.argmax(np.isfinite(out[0, ::-1])))
     return t[:end], out[0, :end], out[1, :end]
