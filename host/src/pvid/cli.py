@@ -330,7 +330,7 @@ def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
         result = identify(run, rig, native)
     except PvidError as error:
         raise PvidError("; ".join((str(error), *advice_on_refusal(run, rig, native)))) from error
-    return replace(result, advice=advice(run, rig, result, native))
+    return replace(result, advice=advice(run, rig, result, native), notes=run.notes)
 
 
 @commands.command(name="compare")
