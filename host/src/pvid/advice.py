@@ -24,6 +24,7 @@ from pvid.ranges_q31 import pivot_acceleration, reach
 from pvid.rigfile import RigFile
 from pvid.sensor_steps import resolution_of
 from pvid.setup import nominal_start
+from pvid.survey import fitted
 from pvid.weak_oracle import VALID_ANGLE
 
 GRAVITY = 9.81  # m/s^2
@@ -47,6 +48,7 @@ _FADING = 2.5  # rms of the swing in the first fifth of a run, over that in the 
 
 _MOST_SAMPLES = 200_000  # of a run, for trials
 _BETTER = 0.5  # chi^2 of a trial that is believed, over that without it
+_EXPLAINED = 3.0  # chi^2 at which nothing in the equations is looked for
 _MOST_ROUNDS = 4
 _CLOCK_OFF = 0.3  # less does not keep a run from being answered
 
@@ -81,41 +83,42 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
         The C core, for trials.
     """
     case = Case(_shortened(run), rig)
-    if _is_good(result):
-        cures = _angle_in_degrees(case, native) or _steps(case)
-        return (*(cure.sentence for cure in cures), *_clock_of(result, case))
     if result.beyond_words is not None and not result.identified:
         return (_wider_ranges(result),)
-    plain = (result.core, result.form, result.law) == ("f32", "weak", "stationary") and case.run is run
-    found, case, now = _put_right(case, native, result if plain else None)
+    if _is_good(result):
+        degrees = _angle_in_degrees(case, native)
+        if degrees:
+            return (degrees[0].sentence,)
+        found, case, now = _put_right(case, native, units=False)
+    else:
+        found, case, now = _put_right(case, native)
     if not found:
         found = list(_remaining(case, result, now))
-    if now is not None and now.identified:
-        found += _clock_of(now, case)
+    answer = now if now is not None and _answers(now) else result
+    if answer.identified:
+        found += _clock_of(answer, case)
     return tuple(found)
 
 
 def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]:
     """Sentences on a run whose rig file's settings were refused."""
-    return tuple(_put_right(Case(_shortened(run), rig), native, None)[0])
+    return tuple(_put_right(Case(_shortened(run), rig), native)[0])
 
 
-def _put_right(
-    case: Case, native: Native, known: Identification | None
-) -> tuple[list[str], Case, Identification | None]:
-    """What is found, the case without it, and what this gives; `known` is what the case as it is gives, where a trial
-    has been made."""
+def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str], Case, Identification | None]:
+    """What is found, the case without it, and what this gives; without `units` only sensors and equations are looked
+    at."""
     found: list[str] = []
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MOST_ROUNDS if units else 0):
         cure = _unit_mistake(case, native)
         if cure is None or cure.sentence in found:
             break
         found.append(cure.sentence)
-        case, known = cure.case, None
-    now = known if known is not None else _trial(case, native)
+        case = cure.case
+    now = _trial(case, native)
     for search in (_step_of, _equation_mistake):
         for _ in range(_MOST_ROUNDS):
-            cure = None if _is_good(now) else search(case, now, native)
+            cure = None if search is _equation_mistake and _is_explained(now) else search(case, now, native)
             if cure is None or cure.sentence in found:
                 break
             found.append(cure.sentence)
@@ -134,11 +137,14 @@ def _shortened(run: Run) -> Run:
 
 
 def _trial(case: Case, native: Native) -> Identification | None:
-    """The case in the weak form and float32; None where the settings are refused."""
+    """The case in the weak form and float32, its residuals held against the sensors' noise alone; None where the
+    settings are refused."""
     identifier = case.rig.identifier
     float32 = replace(identifier, core="f32", form="weak", law="stationary", window_s=_weak_window(case.rig))
     try:
-        return identify(case.run, replace(case.rig, identifier=float32), native, points=1)
+        rig = fitted(replace(case.rig, identifier=float32), case.run)
+        alone = replace(rig, identifier=replace(rig.identifier, disturbance=identifier.disturbance))
+        return identify(case.run, alone, native, points=1)
     except PvidError:
         return None
 
@@ -149,6 +155,10 @@ def _weak_window(rig: RigFile) -> float:
 
 def _is_good(result: Identification | None) -> bool:
     return result is not None and result.identified and result.warning is None
+
+
+def _is_explained(result: Identification | None) -> bool:
+    return _is_good(result) and result is not None and (result.chi2 is None or result.chi2 < _EXPLAINED)
 
 
 def _answers(trial: Identification | None) -> bool:
@@ -442,18 +452,22 @@ def _wider_ranges(result: Identification) -> str:
 
 def _remaining(case: Case, result: Identification, now: Identification | None) -> Iterator[str]:
     """Of a run in which no mistake was found; `now` is what the weak form in float32 makes of it."""
-    if _is_good(now):
-        if result.form == "strong":
-            yield "the strong form needs an encoder of 20 bits and more: use --form weak, which explains this run"
-        elif result.law != "stationary":
-            yield "equation (5) does not arrive from this guess: use --law stationary, which explains this run"
-        elif result.core == "q31" and result.largest_angle > _SMALL_ANGLE:
+    if _is_good(result):
+        return
+    if result.form == "strong" and _is_good(now):
+        yield "the strong form needs an encoder of 20 bits and more: use --form weak, which explains this run"
+        return
+    if result.law != "stationary" and _is_good(now):
+        yield "equation (5) does not arrive from this guess: use --law stationary, which explains this run"
+        return
+    if result.core == "q31" and _answers(now):
+        if result.largest_angle > _SMALL_ANGLE:
             yield (
                 f"angles go to {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
                 f"--core f32, or smaller angles"
             )
-        elif result.core == "q31":
-            yield "fixed point does not resolve this run: use --core f32, which explains it"
+        else:
+            yield "fixed point does not resolve this run: use --core f32, which answers it"
         return
     excitation = excitation_of(case.run, case.rig)
     if excitation.weak is not None:
