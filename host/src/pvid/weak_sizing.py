@@ -25,8 +25,8 @@ _LEAST_PERIODS = 0.8
 _BAND = 1.5  # frequency of the last test function over that of the fast mode
 _FEWEST = 8
 _SAMPLES = 200
-_PASS = 4.5  # edge of the pass band over the fast mode's frequency
-_PASS_MOST = 0.3  # and over the decimated rate
+PASS = 4.5  # edge of the pass band over the fast mode's frequency
+PASS_MOST = 0.3  # and over the decimated rate
 # A run must hold this many windows' lengths, so that at least four half-overlapping ones are judged.
 _WINDOWS_A_RUN = 2.6
 # Filters twice as bad as wanted are taken rather than longer ones than a core has room for by default.
@@ -124,8 +124,8 @@ def sized(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> 
             f"window_s = {window_s:g} s is {window} samples after decimation by {decimation}, and the core "
             f"takes {_MIN_WINDOW} to {bounds.window} (PVID_MAX_WEAK_WINDOW): change window_s or decimation"
         )
-    edge_hz = given.pass_hz if given.pass_hz is not None else _PASS * fast
-    edge = min(edge_hz / sample_rate, _PASS_MOST / decimation)
+    edge_hz = given.pass_hz if given.pass_hz is not None else PASS * fast
+    edge = min(edge_hz / sample_rate, PASS_MOST / decimation)
     return Sized(functions, decimation, window, _front(decimation, edge, given.taps, bounds))
 
 
