@@ -36,7 +36,7 @@ FIRMWARE = ROOT / "firmware"
 INCLUDES = [f"-I{FIRMWARE / name}" for name in ("include", "src", "link")]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
-NATIVE = [*FLAGS, "-DPVID_MAX_P=6", "-DPVID_MAX_MOMENTS=55", "-DPVID_MAX_TAPS=401", "-DPVID_MAX_DECIMATION=64", '-DPVID_NATIVE_BUILD="coverage"']
+NATIVE = [*FLAGS, *playback.HOST_SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
 PLAY = "import playback; from pvid.native import Native; [playback.digest(Native(), v) for v in playback.variants()]"
 

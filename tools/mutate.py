@@ -197,7 +197,7 @@ class Kit:
 
 
 COMMON = ("-O1", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-w")
-SIZES = ("-DPVID_MAX_P=6", "-DPVID_MAX_MOMENTS=55", "-DPVID_MAX_TAPS=401", "-DPVID_MAX_DECIMATION=64", '-DPVID_NATIVE_BUILD="mutant"')
+SIZES = (*playback.HOST_SIZES, '-DPVID_NATIVE_BUILD="mutant"')
 NATIVE = Kit("native", "gcc", ("-std=c99", *SIZES))
 PLAIN = Kit("plain", "gcc", ("-std=c99",))
 WRAPS = f"-fsanitize-ignorelist={ROOT / 'tests' / 'sanitizers.ignore'}"

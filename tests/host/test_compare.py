@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from playback import HOST_SIZES
 from conftest import ROOT
 
 MUTANTS = {
@@ -52,12 +53,7 @@ def test_a_changed_core_exits_1_and_names_tick_variable_and_words(source: str, r
     library = tmp_path / "libpvid_native.so"
     others = [str(path) for path in sorted(core.glob("*.c")) if path.name != source]
     includes = [f"-I{ROOT / 'firmware/include'}", f"-I{core}", '-DPVID_NATIVE_BUILD="mutant"']
-    includes += [
-        "-DPVID_MAX_P=6",
-        "-DPVID_MAX_MOMENTS=55",
-        "-DPVID_MAX_TAPS=401",
-        "-DPVID_MAX_DECIMATION=64",
-    ]  # as host/native builds it
+    includes += HOST_SIZES
     command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / source)]
     subprocess.run([*command, *others, str(ROOT / "host/native/replay.c"), "-o", str(library), "-lm"], check=True)
 

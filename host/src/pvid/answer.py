@@ -102,8 +102,8 @@ def status_line(result: Identification) -> str:
     chi2 = "" if result.chi2 is None else f" chi2 {result.chi2:.2g};"
     since = f" since the estimate of {result.trusted_s:.1f} s" if result.is_old else ""
     return (
-        f"status {result.status}{since};{chi2} kappa {result.kappa:.2g}; {result.ticks} ticks, {result.updates} updates, "
-        f"{result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"
+        f"status {result.status}{since};{chi2} kappa {result.kappa:.2g}; {result.ticks} ticks, "
+        f"{result.updates} updates, {result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"
     )
 
 

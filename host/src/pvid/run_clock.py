@@ -29,8 +29,8 @@ IntArray = npt.NDArray[np.integer]
 _JITTER_PERIODS = 0.1
 # A step of t longer than this many periods is a gap: a sample is missing.
 _GAP_PERIODS = 1.5
-# Between jittering stamps a longer step is empty; in a shorter one, of a late sample or a missing one, the cubic through
-# the samples around it lets 0.8 times their noise through.
+# Between jittering stamps a longer step is empty; in a shorter one, of a late sample or a missing one, the cubic
+# through the samples around it lets 0.8 times their noise through.
 _EMPTY_PERIODS = 2.5
 # Half of what t is rounded to, and a little more.
 _ROUNDING = 0.55

@@ -27,8 +27,8 @@ _FEWEST = 8
 _SAMPLES = 200
 # Edge of the pass band over the fast mode's frequency: of a guess, which may be 1.5 times too slow, and of an estimate.
 _PASS = 7.0
-_PASS_KNOWN = 4.5
-_PASS_MOST = 0.3  # and over the decimated rate
+PASS = 4.5
+PASS_MOST = 0.3  # and over the decimated rate
 # A run must hold this many windows' lengths, so that at least four half-overlapping ones are judged.
 _WINDOWS_A_RUN = 2.6
 # Filters twice as bad as wanted are taken rather than longer ones than a core has room for by default.
@@ -127,7 +127,7 @@ def sized(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = HOST) -> 
             f"takes {_MIN_WINDOW} to {bounds.window} (PVID_MAX_WEAK_WINDOW): change window_s or decimation"
         )
     edge_hz = given.pass_hz if given.pass_hz is not None else _PASS * fast
-    edge = min(edge_hz / sample_rate, _PASS_MOST / decimation)
+    edge = min(edge_hz / sample_rate, PASS_MOST / decimation)
     return Sized(functions, decimation, window, _front(decimation, edge, given.taps, bounds))
 
 
@@ -138,7 +138,7 @@ def decimation_of(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = H
 
 def pass_hz_of(p: Float) -> float:
     """Edge of the pass band [Hz] for a p that is known to a few per cent."""
-    return _PASS_KNOWN * slow_and_fast_hz(p)[1]
+    return PASS * slow_and_fast_hz(p)[1]
 
 
 def window_for_run(p: Float, duration_s: float, bounds: Bounds = HOST) -> float | None:
