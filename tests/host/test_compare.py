@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from playback import HOST_SIZES
 from conftest import ROOT
+from playback import HOST_SIZES
 
 MUTANTS = {
     "estimator_f32.c": (
