@@ -83,7 +83,11 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     if found is not None:
         rig = with_nominal(rig, found.p)
         own = rig.identifier
-        own = replace(own, disturbance=own.disturbance or found.disturbance, pass_hz=own.pass_hz or pass_hz_of(found.p))
+        own = replace(
+            own,
+            disturbance=own.disturbance or _rounded(found.disturbance, 2),
+            pass_hz=own.pass_hz or _rounded(pass_hz_of(found.p), 3),
+        )
         rig = replace(rig, identifier=own)
     return sized_for(replace(rig, identifier=replace(rig.identifier, survey=False)), run)
 
@@ -120,8 +124,13 @@ def survey(rig: RigFile, run: Run) -> Survey | None:
 
 def with_nominal(rig: RigFile, p: Float) -> RigFile:
     """The rig file with p's pendulum as its nominal."""
-    g, l2, rho2 = (float(x) for x in oracle.physical(p[:3], rig.l1))
+    g, l2, rho2 = (_rounded(float(x), 4) for x in oracle.physical(p[:3], rig.l1))
     return replace(rig, nominal=Nominal(g=g, l2=l2, rho2=rho2))
+
+
+def _rounded(x: float, digits: int) -> float:
+    """To so many significant digits: a rig file stays readable, and the last bits of a recording do not matter."""
+    return float(f"{x:.{digits}g}")
 
 
 def sized_for(rig: RigFile, run: Run) -> RigFile:
@@ -129,7 +138,7 @@ def sized_for(rig: RigFile, run: Run) -> RigFile:
     if rig.identifier.window_s > 0:
         return rig
     window_s = window_for_run(nominal_start(rig), len(run.t) / run.sample_rate)
-    return rig if window_s is None else replace(rig, identifier=replace(rig.identifier, window_s=window_s))
+    return rig if window_s is None else replace(rig, identifier=replace(rig.identifier, window_s=_rounded(window_s, 3)))
 
 
 def _starts(rig: RigFile) -> Iterator[RigFile]:
