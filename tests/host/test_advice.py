@@ -354,3 +354,25 @@ def test_the_json_of_an_answer(tmp_path: Path) -> None:
     assert 1 < answer["first_publication_s"] < answer["trusted_s"] <= 15
     assert answer["samples_beyond_range"] is None
     assert "misfit" not in answer
+
+
+def test_the_readmes_simulate_and_identify_end_without_an_alarm(tmp_path: Path) -> None:
+    simulated = CliRunner().invoke(commands, ["simulate", str(tmp_path / "run.csv")], standalone_mode=False)
+    assert simulated.return_value == 0
+    code, out, err = called(tmp_path / "run.csv", "--rig", tmp_path / "run.toml")
+    assert (code, err) == (0, "")
+    assert "status updated" in out
+    answer = json.loads(called(tmp_path / "run.csv", "--json")[1])  # run.toml is beside it
+    assert answer["warning"] is None and answer["advice"] == []
+    for name, truth in (("g", 9.5), ("l2", 0.12), ("rho2", 0.08)):
+        assert abs(answer[name]["value"] - truth) < 3 * answer[name]["se"] < 0.01 * truth
+
+
+def test_missing_ticks_are_no_mistake(native: Native) -> None:
+    run = run_of()
+    phi, y = run.phi.copy(), run.y.copy()
+    phi[1000:1003], y[1000:1003], phi[4000], y[4000] = np.nan, np.nan, np.nan, np.nan
+    result, said = advised(replace(run, phi=phi, y=y), RIG, native)
+    assert result is not None and result.identified and said == ()
+    _, said = advised(replace(run, phi=phi, y=-y), RIG, native)
+    assert len(said) == 1 and "y is counted downwards" in said[0]

@@ -89,14 +89,15 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
         degrees = _angle_in_degrees(case, native)
         if degrees:
             return (degrees[0].sentence,)
-        found, case, now = _put_right(case, native, units=False)
+        # the answer's own start and design serve the trials
+        found, case, now = _put_right(Case(case.run, _settled(case)), native, units=False)
     else:
         found, case, now = _put_right(case, native)
     if not found:
         found = list(_remaining(case, result, now))
     answer = now if now is not None and _answers(now) else result
     if answer.identified:
-        found += _clock_of(answer, case)
+        found += _clock_of(answer, rig)
     return tuple(found)
 
 
@@ -142,11 +143,15 @@ def _trial(case: Case, native: Native) -> Identification | None:
     identifier = case.rig.identifier
     float32 = replace(identifier, core="f32", form="weak", law="stationary", window_s=_weak_window(case.rig))
     try:
-        rig = fitted(replace(case.rig, identifier=float32), case.run)
-        alone = replace(rig, identifier=replace(rig.identifier, disturbance=identifier.disturbance))
-        return identify(case.run, alone, native, points=1)
+        return identify(case.run, _settled(Case(case.run, replace(case.rig, identifier=float32))), native, points=1)
     except PvidError:
         return None
+
+
+def _settled(case: Case) -> RigFile:
+    """The rig with what the run's survey finds, but for the disturbance that explains the rest."""
+    rig = fitted(case.rig, case.run)
+    return replace(rig, identifier=replace(rig.identifier, disturbance=case.rig.identifier.disturbance))
 
 
 def _weak_window(rig: RigFile) -> float:
@@ -359,10 +364,11 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
     def with_identifier(**changed: bool) -> Case:
         return Case(run, replace(rig, identifier=replace(rig.identifier, **changed)))  # type: ignore[arg-type]
 
-    yield Cure(
-        "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
-        Case(replace(run, y=-run.y), rig),
-    )
+    if now is None or not now.identified:
+        yield Cure(
+            "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
+            Case(replace(run, y=-run.y), rig),
+        )
     largest = now.largest_angle if now is not None else _swing(run)[1]
     if not rig.identifier.full_angle:
         yield Cure(
@@ -422,12 +428,12 @@ def _size(ratio: float) -> str:
     return f"{ratio:.3g} times too large" if ratio > 1 else f"{1 / ratio:.3g} times too small"
 
 
-def _clock_of(result: Identification, case: Case) -> tuple[str, ...]:
+def _clock_of(result: Identification, rig: RigFile) -> tuple[str, ...]:
     """Of an answer whose gravity is more than the Earth's, or much less than that and the rig file's."""
     g, error = result.value.get("g", GRAVITY), 3 * result.se.get("g", 0.0)
     if g - error > _MOST_GRAVITY:
         unless = ""
-    elif g + error < _TILTED * min(GRAVITY, case.rig.nominal.g):
+    elif g + error < _TILTED * min(GRAVITY, rig.nominal.g):
         unless = f"unless the plane is tilted by {math.degrees(math.acos(min(g / GRAVITY, 1.0))):.0f} degrees, "
     else:
         return ()
