@@ -604,7 +604,7 @@ def _identification(
     value = dict(zip(names, map(float, p), strict=True))
     unexplained, parts_disagree = None, False
     if rig.identifier.form == "weak" and trusted_s is not None:
-        over_run = verdict(rig, run, p)
+        over_run = verdict(rig, run, np.append(p, friction))
         wider = np.maximum(over_run.se[: len(p)] / np.sqrt(np.diag(covariance)), 1.0)
         covariance = covariance * np.outer(wider, wider)
         unexplained, parts_disagree = over_run.unexplained, bool(wider[:3].max() > DISAGREES)

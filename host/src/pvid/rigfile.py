@@ -40,6 +40,10 @@ _GATE: dict[Form, float] = {"weak": 4.0, "strong": 6.0}
 _PATIENCE: dict[Form, float] = {"weak": 3.0, "strong": 6.0}
 
 
+class Unset(float):
+    """A number that stands where the rig file does not say."""
+
+
 def _number(default: Any, unit: str, low: float, high: float) -> Any:
     """A field that holds a number from low to high; an int where the default is one."""
     metadata = {"unit": unit, "low": low, "high": high}
@@ -68,7 +72,7 @@ class Sensor:
         likewise
     """
 
-    phi_lsb: float = _number(2.0 * math.pi / 2**14, "rad", 0.0, 1.0)
+    phi_lsb: float = _number(Unset(2.0 * math.pi / 2**14), "rad", 0.0, 1.0)
     y_lsb: float = _number(5e-6, "m", 0.0, 1.0)
     phi_zero: float = _number(0.0, "rad", -1e3, 1e3)
     y_gain_sd: float = _number(0.003, "relative", 0.0, 1.0)
@@ -367,7 +371,7 @@ def _check_value(key: Field[Any], value: Any, place: str) -> None:
     if value is None and key.default is None:
         return
     wanted = int if _wants_integer(key) else float
-    if type(value) is not wanted and not (wanted is float and type(value) is int):
+    if type(value) is not wanted and not (wanted is float and type(value) in (int, Unset)):
         kind = "a whole number" if wanted is int else "a number"
         raise PvidError(f"{name} must be {kind}, not {_shown(value)}")
     low, high, unit = key.metadata["low"], key.metadata["high"], key.metadata["unit"]

@@ -19,29 +19,30 @@ from pvid.errors import PvidError
 from pvid.rigfile import RigFile
 from pvid.setup import row_sd_of, weak_drive_threshold
 from pvid.weak_design import WeakDesign, disturbance_gram
-from pvid.weak_oracle import A, B, columns, frames, front_end, jacobian, noise_gram, packed_to_square, remainder, theta
+from pvid.weak_oracle import A, N, columns, frames, front_end, jacobian, noise_gram, packed_to_square, remainder, theta
 
 Float = npt.NDArray[np.float64]
 
 # Windows with this many times the median residual energy hold a jolt or a lost sample, not the mechanism.
-_JOLT = 25.0
+JOLT = 25.0
 _WHITENINGS = 3
 _STEPS = 40
 _LONGEST_STEP = 0.5  # of log w, log d1, log d2
 _DONE = 1e-8
 _PASSES = 3  # of the correction for large angles
+_CORE = 4  # w, d1, d2, c; friction adds two
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Least squares over whitened rows, at p = (w, d1, d2, c).
+    """Least squares over whitened rows, at p = (w, d1, d2, c), with friction (w, d1, d2, c, c1, c2).
 
     Attributes
     ----------
     p : the estimate
     chi2 : variance of the rows over what the encoder's noise, and the disturbance where there is one, explain
-    information : S = C^T M C [4, 4]
-    scores : C^T N e of each window [windows, 4]; they sum to 0 at the least squares
+    information : S = C^T M C [n_p, n_p]
+    scores : C^T N e of each window [windows, n_p]; they sum to 0 at the least squares
     energy, signal : sums of squares of e and of Y over each window's rows [windows]
     row_sd : noise of a row [rad]
     """
@@ -56,7 +57,7 @@ class Fit:
 
     @property
     def clustered_se(self) -> Float:
-        """Standard errors of p [4] from the scatter of the windows' scores, whatever makes it.
+        """Standard errors of p [n_p] from the scatter of the windows' scores, whatever makes it.
 
         S^-1 (sum g g^T) S^-1 with the products of neighbours, which share samples, counted; never less than without
         them, and inflated for the few windows of a short run.
@@ -73,13 +74,15 @@ class Fit:
 
 @dataclass(frozen=True)
 class RunRows:
-    """Columns Y, N1..N8, a, b [windows, 11, K] of the driven windows, their angle and u [windows, W]."""
+    """Columns Y, N1..N8, with friction two more, a, b [windows, 11 or 13, K] of the driven windows, their angle and u
+    [windows, W], their numbers in the run [windows]."""
 
     design: WeakDesign
     row_sd: float
     columns: Float
     phi: Float
     u: Float
+    number: npt.NDArray[np.int64]
     part: float = 1.0  # of the run's windows
 
     @classmethod
@@ -100,34 +103,51 @@ class RunRows:
             usable &= _whole(present, design, len(phi_frames))
         if not usable.any():
             raise PvidError("the pivot stands still in every window of the run")
-        phi_frames, u_frames = phi_frames[usable], u_frames[usable]
-        return cls(
-            design, row_sd_of(rig, design.decimation), columns(phi_frames, u_frames, design), phi_frames, u_frames
+        number = np.flatnonzero(usable)
+        phi_frames, u_frames = phi_frames[number], u_frames[number]
+        of_both = columns(phi_frames, u_frames, design)
+        return cls(design, row_sd_of(rig, design.decimation), of_both, phi_frames, u_frames, number)
+
+    @property
+    def spans(self) -> Float:
+        """First and last instant of each window's samples, from the run's first sample on [windows, 2] in s."""
+        design = self.design
+        first = self.number * design.hop * design.decimation
+        last = first + design.taps - 1 + design.decimation * (design.window - 1)
+        return np.stack([first, last], axis=1) / design.sample_rate
+
+    def only(self, which: npt.NDArray[np.bool_] | slice) -> RunRows:
+        """Some of the windows."""
+        return replace(
+            self, columns=self.columns[which], phi=self.phi[which], u=self.u[which], number=self.number[which]
         )
 
     def thinned(self, most: int) -> RunRows:
         """At most so many windows, evenly spread over the run."""
-        every = -(-len(self.phi) // most)
-        columns, phi, u = self.columns[::every], self.phi[::every], self.u[::every]
-        return replace(self, columns=columns, phi=phi, u=u, part=self.part * len(phi) / len(self.phi))
+        fewer = self.only(slice(None, None, -(-len(self.phi) // most)))
+        return replace(fewer, part=self.part * len(fewer.phi) / len(self.phi))
 
     def within(self, zero: float, angle: float, fewest: int) -> RunRows:
         """The windows whose angle stays within +-`angle` of `zero` [rad]; all of them where those are too few."""
         inside = np.abs(self.phi - zero).max(axis=1) <= angle
-        if int(inside.sum()) < fewest:
-            return self
-        columns, phi, u = self.columns[inside], self.phi[inside], self.u[inside]
-        return replace(self, columns=columns, phi=phi, u=u)
+        return self.only(inside) if int(inside.sum()) >= fewest else self
 
-    def corrected(self, p: Float) -> RunRows:
-        """With what the linear rows lack at large angles taken off Y, at p."""
-        corrected = self.columns.copy()
-        nothing = np.zeros(2)
+    def corrected(self, p: Float, full_angle: bool = True) -> RunRows:
+        """With what the linear rows lack at large angles taken off Y, at p; with the columns of friction where p has
+        its two coefficients."""
+        friction = len(p) > _CORE
+        damping = p[_CORE:] if friction else np.zeros(2)
+        functions = self.design.functions
+        y, k = np.zeros((len(self.phi), functions)), np.zeros((len(self.phi), 2, functions))
         with np.errstate(over="ignore", invalid="ignore"):  # passes diverge where p is far off
             for window, (one, phi, u) in enumerate(zip(self.columns, self.phi, self.u, strict=True)):
-                lack = remainder(p, nothing, one, phi, u, self.design, _PASSES).y
-                corrected[window, 0] -= np.where(np.isfinite(lack).all(), lack, 0.0)
-        return replace(self, columns=corrected)
+                lack = remainder(p[:_CORE], damping, one, phi, u, self.design, _PASSES, full_angle)
+                if np.isfinite(lack.y).all() and np.isfinite(lack.k).all():
+                    y[window], k[window] = lack.y, lack.k
+        parts = [self.columns[:, :1] - y[:, None], self.columns[:, N], self.columns[:, A:]]
+        if friction:
+            parts.insert(2, k)
+        return replace(self, columns=np.concatenate(parts, axis=1))
 
     def covariance(self, p: Float) -> Float:
         """Of a window's rows at p for noise of 1 of the decimated angle [K, K]."""
@@ -138,7 +158,7 @@ class RunRows:
         return packed_to_square(disturbance_gram(self.design.gram, p))
 
     def whitened(self, p: Float, disturbance: float = 0.0) -> Float:
-        """Rows (Y, N) [windows, 9, K] whose noise is white at p, without what a and b explain.
+        """Rows (Y, N) [windows, 9 or 11, K] whose noise is white at p, without what a and b, their last, explain.
 
         `disturbance` is that of `weak_design.design`.
         """
@@ -147,12 +167,12 @@ class RunRows:
             gram = gram + disturbance**2 * self.covariance_of_disturbance(p)
         inverse = np.linalg.inv(np.linalg.cholesky(gram))
         white = self.columns @ inverse.T
-        for column in (A, B):
+        for column in (-2, -1):
             direction = white[:, column]
             length = np.linalg.norm(direction, axis=1, keepdims=True)
             direction = np.divide(direction, length, out=np.zeros_like(direction), where=length > 0)
             white = white - np.einsum("wik,wk->wi", white, direction)[:, :, None] * direction[:, None, :]
-        return np.asarray(white[:, :A])
+        return np.asarray(white[:, :-2])
 
     def fitted(self, p: Float, disturbance: float = 0.0) -> Fit:
         """The least squares from p on, whitened at the estimate itself; windows with a jolt are left out."""
@@ -162,7 +182,7 @@ class RunRows:
             if turn > 0:
                 white = self.whitened(p, disturbance)
                 energy = np.sum(_residuals(white, p) ** 2, axis=1)
-                kept = energy <= _JOLT * np.median(energy)
+                kept = energy <= JOLT * np.median(energy)
             p = least_squares(np.einsum("wik,wjk->ij", white[kept], white[kept]), p)
         return self.judged(p, disturbance, kept)
 
@@ -171,7 +191,7 @@ class RunRows:
         white = self.whitened(p, disturbance)
         if kept is not None:
             white = white[kept]
-        e, n, c = _residuals(white, p), white[:, 1:], jacobian(p)
+        e, n, c = _residuals(white, p), white[:, 1:], _jacobian(p)
         energy = np.sum(e**2, axis=1)
         freedom = len(white) * (self.design.functions - 2) - len(p)
         return Fit(
@@ -187,7 +207,7 @@ class RunRows:
 
 def _residuals(white: Float, p: Float) -> Float:
     """Y - N^T theta(p) [windows, K]."""
-    return np.asarray(white[:, 0] - np.einsum("j,wjk->wk", theta(p), white[:, 1:]))
+    return np.asarray(white[:, 0] - np.einsum("j,wjk->wk", _theta(p), white[:, 1:]))
 
 
 def _bridged(x: Float, present: npt.NDArray[np.bool_]) -> Float:
@@ -207,32 +227,50 @@ def _whole(present: npt.NDArray[np.bool_], design: WeakDesign, windows: int) -> 
     return np.asarray(missing[np.minimum(last, len(present))] == missing[first])
 
 
-def energy_at(moments: Float, p: Float) -> float:
-    """Sum of squares of Y - N^T theta(p), from the moments of (Y, N) [9, 9]."""
-    weights = np.append(1.0, -theta(p))
-    return float(weights @ moments @ weights)
+def energy_at(moments: Float, p: Float) -> Float:
+    """Sum of squares of Y - N^T theta(p), from the moments of (Y, N) [..., n, n]: [...]."""
+    weights = np.append(1.0, -_theta(p))
+    return np.asarray(moments @ weights @ weights)
 
 
 def least_squares(moments: Float, p: Float) -> Float:
-    """Constrained least squares of theta(p) by damped Gauss-Newton steps in (log w, log d1, log d2, c), from p on."""
+    """Constrained least squares of theta(p) by damped Gauss-Newton steps in (log w, log d1, log d2, c and friction),
+    from p on."""
     m, b = moments[1:, 1:], moments[1:, 0]
-    damping, energy = 1e-3, energy_at(moments, p)
+    damping, energy = 1e-3, float(energy_at(moments, p))
+    units = np.ones(len(p))
     for _ in range(_STEPS):
-        c = jacobian(p) * np.array([*p[:3], 1.0])
-        information, force = c.T @ m @ c, c.T @ (b - m @ theta(p))
+        units[:3] = p[:3]
+        c = _jacobian(p) * units
+        information, force = c.T @ m @ c, c.T @ (b - m @ _theta(p))
         scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
         normal = information * np.outer(scale, scale)
-        step, there, better = np.zeros(4), p, False
+        step, there, better = np.zeros(len(p)), p, False
         while not better and damping < 1e12:
-            step = scale * np.linalg.solve(normal + damping * np.eye(4), scale * force)
+            step = scale * np.linalg.solve(normal + damping * np.eye(len(p)), scale * force)
             step[:3] = np.clip(step[:3], -_LONGEST_STEP, _LONGEST_STEP)
-            there = np.append(p[:3] * np.exp(step[:3]), p[3] + step[3])
-            now = energy_at(moments, there)
+            there = np.append(p[:3] * np.exp(step[:3]), p[3:] + step[3:])
+            now = float(energy_at(moments, there))
             better = math.isfinite(now) and now <= energy
             damping *= 1 / 8 if better else 4
         if not better:
             break
-        p, energy = there, energy_at(moments, there)
+        p, energy = there, float(energy_at(moments, there))
         if np.abs(step[:3]).max() < _DONE:
             break
     return p
+
+
+def _theta(p: Float) -> Float:
+    """theta(p), friction last."""
+    return np.append(theta(p[:_CORE]), p[_CORE:])
+
+
+def _jacobian(p: Float) -> Float:
+    """d theta / d p, friction last."""
+    core = jacobian(p[:_CORE])
+    (rows, columns), friction = core.shape, len(p) - _CORE
+    out = np.zeros((rows + friction, columns + friction))
+    out[:rows, :columns] = core
+    out[rows:, columns:] = np.eye(friction)
+    return out

@@ -152,7 +152,8 @@ def _apart(p: Float, q: Float) -> float:
     return float(np.abs(np.log(p[:3] / q[:3])).max())
 
 
-def _is_pendulum(p: Float) -> bool:
+def is_pendulum(p: Float) -> bool:
+    """Whether p = (w, d1, d2, ..) is that of a pendulum, within what rigs are."""
     return bool(np.isfinite(p).all() and (p[:3] > 0).all() and _LEAST_L2 < p[1] - p[2] - 1 < _MOST_L2)
 
 
@@ -162,7 +163,7 @@ def _search(rig: RigFile, run: Run) -> tuple[RigFile, Fit] | None:
     for _ in range(_RENEWALS):
         at = sized_for(rig, run)
         fit = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).fitted(p)
-        if not _is_pendulum(fit.p):
+        if not is_pendulum(fit.p):
             return None
         moved, p = _apart(fit.p, p), fit.p
         if moved < _MOVED:
@@ -181,7 +182,7 @@ def _at_large_angles(rows: RunRows, fit: Fit) -> tuple[RunRows, Fit]:
             better = corrected.fitted(fit.p)
         except np.linalg.LinAlgError:
             return linear
-        if not _is_pendulum(better.p):
+        if not is_pendulum(better.p):
             return linear
         moved, fit = _apart(better.p, fit.p), better
         if moved < _SETTLED:

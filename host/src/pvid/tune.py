@@ -1,135 +1,114 @@
-"""Settings of the weak form for a recorded run, judged by what can be seen without the truth.
+"""Settings of the weak form for a recorded run: the defaults, unless others predict a part held back better.
 
-A candidate (window, test functions, decimation, smoothing) is judged by the error it must be expected to have:
+The yardstick is what `identify` makes of the rig file as it is. Others are tried one group after the other: the
+equations (full angles, friction), the window, the test functions, the pass band, the decimation. One replaces another
+only if the core publishes an estimate with it and
 
-    error^2 = (standard error^2 + bias^2) split
+    it predicts what is held back (pvid.held_back) better, by more than chance explains, or
+    it predicts it as well, its standard errors are clearly smaller, and it does not silence an alarm.
 
-standard error: from the run's own information matrix and residuals, shared noise of neighbouring windows counted.
-bias: how far the estimate moves when the smoothing filter is shortened by 30 % (Hausman's comparison): a filter that
-distorts the motion is seen by nothing else. It hangs on the filter alone, so that it is looked for once a filter, at
-the finest decimation, where it shows best; it counts where the shorter filter's additional noise does not explain it.
-split: how far the estimates of the run's halves are apart, squared, in units of their joint covariance, per parameter
-(the square of Birge's ratio): about 1 when the standard errors are honest. It counts where chance does not explain it.
-
-Where the rig file's own settings are expected within `KEEP` of the smallest error they are kept: such differences are
-mostly noise. Else, of all candidates within `CLOSE` of it, the one that costs the fewest instructions is chosen.
-Forgetting is chosen by how well the estimate so far predicts the next window: first with the rig file's own settings,
-to see whether the parameters drift (then all candidates forget, and the halves may differ), and at last for the choice.
+Forgetting is chosen at last, by how well the estimate so far predicts the next window. What is chosen is written out,
+rounded, and identified once more: the rig file reproduces the answer.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
 
 from pvid.capture import Run
-from pvid.differentiation import savitzky_golay
 from pvid.errors import PvidError
-from pvid.identify import WORST_SE
+from pvid.held_back import HeldBack, sigmas
+from pvid.identify import LINEAR, Identification, identify
 from pvid.native import Native
-from pvid.rig import is_physical
-from pvid.rigfile import RigFile
-from pvid.setup import nominal_start, weak_config, weak_design_of, weak_drive_threshold
-from pvid.weak_cost import Schedule, instructions
-from pvid.weak_design import Bounds
-from pvid.weak_oracle import WeakOracle, WeakSettings
-from pvid.weak_windows import Windows
+from pvid.rigfile import Identifier, Nominal, RigFile, Unset
+from pvid.sensor_steps import resolution_of
+from pvid.setup import weak_design_of
+from pvid.survey import fitted, sized_for
+from pvid.weak_sizing import HOST, PASS, PASS_MOST
 
 Float = npt.NDArray[np.float64]
 
-# Candidates. Windows in slow modal periods; lengths of a window in decimated samples; smoothing in the default's
-# 71 ms; test functions; forgetting [s].
-_WINDOWS = (0.5, 0.7, 0.9, 1.1, 1.4, 1.8, 2.4)
-_SAMPLES = (80, 125, 200)
-_SMOOTHINGS = (0.35, 0.5, 0.72, 1.0, 1.15)
-_FUNCTIONS = (6, 8, 10, 12, 14, 16)
+# Candidates: factors on what was best before, and numbers of test functions.
+_WINDOWS = (0.6, 0.8, 1.25, 1.6)
+_FUNCTIONS = (8, 10, 12, 14, 16)
+_PASS_BANDS = (0.6, 1.6)
+_DECIMATIONS = (0.5, 1.6)
 _FORGETTING_S = (80.0, 40.0, 20.0, 10.0, 5.0, 2.5)
-_DEFAULT_SMOOTHING_S = 0.071
-# The filter's bias is looked for with a filter this much shorter, in windows of this many slow periods.
-_SHORTER = 0.7
-_REFERENCE_WINDOW = 1.1
-_DEGREE = 6  # of the smoothing polynomial, as in weak_design
-_MIN_TAPS = _DEGREE + 3
+_MIN_FORGETTING_WINDOWS = 4  # of the core
+_EQUATIONS = 4
+# Steps of `tune`, at most: survey and the rig file's own settings, sizes from the modes, the groups, forgetting.
+STEPS = 3 + _EQUATIONS + len(_WINDOWS) + len(_FUNCTIONS) + len(_PASS_BANDS) + len(_DECIMATIONS) + 1
 
-# Steps of `tune`, at most: the default, windows by decimation, smoothings, functions, windows again, forgetting.
-STEPS = 1 + 2 * len(_WINDOWS) * len(_SAMPLES) + len(_SMOOTHINGS) + len(_FUNCTIONS) + 1
-
-KEEP = 1.2
-CLOSE = 1.1
-# Windows in each half of the run, for its estimate to have a covariance worth the name.
-_MIN_HALF = 4
-# A shift by the filter, and a gain by forgetting, count from this many standard errors on; a distance of the halves
-# from this share of what chance gives.
+# What is held back is predicted better from this many standard errors on, if this share of its residuals goes; as well
+# up to so many standard errors more.
 _SIGMAS = 3.0
-_CHANCE = 0.99
-# Core: the time constant of forgetting is at least 4 windows.
-_MIN_FORGETTING_WINDOWS = 4
+_GAIN = 0.03
+_AS_WELL = 1.0
+# Standard errors are clearly smaller below this share.
+_SMALLER = 0.8
+# The rig file is written with so many digits; with more where the core publishes nothing with these.
+_DIGITS = (4, 7)
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What is tuned, as in the rig file."""
-
-    window_s: float
-    functions: int
-    decimation: int
-    smoothing_s: float
-    forgetting_s: float = 0.0
-
-    def applied(self, rig: RigFile) -> RigFile:
-        """The rig file with these settings."""
-        identifier = replace(
-            rig.identifier,
-            form="weak",
-            window_s=self.window_s,
-            test_functions=self.functions,
-            decimation=self.decimation,
-            smoothing_s=self.smoothing_s,
-            forgetting_s=self.forgetting_s,
-        )
-        return replace(rig, identifier=identifier)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Judged:
-    """A candidate and what the run says of it; se and bias are relative, for w, d1, d2.
+    """Settings and what the run says of them.
 
     Attributes
     ----------
-    p : its estimate
-    split : squared distance of the halves' estimates per parameter, in units of their joint covariance; NaN where the
-        parameters drift, and may differ
-    misfit : variance of the rows' residuals over that of the encoder's noise
-    colour : energy of the residuals along the test function that has most of it, over the mean; 1 when white
-    delay_s, instructions : what it costs
+    what : how they differ from those before them
+    rig : the rig file with them
+    answer : what the core makes of the run; None where it refuses the settings
+    refusal : why
+    residuals : energy of the windows held back; None where nothing could be held back
     """
 
-    settings: Settings
-    p: Float
-    se: Float
-    bias: Float
-    split: float
-    misfit: float
-    colour: float
-    delay_s: float
-    instructions: float
-
-    @property
-    def error(self) -> float:
-        """Expected relative error, RMS over w, d1, d2."""
-        count = len(self.p)
-        by_chance = float(chi2.ppf(_CHANCE, count)) / count
-        return math.sqrt(float(np.mean(self.se**2 + self.bias**2)) * (self.split if self.split > by_chance else 1.0))
+    what: str
+    rig: RigFile
+    answer: Identification | None
+    refusal: str | None
+    residuals: Float | None
 
     @property
     def identified(self) -> bool:
-        """Whether w is known at all, and p is that of a pendulum."""
-        return bool(self.se[0] <= WORST_SE) and is_physical(self.p[:3])
+        """Whether the core published an estimate."""
+        return self.answer is not None and self.answer.identified
+
+    @property
+    def error(self) -> float:
+        """Relative standard error, RMS over w, d1, d2; infinite where nothing is identified."""
+        if self.answer is None or not self.answer.identified:
+            return math.inf
+        relative = [self.answer.se[name] / self.answer.value[name] for name in LINEAR]
+        return math.sqrt(sum(one**2 for one in relative) / len(relative))
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the answer is given with a warning."""
+        return self.answer is not None and self.answer.warning is not None
+
+    def residual_over(self, other: Judged) -> float:
+        """Energy of what is held back over that with other settings; NaN where one is not known."""
+        if self.residuals is None or other.residuals is None:
+            return math.nan
+        return float(np.sum(self.residuals) / np.sum(other.residuals))
+
+    def better_than(self, other: Judged) -> bool:
+        """Whether these settings replace others."""
+        if not self.identified or self.residuals is None:
+            return False
+        if not other.identified or other.residuals is None:
+            return not other.identified
+        off = sigmas(self.residuals, other.residuals)
+        if off < -_SIGMAS and self.residual_over(other) < 1 - _GAIN:
+            return True
+        return off < _AS_WELL and self.error < _SMALLER * other.error and (self.alarm or not other.alarm)
 
 
 @dataclass(frozen=True)
@@ -141,26 +120,26 @@ class Forgetting:
     better_by_sigmas: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tuned:
     """Outcome of `tune`.
 
     Attributes
     ----------
     rig : the rig file with the chosen settings
-    chosen, default : the candidate chosen, and the rig file's own settings; None where these cannot be used
-    default_refusal : why not
-    candidates : all that could be judged, best first
+    chosen, default : the settings chosen, and the rig file's own with what the survey of the run adds
+    candidates : all that were tried, in that order
     forgetting : what forgetting does
+    phi_lsb : the encoder's resolution [rad] found in the run, where the rig file does not give it
     reason : why `chosen` was chosen, in words
     """
 
     rig: RigFile
     chosen: Judged
-    default: Judged | None
-    default_refusal: str | None
+    default: Judged
     candidates: tuple[Judged, ...]
     forgetting: tuple[Forgetting, ...]
+    phi_lsb: float | None
     reason: str
 
 
@@ -170,307 +149,248 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
     Parameters
     ----------
     run, rig
-        The samples and the rig they come from; the rig's nominal is the start.
+        The samples and the rig they come from.
     native
-        The C core: what it refuses is no candidate.
+        The C core.
     progress
         Called with the number of steps done, of STEPS.
 
     Raises
     ------
     PvidError
-        When the run is too short to be halved, or nothing can be identified from it.
+        When nothing can be identified from the run, with the rig file's own settings or others.
     """
+    phi_lsb = resolution_of(run.phi) if isinstance(rig.sensor.phi_lsb, Unset) else None
+    if phi_lsb is not None:
+        phi_lsb = _rounded(phi_lsb, _DIGITS[0])
+        rig = replace(rig, sensor=replace(rig.sensor, phi_lsb=phi_lsb))
+    if rig.identifier.form != "weak":  # its window is a differentiator's
+        rig = replace(rig, identifier=replace(rig.identifier, form="weak", window_s=0.0))
     bench = _Bench(run, rig, native, progress)
-    rig = bench.rig
-    bench.refuse_a_still_pivot()
-    default, refusal = bench.default()
-    if default is not None and default.identified and bench.look_for_drift(default.settings):
-        default, refusal = bench.default()
-    bench.judge_windows(Settings(bench.period, 12, 1, _DEFAULT_SMOOTHING_S))
-    if default is None and bench.look_for_drift(bench.best()):
-        bench.judge_windows(Settings(bench.period, 12, 1, _DEFAULT_SMOOTHING_S))
-    best = bench.best()
-    bench.judge_all(replace(best, smoothing_s=share * _DEFAULT_SMOOTHING_S) for share in _SMOOTHINGS)
-    best = bench.best()
-    bench.judge_all(replace(best, functions=functions) for functions in _FUNCTIONS)
-    bench.judge_windows(bench.best())
-    ranked = bench.ranked()
-    best_error = ranked[0].error
-    if default is not None and default.identified and default.error <= KEEP * best_error:
-        chosen = default
-    else:
-        chosen = min((one for one in ranked if one.error <= CLOSE * best_error), key=lambda one: one.instructions)
-    kept = chosen is default
-    forgetting = bench.forgetting(chosen.settings)
-    progress(STEPS)
+    default = bench.default()
+    chosen = default
+    if bench.held_back is not None:
+        chosen = bench.best_of(iter([("sizes from the modes", bench.from_modes())]), chosen)
+        for group in (_equations, _windows, _functions, _pass_bands, _decimations):
+            chosen = bench.best_of(group(chosen.rig), chosen)
+        if chosen is not default and not chosen.better_than(default):
+            chosen = default
+    if not chosen.identified:
+        raise PvidError(bench.why_nothing(default))
+    forgetting = bench.forgetting(chosen.rig)
     keep = _chosen_forgetting(forgetting)
-    chosen = replace(chosen, settings=replace(chosen.settings, forgetting_s=keep.forgetting_s))
+    if keep.forgetting_s > 0:
+        forgetful = bench.judged("forgetting", _with(chosen.rig, forgetting_s=keep.forgetting_s))
+        keep = keep if forgetful.identified else forgetting[0]
+        chosen = forgetful if forgetful.identified else chosen
+    progress(STEPS)
+    core = rig.identifier.core
     return Tuned(
-        rig=chosen.settings.applied(rig),
+        rig=_with(chosen.rig, core=core),
         chosen=chosen,
         default=default,
-        default_refusal=refusal,
-        candidates=ranked,
+        candidates=tuple(bench.tried),
         forgetting=forgetting,
-        reason=_reason(kept, ranked, keep),
+        phi_lsb=phi_lsb,
+        reason=_reason(chosen, default, bench, keep),
     )
 
 
-def slow_period(p: Float) -> float:
-    """Period of the slow mode at rest [s], of s^4 + d1 w s^2 + d2 w^2."""
-    w, d1, d2 = p[:3]
-    square = w * (d1 - math.sqrt(max(d1**2 - 4 * d2, 0.0))) / 2
-    return 2 * math.pi / math.sqrt(square)
+# ---- candidates
 
 
-def _chosen_forgetting(forgetting: tuple[Forgetting, ...]) -> Forgetting:
-    useful = [one for one in forgetting[1:] if one.better_by_sigmas > _SIGMAS]
-    return min(useful, key=lambda one: one.energy) if useful else forgetting[0]
+def _with(rig: RigFile, **identifier: Any) -> RigFile:
+    return replace(rig, identifier=replace(rig.identifier, **identifier))
 
 
-def _reason(kept: bool, ranked: tuple[Judged, ...], keep: Forgetting) -> str:
-    what = f"of {len(ranked)} candidates the smallest expected error is {100 * ranked[0].error:.2g} %"
-    if kept:
-        what += f", and the rig file's own settings come within {100 * (KEEP - 1):.0f} % of it"
-    else:
-        what += f"; of those within {100 * (CLOSE - 1):.0f} % of it this one costs the fewest instructions"
-    if keep.forgetting_s == 0:
-        return f"{what}; no forgetting predicts the next window better than remembering everything"
-    return (
-        f"{what}; forgetting in {keep.forgetting_s:g} s leaves {keep.energy:.2g} times the residual of the next "
-        f"window, {keep.better_by_sigmas:.0f} standard errors less: the parameters drift"
+def _equations(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+    if rig.identifier.core == "q31":
+        return
+    for full_angle in (True, False):
+        for damping in (False, True) if rig.identifier.zero else (False,):
+            what = f"full_angle = {str(full_angle).lower()}, damping = {str(damping).lower()}"
+            yield what, _with(rig, full_angle=full_angle, damping=damping)
+
+
+def _windows(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+    own = rig.identifier
+    for factor in _WINDOWS:
+        window_s = factor * own.window_s
+        functions = min(max(round(factor * own.test_functions), _FUNCTIONS[0]), HOST.functions)
+        # the filters stay: they belong to the fast mode
+        yield f"window_s x {factor:g}", _with(rig, window_s=window_s, test_functions=functions, decimation=0)
+
+
+def _functions(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+    for functions in _FUNCTIONS:
+        yield f"test_functions = {functions}", _with(rig, test_functions=functions)
+
+
+def _pass_bands(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+    for factor in _PASS_BANDS:
+        yield f"pass_hz x {factor:g}", _with(rig, pass_hz=factor * rig.identifier.pass_hz, smoothing_s=0.0)
+
+
+def _decimations(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+    for factor in _DECIMATIONS:
+        decimation = min(max(1, round(factor * rig.identifier.decimation)), HOST.decimation)
+        yield f"decimation = {decimation}", _with(rig, decimation=decimation, smoothing_s=0.0)
+
+
+def _written(rig: RigFile, sample_rate: float, digits: int) -> RigFile:
+    """The rig file with all that it leaves open, rounded to so many digits."""
+    guess = rig.nominal
+    nominal = Nominal(*(_rounded(x, digits) for x in (guess.l2, guess.rho2, guess.g)))
+    rig = replace(rig, nominal=nominal)
+    design = weak_design_of(rig, sample_rate)
+    fast = design.fast_rad_s / (2 * math.pi)
+    widest = PASS_MOST * sample_rate / design.decimation
+    return _with(
+        rig,
+        window_s=_rounded(design.window_s, digits),
+        test_functions=design.functions,
+        decimation=design.decimation,
+        smoothing_s=_rounded(design.taps / sample_rate, digits),
+        pass_hz=_rounded(min(rig.identifier.pass_hz or PASS * fast, widest), digits),
+        disturbance=_rounded(rig.identifier.disturbance, digits),
+        survey=False,
     )
+
+
+def _rounded(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+# ---- their judgement
 
 
 class _Bench:
-    """Judges candidates on one run, each once."""
+    """Judges settings on one run, each once."""
 
     def __init__(self, run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]) -> None:
-        if rig.identifier.form != "weak":  # its window is a differentiator's
-            rig = replace(rig, identifier=replace(rig.identifier, form="weak", window_s=0.0))
-        self.run, self.rig, self.native, self.progress = run, rig, native, progress
-        self.bounds = Bounds()
-        self.forgetting_s = 0.0
-        self.start: Float | None = None
-        self.period = slow_period(nominal_start(rig))
-        self.biases: dict[int, Float] = {}
-        self.judged: dict[Settings, Judged | None] = {}
-        self.refusal = ""
+        if rig.identifier.core == "f64":
+            rig = _with(rig, core="f32")
+        self.run, self.given, self.native, self.progress = run, rig, native, progress
+        self.held_back: HeldBack | None = None
+        self.not_held_back = ""
+        self.tried: list[Judged] = []
+        self.seen: set[Identifier] = set()
         self.steps = 0
-
-    def refuse_a_still_pivot(self) -> None:
-        """PvidError where u, smoothed as well as the core can, does not stand out of the pivot sensor's noise."""
-        rate = self.run.sample_rate
-        taps = self.taps(math.inf)
-        if len(self.run.t) <= taps:
-            return  # too short, which `ranked` says
-        second = savitzky_golay(taps, _DEGREE).weights[2]
-        kernel = np.concatenate([second[::-1], [-2 * float(np.sum(second))], second])
-        u = np.convolve(self.run.y, kernel, "valid") * rate**2 / self.rig.l1
-        if float(np.std(u)) < weak_drive_threshold(self.rig, second, rate):
-            raise PvidError(
-                "nothing can be tuned without a drive: through the longest smoothing filter that the core holds "
-                f"({1000 * taps / rate:.3g} ms) the pivot's acceleration hardly stands out of its sensor's noise"
-            )
-
-    def default(self) -> tuple[Judged | None, str | None]:
-        """The rig file's own settings judged, or why they cannot be used."""
-        own = self.rig.identifier
-        try:
-            design = weak_design_of(self.rig, self.run.sample_rate)
-            settings = Settings(
-                own.window,
-                own.test_functions,
-                design.decimation,
-                design.taps / self.run.sample_rate,
-                self.forgetting_s,
-            )
-            judged = self.judge(settings)
-            if judged.identified:
-                self.period = slow_period(judged.p)
-            judged = replace(judged, bias=self.bias(design.taps))
-        except (PvidError, np.linalg.LinAlgError) as error:
-            return None, str(error)
-        finally:
-            self.advance()
-        self.judged[settings] = judged
-        return judged, None
-
-    def decimations(self, window_s: float) -> list[int]:
-        """Those that give a window about _SAMPLES samples."""
-        wanted = {round(window_s * self.run.sample_rate / samples) for samples in _SAMPLES}
-        return sorted({min(max(one, 1), self.bounds.decimation) for one in wanted})
+        self.surveyed = fitted(rig, run)
 
     def advance(self) -> None:
         """One step more for the progress bar."""
         self.steps = min(self.steps + 1, STEPS)
         self.progress(self.steps)
 
-    def look_for_drift(self, settings: Settings) -> bool:
-        """Whether forgetting predicts better; then it applies to all that is judged from now on."""
-        self.forgetting_s = _chosen_forgetting(self.forgetting(settings)).forgetting_s
-        if self.forgetting_s > 0:
-            self.judged.clear()
-            self.biases.clear()
-        return self.forgetting_s > 0
-
-    def judge_windows(self, settings: Settings) -> None:
-        """Judges the settings with every window and its decimations."""
-        self.judge_all(
-            replace(settings, window_s=factor * self.period, decimation=decimation)
-            for factor in _WINDOWS
-            for decimation in self.decimations(factor * self.period)
-        )
-
-    def judge_all(self, candidates: Iterable[Settings]) -> None:
-        """Judges candidates; those that cannot be designed, or that the core refuses, are left out."""
-        for candidate in candidates:
-            taps = self.taps(candidate.smoothing_s)
-            smoothing_s = taps / self.run.sample_rate
-            window_s = float(f"{candidate.window_s:.3g}")
-            settings = replace(candidate, window_s=window_s, smoothing_s=smoothing_s, forgetting_s=self.forgetting_s)
-            if settings not in self.judged:
-                try:
-                    self.judged[settings] = replace(self.judge(settings), bias=self.bias(taps))
-                except (PvidError, np.linalg.LinAlgError) as error:
-                    self.judged[settings] = None
-                    self.refusal = str(error)
-            self.advance()
-
-    def ranked(self) -> tuple[Judged, ...]:
-        """All that could be judged and identify something, best first.
-
-        Raises
-        ------
-        PvidError
-            When there is none.
-        """
-        usable = [one for one in self.judged.values() if one is not None]
-        if not usable:
-            duration = len(self.run.t) / self.run.sample_rate
-            shortest = (_MIN_HALF + 1) * _WINDOWS[0] * self.period  # half-overlapping windows: _MIN_HALF in each half
-            if duration < shortest:
-                raise PvidError(
-                    f"the run of {duration:.3g} s is too short to be tuned: each half must hold {_MIN_HALF} windows of "
-                    f"at least half a slow modal period ({self.period:.2g} s at the rig's nominal)"
-                )
-            raise PvidError(f"none of the settings tried can be used with this run: {self.refusal}")
-        known = [one for one in usable if one.identified]
-        if not known:
-            raise PvidError(
-                f"no setting identifies a pendulum from this run (w to {100 * WORST_SE:.0f} %): is the pivot driven, "
-                "and are the columns phi and y what they should be?"
-            )
-        return tuple(sorted(known, key=lambda one: one.error))
-
-    def best(self) -> Settings:
-        """Settings of the best candidate so far."""
-        return self.ranked()[0].settings
-
-    def taps(self, smoothing_s: float) -> int:
-        """Samples of a smoothing filter that the core can hold, odd."""
-        most = (self.bounds.taps - 1) | 1
-        taps = round(min(smoothing_s * self.run.sample_rate, most)) | 1
-        return min(max(taps, _MIN_TAPS), most)
-
-    def judge(self, settings: Settings) -> Judged:
-        """What the run says of a candidate, but for the bias of its smoothing filter."""
-        self.native.weak(weak_config(settings.applied(self.rig), self.run.sample_rate))  # refuses what it cannot hold
-        windows, estimator = self._prepared(settings)
-        count = len(windows.phi)
-        half = (count - 1) // 2
-        if half < _MIN_HALF:
-            raise PvidError(f"the run fills {count} windows of {settings.window_s:g} s: too few")
-        whole = windows.estimated(estimator)
-        if not (np.isfinite(whole.p).all() and (whole.p[:3] > 0).all()):
-            raise PvidError("the estimate left the region where parameters have a meaning")
-        se = whole.sandwich()[:3] / whole.p[:3]
-        energies = np.mean(windows.residuals(whole) ** 2, axis=0)
-        first, second = slice(half), slice(count - half, None)
-        design = windows.design
-        schedule = Schedule.of(design.taps, design.decimation, design.window, design.functions)
-        judged = Judged(
-            settings=settings,
-            p=whole.p,
-            se=se,
-            bias=np.zeros(3),
-            split=_split(windows.estimated(estimator, first), windows.estimated(estimator, second))
-            if settings.forgetting_s == 0
-            else math.nan,
-            misfit=(whole.assess().residual_sd / estimator.row_sd) ** 2,
-            colour=float(energies.max() / energies.mean()),
-            delay_s=design.delay / design.sample_rate + design.window_s,
-            instructions=instructions(schedule, self.rig.identifier.zero)[0],
-        )
-        if judged.identified:
-            self.start = whole.p[: len(estimator.start)]
-        return judged
-
-    def _prepared(self, settings: Settings) -> tuple[Windows, WeakSettings]:
-        """The run's windows and the estimator's settings."""
-        rig = settings.applied(self.rig)
-        config = weak_config(rig, self.run.sample_rate)
-        estimator = config.estimator
-        n_core = 3 + rig.identifier.zero  # the oracle adds friction by itself
-        # From an estimate of an earlier candidate one step a window is enough: the sums are the same.
-        return Windows.of(self.run, weak_design_of(rig, self.run.sample_rate)), WeakSettings(
-            start=estimator.start[:n_core].astype(np.float64) if self.start is None else self.start,
-            row_sd=estimator.row_sd,
-            start_sd=estimator.start_sd[:n_core].astype(np.float64),
-            forgetting_s=rig.identifier.forgetting_s,
-            iterations=config.iterations if self.start is None else 1,
-            drive_min=config.drive_min,
-            full_angle=rig.identifier.full_angle,
-            damping=rig.identifier.damping,
-        )
-
-    def bias(self, taps: int) -> Float:
-        """Relative bias of w, d1, d2 by a smoothing filter; 0 where it cannot be shortened, or noise explains all."""
-        if taps not in self.biases:
-            shorter = round(_SHORTER * taps) | 1
-            self.biases[taps] = self._shift(taps, shorter) if _MIN_TAPS <= shorter < taps else np.zeros(3)
-        return self.biases[taps]
-
-    def _shift(self, taps: int, shorter: int) -> Float:
-        rate, most = self.run.sample_rate, self.bounds.window - 1
-        window_s = min(_REFERENCE_WINDOW * self.period, most * self.bounds.decimation / rate)
-        decimation = math.ceil(window_s * rate / most)
-        estimates, errors = [], []
-        for length in (taps, shorter):
-            windows, estimator = self._prepared(Settings(window_s, 12, decimation, length / rate, self.forgetting_s))
-            oracle = windows.estimated(estimator)
-            estimates.append(oracle.p[:3])
-            errors.append(oracle.sandwich()[:3] / oracle.p[:3])
-        shift = estimates[1] / estimates[0] - 1
-        # The difference of the variances is itself known roughly, and may come out as nothing.
-        noise = np.maximum(errors[1] ** 2 - errors[0] ** 2, errors[0] ** 2 / 4)
-        return np.where(shift**2 > _SIGMAS**2 * noise, np.sqrt(np.maximum(shift**2 - noise, 0.0)), 0.0)
-
-    def forgetting(self, settings: Settings) -> tuple[Forgetting, ...]:
-        """No forgetting first, then every time constant that the core takes and that is shorter than the run."""
-        windows, estimator = self._prepared(settings)
-        settled = len(windows.phi) // 4
-        reference = windows.innovations(replace(estimator, forgetting_s=0.0))[settled:]
-        out = [Forgetting(0.0, 1.0, 0.0)]
-        for forgetting_s in _FORGETTING_S:
-            too_short = forgetting_s < _MIN_FORGETTING_WINDOWS * windows.design.hop_s
-            if too_short or forgetting_s > len(self.run.t) / self.run.sample_rate:
-                continue
-            energy = windows.innovations(replace(estimator, forgetting_s=forgetting_s))[settled:]
-            gain = reference - energy
-            spread = float(np.std(gain)) * math.sqrt(len(gain))
-            sigmas = float(np.sum(gain)) / spread if spread > 0 else 0.0
-            out.append(Forgetting(forgetting_s, float(np.sum(energy) / np.sum(reference)), sigmas))
+    def default(self) -> Judged:
+        """The rig file as it is, written out; with as many digits as it takes to keep its answer."""
+        rig = self.surveyed
         self.advance()
+        try:
+            self.held_back = HeldBack(self.run, rig)
+        except (PvidError, np.linalg.LinAlgError) as error:
+            self.not_held_back = str(error)
+        as_it_is = self.judged("as given", rig)
+        default = as_it_is
+        for digits in _DIGITS:
+            if as_it_is.answer is not None:
+                default = self.judged("as given", _written(rig, self.run.sample_rate, digits))
+            if default.identified or not as_it_is.identified:
+                break
+        else:
+            default = as_it_is
+        self.tried = [default]
+        self.seen.add(default.rig.identifier)
+        self.advance()
+        return default
+
+    def from_modes(self) -> RigFile:
+        """The rig file with sizes that follow from the modes."""
+        rig = _with(self.surveyed, window_s=0.0, test_functions=0, decimation=0, smoothing_s=0.0, pass_hz=0.0)
+        return sized_for(rig, self.run)
+
+    def judged(self, what: str, rig: RigFile) -> Judged:
+        """What the core makes of settings, and how well they predict what is held back."""
+        residuals = None
+        try:
+            if self.held_back is not None:
+                residuals = self.held_back.residuals(rig)
+        except (PvidError, np.linalg.LinAlgError):
+            pass  # it cannot be judged, but identify may answer
+        try:
+            return Judged(what, rig, identify(self.run, rig, self.native, points=1), None, residuals)
+        except PvidError as error:
+            return Judged(what, rig, None, str(error), residuals)
+
+    def best_of(self, candidates: Iterator[tuple[str, RigFile]], best: Judged) -> Judged:
+        """The best of a group and of what was best before."""
+        assert self.held_back is not None
+        for what, candidate in candidates:
+            self.advance()
+            try:
+                if candidate.identifier.full_angle != best.rig.identifier.full_angle or candidate.identifier.damping:
+                    candidate = self.held_back.nominal_of(candidate)
+                rig = _written(candidate, self.run.sample_rate, _DIGITS[0])
+            except (PvidError, np.linalg.LinAlgError):
+                continue  # no such pendulum, or sizes that the core does not hold
+            if rig.identifier in self.seen:
+                continue
+            self.seen.add(rig.identifier)
+            judged = self.judged(what, rig)
+            self.tried.append(judged)
+            if judged.better_than(best):
+                best = judged
+        return best
+
+    def forgetting(self, rig: RigFile) -> tuple[Forgetting, ...]:
+        """No forgetting first, then every time constant that the core takes and that is shorter than the run."""
+        out = [Forgetting(0.0, 1.0, 0.0)]
+        if self.held_back is None:
+            return tuple(out)
+        try:
+            reference = self.held_back.innovations(rig, 0.0)
+        except PvidError:  # its equations lead to no pendulum
+            return tuple(out)
+        hop_s = weak_design_of(rig, self.run.sample_rate).hop_s
+        for forgetting_s in _FORGETTING_S:
+            if _MIN_FORGETTING_WINDOWS * hop_s <= forgetting_s < len(self.run.t) / self.run.sample_rate:
+                energies = self.held_back.innovations(rig, forgetting_s)
+                share = float(np.sum(energies) / np.sum(reference))
+                out.append(Forgetting(forgetting_s, share, -sigmas(energies, reference)))
         return tuple(out)
 
+    def why_nothing(self, default: Judged) -> str:
+        """Why nothing is identified, in words."""
+        own = default.refusal or (default.answer.verdict if default.answer is not None else "")
+        if self.held_back is None:
+            return f"nothing is identified from this run ({own}), and nothing can be tuned: {self.not_held_back}"
+        return (
+            f"none of {len(self.tried)} settings identifies a pendulum from this run (the rig file's own: {own}): is "
+            "the pivot driven, and are the columns phi and y what they should be?"
+        )
 
-def _split(first: WeakOracle, second: WeakOracle) -> float:
-    """Squared distance of two independent estimates, per parameter, in units of their joint covariance."""
-    one, other = first.assess(), second.assess()
-    distance = one.p - other.p
-    covariance = one.covariance + other.covariance
-    scale = 1 / np.sqrt(np.diag(covariance))
-    scaled = distance * scale
-    return float(scaled @ np.linalg.solve(covariance * np.outer(scale, scale), scaled)) / len(distance)
+
+def _chosen_forgetting(forgetting: tuple[Forgetting, ...]) -> Forgetting:
+    useful = [one for one in forgetting[1:] if one.better_by_sigmas > _SIGMAS and one.energy < 1 - _GAIN]
+    return min(useful, key=lambda one: one.energy) if useful else forgetting[0]
+
+
+def _reason(chosen: Judged, default: Judged, bench: _Bench, keep: Forgetting) -> str:
+    if bench.held_back is None:
+        what = f"the rig file's own settings: {bench.not_held_back}"
+    elif chosen.rig.identifier == _with(default.rig, forgetting_s=chosen.rig.identifier.forgetting_s).identifier:
+        what = f"the rig file's own settings: none of {len(bench.tried) - 1} others is better by more than chance"
+    elif not default.identified:
+        what = "the rig file's own settings identify nothing, these do"
+    else:
+        what = (
+            f"of {len(bench.tried)} settings these leave {chosen.residual_over(default):.3g} times the residuals held "
+            f"back that the rig file's own leave, with {chosen.error / default.error:.2g} times the standard errors"
+        )
+    if keep.forgetting_s == 0:
+        return f"{what}; no forgetting predicts the next window better than remembering everything"
+    return (
+        f"{what}; forgetting in {keep.forgetting_s:g} s leaves {keep.energy:.2g} times the residual of the next "
+        f"window, {keep.better_by_sigmas:.0f} standard errors less: the parameters drift"
+    )

@@ -34,11 +34,11 @@ DISAGREES = 3.0
 
 @dataclass(frozen=True)
 class Verdict:
-    """Of an estimate p = (w, d1, d2, c).
+    """Of an estimate p = (w, d1, d2, c), with friction (w, d1, d2, c, c1, c2).
 
     Attributes
     ----------
-    se : standard errors of p [4] from the scatter of the windows and their distance from p; 0 where there are too few
+    se : standard errors of p [n_p] from the scatter of the windows and their distance from p; 0 where there are too few
     unexplained : rms of the rows' residuals beyond the encoder's noise, over that of the rows (0 to about 1)
     """
 
@@ -48,13 +48,14 @@ class Verdict:
 
 def verdict(rig: RigFile, run: Run, p: Float) -> Verdict:
     """What the run's windows say of p, which the core published; large angles are corrected."""
-    nothing = Verdict(np.zeros(4), 0.0)
     at = p if len(p) > 3 else np.append(p, 0.0)
+    nothing = Verdict(np.zeros(len(at)), 0.0)
     try:
         rows = RunRows.of(rig, run, weak_design_of(rig, run.sample_rate)).thinned(_WINDOWS)
         rows = rows.within(at[3], VALID_ANGLE, _FEWEST)
-        if rig.identifier.full_angle:  # the fixed-point core takes linear rows: what they lack shows as a distance
-            rows = rows.corrected(at)
+        if rig.identifier.full_angle or rig.identifier.damping:
+            # the fixed-point core takes linear rows: what they lack shows as a distance
+            rows = rows.corrected(at, rig.identifier.full_angle)
         fit = rows.judged(at)
         bare = replace(rig, identifier=replace(rig.identifier, disturbance=0.0))
         plain = replace(rows, design=weak_design_of(bare, run.sample_rate)).judged(at)
