@@ -1,6 +1,6 @@
-"""How well settings of the weak form predict what they have not seen: alternate blocks of a run, one half from the other.
+"""How well settings of the weak form predict what they have not seen: alternate blocks of a run, half from half.
 
-    settings -> rows of the even blocks -> p -> residuals of the reference rows in the odd blocks, and the other way round
+    settings -> rows of the even blocks -> p -> residuals of the reference rows in the odd blocks, and vice versa
 
 The reference rows are the same for all settings: one design, whitened at one p. With the full-angle correction or
 friction in the settings the reference rows have them, too, since these belong to the model that predicts.
