@@ -1,5 +1,4 @@
-"""How well settings of the weak form predict what they have not seen: alternate blocks of a run, each half from the
-other.
+"""How well settings of the weak form predict what they have not seen: alternate blocks of a run, half from half.
 
     settings -> rows of the even blocks -> p -> residuals of the reference rows in the odd blocks, and vice versa
 

@@ -5,7 +5,7 @@ equations (full angles, friction), the window, the test functions, the pass band
 only if the core publishes an estimate with it and
 
     it predicts what is held back (pvid.held_back) better, by more than chance explains, or
-    it predicts it as well, its standard errors are clearly smaller, and it does not silence an alarm.
+    it predicts it as well, its standard errors are clearly smaller, and it does not silence a warning.
 
 Forgetting is chosen at last, by how well the estimate so far predicts the next window. What is chosen is written out,
 rounded, and identified once more: the rig file reproduces the answer.
@@ -24,12 +24,13 @@ import numpy.typing as npt
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.held_back import HeldBack, sigmas
-from pvid.identify import LINEAR, Identification, identify
+from pvid.identify import LINEAR, Identification, identify, largest_angle
 from pvid.native import Native
 from pvid.rigfile import Identifier, Nominal, RigFile, Unset
 from pvid.sensor_steps import resolution_of
 from pvid.setup import weak_design_of
 from pvid.survey import fitted, sized_for
+from pvid.weak_oracle import VALID_ANGLE
 from pvid.weak_sizing import HOST, PASS, PASS_MOST
 
 Float = npt.NDArray[np.float64]
@@ -48,10 +49,10 @@ STEPS = 3 + _EQUATIONS + len(_WINDOWS) + len(_FUNCTIONS) + len(_PASS_BANDS) + le
 # What is held back is predicted better from this many standard errors on, if this share of its residuals goes; as well
 # up to so many standard errors more.
 _SIGMAS = 3.0
-_GAIN = 0.03
+_GAIN = 0.1
 _AS_WELL = 1.0
 # Standard errors are clearly smaller below this share.
-_SMALLER = 0.8
+_SMALLER = 0.7
 # The rig file is written with so many digits; with more where the core publishes nothing with these.
 _DIGITS = (4, 7)
 
@@ -89,7 +90,7 @@ class Judged:
         return math.sqrt(sum(one**2 for one in relative) / len(relative))
 
     @property
-    def alarm(self) -> bool:
+    def warned(self) -> bool:
         """Whether the answer is given with a warning."""
         return self.answer is not None and self.answer.warning is not None
 
@@ -103,12 +104,14 @@ class Judged:
         """Whether these settings replace others."""
         if not self.identified or self.residuals is None:
             return False
-        if not other.identified or other.residuals is None:
+        if other.residuals is None:
             return not other.identified
         off = sigmas(self.residuals, other.residuals)
+        if not other.identified:
+            return off < _AS_WELL
         if off < -_SIGMAS and self.residual_over(other) < 1 - _GAIN:
             return True
-        return off < _AS_WELL and self.error < _SMALLER * other.error and (self.alarm or not other.alarm)
+        return off < _AS_WELL and self.error < _SMALLER * other.error and (self.warned or not other.warned)
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,7 @@ class Tuned:
     Attributes
     ----------
     rig : the rig file with the chosen settings
+    answer : what the core makes of the run with it
     chosen, default : the settings chosen, and the rig file's own with what the survey of the run adds
     candidates : all that were tried, in that order
     forgetting : what forgetting does
@@ -135,6 +139,7 @@ class Tuned:
     """
 
     rig: RigFile
+    answer: Identification
     chosen: Judged
     default: Judged
     candidates: tuple[Judged, ...]
@@ -171,11 +176,13 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
     chosen = default
     if bench.held_back is not None:
         chosen = bench.best_of(iter([("sizes from the modes", bench.from_modes())]), chosen)
-        for group in (_equations, _windows, _functions, _pass_bands, _decimations):
+        angle = largest_angle(run, None)
+        chosen = bench.best_of(_equations(chosen.rig, angle), chosen)
+        for group in (_windows, _functions, _pass_bands, _decimations):
             chosen = bench.best_of(group(chosen.rig), chosen)
         if chosen is not default and not chosen.better_than(default):
             chosen = default
-    if not chosen.identified:
+    if chosen.answer is None or not chosen.identified:
         raise PvidError(bench.why_nothing(default))
     forgetting = bench.forgetting(chosen.rig)
     keep = _chosen_forgetting(forgetting)
@@ -184,9 +191,10 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
         keep = keep if forgetful.identified else forgetting[0]
         chosen = forgetful if forgetful.identified else chosen
     progress(STEPS)
-    core = rig.identifier.core
+    assert chosen.answer is not None
     return Tuned(
-        rig=_with(chosen.rig, core=core),
+        rig=_with(chosen.rig, core=rig.identifier.core),
+        answer=chosen.answer,
         chosen=chosen,
         default=default,
         candidates=tuple(bench.tried),
@@ -203,10 +211,11 @@ def _with(rig: RigFile, **identifier: Any) -> RigFile:
     return replace(rig, identifier=replace(rig.identifier, **identifier))
 
 
-def _equations(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+def _equations(rig: RigFile, angle: float) -> Iterator[tuple[str, RigFile]]:
+    """With an angle beyond what the correction is good for, linear equations are no alternative."""
     if rig.identifier.core == "q31":
         return
-    for full_angle in (True, False):
+    for full_angle in (True, False) if angle <= VALID_ANGLE else (True,):
         for damping in (False, True) if rig.identifier.zero else (False,):
             what = f"full_angle = {str(full_angle).lower()}, damping = {str(damping).lower()}"
             yield what, _with(rig, full_angle=full_angle, damping=damping)

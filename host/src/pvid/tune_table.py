@@ -1,62 +1,55 @@
-"""The candidates of `pvid tune` as a table for the terminal."""
+"""The settings that `pvid tune` tried, as a table for the terminal."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from rich.table import Table
 
 from pvid.tune import Judged, Tuned
 
-_SHOWN = 12  # best ones, and beside them the choice and the rig file's own settings wherever they stand
 _HEADINGS = (
     "",
+    "tried",
     "window s",
     "functions",
     "decimation",
-    "smoothing ms",
-    "standard error",
-    "bias",
-    "split",
-    "misfit",
-    "colour",
-    "delay s",
-    "instructions",
-    "expected error %",
+    "pass band Hz",
+    "filters ms",
+    "full angle",
+    "friction",
+    "residual held back",
+    "standard error %",
+    "warned",
 )
 
 
 def candidates_table(tuned: Tuned) -> Table:
-    """The candidates, best first, with all that they were judged by."""
-    table = Table(title="errors in % of w / d1 / d2, best first")
+    """All settings in the order in which they were tried; residuals over those of the rig file's own settings."""
+    table = Table(
+        title="residuals held back, over those of the rig file's own settings; standard errors of w, d1, d2, rms"
+    )
     for heading in _HEADINGS:
         table.add_column(heading, justify="right")
-    chosen = tuned.chosen.settings
-    for rank, one in enumerate(tuned.candidates):
-        mark = ""
-        if replace(one.settings, forgetting_s=chosen.forgetting_s) == chosen:
-            mark = "chosen"
-        elif one is tuned.default:
-            mark = "rig file"
-        if rank < _SHOWN or mark:
-            table.add_row(mark, *_cells(one))
+    for one in tuned.candidates:
+        mark = "chosen" if one is tuned.chosen else ""
+        table.add_row(mark, *_cells(one, tuned.default))
     return table
 
 
-def _cells(one: Judged) -> tuple[str, ...]:
-    settings = one.settings
+def _cells(one: Judged, default: Judged) -> tuple[str, ...]:
+    settings = one.rig.identifier
+    over = one.residual_over(default)
     return (
+        one.what,
         f"{settings.window_s:g}",
-        f"{settings.functions}",
+        f"{settings.test_functions}",
         f"{settings.decimation}",
-        f"{1000 * settings.smoothing_s:.4g}",
-        " ".join(f"{100 * error:.2g}" for error in one.se),
-        " ".join(f"{100 * bias:.2g}" for bias in one.bias),
-        "-" if math.isnan(one.split) else f"{one.split:.2g}",
-        f"{one.misfit:.2g}",
-        f"{one.colour:.2g}",
-        f"{one.delay_s:.3g}",
-        f"{one.instructions:.0f}",
-        f"{100 * one.error:.2g}",
+        f"{settings.pass_hz:g}",
+        f"{1000 * settings.smoothing_s:g}",
+        "yes" if settings.full_angle else "no",
+        "yes" if settings.damping else "no",
+        "-" if math.isnan(over) else f"{over:.3g}",
+        f"{100 * one.error:.2g}" if one.identified else "held",
+        "yes" if one.warned else "no",
     )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from pvid.capture import Run
-from pvid.errors import PvidError
+from pvid.identify import LINEAR, Identification, identify
 from pvid.native import Native
 from pvid.rig import (
     STANDARD_DRIVE,
@@ -24,7 +24,6 @@ from pvid.rig import (
     standard_sensors,
 )
 from pvid.rigfile import Nominal, RigFile
-from pvid.setup import weak_config
 from pvid.tune import Tuned, tune
 
 Float = npt.NDArray[np.float64]
@@ -40,7 +39,8 @@ HEADER = (
     "window s",
     "functions",
     "decimation",
-    "smoothing ms",
+    "pass band Hz",
+    "full angle, friction",
     "forgetting s",
 )
 
@@ -50,6 +50,7 @@ class Case:
     """The standard rig with all lengths times `scale` (times with its root), its drive scaled alike.
 
     drift : relative change of w over the run; the truth is then w at its end
+    friction : of both joints over the mass of body 2 [m^2/s]
     """
 
     label: str
@@ -57,12 +58,14 @@ class Case:
     bits: int = 14
     rate: float = RATE_HZ
     drift: float = 0.0
+    friction: float = 0.0
 
     @property
     def pendulum(self) -> Pendulum:
         """Of the case."""
         one = STANDARD_PENDULUM
-        return Pendulum(one.l1 * self.scale, one.l2 * self.scale, one.rho2 * self.scale, one.g)
+        l1, l2, rho2 = (self.scale * x for x in (one.l1, one.l2, one.rho2))
+        return Pendulum(l1, l2, rho2, one.g, self.friction, self.friction)
 
     @property
     def tones(self) -> tuple[Tone, ...]:
@@ -74,15 +77,14 @@ class Case:
     def rig(self) -> RigFile:
         """What a user would write who knows l1 and the sensors."""
         l1 = self.pendulum.l1
-        sensor = RigFile.standard().sensor
-        rig = RigFile(l1=l1, nominal=Nominal(l2=l1 / 3, rho2=l1 / 3), sensor=sensor, sample_rate=self.rate)
-        return rig
+        sensor = replace(RigFile.standard().sensor, phi_lsb=standard_sensors(self.bits).phi_lsb)
+        return RigFile(l1=l1, nominal=Nominal(l2=l1 / 3, rho2=l1 / 3), sensor=sensor, sample_rate=self.rate, l1_sd=0.0)
 
     def run(self, seed: int) -> Run:
-        """A run of the linear pendulum."""
+        """A run of the full equations; of the linear ones where w drifts."""
         sensors = standard_sensors(self.bits)
         if self.drift == 0.0:
-            return simulate(self.pendulum, self.tones, sensors, self.rate, DURATION_S, seed=seed).run
+            return simulate(self.pendulum, self.tones, sensors, self.rate, DURATION_S, truth="full", seed=seed).run
         t, phi, y = self._drifting()
         measured_phi, measured_y = sensors.measure(phi, y, seed)
         return Run(t, measured_phi, measured_y, self.rate)
@@ -121,12 +123,13 @@ CASES = (
     Case("l1 = 0.05 m, modes 2.4 times as fast", 1 / 6),
     Case("standard, 2 kHz", rate=2000.0),
     Case("standard, w falls by 5 %", drift=-0.05),
+    Case("standard, friction 2e-4 m^2/s in both joints", friction=2e-4),
 )
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Relative errors of w, d1, d2 [seeds, 3], default (None: refused) and tuned, and the choices."""
+    """Relative errors of w, d1, d2 [seeds, 3], default (None: some run is not identified) and tuned; the choices."""
 
     default: Float | None
     tuned: Float
@@ -134,7 +137,7 @@ class Outcome:
 
     @property
     def ratio(self) -> float:
-        """RMS over everything, tuned over default; NaN where the default is refused."""
+        """RMS over everything, tuned over default; NaN where the default identifies nothing."""
         if self.default is None:
             return math.nan
         return float(np.sqrt(np.mean(self.tuned**2) / np.mean(self.default**2)))
@@ -143,28 +146,24 @@ class Outcome:
 def run_case(
     native: Native, case: Case, seeds: Sequence[int] = range(SEEDS), progress: Callable[[], None] = lambda: None
 ) -> Outcome:
-    """Tunes every run and identifies it in the C core, from the rig's nominal."""
+    """Identifies every run with the rig file as it is and with what `tune` makes of it."""
     default: list[Float] = []
     tuned, choices = [], []
     for seed in seeds:
         run = case.run(seed)
         choice = tune(run, case.rig, native)
         choices.append(choice)
-        tuned.append(errors(native, case, choice.rig, run))
-        try:
-            default.append(errors(native, case, case.rig, run))
-        except PvidError:
-            continue
-        finally:
-            progress()
+        tuned.append(errors(case, identify(run, choice.rig, native)))
+        by_default = identify(run, case.rig, native)
+        if by_default.identified:
+            default.append(errors(case, by_default))
+        progress()
     return Outcome(np.array(default) if len(default) == len(tuned) else None, np.array(tuned), choices)
 
 
-def errors(native: Native, case: Case, rig: RigFile, run: Run) -> Float:
-    """Relative errors of w, d1, d2 that the C core makes of a run, started at the rig's nominal."""
-    identifier = native.weak(weak_config(rig, run.sample_rate))
-    identifier.run(run.phi, run.y, sums=False, hashes=False)
-    return np.asarray(identifier.assess()["p"][:3].astype(np.float64) / case.truth - 1)
+def errors(case: Case, found: Identification) -> Float:
+    """Relative errors of w, d1, d2."""
+    return np.array([found.value[name] for name in LINEAR]) / case.truth - 1
 
 
 def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
@@ -172,23 +171,25 @@ def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
 
     def rms(errors: Float | None) -> str:
         if errors is None:
-            return "refused"
+            return "nothing"
         return " / ".join(f"{100 * value:.2g}" for value in np.sqrt(np.mean(errors**2, axis=0)))
 
     def span(values: list[float]) -> str:
         low, high = min(values), max(values)
         return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
-    settings = [choice.chosen.settings for choice in outcome.choices]
+    settings = [choice.rig.identifier for choice in outcome.choices]
+    corrected = [sum(getattr(one, name) for one in settings) for name in ("full_angle", "damping")]
     return (
         case.label,
         rms(outcome.default),
         rms(outcome.tuned),
         "-" if outcome.default is None else f"{outcome.ratio:.2f}",
         span([one.window_s for one in settings]),
-        span([one.functions for one in settings]),
+        span([one.test_functions for one in settings]),
         span([one.decimation for one in settings]),
-        span([1000 * one.smoothing_s for one in settings]),
+        span([one.pass_hz for one in settings]),
+        f"{corrected[0]}, {corrected[1]} of {len(settings)}",
         span([one.forgetting_s for one in settings]),
     )
 
