@@ -49,6 +49,7 @@ from pvid.run_columns import Columns
 from pvid.setup import weak_design_of
 from pvid.setup_q31 import strong_config_q31, tables_of, weak_config_q31
 from pvid.strong_header_q31 import strong_header_q31
+from pvid.survey import fitted
 from pvid.weak_design import to_c_header
 from pvid.weak_header_q31 import to_c_header_q31
 
@@ -102,7 +103,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     standard = RigFile.standard()
     rig = replace(
         standard,
-        identifier=replace(standard.identifier, form=form),  # type: ignore[arg-type]
+        identifier=replace(standard.identifier, form=form, full_angle=truth == "full"),  # type: ignore[arg-type]
         sensor=replace(standard.sensor, phi_lsb=2 * np.pi / 2**bits),
     )
     cores = ("f32", "q31") if form == "weak" else ("f32",)  # the strong form's twins take a solve a tick
@@ -300,7 +301,7 @@ def identify_command(
         from pvid.stream_rig import played_samples, stream_rig
         from pvid.target import verify
 
-        image = stream_rig(rig, run.sample_rate, run)
+        image = stream_rig(fitted(rig, run), run.sample_rate, run)
         with progress_bar(f"streaming to {target}", len(run.t)) as advance:
             verdict = verify(target, image, native, *played_samples(rig, run), progress=advance)
         messages.print(f"{target}: {verdict.playback.account}")
@@ -348,7 +349,8 @@ def compare_command(
     core: str | None,
     targets: tuple[str, ...],
 ) -> int:
-    """Compares the C core with its numpy twin on RUN, after every tick, in every bit.
+    """Compares the C core with its numpy twin on RUN, after every tick, in every bit: start and tables are those of
+    identify.
 
     With --on the run is streamed to targets, too, and their running hashes are held against the host's.
     """
@@ -357,6 +359,7 @@ def compare_command(
 
     rig = _with(rig_for(run_path, rig_path, settings), form=form)
     run = read_input(run_path, rig, columns)
+    rig = fitted(rig, run)
     native = Native()
     own = "q31" if rig.identifier.core == "q31" else "f32"
     outcomes: list[Outcome] = []

@@ -29,6 +29,7 @@ from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 from pvid.weak_header_q31 import to_c_header_q31
+from pvid.weak_sizing import raised_bounds
 
 REPORT_EVERY = 500  # ticks from one line with the running hash to the next
 
@@ -101,6 +102,7 @@ def standard_run(form: str, ticks: int, core: str = "f32", divider: int = 1) -> 
         form=form,  # type: ignore[arg-type]
         differentiator="finite-difference",
         stride=1,
+        full_angle=False,  # the run's equations are linear
         divider=divider,
     )
     rig = replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb))
@@ -331,6 +333,8 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
         options |= {"PVID_MAX_FUNCTIONS": str(design.functions)}
         if run.fixed is not None:
             options |= {"PVID_MAX_THETA_Q31": str(len(run.fixed.estimator.n_bits))}
+    else:
+        options |= {macro: str(value) for macro, value in raised_bounds(run.config.design).items()}
     options |= macros or {}
     suffix = "".join(f"-{macro}-{value}" for macro, value in (macros or {}).items())
     tree = build(target, BUILD / f"{target.name}-{name}{suffix}", options)

@@ -112,6 +112,8 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
     reader, values = LogReader(path), Values(rig.l1)
     columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason")}
     columns |= {name: [] for one in (*LINEAR, ZERO, *PHYSICAL) for name in (one, f"{one}_se")}
+    # the board's tables are those of its rig file, whatever the run says
+    rig = replace(rig, identifier=replace(rig.identifier, survey=False))
     hello, began = None, None
     friction: tuple[float, ...] = ()
     for record in reader:

@@ -19,6 +19,7 @@ from pvid.stream_rig import FixedConfig, FloatConfig, StreamRig
 from pvid.strong_header_q31 import strong_header_q31
 from pvid.twin.sensor import SensorConstants
 from pvid.weak_header_q31 import to_c_header_q31
+from pvid.weak_sizing import raised_bounds
 
 HOST = "host"
 
@@ -129,10 +130,11 @@ def _sizes(config: FloatConfig | FixedConfig) -> dict[str, str]:
             return {"PVID_MAX_WINDOW": str(max(config.window, 5))}
         case StrongConfigQ31():
             return {"PVID_MAX_WINDOW": str(config.design.bank.window)}
-        case WeakConfig(friction=True):
-            return {"PVID_MAX_P": str(MAX_P), "PVID_MAX_MOMENTS": str(MAX_MOMENTS)}
-        case _:
-            return {}
+        case WeakConfig() | WeakConfigQ31():
+            bounds = raised_bounds(config.design)
+            if isinstance(config, WeakConfig) and config.friction:
+                bounds |= {"PVID_MAX_P": MAX_P, "PVID_MAX_MOMENTS": MAX_MOMENTS}
+            return {macro: str(value) for macro, value in bounds.items()}
 
 
 def build_image(rig: StreamRig, board: Board | None) -> Path:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -139,6 +140,38 @@ def decimation_of(p: Float, sample_rate: float, given: Sizes, bounds: Bounds = H
 def pass_hz_of(p: Float) -> float:
     """Edge of the pass band [Hz] for a p that is known to a few per cent."""
     return PASS * slow_and_fast_hz(p)[1]
+
+
+class SizesOfDesign(Protocol):
+    """What the core's bounds are held against: a design, or its tables in either arithmetic."""
+
+    @property
+    def taps(self) -> int:
+        """Length of the front end's filters [samples]."""
+
+    @property
+    def decimation(self) -> int:
+        """Samples per decimated sample."""
+
+    @property
+    def window(self) -> int:
+        """Length of a window [decimated samples]."""
+
+    @property
+    def functions(self) -> int:
+        """Test functions a window."""
+
+
+def raised_bounds(design: SizesOfDesign) -> dict[str, int]:
+    """Macros of pvid/config.h whose default is too small for a design, with the values that just hold it."""
+    default = Bounds()
+    held = {
+        "PVID_MAX_TAPS": (design.taps, default.taps),
+        "PVID_MAX_DECIMATION": (design.decimation, default.decimation),
+        "PVID_MAX_WEAK_WINDOW": (design.window, default.window),
+        "PVID_MAX_FUNCTIONS": (design.functions, default.functions),
+    }
+    return {macro: needed for macro, (needed, most) in held.items() if needed > most}
 
 
 def window_for_run(p: Float, duration_s: float, bounds: Bounds = HOST) -> float | None:
