@@ -62,7 +62,7 @@ void weak_rig_prepare(float (*noise)(void))
         config.estimator.upper[i] = (i < 3u) ? 1.0e4f : 3.0f;
     }
     config.estimator.row_sd = 1.0e-3f;
-    config.estimator.forgetting_s = 6.0f; /* a fold at every window */
+    config.estimator.forgetting_s = 0.0096f * (float)WEAK_RIG_PERIOD; /* 9.6 windows: a fold at every one */
     config.estimator.kappa_min = 0.0f;
     if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) {
         exit(2);

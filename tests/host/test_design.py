@@ -90,7 +90,13 @@ def test_a_run_predicts_what_its_tones_do() -> None:
 
 
 @pytest.mark.parametrize(
-    "sizes", [Sizes(61, 6, 181, 10), Sizes(75, 10, 121, 14, zero_unknown=False), Sizes(21, 2, 221, 7)]
+    "sizes",
+    [
+        Sizes(81, 9, 191, 10),  # the standard rig's
+        Sizes(75, 10, 121, 14, zero_unknown=False),
+        Sizes(21, 2, 221, 7),
+        Sizes(357, 43, 201, 10),  # that of the standard rig at 5 kHz
+    ],
 )
 def test_instructions_are_predicted_within_ten_per_cent(sizes: Sizes) -> None:
     assert sizes not in GRID

@@ -15,6 +15,7 @@ from pvid.identify import WORST_SE
 from pvid.rig import Drive, Pendulum, Sensors, Tone
 from pvid.rigfile import RigFile
 from pvid.setup import weak_config, weak_design_of
+from pvid.survey import fitted
 from pvid.weak_cost import WeakCost, cost_of
 from pvid.weak_design import WeakDesign
 from pvid.weak_oracle import Prediction, WeakSettings, identify_weak, predict, predict_rig
@@ -58,6 +59,7 @@ class DesignReport:
             "update_s": cost.update_s,
             "flash_bytes": cost.flash_bytes,
             "ram_bytes": cost.ram_bytes,
+            "raised": list(cost.raised),
             "ram_bytes_fitted": cost.ram_bytes_fitted,
             "definitions": list(cost.definitions),
             "instructions": round(cost.instructions),
@@ -75,6 +77,7 @@ class DesignReport:
         def size(ram_bytes: int | None) -> str:
             return "unknown (this gcc has no 32-bit mode)" if ram_bytes is None else f"{ram_bytes} bytes"
 
+        raised = f" but -D{' -D'.join(cost.raised)}" if cost.raised else ""
         return [
             (
                 "tables",
@@ -84,12 +87,12 @@ class DesignReport:
             ("delay", f"{cost.delay_s:.3g} s from a sample to the last estimate it enters, at most"),
             ("estimates", f"one every {cost.update_s:.3g} s"),
             ("flash", f"{cost.flash_bytes} bytes of tables"),
-            ("RAM", f"{size(cost.ram_bytes)} with the default bounds of pvid/config.h, on a 32-bit device"),
+            ("RAM", f"{size(cost.ram_bytes)} with the default bounds of pvid/config.h{raised}, on a 32-bit device"),
             ("RAM, fitted", f"{size(cost.ram_bytes_fitted)} with -D{' -D'.join(cost.definitions)}"),
             (
                 "instructions",
                 f"{cost.instructions:.0f} a sample, {cost.longest_tick:.0f} in the longest tick "
-                f"(formula fitted to counts on x86-64, gcc -O2)",
+                f"(formula fitted to counts on x86-64, gcc -O2; without the correction of large angles)",
             ),
         ]
 
@@ -128,9 +131,11 @@ def report_for_tones(
 def report_for_run(rig: RigFile, run: Run, duration: float | None = None) -> DesignReport:
     """For a recorded run, or one of `duration` [s] that goes on as the run does.
 
-    The prediction is made at what the run identifies, or at the nominal where that is nothing.
+    Of the tables that identify takes for this run. The prediction is made at what the run identifies, or at the nominal
+    where that is nothing.
     """
     _refuse_exact(rig)
+    rig = fitted(rig, run)
     design = weak_design_of(rig, run.sample_rate)
     config = weak_config(rig, run.sample_rate)
     settings = WeakSettings(config.estimator.start.astype(np.float64), config.estimator.row_sd)
@@ -157,6 +162,8 @@ def _report(
     p, covariance = prediction.p, prediction.covariance
     if duration is not None:
         covariance = covariance * (recorded / duration)
+    settings = rig.identifier
+    corrected = settings.core == "f32" and (settings.full_angle or settings.damping)
     names = ("w", "d1", "d2", "c")[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
     se = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
@@ -172,5 +179,5 @@ def _report(
         se=se,
         kappa=prediction.kappa,
         row_sd=prediction.row_sd,
-        cost=cost_of(design, rig.identifier.zero),
+        cost=cost_of(design, rig.identifier.zero, corrected=corrected),
     )

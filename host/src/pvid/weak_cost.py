@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from pvid.errors import PvidError
 from pvid.weak_design import WeakDesign
+from pvid.weak_sizing import raised_bounds
 
 COEFFICIENTS_FILE = Path(__file__).with_name("weak_cost.toml")
 
@@ -127,10 +128,12 @@ class WeakCost:
     delay_s : from a sample to the estimate of the last window that it is part of, at most [s]
     update_s : from estimate to estimate [s]
     flash_bytes : the tables
-    ram_bytes : sizeof(pvid_weak_f32) with the default bounds of pvid/config.h, for a 32-bit device
+    ram_bytes : state of the identifier with the default bounds of pvid/config.h, for a 32-bit device; with that of the
+        correction of large angles where it is wanted
+    raised : the macros of those bounds that are too small for the design, with what it needs; part of ram_bytes
     ram_bytes_fitted : with bounds that just hold the design; None, both, where this machine's compiler cannot tell
     definitions : the macros of these bounds
-    instructions : mean per sample (x86-64, gcc -O2, by the formula)
+    instructions : mean per sample (x86-64, gcc -O2, by the formula), without the correction
     longest_tick : instructions of the longest tick (same)
     """
 
@@ -138,25 +141,28 @@ class WeakCost:
     update_s: float
     flash_bytes: int
     ram_bytes: int | None
+    raised: tuple[str, ...]
     ram_bytes_fitted: int | None
     definitions: tuple[str, ...]
     instructions: float
     longest_tick: float
 
 
-def cost_of(design: WeakDesign, zero_unknown: bool = True, iterations: int = 3) -> WeakCost:
-    """Cost of a design."""
+def cost_of(design: WeakDesign, zero_unknown: bool = True, iterations: int = 3, corrected: bool = False) -> WeakCost:
+    """Cost of a design, by itself or corrected for large angles."""
     schedule = Schedule.of(design.taps, design.decimation, design.window, design.functions)
     mean, longest = instructions(schedule, zero_unknown)
     stages = stages_of(design.functions, zero_unknown, iterations)
     worked_off_s = -(-stages // (schedule.free * schedule.together)) * design.dt
     definitions = fitted_definitions(design)
+    raised = tuple(f"{macro}={value}" for macro, value in raised_bounds(design).items())
     return WeakCost(
         delay_s=design.delay / design.sample_rate + design.window_s + min(worked_off_s, design.hop_s),
         update_s=design.hop_s,
         flash_bytes=design.flash_bytes,
-        ram_bytes=state_bytes_32(),
-        ram_bytes_fitted=state_bytes_32(definitions),
+        ram_bytes=state_bytes_32(raised, corrected),
+        raised=raised,
+        ram_bytes_fitted=state_bytes_32(definitions, corrected),
         definitions=definitions,
         instructions=mean,
         longest_tick=longest,
@@ -188,8 +194,9 @@ def fitted_definitions(design: WeakDesign) -> tuple[str, ...]:
 
 
 @cache
-def state_bytes_32(definitions: tuple[str, ...] = ()) -> int | None:
-    """sizeof(pvid_weak_f32) where pointers have 32 bits: gcc is asked, nothing is linked or run.
+def state_bytes_32(definitions: tuple[str, ...] = (), corrected: bool = False) -> int | None:
+    """sizeof(pvid_weak_f32) where pointers have 32 bits, with pvid_weak_angle_f32 where rows are corrected: gcc is
+    asked, nothing is linked or run.
 
     None without gcc, or on a machine whose gcc has no 32-bit mode.
     """
@@ -197,7 +204,8 @@ def state_bytes_32(definitions: tuple[str, ...] = ()) -> int | None:
         return None
     include = Path(__file__).resolve().parents[3] / "firmware" / "include"
     command = ["gcc", "-m32", "-msse2", "-mfpmath=sse", "-std=c99", "-ffreestanding", "-fno-common", f"-I{include}"]
-    source = '#include "pvid/weak.h"\nchar state[sizeof(pvid_weak_f32)];\n'
+    room = "sizeof(pvid_weak_f32)" + (" + sizeof(pvid_weak_angle_f32)" if corrected else "")
+    source = f'#include "pvid/weak.h"\nchar state[{room}];\n'
     command += [*(f"-D{definition}" for definition in definitions), "-S", "-x", "c", "-", "-o", "-"]
     done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
     size = re.search(r"\.size\s+state, (\d+)", done.stdout)

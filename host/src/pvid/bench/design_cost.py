@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from pvid.bench.cost import build
 from pvid.bench.spread import Spread, measure
 from pvid.weak_cost import LONGEST_TERMS, MEAN_TERMS, Schedule
+from pvid.weak_sizing import raised_bounds
 
 Float = npt.NDArray[np.float64]
 
@@ -47,7 +48,8 @@ class Sizes:
             "FUNCTIONS": self.functions,
             "ZERO": int(self.zero_unknown),
         }
-        return [*(f"WEAK_RIG_{name}={value}" for name, value in rig.items()), f"PVID_MAX_TAPS={max(self.taps, 81)}"]
+        bounds = raised_bounds(self)
+        return [f"{name}={value}" for name, value in ({f"WEAK_RIG_{name}": rig[name] for name in rig} | bounds).items()]
 
 
 GRID = (
