@@ -318,11 +318,15 @@ _ROOM = 1.0 + 2.0 ** (3 - CHI_BITS)
 
 
 def _slow_signals(window: int) -> Float:
-    """Motion as test functions see it: up to 12 periods a window, fewer weighing more. [window, signals]."""
+    """Motion as test functions see it: up to 16 periods a window, fewer weighing more. [window, signals].
+
+    Motion times drive has sums of their frequencies: in a window of 1.3 slow periods up to some 11 periods. With 12 at
+    most, of which those beyond 5 weigh little, a window of 2 s had four times the noise of its rows.
+    """
     x = np.arange(window) / (window - 1)
-    periods = np.arange(0.0, min(12.0, window / 10), 0.25)
+    periods = np.arange(0.0, min(16.0, window / 10), 0.25)
     angle = 2 * np.pi * x[:, None] * periods
-    weight = 1 / (1 + (periods / 5) ** 4)
+    weight = 1 / (1 + (periods / 8) ** 4)
     return np.concatenate([np.cos(angle) * weight, np.sin(angle[:, 1:]) * weight[1:]], axis=1)
 
 
