@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from linear_rig import LINEAR_RIG
 
 from pvid import link
 from pvid.capture import Run
@@ -48,12 +49,11 @@ class Field:
 
 def rig() -> RigFile:
     """The rig file that goes with it."""
-    standard = RigFile.standard()
     sensors = standard_sensors(14)
     return replace(
-        standard,
+        LINEAR_RIG,
         sample_rate=1000.0,
-        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+        sensor=replace(LINEAR_RIG.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
     )
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from linear_rig import LINEAR_RIG
 
 from pvid.capture import Run
 from pvid.compare_q31 import identifier_q31
@@ -40,7 +41,7 @@ Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 HOST_SIZES = ("-DPVID_MAX_P=6", "-DPVID_MAX_MOMENTS=55", "-DPVID_MAX_TAPS=401", "-DPVID_MAX_DECIMATION=64")
 UNIT = Path(__file__).resolve().parents[1] / "unit"
 RATE = 1000.0
-RIG = RigFile.standard()
+RIG = LINEAR_RIG
 FINE = replace(RIG, sensor=replace(RIG.sensor, phi_lsb=standard_sensors(20).phi_lsb))
 WEAK_TICKS = 22_000
 STRONG_TICKS = 2600

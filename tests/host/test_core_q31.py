@@ -106,7 +106,7 @@ def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
     [
         ({"sensor": {"phi_lsb": 0.0}}, "phi_lsb is 0"),
         ({"sensor": {"phi_range": 1e-6}}, "phi_range is 0 counts"),
-        ({"identifier": {"full_angle": True}}, "neither full_angle nor damping"),
+        ({"identifier": {"damping": True}}, "core q31 has no damping"),
     ],
 )
 def test_what_it_cannot_do_is_said(

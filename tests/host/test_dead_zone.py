@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from linear_rig import LINEAR_RIG
 
 from pvid import compare_q31
 from pvid.capture import Run
@@ -21,7 +22,7 @@ from pvid.setup_q31 import config_of_q31, counts_of, p_of, se_of
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
-RIG = RigFile.standard()
+RIG = LINEAR_RIG
 FORMS = ("weak", "strong")
 LAWS: dict[str, dict[str, Any]] = {
     "gauss-newton": {"feedback_hz": 0.0},

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from linear_rig import LINEAR_RIG
 from strong_lanes import strong_lanes
 
 from pvid.capture import Run
@@ -21,7 +22,7 @@ from pvid.setup import strong_config, weak_config
 from pvid.twin.gate import Gate
 from pvid.twin.weak import WeakTwin
 
-RIG = RigFile.standard()
+RIG = LINEAR_RIG
 OUTLIER = Reason.REJECTED_OUTLIER
 
 
@@ -142,7 +143,7 @@ def test_windows_that_were_touched_are_kept_out(native: Native, jolted: Run) -> 
         record = core.run(jolted.phi, jolted.y, sums=False)
         errors[sigmas] = np.abs(record.published[-1, :3] / STANDARD_PENDULUM.linear - 1).max()
         refused = np.flatnonzero(record.reason == OUTLIER)
-        # each lies in two or three windows of 1.25 s, and nothing else is refused
+        # each lies in two or three windows of 1.71 s, and nothing else is refused
         assert len(refused) == 0 if sigmas == 0.0 else 4 <= len(refused) <= 6
         assert np.isin(refused // 1000, (25, 26, 27, 30, 31, 32)).all()
     assert errors[4.0] < 5e-4 < errors[0.0]

@@ -45,7 +45,7 @@ def savitzky_golay_of(native: Native) -> Identifier:
 
 
 def weak_of(native: Native) -> Identifier:
-    return native.weak(weak_config(RIG, 1000.0))
+    return native.weak(weak_config(rig_with(full_angle=False), 1000.0))
 
 
 def forgetting_of(native: Native) -> Identifier:

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linear_rig import LINEAR_RIG
 
 from pvid.compare import first_difference
 from pvid.native import EstimatorConfig, Law, Native, WeakConfig
 from pvid.rig import Simulation, simulate, standard_sensors, standard_start
-from pvid.rigfile import RigFile
 from pvid.setup import weak_config
 from pvid.twin import fnv
 from pvid.twin.weak import WeakTwin
@@ -25,8 +25,7 @@ def run() -> Simulation:
 
 
 def configuration(zero_unknown: bool) -> WeakConfig:
-    rig = RigFile.standard()
-    return weak_config(replace(rig, identifier=replace(rig.identifier, form="weak", zero=zero_unknown)), 1000.0)
+    return weak_config(replace(LINEAR_RIG, identifier=replace(LINEAR_RIG.identifier, zero=zero_unknown)), 1000.0)
 
 
 def started(config: WeakConfig, seed: int) -> EstimatorConfig:

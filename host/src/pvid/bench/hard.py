@@ -84,12 +84,16 @@ class Case:
 
     @property
     def rig(self) -> RigFile:
-        """As a user would write it: phi_lsb is that of an encoder with half an LSB of noise and this much in all."""
+        """As a user would write it: phi_lsb is that of an encoder with half an LSB of noise and this much in all.
+
+        Sines are corrected where the equations have them.
+        """
         standard = RigFile.standard()
         lsb = self.sensors.phi_lsb
         if self.told:
             lsb *= sample_sd(1.0, self.noise_lsb) / sample_sd(1.0, 0.5)
-        return replace(standard, sensor=replace(standard.sensor, phi_lsb=lsb))
+        identifier = replace(standard.identifier, full_angle=self.truth == "full")
+        return replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=lsb))
 
     def run(self, seed: int, duration: float = 40.0) -> Run:
         """What the sensors see in `duration` [s]."""

@@ -141,10 +141,14 @@ class Outcome:
 
 
 def rig_of(lane: Lane) -> RigFile:
-    """The standard rig with the lane's settings; the strong form with a filter that is cheap enough for 10^7 ticks."""
+    """The standard rig with the lane's settings; the strong form with a filter that is cheap enough for 10^7 ticks.
+
+    The signals are those of linear equations: no sines are corrected.
+    """
     rig = RigFile.standard()
     settings = replace(
         rig.identifier,
+        full_angle=False,
         forgetting_s=lane.forgetting_s,
         outlier_gate=None if lane.gated else 0.0,
         core=lane.core,  # type: ignore[arg-type]

@@ -61,7 +61,9 @@ def run_of(library: ctypes.CDLL, scenario: str, form: str, core: str, ticks: int
         counts[at : at + len(whole)] = np.where(np.isnan(whole), MISSING, whole).astype(np.int16)
         at += len(whole)
     rig = RigFile.standard()
-    settings = rig.identifier if form == "weak" else replace(rig.identifier, form="strong", stride=STRIDE)
+    settings = replace(rig.identifier, full_angle=False)  # the signals' equations are linear
+    if form == "strong":
+        settings = replace(settings, form="strong", stride=STRIDE)
     rig = replace(rig, identifier=settings, sensor=replace(rig.sensor, phi_lsb=lsb))
     return ReplayRun(
         form=form,

@@ -107,11 +107,12 @@ def start_off(size: float) -> Callable[[int], Float]:
 
 
 def through_core(native: Native, **settings: object) -> Identifier:
-    """The C core with the given settings of the rig file's table [identifier], as `pvid identify` runs it."""
+    """The C core with the given settings of the rig file's table [identifier], as `pvid identify` runs it from a start;
+    the equations of these runs are linear, so that there are no sines to correct."""
 
     def run_core(phi: Float, y: Float, sample_rate: float, start: Float) -> tuple[Float, Float]:
         rig = RigFile.standard()
-        chosen: Settings = replace(rig.identifier, **settings)  # type: ignore[arg-type]
+        chosen: Settings = replace(rig.identifier, full_angle=False, **settings)  # type: ignore[arg-type]
         # without the pivot sensor's resolution the strong form refuses no row: it is shown at its best
         sensor = replace(rig.sensor, y_lsb=0.0) if chosen.form == "strong" else rig.sensor
         rig = replace(rig, identifier=chosen, sensor=sensor)
