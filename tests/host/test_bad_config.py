@@ -253,7 +253,7 @@ REFUSED = {
     "strong": {"bank.half": (0, 1, 65535), "bank.stride": (0, 65535), "bank.weights": (None,)},
     "weak": {
         "design.taps": (0, 1, 3, 6, 65535),
-        "design.decimation": (0, 33, 65535),
+        "design.decimation": (0, 65, 65535),
         "design.window": (0, 7, 156, 65535),
         "design.functions": (0, 3, 255),
         "design.lag": (0,),
@@ -261,7 +261,7 @@ REFUSED = {
     },
     "weak q31": {
         "design.taps": (0, 1, 3, 6, 65535),
-        "design.decimation": (0, 33, 65535),
+        "design.decimation": (0, 65, 65535),
         "design.window": (0, 7, 156, 65535),
         "design.functions": (0, 3, 255),
         "design.smooth_bits": (32, 255),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from linear_rig import LINEAR_RIG
 
 from pvid import compare_q31, snapshot
 from pvid.compare import first_difference
@@ -21,7 +22,7 @@ from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
 FROM, TO = 7_000, 12_345
-HALF_A_WINDOW = 624  # ticks
+HALF_A_WINDOW = 855  # ticks
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +32,7 @@ def samples() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
 
 
 def rig_with(**identifier: Any) -> RigFile:
-    rig = RigFile.standard()
-    return replace(rig, identifier=replace(rig.identifier, **identifier))
+    return replace(LINEAR_RIG, identifier=replace(LINEAR_RIG.identifier, **identifier))
 
 
 def frozen_run(core: Any, phi: Any, y: Any) -> Any:

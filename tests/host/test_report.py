@@ -55,7 +55,7 @@ def test_residuals_at_the_truth_are_the_encoders_noise_and_white() -> None:
     run = simulate(sensors=sensors, truth="linear", duration=40, seed=3).run
     residuals = residuals_of(run, LINEAR, P)
     assert residuals.expected
-    # 62 windows of 10 degrees of freedom, half of whose noise they share: the mean square's standard deviation is 7 %
+    # 44 windows of 12 degrees of freedom, half of whose noise they share: the mean square's standard deviation is 7 %
     assert float(np.mean(residuals.rms**2)) == pytest.approx(1, abs=0.2)
     correlation = residuals.autocorrelation(20)
     assert correlation[0] == 1

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from linear_rig import LINEAR_RIG
 
 from pvid.bench.weak import LSB_14, Case, Outcome, cramer_rao, run_case
 from pvid.identify import Identification, identify
@@ -39,11 +40,13 @@ def rms_percent(case: Case) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("bits", "allowed"), [(12, (0.06, 0.06, 0.15)), (14, (0.014, 0.014, 0.036)), (16, (0.009, 0.009, 0.02))]
+    # 14 and 16 bits: 1.25 times what 40 seeds measure (.0110/.0115/.0240 and .0026/.0028/.0057 %); 20 know it to 16 %
+    ("bits", "allowed"),
+    [(12, (0.06, 0.06, 0.15)), (14, (0.014, 0.0144, 0.03)), (16, (0.0033, 0.0035, 0.0071))],
 )
 def test_twenty_runs_are_as_near_as_promised(bits: int, allowed: tuple[float, float, float]) -> None:
     assert (rms_percent(Case(bits)) <= allowed).all()
-    assert outcome(Case(bits)).early == 20  # all within 1 % from 3 s on
+    assert outcome(Case(bits)).early == 20  # all within 1 % from 4 s on: the first answer is that of 3.8 s
 
 
 def test_sixty_runs_stay_within_1_6_times_of_the_bound() -> None:
@@ -88,10 +91,8 @@ def test_large_angles_and_friction_are_corrected(case: Case, w_allowed: float, l
 
 
 def test_beyond_its_range_the_correction_is_not_used(native: Native) -> None:
-    rig = RigFile.standard()
-    rig = replace(rig, identifier=replace(rig.identifier, full_angle=True))
-    run = simulate(truth="full", release=(0.09, 0.21), duration=20.0, seed=3).run  # 0.16 rad
-    result = identify(run, rig, native, start=standard_start(3))
+    run = simulate(truth="full", release=(0.15, 0.36), duration=20.0, seed=3).run  # 0.28 rad
+    result = identify(run, RigFile.standard(), native, start=standard_start(3))
     assert result.status == Reason.HELD_OUT_OF_RANGE.text
     assert not result.identified
 
@@ -120,11 +121,10 @@ def test_without_a_drive_nothing_is_identified(native: Native, bits: int, releas
 
 def test_a_drive_that_goes_away_leaves_the_answer(native: Native) -> None:
     run = simulate(drive=Drive(STANDARD_DRIVE, on=((0.0, 15.0), (45.0, 60.0))), duration=60.0, seed=2).run
-    rig = RigFile.standard()
     parts = []
     for end in (15.0, 45.0, 60.0):
         part = replace(run, t=run.t[run.t < end], phi=run.phi[run.t < end], y=run.y[run.t < end])
-        result = identify(part, rig, native, start=standard_start(2))
+        result = identify(part, LINEAR_RIG, native, start=standard_start(2))
         parts.append(np.array([result.value[name] for name in ("w", "d1", "d2")]))
     assert np.abs(parts[1] / parts[0] - 1).max() < 0.01
     assert np.abs(parts[2] / parts[0] - 1).max() < 0.01
@@ -141,16 +141,16 @@ def test_an_hour_without_a_drive_changes_no_bit_of_the_estimate(native: Native) 
     swing = 0.06 * np.cos(slow * t) + 0.03 * np.cos(fast * t + 1.0)
     noise = np.random.default_rng(4).normal(0.0, 0.5, len(t))
     swing = LSB_14 * np.rint(swing / LSB_14 + noise)
-    identifier = native.weak(weak_config(RigFile.standard(), 1000.0, standard_start(2)))
+    identifier = native.weak(weak_config(LINEAR_RIG, 1000.0, standard_start(2)))
     identifier.run(first.phi, first.y, sums=False, hashes=False)
     before = identifier.estimate
     hour = identifier.run(swing, np.full(len(t), first.y[-1]), sums=False, hashes=False)
-    assert (hour.reason == Reason.HELD_NOT_EXCITED).sum() > 5700  # a window every 0.624 s
+    assert (hour.reason == Reason.HELD_NOT_EXCITED).sum() > 4190  # a window every 0.855 s
     assert not np.isin(hour.reason, (Reason.UPDATED, Reason.MISFIT)).any()
     assert identifier.estimate.tobytes() == before.tobytes()
     assert (hour.p == hour.p[0]).all()
     resumed = identifier.run(again.phi, again.y, sums=False, hashes=False)
-    assert (resumed.reason == Reason.UPDATED).sum() > 35
+    assert (resumed.reason == Reason.UPDATED).sum() > 25  # of 31 windows in 27 s of drive
     after = identifier.estimate
     truth = STANDARD_PENDULUM.linear
     assert (np.abs(after["p"][:3] - truth) < 3 * after["se"][:3]).all()
@@ -173,8 +173,7 @@ def test_the_command_line_publishes_the_zero(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("bits", [12, 14, 16])
 def test_a_model_that_does_not_fit_is_noticed_and_one_that_does_is_not_blamed(native: Native, bits: int) -> None:
-    rig = RigFile.standard()
-    rig = replace(rig, sensor=replace(rig.sensor, phi_lsb=2 * np.pi / 2**bits))
+    rig = replace(LINEAR_RIG, sensor=replace(LINEAR_RIG.sensor, phi_lsb=2 * np.pi / 2**bits))
     rubbing = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
     for seed in range(100, 105):  # the thresholds were set on other seeds
         sensors, start = standard_sensors(bits), standard_start(seed)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +16,7 @@ from pvid.rig import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, 
 from pvid.twin import fnv
 from pvid.twin.weak import WeakTwin
 from pvid.weak_design import design
+from pvid.weak_sizing import Sizes
 
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
 L1 = 0.3
@@ -55,9 +55,9 @@ def with_friction(config: EstimatorConfig) -> EstimatorConfig:
     )
 
 
-def configuration(zero_unknown: bool = True, **sizes: float) -> WeakConfig:
+def configuration(zero_unknown: bool = True, sizes: Sizes | None = None) -> WeakConfig:
     """The base design, or one of other sizes."""
-    tables = design(L1, 1000.0, NOMINAL, **sizes).f32  # type: ignore[arg-type]
+    tables = design(L1, 1000.0, NOMINAL, sizes).f32
     return WeakConfig(1000.0, L1, tables, estimator(0, zero_unknown), zero_unknown=zero_unknown)
 
 
@@ -91,8 +91,8 @@ def test_twelve_lanes_equal_the_twin_in_every_build(matrix: dict[str, Native], s
     lanes = [replace(estimator(seed), forgetting_s=tau) for seed in range(4) for tau in (0.0, 5.0, 40.0)]
     records = assert_lanes_equal([matrix[name] for name in BUILDS], configuration(), lanes, run.phi, run.y)
     for record in records:
-        # a window every 0.624 s; this configuration takes the pivot's sensor for exact
-        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 26
+        # a window every 0.855 s; this configuration takes the pivot's sensor for exact
+        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 19
         assert record.p[-1, :3] == pytest.approx(standard_14_bits.p, rel=0.005)
 
 
@@ -109,7 +109,7 @@ def test_the_correction_equals_the_twin_in_every_build(
     config = replace(config, trust=TrustConfig(misfit_max=6.0))
     records = assert_lanes_equal([matrix[name] for name in BUILDS], config, lanes, run.phi, run.y)
     for record in records:
-        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 20
+        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 14
         assert record.published[-1, :3] == pytest.approx(STANDARD_PENDULUM.linear, rel=0.02)
 
 
@@ -143,17 +143,18 @@ def test_laws_and_divider_equal_the_twin(
 @pytest.mark.parametrize(
     "sizes",
     [
-        {"decimation": 1, "taps": 31, "functions": 4, "window_s": 0.25},
-        {"decimation": 2, "taps": 31, "functions": 4, "window_s": 0.5},
-        {"decimation": 3, "taps": 21, "functions": 7, "window_s": 0.6},
-        {"decimation": 5, "taps": 61, "functions": 16, "window_s": 0.75},
-        {"decimation": 32, "taps": 81, "functions": 5, "window_s": 2.0},
+        Sizes(decimation=1, taps=31, functions=4, window_s=0.25),
+        Sizes(decimation=2, taps=31, functions=4, window_s=0.5),
+        Sizes(decimation=3, taps=21, functions=7, window_s=0.6),
+        Sizes(decimation=5, taps=61, functions=16, window_s=0.75),
+        Sizes(decimation=32, taps=81, functions=5, window_s=2.0),
+        Sizes(decimation=64, taps=401, functions=16, window_s=1.3),
     ],
-    ids=lambda sizes: f"D{sizes['decimation']}-K{sizes['functions']}",
+    ids=lambda sizes: f"D{sizes.decimation}-K{sizes.functions}",
 )
-def test_every_size_equals_the_twin(native: Native, standard_14_bits: Simulation, sizes: dict[str, Any]) -> None:
+def test_every_size_equals_the_twin(native: Native, standard_14_bits: Simulation, sizes: Sizes) -> None:
     run = standard_14_bits.run
-    records = assert_lanes_equal([native], configuration(**sizes), [estimator(0)], run.phi[:8000], run.y[:8000])
+    records = assert_lanes_equal([native], configuration(sizes=sizes), [estimator(0)], run.phi[:8000], run.y[:8000])
     assert (records[0].reason != Reason.WARMING_UP).any()
 
 
@@ -213,8 +214,8 @@ def test_a_pause_of_the_drive_freezes_p_and_the_sums(native: Native, standard_14
     y[8000:16000] = y[8000]
     config = replace(configuration(), drive_min=0.4)
     record = assert_lanes_equal([native], config, [estimator(0)], phi, y)[0]
-    # the last window that saw the drive is complete 1.25 s after it stops, and worked off 0.3 s later
-    paused = slice(8000 + 1600, 16000)
+    # the last window that saw the drive is complete 1.79 s after it stops, and worked off 0.3 s later
+    paused = slice(8000 + 2100, 16000)
     assert (record.p[paused] == record.p[paused.start]).all()
     assert (record.sums[paused] == record.sums[paused.start]).all()
     assert (record.p[-1] != record.p[paused.start]).any()
@@ -283,6 +284,8 @@ def test_what_the_core_refuses_it_names(native: Native) -> None:
 
 
 def test_a_window_too_short_for_its_work_is_refused(native: Native) -> None:
-    config = configuration(decimation=1, taps=31, functions=12, window_s=0.08)
+    # a hop of 4 ticks: 8 stages for each function, 17 for each step and some 30 others, of which a tick takes 32
+    config = configuration(sizes=Sizes(decimation=1, taps=31, functions=4, window_s=0.008))
+    native.weak(replace(config, iterations=2))
     with pytest.raises(PvidError, match="bad iterations"):
-        native.weak(config)
+        native.weak(replace(config, iterations=6))

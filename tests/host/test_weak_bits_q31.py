@@ -112,7 +112,8 @@ def test_laws_and_divider_equal_the_twin(
 def test_other_sizes_equal_the_twin(native: Native, counts: tuple[Counts, Counts], sizes: dict[str, Any]) -> None:
     functions = {"test_functions": 4} if "decimation" in sizes else {}
     config = configuration(**{**sizes, **functions})
-    assert_lanes_equal([native], config, [config.estimator], *(c[:8000] for c in counts))
+    # after so many ticks no window is in work, whose solves the core counts before the twin does
+    assert_lanes_equal([native], config, [config.estimator], *(c[:8020] for c in counts))
 
 
 HOSTILE = (
@@ -191,7 +192,7 @@ def test_a_quarter_of_full_scale_in_phase_becomes_rows(native: Native) -> None:
     phi, y = hostile("full scale in phase", config)
     core = WeakIdentifierQ31(native, config)
     core.run(phi // 4, y)
-    assert core.counters["rows"] >= 12 * 8
+    assert core.counters["rows"] >= 8 * config.design.functions
 
 
 def test_a_sample_beyond_full_scale_costs_a_window_and_no_more(native: Native, counts: tuple[Counts, Counts]) -> None:

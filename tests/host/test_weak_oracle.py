@@ -20,7 +20,8 @@ from pvid.rig import (
     standard_sensors,
     standard_start,
 )
-from pvid.weak_design import Bounds, WeakDesign, design
+from pvid.weak_design import WeakDesign, design
+from pvid.weak_sizing import Bounds, Sizes
 
 TRUTH = STANDARD_PENDULUM.linear
 NOMINAL = oracle.linear(9.8, 0.1, 0.1, 0.3)
@@ -75,7 +76,7 @@ def test_double_integral_of_a_sine() -> None:
 def test_rows_hold_for_exact_signals(standard: WeakDesign, c: float) -> None:
     """Y = N^T theta + a A + b B on exact samples, but for the errors of quadrature and smoother."""
     run = simulate(sensors=Sensors(phi_zero=c)).run
-    finer = design(0.3, 1000.0, NOMINAL, decimation=4, bounds=Bounds(window=401))
+    finer = design(0.3, 1000.0, NOMINAL, Sizes(decimation=4, taps=81, pass_hz=20.0), bounds=Bounds(window=451))
     worst = []
     for tables in (standard, finer):
         phi, u = weak.front_end(run.phi, run.y, tables)
@@ -88,7 +89,7 @@ def test_rows_hold_for_exact_signals(standard: WeakDesign, c: float) -> None:
         worst.append(max(left))
         assert np.abs(windows[:, weak.Y]).max() > 0.02  # what the residuals are to be compared with
     assert worst[0] < 4e-6  # a twentieth of what the noise of a 14-bit encoder leaves
-    assert worst[1] < worst[0] / 2.5  # of quadrature and smoother; a mistake in a formula would stay
+    assert worst[1] < worst[0] / 20  # of quadrature and filters; a mistake in a formula would stay
 
 
 def test_ignoring_a_column_is_noticed(standard: WeakDesign) -> None:
@@ -115,10 +116,10 @@ def test_whitened_rows_have_the_noise_they_are_said_to_have(standard: WeakDesign
     covariance = rows.T @ rows / len(rows)
     # rounding alone, then with a variance of 1
     expected = weak.row_sd(standard, Sensors(phi_lsb=np.sqrt(12))) ** 2
-    # 480 half-overlapping windows: an entry is known to 1 / sqrt(480) = 4.6 %; of 144 some are 3.5 times that
-    np.testing.assert_allclose(covariance, expected * np.eye(12), atol=0.25 * expected)
+    # 350 half-overlapping windows: an entry is known to 1 / sqrt(350) = 5.3 %; of 100 some are 3.5 times that
+    np.testing.assert_allclose(covariance, expected * np.eye(standard.functions), atol=0.25 * expected)
     # the smoother lets the rows' frequencies pass, but for the edges that the weights at the ends make
-    assert expected == pytest.approx(1 / 8, rel=0.03)
+    assert expected == pytest.approx(1 / standard.decimation, rel=0.03)
 
 
 def test_starts_off_by_half_converge_to_one_answer(standard: WeakDesign) -> None:
@@ -179,7 +180,7 @@ def test_damping_is_estimated(standard: WeakDesign) -> None:
 
 
 def test_large_angles_are_not_valid(standard: WeakDesign) -> None:
-    run = simulate(release=(0.08, 0.19), truth="full", duration=10.0).run
+    run = simulate(release=(0.15, 0.36), truth="full", duration=10.0).run  # 0.28 rad
     assert not weak.identify_weak(run.phi, run.y, standard, settings(standard, 0, full_angle=True)).valid
 
 
@@ -187,7 +188,7 @@ def test_misfit_is_one_when_the_model_holds_and_large_when_not(standard: WeakDes
     sensors = standard_sensors(12)  # where the pivot sensor's noise adds nothing
     run = simulate(sensors=sensors, seed=0).run
     result = weak.identify_weak(run.phi, run.y, standard, settings(standard, 0, bits=12))
-    # 50 windows of 10 degrees of freedom: known to sqrt(2/500) = 6 %, and R0 leaves out u
+    # 35 windows of 8 degrees of freedom: known to sqrt(2/280) = 8 %, and R0 leaves out u
     assert result.misfit[10:].mean() == pytest.approx(1.0, abs=0.3)
     damped = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
     run = simulate(damped, sensors=sensors, seed=0).run
@@ -268,4 +269,5 @@ def test_the_core_gives_the_oracles_answer(native: Native, standard: WeakDesign,
     assert count >= len(result.p) - 1  # the core may still be at work on the last one
     # the residuals are 1e-3 of Y, float32 knows Y to 1e-7: 1e-4 of an error, more where the sums are few
     assert (np.abs(worked_off - result.p[:count])[2:] < 0.02 * result.se[2:count]).all()
-    np.testing.assert_allclose(answer["se"][: 3 + zero], result.se[count - 1], rtol=0.02)
+    # but the residuals' energy is what remains of sums that are 1e7 times as large: seeds 2 to 4 differ by up to 2.9 %
+    np.testing.assert_allclose(answer["se"][: 3 + zero], result.se[count - 1], rtol=0.04)
