@@ -45,6 +45,7 @@ from pvid.rig import (
 )
 from pvid.rig_settings import rig_for, rig_path_of
 from pvid.rigfile import RigFile, load
+from pvid.rounding import with_error
 from pvid.run_columns import Columns
 from pvid.setup import weak_design_of
 from pvid.setup_q31 import strong_config_q31, tables_of, weak_config_q31
@@ -543,7 +544,7 @@ def design_command(
     for name, value in report.value.items():
         share = f"{100 * report.se[name] / abs(value):.2g}" if name != ZERO else ""
         label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
-        table.add_row(label, f"{value:.6g}", f"{report.se[name]:.2g}", share)
+        table.add_row(label, *with_error(value, report.se[name]), share)
     Console().print(table)
     click.echo(f"kappa {report.kappa:.2g}; noise of a row {report.row_sd:.2g} rad")
     for name, text in report.cost_rows():

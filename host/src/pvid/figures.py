@@ -37,7 +37,8 @@ def convergence(result: Identification, path: Path, *, truth: dict[str, float] |
         value = trajectory.physical[:, column]
         band = 2 * trajectory.physical_se[:, column]
         axis.fill_between(trajectory.t, value - band, value + band, alpha=0.25, color="C0", label="±2 s.e.")
-        axis.plot(trajectory.t, value, color="C0", linewidth=1.2, label="estimate")
+        label = "estimate" if result.identified else "not published"
+        axis.plot(trajectory.t, value, color="C0", linewidth=1.2, label=label)
         low, high = interesting(value, band)
         if truth is not None:
             axis.axhline(truth[name], color="C3", linestyle="--", linewidth=1.2, label="truth")
