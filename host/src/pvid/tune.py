@@ -31,7 +31,7 @@ from pvid.sensor_steps import resolution_of
 from pvid.setup import weak_design_of
 from pvid.survey import fitted, sized_for
 from pvid.weak_oracle import VALID_ANGLE
-from pvid.weak_sizing import HOST, PASS, PASS_MOST
+from pvid.weak_sizing import HOST, pass_hz_of
 
 Float = npt.NDArray[np.float64]
 
@@ -252,15 +252,13 @@ def _written(rig: RigFile, sample_rate: float, digits: int) -> RigFile:
     nominal = Nominal(*(_rounded(x, digits) for x in (guess.l2, guess.rho2, guess.g)))
     rig = replace(rig, nominal=nominal)
     design = weak_design_of(rig, sample_rate)
-    fast = design.fast_rad_s / (2 * math.pi)
-    widest = PASS_MOST * sample_rate / design.decimation
     return _with(
         rig,
         window_s=_rounded(design.window_s, digits),
         test_functions=design.functions,
         decimation=design.decimation,
         smoothing_s=_rounded(design.taps / sample_rate, digits),
-        pass_hz=_rounded(min(rig.identifier.pass_hz or PASS * fast, widest), digits),
+        pass_hz=_rounded(rig.identifier.pass_hz or pass_hz_of(design.nominal), digits),
         disturbance=_rounded(rig.identifier.disturbance, digits),
         survey=False,
     )
