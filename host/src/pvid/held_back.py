@@ -19,7 +19,7 @@ from pvid.errors import PvidError
 from pvid.rigfile import RigFile
 from pvid.run_rows import JOLT, RunRows, energy_at, least_squares
 from pvid.setup import nominal_start, weak_design_of
-from pvid.survey import is_pendulum, sized_for, with_nominal
+from pvid.survey import is_pendulum, sized_for
 from pvid.weak_oracle import VALID_ANGLE
 from pvid.weak_sizing import HOST
 
@@ -110,10 +110,6 @@ class HeldBack:
             if not is_pendulum(p):
                 raise PvidError("the run's least squares lead to no pendulum")
         return Model(full_angle, p, moments)
-
-    def nominal_of(self, rig: RigFile) -> RigFile:
-        """The rig file with the pendulum that its equations find as its nominal one."""
-        return with_nominal(rig, self.model_of(rig).p)
 
     def residuals(self, rig: RigFile) -> Float:
         """Energy of the reference windows held back, predicted with a rig file's settings [windows held back].

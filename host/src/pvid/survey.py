@@ -3,9 +3,9 @@
 The weak form's rows are summed in float64 over all windows of the run, and the least squares of these sums are searched
 from several starts about the guess. Rows depend on p in three ways: by their design (window, test functions, filters
 follow the modes), by their whitening, and by the constraints theta = f(p); the search renews all three until p stays.
-Of the minima found the one with the smallest chi^2 is taken. There the rows are corrected for large angles, where the
-rig file asks for it, and what still exceeds the encoder's noise becomes a white disturbance of the joints: rows are
-weighted by both from then on.
+Of the minima found the one with the smallest chi^2 is taken. There the rows are corrected for large angles and
+friction, where the rig file asks for it, and what still exceeds the encoder's noise becomes a white disturbance of the
+joints: rows are weighted by both from then on.
 
 `fitted` returns the rig file with the outcome as its nominal pendulum: what a board would be given after a first run.
 """
@@ -113,13 +113,14 @@ def survey(rig: RigFile, run: Run) -> Survey | None:
     at, fit = _best(outcomes)
     agreeing = _agreeing(outcomes, fit)
     rows = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).thinned(_WINDOWS)
-    if rig.identifier.full_angle and rig.identifier.core != "q31":
-        rows, fit = _at_large_angles(rows, fit)
+    asked = rig.identifier
+    if (asked.full_angle or asked.damping) and asked.core != "q31":
+        rows, fit = _corrected(rows, fit, asked.full_angle, asked.damping)
     ratio = _disturbance(rows, fit)
     if ratio > 0:
         fit = rows.fitted(fit.p, ratio)
     density = ratio * rows.row_sd * math.sqrt(rows.design.dt)
-    return Survey(fit.p, fit.chi2, density, agreeing, tried)
+    return Survey(fit.p[:4], fit.chi2, density, agreeing, tried)
 
 
 def with_nominal(rig: RigFile, p: Float) -> RigFile:
@@ -181,19 +182,20 @@ def _search(rig: RigFile, run: Run) -> tuple[RigFile, Fit] | None:
     return at, fit
 
 
-def _at_large_angles(rows: RunRows, fit: Fit) -> tuple[RunRows, Fit]:
-    """Rows corrected at p and the fit to them, where that explains more; else as they were."""
+def _corrected(rows: RunRows, fit: Fit, full_angle: bool, damping: bool) -> tuple[RunRows, Fit]:
+    """Rows corrected for large angles at p, or with friction in p, and the fit to them, where that explains more; else
+    as they were."""
     linear = rows, fit
-    corrected = rows
+    corrected, p = rows, np.append(fit.p, [0.0, 0.0]) if damping else fit.p
     for _ in range(_CORRECTIONS):
         try:
-            corrected = rows.corrected(fit.p)
-            better = corrected.fitted(fit.p)
+            corrected = rows.corrected(p, full_angle)
+            better = corrected.fitted(p)
         except np.linalg.LinAlgError:
             return linear
         if not is_pendulum(better.p):
             return linear
-        moved, fit = _apart(better.p, fit.p), better
+        moved, fit, p = _apart(better.p, p), better, better.p
         if moved < _SETTLED:
             break
     return (corrected, fit) if fit.chi2 < linear[0].judged(linear[1].p).chi2 else linear

@@ -31,7 +31,7 @@ from pvid.sensor_steps import resolution_of
 from pvid.setup import weak_design_of
 from pvid.survey import fitted, sized_for
 from pvid.weak_oracle import VALID_ANGLE
-from pvid.weak_sizing import HOST, PASS, PASS_MOST
+from pvid.weak_sizing import HOST, pass_hz_of
 
 Float = npt.NDArray[np.float64]
 
@@ -40,6 +40,7 @@ _WINDOWS = (0.6, 0.8, 1.25, 1.6)
 _FUNCTIONS = (8, 10, 12, 14, 16)
 _PASS_BANDS = (0.6, 1.6)
 _DECIMATIONS = (0.5, 1.6)
+_FROM_MODES = {"window_s": 0.0, "test_functions": 0, "decimation": 0, "smoothing_s": 0.0, "pass_hz": 0.0}
 _FORGETTING_S = (80.0, 40.0, 20.0, 10.0, 5.0, 2.5)
 _MIN_FORGETTING_WINDOWS = 4  # of the core
 _EQUATIONS = 4
@@ -53,7 +54,9 @@ _GAIN = 0.1
 _AS_WELL = 1.0
 # Standard errors are clearly smaller below this share.
 _SMALLER = 0.7
-# The rig file is written with so many digits; with more where the core publishes nothing with these.
+# Linear equations bias w by this times the square of the largest angle (theory; the standard rig).
+_LINEAR_BIAS = 0.36
+# The rig file is written with so many digits; with more, at last all, where the answer would be another with these.
 _DIGITS = (4, 7)
 
 
@@ -83,11 +86,20 @@ class Judged:
 
     @property
     def error(self) -> float:
-        """Relative standard error, RMS over w, d1, d2; infinite where nothing is identified."""
+        """Expected relative error, RMS over w, d1, d2: standard errors, and the bias of linear equations; infinite where
+        nothing is identified."""
         if self.answer is None or not self.answer.identified:
             return math.inf
         relative = [self.answer.se[name] / self.answer.value[name] for name in LINEAR]
-        return math.sqrt(sum(one**2 for one in relative) / len(relative))
+        bias = 0.0 if self.rig.identifier.full_angle else _LINEAR_BIAS * self.answer.largest_angle**2
+        return math.hypot(math.sqrt(sum(one**2 for one in relative) / len(relative)), bias)
+
+    def agrees_with(self, other: Judged) -> bool:
+        """Whether both answers are the same but for rounding: within a standard error, and as good."""
+        if self.answer is None or other.answer is None or self.identified != other.identified:
+            return False
+        near = [abs(self.answer.value[x] - other.answer.value[x]) <= other.answer.se[x] for x in LINEAR]
+        return not self.identified or (all(near) and self.warned == other.warned)
 
     @property
     def warned(self) -> bool:
@@ -175,10 +187,7 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
     default = bench.default()
     chosen = default
     if bench.held_back is not None:
-        chosen = bench.best_of(iter([("sizes from the modes", bench.from_modes())]), chosen)
-        angle = largest_angle(run, None)
-        chosen = bench.best_of(_equations(chosen.rig, angle), chosen)
-        for group in (_windows, _functions, _pass_bands, _decimations):
+        for group in (bench.from_modes, bench.equations, _windows, _functions, _pass_bands, _decimations):
             chosen = bench.best_of(group(chosen.rig), chosen)
         if chosen is not default and not chosen.better_than(default):
             chosen = default
@@ -209,16 +218,6 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
 
 def _with(rig: RigFile, **identifier: Any) -> RigFile:
     return replace(rig, identifier=replace(rig.identifier, **identifier))
-
-
-def _equations(rig: RigFile, angle: float) -> Iterator[tuple[str, RigFile]]:
-    """With an angle beyond what the correction is good for, linear equations are no alternative."""
-    if rig.identifier.core == "q31":
-        return
-    for full_angle in (True, False) if angle <= VALID_ANGLE else (True,):
-        for damping in (False, True) if rig.identifier.zero else (False,):
-            what = f"full_angle = {str(full_angle).lower()}, damping = {str(damping).lower()}"
-            yield what, _with(rig, full_angle=full_angle, damping=damping)
 
 
 def _windows(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
@@ -252,15 +251,13 @@ def _written(rig: RigFile, sample_rate: float, digits: int) -> RigFile:
     nominal = Nominal(*(_rounded(x, digits) for x in (guess.l2, guess.rho2, guess.g)))
     rig = replace(rig, nominal=nominal)
     design = weak_design_of(rig, sample_rate)
-    fast = design.fast_rad_s / (2 * math.pi)
-    widest = PASS_MOST * sample_rate / design.decimation
     return _with(
         rig,
         window_s=_rounded(design.window_s, digits),
         test_functions=design.functions,
         decimation=design.decimation,
         smoothing_s=_rounded(design.taps / sample_rate, digits),
-        pass_hz=_rounded(min(rig.identifier.pass_hz or PASS * fast, widest), digits),
+        pass_hz=_rounded(rig.identifier.pass_hz or pass_hz_of(design.nominal), digits),
         disturbance=_rounded(rig.identifier.disturbance, digits),
         survey=False,
     )
@@ -285,7 +282,7 @@ class _Bench:
         self.tried: list[Judged] = []
         self.seen: set[Identifier] = set()
         self.steps = 0
-        self.surveyed = fitted(rig, run)
+        self.surveyed = fitted(_with(rig, survey=True), run)
 
     def advance(self) -> None:
         """One step more for the progress bar."""
@@ -294,30 +291,45 @@ class _Bench:
 
     def default(self) -> Judged:
         """The rig file as it is, written out; with as many digits as it takes to keep its answer."""
-        rig = self.surveyed
+        rig = self.surveyed if self.given.identifier.survey else fitted(self.given, self.run)
         self.advance()
         try:
-            self.held_back = HeldBack(self.run, rig)
+            self.held_back = HeldBack(self.run, self.surveyed)
         except (PvidError, np.linalg.LinAlgError) as error:
             self.not_held_back = str(error)
         as_it_is = self.judged("as given", rig)
         default = as_it_is
-        for digits in _DIGITS:
-            if as_it_is.answer is not None:
-                default = self.judged("as given", _written(rig, self.run.sample_rate, digits))
-            if default.identified or not as_it_is.identified:
+        for digits in _DIGITS if as_it_is.answer is not None else ():
+            written = self.judged("as given", _written(rig, self.run.sample_rate, digits))
+            if written.agrees_with(as_it_is):
+                default = written
                 break
-        else:
-            default = as_it_is
         self.tried = [default]
         self.seen.add(default.rig.identifier)
         self.advance()
         return default
 
-    def from_modes(self) -> RigFile:
-        """The rig file with sizes that follow from the modes."""
-        rig = _with(self.surveyed, window_s=0.0, test_functions=0, decimation=0, smoothing_s=0.0, pass_hz=0.0)
-        return sized_for(rig, self.run)
+    def from_modes(self, rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+        """Surveyed, with sizes that follow from the modes; that the rig file as it is has, unless it says otherwise."""
+        yield "sizes from the modes", sized_for(_with(self.surveyed, **_FROM_MODES), self.run)
+
+    def equations(self, rig: RigFile) -> Iterator[tuple[str, RigFile]]:
+        """With and without sines and friction, each with its own survey.
+
+        With an angle beyond what the correction is good for, linear equations are no alternative.
+        """
+        if rig.identifier.core == "q31":
+            return
+        small = largest_angle(self.run, None) <= VALID_ANGLE
+        for full_angle in (True, False) if small else (True,):
+            for damping in (False, True) if rig.identifier.zero else (False,):
+                asked = {"full_angle": full_angle, "damping": damping}
+                if all(getattr(rig.identifier, name) == value for name, value in asked.items()):
+                    continue
+                found = fitted(_with(self.given, survey=True, **asked), self.run)
+                what = ", ".join(f"{name} = {str(value).lower()}" for name, value in asked.items())
+                with_them = replace(rig, nominal=found.nominal)
+                yield what, _with(with_them, disturbance=found.identifier.disturbance, **asked)
 
     def judged(self, what: str, rig: RigFile) -> Judged:
         """What the core makes of settings, and how well they predict what is held back."""
@@ -334,15 +346,12 @@ class _Bench:
 
     def best_of(self, candidates: Iterator[tuple[str, RigFile]], best: Judged) -> Judged:
         """The best of a group and of what was best before."""
-        assert self.held_back is not None
         for what, candidate in candidates:
             self.advance()
             try:
-                if candidate.identifier.full_angle != best.rig.identifier.full_angle or candidate.identifier.damping:
-                    candidate = self.held_back.nominal_of(candidate)
                 rig = _written(candidate, self.run.sample_rate, _DIGITS[0])
             except (PvidError, np.linalg.LinAlgError):
-                continue  # no such pendulum, or sizes that the core does not hold
+                continue  # sizes that the core does not hold
             if rig.identifier in self.seen:
                 continue
             self.seen.add(rig.identifier)

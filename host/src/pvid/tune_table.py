@@ -19,7 +19,7 @@ _HEADINGS = (
     "full angle",
     "friction",
     "residual held back",
-    "standard error %",
+    "expected error %",
     "warned",
 )
 
@@ -27,7 +27,7 @@ _HEADINGS = (
 def candidates_table(tuned: Tuned) -> Table:
     """All settings in the order in which they were tried; residuals over those of the rig file's own settings."""
     table = Table(
-        title="residuals held back, over those of the rig file's own settings; standard errors of w, d1, d2, rms"
+        title="residuals held back, over those of the rig file's own settings; expected errors: of w, d1, d2, rms"
     )
     for heading in _HEADINGS:
         table.add_column(heading, justify="right")
