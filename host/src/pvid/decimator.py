@@ -93,7 +93,7 @@ def fir(taps: int, decimation: int, order: int, edge: float) -> Fir:
         raise PvidError(f"the pass band must end below half the sample rate, not at {edge:g} cycles per sample")
     half = (taps - 1) // 2
     points = np.arange(half + 1)
-    frequency = np.linspace(0.0, 0.5, max(401, 8 * taps))
+    frequency = np.linspace(0.0, 0.5, max(401, 4 * taps))
     responses = 2 * np.cos(2 * math.pi * np.outer(frequency, points))
     responses[:, 0] = 1.0
     wanted = np.ones_like(frequency) if order == 0 else -((2 * math.pi * frequency) ** 2)
@@ -150,28 +150,35 @@ def pair(taps: int, decimation: int, edge: float) -> Decimator:
     return Decimator(taps, decimation, fir(taps, decimation, 0, edge), fir(taps, decimation, 2, edge))
 
 
-@lru_cache(maxsize=256)
 def shortest(decimation: int, edge: float, most_taps: int) -> Decimator:
-    """The shortest good pair of filters up to `most_taps`, or the best there is.
+    """The shortest good pair of filters up to `most_taps`, or the longest.
 
     Parameters
     ----------
     decimation : D
-    edge : of the pass band [cycles per sample]
+    edge : of the pass band [cycles per sample]; counts to two digits, upwards
     most_taps : longest allowed
     """
-    lengths = sorted({min(round(length), most_taps - 1 + most_taps % 2) | 1 for length in _LENGTHS})
-    best = None
-    for taps in lengths:
-        if taps > most_taps:
-            break
-        tried = pair(taps, decimation, edge)
-        if best is None or tried.badness < best.badness:
-            best = tried
-        if tried.badness <= 1:
-            break
-    assert best is not None  # _LENGTHS begins with MIN_TAPS
-    return best
+    return _shortest(decimation, _rounded_up(edge), most_taps)
+
+
+@lru_cache(maxsize=1024)
+def _shortest(decimation: int, edge: float, most_taps: int) -> Decimator:
+    longest = most_taps - 1 + most_taps % 2
+    lengths = sorted({min(round(length) | 1, longest) for length in _LENGTHS})
+    low, high = 0, len(lengths) - 1
+    while low < high:  # longer filters are better ones
+        middle = (low + high) // 2
+        if pair(lengths[middle], decimation, edge).badness <= 1:
+            high = middle
+        else:
+            low = middle + 1
+    return pair(lengths[high], decimation, edge)
+
+
+def _rounded_up(x: float) -> float:
+    digit = 10.0 ** (math.floor(math.log10(x)) - 1)
+    return math.ceil(x / digit - 1e-9) * digit
 
 
 _LENGTHS = tuple(float(length) for length in np.geomspace(MIN_TAPS, 1023, 28))

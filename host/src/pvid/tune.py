@@ -86,8 +86,8 @@ class Judged:
 
     @property
     def error(self) -> float:
-        """Expected relative error, RMS over w, d1, d2: standard errors, and the bias of linear equations; infinite where
-        nothing is identified."""
+        """Expected relative error, RMS over w, d1, d2: standard errors, and the bias of linear equations; infinite
+        where nothing is identified."""
         if self.answer is None or not self.answer.identified:
             return math.inf
         relative = [self.answer.se[name] / self.answer.value[name] for name in LINEAR]
