@@ -88,8 +88,8 @@ def test_rows_hold_for_exact_signals(standard: WeakDesign, c: float) -> None:
             left.append(np.sqrt(np.mean((rows[0] - th @ rows[1:]) ** 2)))
         worst.append(max(left))
         assert np.abs(windows[:, weak.Y]).max() > 0.02  # what the residuals are to be compared with
-    assert worst[0] < 4e-6  # a twentieth of what the noise of a 14-bit encoder leaves
-    assert worst[1] < worst[0] / 20  # of quadrature and filters; a mistake in a formula would stay
+    assert worst[0] < 1e-6  # an eightieth of what the noise of a 14-bit encoder leaves
+    assert worst[1] < worst[0] / 4  # of quadrature and filters; a mistake in a formula would stay
 
 
 def test_ignoring_a_column_is_noticed(standard: WeakDesign) -> None:

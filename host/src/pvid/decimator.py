@@ -93,12 +93,12 @@ def fir(taps: int, decimation: int, order: int, edge: float) -> Fir:
         raise PvidError(f"the pass band must end below half the sample rate, not at {edge:g} cycles per sample")
     half = (taps - 1) // 2
     points = np.arange(half + 1)
-    frequency = np.linspace(0.0, 0.5, max(401, 4 * taps))
+    frequency = np.union1d(np.linspace(0.0, 0.5, max(401, 4 * taps)), edge)
     responses = 2 * np.cos(2 * math.pi * np.outer(frequency, points))
     responses[:, 0] = 1.0
     wanted = np.ones_like(frequency) if order == 0 else -((2 * math.pi * frequency) ** 2)
     at_edge = 1.0 if order == 0 else (2 * math.pi * edge) ** 2
-    inside = frequency < edge
+    inside = frequency <= edge
     nearest = np.round(frequency * decimation)
     folding = (np.abs(frequency - nearest / decimation) < edge) & (nearest > 0) & ~inside
     relative = np.maximum(np.abs(wanted), _SHARE * at_edge)
