@@ -33,7 +33,7 @@ def response(taps: Float) -> tuple[Float, Float]:
     padded[: half + 1], padded[-half:] = taps[half:], taps[:half]
     spectrum = np.fft.rfft(padded)
     assert np.abs(spectrum.imag).max() < 1e-9 * np.abs(spectrum).max()
-    return np.fft.rfftfreq(_POINTS), np.asarray(spectrum.real, np.float64)
+    return np.asarray(np.fft.rfftfreq(_POINTS), np.float64), np.asarray(spectrum.real, np.float64)
 
 
 def wanted(frequency: Float, order: int) -> Float:

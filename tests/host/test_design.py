@@ -8,6 +8,7 @@ import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,14 +38,15 @@ FASTER = (Tone(6e-3, 1.7, 0.3), Tone(5e-3, 3.1, 1.7), Tone(2e-3, 5.3, 4.0))
 
 
 def rig_of(pendulum: Pendulum, bits: int = 14, **identifier: float) -> RigFile:
-    """A rig file that knows the truth: a prediction at the nominal is one at the truth."""
+    """A rig file that knows the truth: a prediction at the nominal is one at the truth, of linear equations."""
     rig = RigFile(
         l1=pendulum.l1,
         nominal=Nominal(l2=pendulum.l2, rho2=pendulum.rho2, g=pendulum.g),
         sensor=Sensor(phi_lsb=2 * np.pi / 2**bits),
         sample_rate=1000.0,
     )
-    return replace(rig, identifier=replace(rig.identifier, **identifier))  # type: ignore[arg-type]
+    settings: dict[str, Any] = {"full_angle": False} | identifier
+    return replace(rig, identifier=replace(rig.identifier, **settings))
 
 
 @pytest.mark.parametrize(
@@ -131,17 +133,34 @@ def test_ram_is_the_compilers_word(tmp_path: Path) -> None:
         pytest.skip("this machine's gcc has no 32-bit mode")
     built = state_bytes(tmp_path)["weak form"]
     assert 0 < built - default < 100  # pointers of 8 bytes, and their padding
-    # the ring of (81 + 32 - 1) - (71 + 8 - 1) samples of 8 bytes, and four functions of three buffers of 13 sums
-    assert default - fitted >= 34 * 8 + 4 * 3 * 13 * 4
+    # the ring of (81 + 32 - 1) - (81 + 9 - 1) samples of 8 bytes, and six functions of three buffers of 13 sums
+    assert default - fitted >= 23 * 8 + 6 * 3 * 13 * 4
     assert cost_of(design).ram_bytes == default
 
 
 def test_the_delay_covers_front_window_and_work() -> None:
     design = weak_design_of(RigFile.standard(), 1000.0)
     cost = cost_of(design)
-    assert cost.delay_s > 0.035 + 1.248  # half of 71 samples, the window
-    assert cost.delay_s < 0.035 + 1.248 + 0.624  # a window is worked off before the next one is complete
-    assert cost.update_s == pytest.approx(0.624)
+    assert cost.delay_s > 0.04 + 1.71  # half of 81 samples, the window
+    assert cost.delay_s < 0.04 + 1.71 + 0.855  # a window is worked off before the next one is complete
+    assert cost.update_s == pytest.approx(0.855)
+
+
+def test_a_design_beyond_the_default_bounds_says_which_and_what_the_correction_takes() -> None:
+    standard = RigFile.standard()
+    plain = cost_of(weak_design_of(standard, 1000.0))
+    large = cost_of(weak_design_of(standard, 5000.0))
+    assert plain.raised == ()
+    assert {one.split("=")[0] for one in large.raised} == {"PVID_MAX_TAPS", "PVID_MAX_DECIMATION"}
+    if plain.ram_bytes is None or large.ram_bytes is None:
+        pytest.skip("this machine's gcc has no 32-bit mode")
+    assert large.ram_bytes > plain.ram_bytes + 8 * (200 + 11)  # 281 taps and 43 samples a decimated one, or more
+    corrected = cost_of(weak_design_of(standard, 1000.0), corrected=True)
+    assert corrected.ram_bytes is not None
+    assert corrected.ram_bytes > plain.ram_bytes + 377 * 8  # a ring of one and a half windows of 251 samples
+    report = report_for_tones(replace(standard, sample_rate=5000.0), STANDARD_DRIVE, STANDARD_RELEASE, 10.0)
+    rows = dict(report.cost_rows())
+    assert "pvid/config.h but -DPVID_MAX_TAPS=" in rows["RAM"]
 
 
 def test_less_noise_and_a_longer_run_are_better() -> None:
