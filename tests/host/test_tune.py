@@ -63,6 +63,14 @@ def test_friction_is_found() -> None:
     assert choice.chosen.residual_over(choice.default) < 0.5
 
 
+def test_a_survey_that_is_asked_for_friction_leaves_less_to_disturbances() -> None:
+    run = RUBBING.run(0)
+    without = fitted(RUBBING.rig, run).identifier.disturbance
+    asked = fitted(with_identifier(RUBBING.rig, damping=True), run)
+    assert asked.identifier.disturbance < 0.3 * without
+    assert asked.nominal.l2 == pytest.approx(0.12, rel=2e-3)  # its standard error is 1e-3
+
+
 def test_linear_equations_are_taken_where_the_motion_is_linear(native: Native) -> None:
     choice = tune(short_run("linear"), RigFile.standard(), native)
     assert not choice.rig.identifier.full_angle

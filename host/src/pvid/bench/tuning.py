@@ -105,8 +105,10 @@ class Case:
         angle = absolute2 - absolute1
         q = absolute1 - (big_l2 + d2) * angle  # phi1 - L2 (1 + L1) phi
 
+        tones = [(tone.amplitude_m, 2 * math.pi * tone.frequency_hz, tone.phase_rad) for tone in self.tones]
+
         def rate(time: float, state: Float) -> Float:
-            u = drive.derivatives(np.array([time]))[0, 2] / self.pendulum.l1
+            u = -sum(a * omega**2 * math.sin(omega * time + phase) for a, omega, phase in tones) / self.pendulum.l1
             g = w * (1 + self.drift * time / DURATION_S) + u
             acceleration = g * state[2]
             return np.array([state[1], acceleration, state[3], -d1 * acceleration - d2 * g * state[0]])
