@@ -329,6 +329,7 @@ static const bound weak_fields[] = {
     FIELD(pvid_weak_config_q31, , trust.misfit_max, KIND_UINT32, 65536.0, 4294967295.0, PVID_BAD_MISFIT_MAX),
     FIELD(pvid_weak_config_q31, , trust.groups_min, KIND_UINT16, 0.0, 65535.0, PVID_OK),
     FIELD(pvid_weak_config_q31, , trust.shut_max, KIND_UINT16, 0.0, 65535.0, PVID_OK),
+    FIELD(pvid_weak_config_q31, , trust.renewal, KIND_UINT32, 655.0, 65536000.0, PVID_BAD_RENEWAL),
     FIELD(pvid_weak_config_q31, , gate.sigmas, KIND_UINT32, 131072.0, 65536000.0, PVID_BAD_GATE_SIGMAS),
     FIELD(pvid_weak_config_q31, , gate.patience_groups, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_GATE_PATIENCE),
     OF_ESTIMATOR(pvid_weak_config_q31, estimator.),

@@ -186,7 +186,6 @@ struct pvid_weak_angle_f32 {
     uint8_t channels;    /* 1, or 3 with friction */
     bool full_angle;
     bool on;             /* the estimate has settled: rows are corrected */
-    uint8_t ageing;      /* windows before which the past is still to be aged */
     bool sensible;       /* p is that of a pendulum */
     float dt;
     float inverse_l1_square; /* of rod 1 [1/m^2] */
