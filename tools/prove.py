@@ -271,6 +271,7 @@ PROOFS = (
             *("pvid_estimator_innovation_q31", "pvid_estimator_add_q31", "pvid_estimator_begin_q31"),
             *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_on_q31"),
             *("pvid_gate_passes_q31", "pvid_trust_refuge_q31", "pvid_trust_judge_q31"),
+            *("pvid_estimator_expect_q31", "pvid_information_fade_q31", "pvid_trust_ageing_q31"),
         ),
     ),
     Proof(

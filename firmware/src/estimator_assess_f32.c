@@ -11,9 +11,6 @@
 /* Rounding floor of yy - 2 B^T theta + theta^T M theta, relative to yy: a few ulp of each term. */
 #define RESIDUAL_FLOOR 4.8e-7f
 
-/* Where p is absurd the sum overflows or is no number; so far up no standard error made of it does. */
-#define RESIDUAL_MAX 1.0e30f
-
 float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy)
 {
     const pvid_model_f32 *model = self->model;
@@ -23,10 +20,40 @@ float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float su
     if (!(freedom >= 1.0f)) {
         return self->row_variance;
     }
-    const float floor = pvid_relative_f32(model) ? 0.0f : (RESIDUAL_FLOOR * yy);
-    const float sum = yy + energy;
-    const float residual = (sum <= RESIDUAL_MAX) ? sum : RESIDUAL_MAX;
+    const float floor = pvid_relative_f32(model) ? (self->expected * freedom) : (RESIDUAL_FLOOR * yy);
+    const float sum = (yy + energy) + self->information.rounding;
+    const float residual = (sum <= PVID_RESIDUAL_MAX) ? sum : PVID_RESIDUAL_MAX;
     return ((residual > floor) ? residual : floor) / freedom;
+}
+
+void pvid_estimator_expect_f32(pvid_estimator_f32 *self, float variance)
+{
+    float tail[2];
+    pvid_information_tail_f32(&self->information, tail);
+    const float share = (self->taken < tail[1]) ? (self->taken / tail[1]) : 1.0f;
+    const float held = (variance <= PVID_RESIDUAL_MAX) ? variance : PVID_RESIDUAL_MAX;
+    if (self->taken > 0.0f) {
+        self->expected += (held - self->expected) * share;
+    }
+}
+
+float pvid_estimator_misfit_f32(const pvid_estimator_f32 *self, const float sums[])
+{
+    const float *tail = &sums[self->model->n_moments + self->model->n_theta];
+    const float freedom = tail[1] - (float)self->model->n_p;
+    const float explained = freedom * self->expected;
+    if (!(freedom >= 1.0f) || !(explained > 0.0f) || !(tail[0] > 0.0f)) {
+        return 0.0f;
+    }
+    const float misfit = tail[0] / explained;
+    return (misfit <= PVID_RESIDUAL_MAX) ? misfit : PVID_RESIDUAL_MAX;
+}
+
+bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self)
+{
+    float tail[2];
+    pvid_information_tail_f32(&self->information, tail);
+    return self->information.rounding > tail[0];
 }
 
 bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,

@@ -12,14 +12,59 @@ pvid_scaled_q31 pvid_estimator_expected_variance_q31(const pvid_estimator_q31 *s
     return pvid_scaled_of_q31((int64_t)self->row_sd * self->row_sd, exponent);
 }
 
+/* Degrees of freedom of the residuals, Q16. */
+static int64_t freedom_of(const pvid_estimator_q31 *self)
+{
+    return self->information.sums[self->information.n_sums - 1u] - ((int64_t)self->model->n_p << 16);
+}
+
+/* Residual sum over the degrees of freedom, of which there is one at least. */
+static pvid_scaled_q31 found_variance(const pvid_estimator_q31 *self, int64_t freedom)
+{
+    const int64_t residual = self->information.sums[self->information.n_sums - 2u];
+    return pvid_scaled_over_q31(pvid_scaled_of_q31(residual, 0), pvid_scaled_of_q31(freedom, -16));
+}
+
+/* What the sensors' noise explains of it. */
+static pvid_scaled_q31 explained_variance(const pvid_estimator_q31 *self)
+{
+    return pvid_scaled_shifted_q31(self->expected, -2 * (int32_t)self->information.exponent);
+}
+
 pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self)
 {
-    const int64_t *tail = &self->information.sums[self->information.n_sums - 2u];
-    const int64_t freedom = tail[1] - ((int64_t)self->model->n_p << 16); /* Q16 */
+    const int64_t freedom = freedom_of(self);
     if (freedom < ((int64_t)1 << 16)) {
         return pvid_estimator_expected_variance_q31(self);
     }
-    return pvid_scaled_over_q31(pvid_scaled_of_q31(tail[0], 0), pvid_scaled_of_q31(freedom, -16));
+    const pvid_scaled_q31 found = found_variance(self, freedom);
+    const pvid_scaled_q31 explained = explained_variance(self);
+    return pvid_scaled_exceeds_q31(explained, found) ? explained : found;
+}
+
+void pvid_estimator_expect_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance)
+{
+    const int64_t weight = self->information.sums[self->information.n_sums - 1u];
+    if ((self->taken <= 0) || (weight < self->taken)) {
+        return;
+    }
+    const pvid_scaled_q31 share = pvid_scaled_over_q31(pvid_scaled_of_q31(self->taken, 0), pvid_scaled_of_q31(weight, 0));
+    const pvid_scaled_q31 change = pvid_scaled_times_q31(share, pvid_scaled_minus_q31(variance, self->expected));
+    const pvid_scaled_q31 mean = pvid_scaled_plus_q31(self->expected, change);
+    self->expected.m = (mean.m > 0) ? mean.m : 0;
+    self->expected.e = mean.e;
+}
+
+/* Residual variance over what the sensors explain of it, Q16; 0 where that is not known. */
+static int32_t misfit_of(const pvid_estimator_q31 *self)
+{
+    const int64_t freedom = freedom_of(self);
+    const pvid_scaled_q31 explained = explained_variance(self);
+    if ((freedom < ((int64_t)1 << 16)) || (explained.m <= 0)) {
+        return 0;
+    }
+    const pvid_scaled_q31 misfit = pvid_scaled_over_q31(found_variance(self, freedom), explained);
+    return (int32_t)pvid_clamp_q31(pvid_scaled_fixed_q31(misfit, 16), INT32_MAX);
 }
 
 void pvid_estimator_residual_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
@@ -28,6 +73,7 @@ void pvid_estimator_residual_q31(const pvid_estimator_q31 *self, pvid_estimator_
     const pvid_information_q31 *information = &self->information;
     const int64_t weight = pvid_floor_shift_q31(information->sums[information->n_sums - 1u], 16);
     estimate->weight = (weight > (int64_t)UINT32_MAX) ? UINT32_MAX : (uint32_t)weight;
+    estimate->misfit = misfit_of(self);
     solve->variance = pvid_estimator_variance_q31(self);
     const pvid_root_q31 residual = pvid_root_of_q31(solve->variance.m, solve->variance.e);
     const int32_t shift = -((residual.e + (int32_t)information->exponent) + PVID_ROW_SD_BITS);

@@ -224,6 +224,7 @@ static inline pvid_reason add_relative_row(pvid_estimator_f32 *self, const float
         listen(self, gradient, e);
     }
     self->energy += e * e;
+    self->taken += self->information.row_weight;
     pvid_information_add_f32(&self->information, self->model, n, e, NULL);
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;

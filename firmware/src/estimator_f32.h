@@ -124,8 +124,23 @@ bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float 
 bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
                                    const float force[], float variance);
 
-/* s^2 of a row: residual sum of squares over degrees of freedom; row_sd^2 while there are none. */
+/* Where p is absurd a residual sum overflows or is no number; so far up no standard error made of it does. */
+#define PVID_RESIDUAL_MAX 1.0e30f
+
+/* s^2 of a row: residual sum of squares, with what rounding may have taken from it, over degrees of freedom; no less
+ * than the sensors' noise explains, and row_sd^2 while there are no degrees of freedom. */
 float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy);
+
+/* Takes note of the variance that the sensors' noise gives the rows taken in since the last group's end; call it when
+ * all of a group are, and before its solve begins. For models without functions of their own, as the next two. */
+void pvid_estimator_expect_f32(pvid_estimator_f32 *self, float variance);
+
+/* Residual variance of all rows in these sums over the variance that was told for them; 0 while there are no degrees of
+ * freedom, or where no digit of the residuals is left. */
+float pvid_estimator_misfit_f32(const pvid_estimator_f32 *self, const float sums[]);
+
+/* Whether rounding may be all there is in the residual sum: p has come a long way with these sums. */
+bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self);
 
 /* estimate->kappa and least_pivot from S, the upper triangle s. */
 void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],

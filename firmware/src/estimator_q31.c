@@ -212,6 +212,7 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
 void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
 {
     self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
+    self->taken = pvid_clamp_q31(self->taken + self->information.row_weight, PVID_WIDE);
     pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);
 }

@@ -59,9 +59,13 @@ void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], in
 /* Sets theta = f(p), and what rows are multiplied with. */
 void pvid_estimator_take_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
 
-/* s^2 of a row: residual sum of squares over degrees of freedom, row_sd^2 while there are none; divided by 4^exponent
- * as the sums are. */
+/* s^2 of a row: residual sum of squares over degrees of freedom, no less than the sensors' noise explains, row_sd^2
+ * while there are none; divided by 4^exponent as the sums are. */
 pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self);
+
+/* Takes note of the variance >= 0 that the sensors' noise gives the rows taken in since the last group's end [units of
+ * Y's integer squared]; call it when all of a group are, and before its solve begins. */
+void pvid_estimator_expect_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
 
 /* row_sd^2 as that. */
 pvid_scaled_q31 pvid_estimator_expected_variance_q31(const pvid_estimator_q31 *self);

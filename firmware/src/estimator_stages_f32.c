@@ -25,6 +25,9 @@ enum {
     STAGE_SCALE
 };
 
+/* What a step leaves wrong in rr, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
+#define ROUNDING 2.4e-7f
+
 #define ROWS_A_STAGE 4u
 #define COLUMNS_A_STAGE 3u
 
@@ -133,6 +136,7 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
         solve->theta_step[i] = solve->theta[i] - self->theta[i];
     }
     solve->fall = 0.0f;
+    solve->scale = 0.0f;
 }
 
 /* Rows first.. of M dtheta, and of the fall of rr by dtheta^T (b_old + b_new); returns the next row. */
@@ -145,6 +149,7 @@ static size_t follow_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
         const float moved = pvid_pattern_times_f32(n, solve->sums, i, solve->theta_step);
         solve->moved[i] = moved;
         solve->fall += solve->theta_step[i] * (b[i] + (b[i] - moved));
+        solve->scale += solve->sums[pvid_pattern_diagonal_f32(n, i)] * (solve->theta_step[i] * solve->theta_step[i]);
     }
     return last;
 }
@@ -169,6 +174,8 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
         self->theta[i] = solve->theta[i];
     }
     low[n] -= solve->fall;
+    const float lost = self->information.rounding + (ROUNDING * solve->scale);
+    self->information.rounding = (lost <= PVID_RESIDUAL_MAX) ? lost : PVID_RESIDUAL_MAX;
     memcpy(self->p, solve->p, sizeof self->p);
     if (steps) {
         pvid_count_up(&self->counters.updates);
@@ -216,6 +223,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
     if (ends_group) {
         solve->energy = self->energy;
         self->energy = 0.0f;
+        self->taken = 0.0f;
         solve->gain = self->gain;
         solve->stage = (uint8_t)(pvid_estimator_is_due_f32(self) ? STAGE_READ : STAGE_FOLD);
     } else if (self->gain < 1.0f) {
@@ -237,6 +245,7 @@ static void kappa_stage(const pvid_estimator_f32 *self, const pvid_estimator_sol
     pvid_estimate_f32 *estimate = solve->estimate;
     estimate->weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
     estimate->residual_sd = sqrtf(solve->variance);
+    estimate->misfit = pvid_estimator_misfit_f32(self, solve->sums);
     pvid_estimator_find_kappa_f32(self, (const float(*)[PVID_MAX_P])solve->s, estimate);
 }
 

@@ -403,6 +403,7 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
     if (ends_group) {
         solve->energy = self->energy;
         self->energy = 0;
+        self->taken = 0;
         solve->gain = self->gain;
         solve->stage = (uint8_t)(is_due(self) ? STAGE_MATRIX : STAGE_FOLD);
     } else if (self->gain < PVID_ONE_Q30) {

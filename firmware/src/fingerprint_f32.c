@@ -78,7 +78,8 @@ static uint32_t trust_of(uint32_t hash, const pvid_trust_config_f32 *config)
     running = one(running, config->se_max);
     running = one(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
-    return pvid_fnv_word(running, config->shut_max);
+    running = pvid_fnv_word(running, config->shut_max);
+    return one(running, config->renewal);
 }
 
 uint32_t pvid_fingerprint_weak_f32(const pvid_weak_config_f32 *config)

@@ -102,7 +102,8 @@ static uint32_t trust_of(uint32_t hash, const pvid_trust_config_q31 *config)
     uint32_t running = words(hash, limits, sizeof limits / sizeof limits[0]);
     running = pvid_fnv_word(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
-    return pvid_fnv_word(running, config->shut_max);
+    running = pvid_fnv_word(running, config->shut_max);
+    return pvid_fnv_word(running, config->renewal);
 }
 
 static uint32_t gate_of(uint32_t hash, const pvid_gate_config_q31 *config)

@@ -27,6 +27,7 @@ void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 
     self->age = 0;
     self->retention = 1.0f;
     self->row_weight = 1.0f;
+    self->rounding = 0.0f;
     if (forgetting_groups > 0.0f) {
         if (forgetting_groups < 16.0f * (float)BLOCK_MAX) {
             self->block = (uint16_t)((forgetting_groups < 32.0f) ? 1.0f : (forgetting_groups / 16.0f));
@@ -132,6 +133,7 @@ void pvid_information_end_group_f32(pvid_information_f32 *self)
     for (size_t i = in_lanes; i < sums; i++) {
         fold(&self->high[i], &self->low[i], retention);
     }
+    self->rounding *= retention;
 }
 
 void pvid_information_fade_f32(pvid_information_f32 *self, float factor)
@@ -141,6 +143,7 @@ void pvid_information_fade_f32(pvid_information_f32 *self, float factor)
         self->high[i] *= factor;
         self->low[i] *= factor;
     }
+    self->rounding *= factor;
 }
 
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS])
@@ -149,4 +152,11 @@ void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID
     for (size_t i = 0; i < n; i++) {
         sums[i] = self->high[i] + self->low[i];
     }
+}
+
+void pvid_information_tail_f32(const pvid_information_f32 *self, float tail[2])
+{
+    const size_t yy = (size_t)self->n_moments + self->n_theta;
+    tail[0] = self->high[yy] + self->low[yy];
+    tail[1] = self->high[yy + 1u] + self->low[yy + 1u];
 }

@@ -125,3 +125,12 @@ void pvid_information_end_group_q31(pvid_information_q31 *self, size_t part, int
     self->age = (uint16_t)((self->age < self->block) ? self->age : 0u);
     rescale(self, fresh);
 }
+
+void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t factor)
+{
+    const size_t half = self->n_sums / 2u;
+    const size_t last = (part == 0u) ? half : self->n_sums;
+    for (size_t i = (part == 0u) ? 0u : half; i < last; i++) {
+        self->sums[i] = pvid_times_q31(self->sums[i], factor);
+    }
+}

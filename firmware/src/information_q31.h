@@ -21,6 +21,9 @@ void pvid_information_add_q31(pvid_information_q31 *self, const int32_t n[], int
 #define PVID_INFORMATION_END_PARTS 2u
 void pvid_information_end_group_q31(pvid_information_q31 *self, size_t part, int64_t fresh[]);
 
+/* Multiplies all that was gathered by factor, Q31, rounding each sum; for part = 0, 1 of the work. */
+void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t factor);
+
 /* Place of M_ij, i <= j, among the sums. */
 static inline uint32_t pvid_moment_q31(uint32_t n_theta, uint32_t i, uint32_t j)
 {

@@ -27,6 +27,12 @@ void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], 
 /* c_a^T x, x[n_theta]. */
 float pvid_pattern_dot_f32(const pvid_model_f32 *model, const float c[], size_t start, const float x[]);
 
+/* Place of M_ii in the packed M. */
+static inline size_t pvid_pattern_diagonal_f32(size_t n, size_t i)
+{
+    return (i * ((2u * n) + 1u - i)) / 2u;
+}
+
 /* Entry i of M x, x[n]. */
 float pvid_pattern_times_f32(size_t n, const float m[], size_t i, const float x[]);
 

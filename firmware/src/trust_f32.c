@@ -1,5 +1,6 @@
 #include "pvid/trust.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -11,14 +12,25 @@
 const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .kappa_min = 3.0e-5f,
     .se_max = 0.05f,
-    .misfit_max = 1.5f,
+    .misfit_max = 4.0f,
     .groups_min = 3,
     .shut_max = 16,
+    .renewal = 0.2f,
 };
 
 /* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
 #define ARRIVED 0.3f
 #define SMALL_STEP 1.0e-4f
+
+/* p has settled when its last step is smaller than this. */
+#define SETTLED_STEP 0.02f
+
+/* It is near where it goes when it has settled with standard errors, relative, below this. */
+#define NEAR 0.1f
+
+/* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
+#define AGEING 0.3f
+#define AGEING_GROUPS 4u
 
 /* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
 #define LONG_MEMORY 4096.0f
@@ -37,6 +49,9 @@ static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
     if (!pvid_within_f32(config->misfit_max, 1.0f, 1.0e6f) && !pvid_within_f32(config->misfit_max, 0.0f, 0.0f)) {
         return PVID_BAD_MISFIT_MAX;
     }
+    if (!pvid_within_f32(config->renewal, 0.01f, 1.0e3f) && !pvid_within_f32(config->renewal, 0.0f, 0.0f)) {
+        return PVID_BAD_RENEWAL;
+    }
     return PVID_OK;
 }
 
@@ -52,6 +67,7 @@ static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 
 void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
     memcpy(self->estimate.p, estimator->p, sizeof self->estimate.p);
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
 }
 
 pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
@@ -72,6 +88,7 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
     }
     self->long_memory = (uint16_t)((memory < (float)PVID_TRUST_LONG) ? (float)PVID_TRUST_LONG : memory);
     publish_start(&self->estimate, estimator);
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
     return PVID_OK;
 }
 
@@ -82,7 +99,8 @@ const float *pvid_trust_refuge_f32(const pvid_trust_f32 *self)
 
 /* ---- the alarm ---- */
 
-static void take_surplus(pvid_trust_f32 *self, float surplus)
+/* Returns whether the windows alone raise it. */
+static bool take_surplus(pvid_trust_f32 *self, float surplus)
 {
     const float x = (surplus <= SURPLUS_MAX) ? surplus : SURPLUS_MAX; /* NaN becomes the limit */
     if (self->judged < self->long_memory) {
@@ -98,19 +116,25 @@ static void take_surplus(pvid_trust_f32 *self, float surplus)
     const float limit = self->config.misfit_max;
     const bool lately = (self->judged >= PVID_TRUST_SHORT) && (sum > (1.5f * (limit * (float)PVID_TRUST_SHORT)));
     const bool at_length = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
-    self->misfit = (limit > 0.0f) && (lately || at_length);
+    return lately || at_length;
 }
 
-void pvid_trust_restart_alarm_f32(pvid_trust_f32 *self)
+static void restart_alarm(pvid_trust_f32 *self)
 {
     self->judged = 0;
     self->next = 0;
     self->long_mean = 0.0f;
-    self->misfit = false;
     memset(self->recent, 0, sizeof self->recent);
 }
 
-/* ---- the gate ---- */
+/* Whether the residuals of all rows are within what chance makes of the limit. */
+static bool all_agree(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
+                      const pvid_estimate_f32 *candidate)
+{
+    const float freedom = candidate->weight - (float)estimator->model->n_p;
+    const float chance = sqrtf(2.0f / ((freedom >= 1.0f) ? freedom : 1.0f));
+    return candidate->misfit <= (self->config.misfit_max * (1.0f + (3.0f * chance)));
+}
 
 float pvid_trust_widest_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
 {
@@ -122,6 +146,73 @@ float pvid_trust_widest_f32(const pvid_estimator_f32 *estimator, const pvid_esti
         }
     }
     return widest;
+}
+
+/* ---- renewal ---- */
+
+void pvid_trust_age_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    self->ageing = AGEING_GROUPS;
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    restart_alarm(self);
+}
+
+float pvid_trust_ageing_f32(pvid_trust_f32 *self)
+{
+    if ((self->ageing == 0u) || !self->known) {
+        return 1.0f;
+    }
+    self->ageing--;
+    return AGEING;
+}
+
+/* Whether p is so far from where the rows came in. */
+static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    bool moved = false;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_f32(estimator->model, a)) {
+            const float part = (estimator->p[a] / self->anchor[a]) - 1.0f;
+            moved = moved || (part > self->config.renewal) || (part < -self->config.renewal);
+        }
+    }
+    return moved;
+}
+
+/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had come
+ * in there; and a p that noise may have moved so far has not arrived anywhere. */
+static void settle(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool known, bool agrees)
+{
+    const bool stale = known && !agrees && has_moved(self, estimator);
+    if (stale || pvid_estimator_is_rounded_f32(estimator)) {
+        pvid_trust_age_f32(self, estimator);
+    } else if (known && agrees) {
+        memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    } else {
+        /* p is on its way yet, or about where it was */
+    }
+}
+
+/* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
+static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled, float surplus,
+                        const pvid_estimate_f32 *candidate)
+{
+    const bool agrees = all_agree(self, estimator, candidate);
+    const bool known = pvid_trust_widest_f32(estimator, candidate) <= NEAR;
+    const bool renewing = self->ageing > 0u;
+    self->known = known;
+    bool lately = false;
+    if (renewing) {
+        restart_alarm(self);
+    } else if (self->near) {
+        lately = take_surplus(self, surplus);
+    } else {
+        self->near = settled && known && (self->groups >= self->config.groups_min);
+    }
+    self->misfit = (self->config.misfit_max > 0.0f) && (!agrees || lately);
+    if (settled && !renewing && (self->config.renewal > 0.0f)) {
+        settle(self, estimator, known, agrees);
+    }
 }
 
 static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
@@ -151,9 +242,7 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
         return reason;
     }
     pvid_trust_count_shut(&self->shut, reason, pvid_trust_refuge_f32(self) != NULL);
-    if (self->published) {
-        take_surplus(self, surplus);
-    }
+    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), surplus, candidate);
     const pvid_reason judged = verdict(self, estimator, reason, size, informed, candidate);
     if (judged == PVID_UPDATED) {
         self->estimate = *candidate;

@@ -11,6 +11,20 @@
 #define ARRIVED 19661 /* 0.3, Q16 */
 #define SMALL_STEP (((int64_t)1 << PVID_SIZE_BITS) / 10000)
 
+/* p has settled when its last step is smaller than 2 %, and is near where it goes when it has with standard errors below
+ * a tenth. */
+#define SETTLED_STEP (((int64_t)1 << PVID_SIZE_BITS) / 50)
+#define NEAR (((int64_t)1 << ERROR_BITS) / 10)
+
+/* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
+#define AGEING 644245094 /* 0.3, Q31 */
+#define AGEING_GROUPS 4u
+
+#define CHANCE_MAX 92682 /* sqrt(2), Q16: of one degree of freedom */
+
+#define RENEWAL_MIN 655u /* 0.01, Q16 */
+#define RENEWAL_MAX ((uint32_t)1000 << 16)
+
 /* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
 #define LONG_MEMORY 4096u
 
@@ -30,12 +44,16 @@ static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
     if ((config->misfit_max != 0u) && (config->misfit_max < ((uint32_t)1 << 16))) {
         return PVID_BAD_MISFIT_MAX;
     }
+    if ((config->renewal != 0u) && ((config->renewal < RENEWAL_MIN) || (config->renewal > RENEWAL_MAX))) {
+        return PVID_BAD_RENEWAL;
+    }
     return PVID_OK;
 }
 
 void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
 {
     memcpy(self->estimate.p, estimator->p, sizeof self->estimate.p);
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
 }
 
 pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q31 *config,
@@ -67,7 +85,8 @@ const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self)
 
 /* ---- the alarm ---- */
 
-static void take_surplus(pvid_trust_q31 *self, int64_t surplus)
+/* Returns whether the windows alone raise it. */
+static bool take_surplus(pvid_trust_q31 *self, int64_t surplus)
 {
     const int64_t x = pvid_clamp_q31(surplus, SURPLUS_MAX);
     if (self->judged < self->long_memory) {
@@ -83,7 +102,27 @@ static void take_surplus(pvid_trust_q31 *self, int64_t surplus)
     const int64_t limit = (int64_t)self->config.misfit_max << (PVID_SURPLUS_BITS - 16);
     const bool lately = (self->judged >= PVID_TRUST_SHORT) && ((2 * sum) > (3 * (limit * (int64_t)PVID_TRUST_SHORT)));
     const bool at_length = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
-    self->misfit = (limit > 0) && (lately || at_length);
+    return lately || at_length;
+}
+
+static void restart_alarm(pvid_trust_q31 *self)
+{
+    self->judged = 0;
+    self->next = 0;
+    self->long_mean = 0;
+    memset(self->recent, 0, sizeof self->recent);
+}
+
+/* Whether the residuals of all rows are within what chance makes of the limit. */
+static bool all_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
+                      const pvid_estimate_q31 *candidate)
+{
+    const uint32_t n_p = estimator->model->n_p;
+    const uint32_t freedom = (candidate->weight > n_p) ? (candidate->weight - n_p) : 1u;
+    const int64_t root = (int64_t)pvid_square_root_q31(((uint64_t)1 << 33) / freedom); /* of 2 / freedom, Q16 */
+    const int64_t chance = pvid_clamp_q31(root, CHANCE_MAX);
+    const int64_t limit = (int64_t)self->config.misfit_max * (((int64_t)1 << 16) + (3 * chance)); /* Q32 */
+    return ((int64_t)candidate->misfit * ((int64_t)1 << 16)) <= limit;
 }
 
 /* ---- the gate ---- */
@@ -99,6 +138,66 @@ static int64_t widest(const pvid_estimator_q31 *estimator, const pvid_estimate_q
         }
     }
     return most;
+}
+
+/* ---- renewal ---- */
+
+int32_t pvid_trust_ageing_q31(pvid_trust_q31 *self)
+{
+    if ((self->ageing == 0u) || !self->known) {
+        return 0;
+    }
+    self->ageing--;
+    return AGEING;
+}
+
+/* Whether p is so far from where the rows came in. */
+static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
+{
+    bool moved = false;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_q31(estimator->model, a)) {
+            const int64_t way = (int64_t)pvid_magnitude_q31((int64_t)estimator->p[a] - self->anchor[a]);
+            moved = moved || ((way * ((int64_t)1 << 16)) > ((int64_t)self->anchor[a] * self->config.renewal));
+        }
+    }
+    return moved;
+}
+
+/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had come
+ * in there; and a p that noise may have moved so far has not arrived anywhere. */
+static void settle(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool agrees)
+{
+    if (!agrees && has_moved(self, estimator)) {
+        self->ageing = AGEING_GROUPS;
+        restart_alarm(self);
+        memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    }
+    if (agrees) {
+        memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    }
+}
+
+/* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
+static void raise_alarm(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool settled, int64_t surplus,
+                        const pvid_estimate_q31 *candidate)
+{
+    const bool agrees = all_agree(self, estimator, candidate);
+    const bool known = widest(estimator, candidate) <= NEAR;
+    const bool renewing = self->ageing > 0u;
+    self->known = known;
+    bool lately = false;
+    if (renewing) {
+        restart_alarm(self);
+    } else if (self->near) {
+        lately = take_surplus(self, surplus);
+    } else {
+        self->near = settled && known && (self->groups >= self->config.groups_min);
+    }
+    self->misfit = (self->config.misfit_max > 0u) && (!agrees || lately);
+    if (settled && known && !renewing && (self->config.renewal > 0u)) {
+        settle(self, estimator, agrees);
+    }
 }
 
 static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
@@ -128,9 +227,7 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
         return reason;
     }
     pvid_trust_count_shut(&self->shut, reason, pvid_trust_refuge_q31(self) != NULL);
-    if (self->published) {
-        take_surplus(self, surplus);
-    }
+    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), surplus, candidate);
     const pvid_reason judged = verdict(self, estimator, reason, size, informed, candidate);
     if (judged == PVID_UPDATED) {
         self->estimate = *candidate;

@@ -20,10 +20,6 @@ enum { LACK_Y = 0, LACK_C1 = 1, LACK_C2 = 2 };
 #define SETTLED_ERROR 0.05f
 #define LOST_ERROR 0.2f
 
-/* After the switch the uncorrected past is multiplied by this in so many windows: less than a hundredth is left. */
-#define AGEING 0.3f
-#define AGEING_GROUPS 4u
-
 void pvid_weak_angle_init_f32(pvid_weak_angle_f32 *self, const pvid_weak_config_f32 *config)
 {
     const pvid_weak_design_f32 *design = config->design;
@@ -284,20 +280,11 @@ bool pvid_weak_angle_settle_f32(pvid_weak_angle_f32 *self, const float p[], floa
         const float size = (step < 0.0f) ? -step : step;
         moved = (size <= moved) ? moved : size;
     }
-    if (self->on) {
+    const bool was_on = self->on;
+    if (was_on) {
         self->on = worst <= LOST_ERROR;
     } else {
         self->on = (groups >= SETTLED_GROUPS) && (moved < SETTLED_STEP) && (worst < SETTLED_ERROR);
-        self->ageing = self->on ? (uint8_t)AGEING_GROUPS : 0u;
     }
-    return self->ageing > 0u;
-}
-
-float pvid_weak_angle_ageing_f32(pvid_weak_angle_f32 *self)
-{
-    if (self->ageing == 0u) {
-        return 1.0f;
-    }
-    self->ageing--;
-    return AGEING;
+    return self->on && !was_on;
 }

@@ -44,10 +44,7 @@ uint32_t pvid_weak_angle_stages_f32(const pvid_weak_angle_f32 *self, const pvid_
 
 /* Switches the correction on once the estimate has settled, off when it is lost: p after the window's steps,
  * `worst` the largest relative standard error, `groups` windows taken in: from the first window on it would
- * diverge. Returns whether what was gathered without it is still to be aged. */
+ * diverge. Returns whether it was switched on: what was gathered without it is to be aged then. */
 bool pvid_weak_angle_settle_f32(pvid_weak_angle_f32 *self, const float p[], float worst, uint16_t groups);
-
-/* Factor on the sums of the past before the coming window's rows are added; 1 but in the windows after the switch. */
-float pvid_weak_angle_ageing_f32(pvid_weak_angle_f32 *self);
 
 #endif

@@ -6,6 +6,7 @@
 
 #include "cholesky_f32.h"
 #include "count.h"
+#include "estimator_f32.h"
 #include "finite_f32.h"
 #include "unroll.h"
 #include "weak_angle_f32.h"
@@ -150,15 +151,13 @@ static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *
 }
 
 /* Before the rows: what noise there is (where the window keeps the whitening of its design, the last known), and
- * the past fades if it was made without the correction. */
-static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator)
+ * the past fades while it is to be aged. */
+static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator, pvid_trust_f32 *trust)
 {
     if (self->whiten.whitened) {
         memcpy(estimator->noise, self->whiten.trace, sizeof estimator->noise);
     }
-    if (pvid_weak_angle_is_asked_f32(self->angle)) {
-        pvid_information_fade_f32(&estimator->information, pvid_weak_angle_ageing_f32(self->angle));
-    }
+    pvid_information_fade_f32(&estimator->information, pvid_trust_ageing_f32(trust));
 }
 
 /* A row to the estimator; its reason is told if it was refused. */
@@ -176,6 +175,7 @@ static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *est
 
 static void begin_solves(pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator, const pvid_trust_f32 *trust)
 {
+    pvid_estimator_expect_f32(estimator, self->expected);
     pvid_estimator_begin_f32(estimator, &self->solve, true);
     self->solve.refuge = pvid_trust_refuge_f32(trust);
 }
@@ -212,7 +212,7 @@ static bool assess_on(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *de
     if (pvid_weak_angle_is_asked_f32(self->angle) && stepped) {
         const float worst = pvid_trust_widest_f32(estimator, &self->candidate);
         if (pvid_weak_angle_settle_f32(self->angle, estimator->p, worst, trust->groups)) {
-            pvid_trust_restart_alarm_f32(trust); /* until p has left where the uncorrected rows had led it */
+            pvid_trust_age_f32(trust, estimator); /* the uncorrected rows, and where they have led p */
         }
     }
     return true;
@@ -305,7 +305,7 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         if (self->stage == STAGE_ADD) {
             const float freedom = (float)functions - 2.0f;
             if (pvid_gate_passes_f32(&self->gate, self->energy / (freedom * self->expected))) {
-                begin_rows(self, estimator);
+                begin_rows(self, estimator, trust);
             } else {
                 pvid_count_up(&estimator->counters.rejected_outlier);
                 *reason = PVID_REJECTED_OUTLIER;

@@ -29,6 +29,7 @@ enum {
     STAGE_REMOVE_B,
     STAGE_FIT,   /* likewise: what the rows leave unexplained, for the gate */
     STAGE_NOISE, /* are the rows to be taken in? and what noise there is in them */
+    STAGE_FADE,  /* in two parts: the past, while it is to be aged */
     STAGE_ADD,   /* K times: a row to the estimator */
     STAGE_SOLVE, /* `iterations` solves of several stages each */
     STAGE_ASSESS, /* several stages */
@@ -471,6 +472,7 @@ static void add_row(const pvid_weak_finish_q31 *self, const int32_t column[PVID_
 static void begin_solves(pvid_weak_finish_q31 *self, pvid_estimator_q31 *estimator, const pvid_trust_q31 *trust)
 {
     const int32_t *refuge = pvid_trust_refuge_q31(trust);
+    pvid_estimator_expect_q31(estimator, self->expected);
     pvid_estimator_begin_q31(estimator, &self->solve, true);
     self->energy = self->solve.energy;
     if (refuge != NULL) {
@@ -596,6 +598,15 @@ void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_desig
         }
         tell_noise(self, design, estimator);
         break;
+    case STAGE_FADE:
+        if (self->index == 0u) {
+            self->ageing = pvid_trust_ageing_q31(trust);
+        }
+        if (self->ageing > 0) {
+            pvid_information_fade_q31(&estimator->information, self->index, self->ageing);
+        }
+        all = PVID_INFORMATION_END_PARTS;
+        break;
     case STAGE_ADD:
         add_row(self, sums[self->index], estimator, reason);
         all = design->functions;
@@ -640,5 +651,6 @@ uint32_t pvid_weak_finish_stages_q31(uint8_t functions, uint8_t iterations, cons
     const uint32_t rows = once + (2u * (2u + along + removed));
     const uint32_t first = pvid_estimator_stages_q31(estimator, true);
     const uint32_t more = pvid_estimator_stages_q31(estimator, false);
-    return rows + first + ((iterations - 1u) * more) + pvid_estimator_assessment_stages_q31(estimator) + 2u;
+    return rows + first + ((iterations - 1u) * more) + pvid_estimator_assessment_stages_q31(estimator) +
+           PVID_INFORMATION_END_PARTS + 2u;
 }

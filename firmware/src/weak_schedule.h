@@ -14,8 +14,8 @@
 #include "pvid/status.h"
 #include "pvid/weak_job.h"
 
-/* Most stages of a complete window that a tick may take: more than one only where decimation is so low that every
- * tick has two windows to fill as well. */
+/* Most stages of a complete window that a tick may take. One is the rule; more only where a hop has fewer free ticks
+ * than a window has stages: short windows, low decimation, the correction's sweeps. The longest tick grows with them. */
 #define PVID_STAGES_TOGETHER 32u
 
 static inline bool pvid_is_odd_within(uint16_t n, uint16_t low, uint16_t high)
@@ -67,7 +67,7 @@ static inline uint32_t pvid_weak_free_ticks(uint32_t decimation, uint32_t functi
     return decimation - (2u * ((functions + (slice - 1u)) / slice));
 }
 
-/* Stages a tick that work a window off before the next one is complete; 0: none that is allowed. */
+/* Stages a tick that work a window off before the next one is complete; 0: more than are allowed. */
 static inline uint8_t pvid_weak_stages_together(uint32_t stages, uint16_t window, uint32_t decimation,
                                                 uint32_t functions)
 {

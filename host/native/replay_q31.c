@@ -38,7 +38,6 @@ const uint32_t pvid_native_layout_q31[] = {
     FIELD(pvid_weak_q31, estimator),
     FIELD(pvid_weak_q31, trust),
     FIELD(pvid_weak_q31, trust.published),
-    FIELD(pvid_weak_q31, trust.long_mean),
     FIELD(pvid_weak_q31, trust.estimate),
     (uint32_t)sizeof(pvid_differentiator_q31),
     (uint32_t)sizeof(pvid_strong_q31),

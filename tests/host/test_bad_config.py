@@ -174,6 +174,7 @@ WEAK = {
     "trust.kappa_min": Range(0.0, 0.999, Status.BAD_PUBLISH_KAPPA),
     "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
+    "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.shut_max": Range(0, 65535, Status.OK),
 }
@@ -211,6 +212,7 @@ WEAK_Q31 = {
     "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
     "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
+    "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.shut_max": Range(0, 65535, Status.OK),
 }

@@ -135,3 +135,13 @@ def test_the_pivots_acceleration_of_a_sine() -> None:
     inner = pivot_acceleration(run)[100:-100]
     assert np.abs(inner).max() == pytest.approx(0.01 * (4 * np.pi) ** 2, rel=0.01)
     assert len(pivot_acceleration(replace(run, t=t[:5], phi=t[:5], y=t[:5]))) == 0
+
+
+def test_windows_that_never_fill_name_what_was_rejected(native: Native) -> None:
+    """A sample that is no number twice a second: the run ends while the windows warm up, and that is not the reason."""
+    run = simulate(sensors=standard_sensors(14), duration=6.0, seed=1).run
+    phi = run.phi.copy()
+    phi[300::500] = np.nan
+    result = identify(replace(run, phi=phi), STANDARD, native, start=[30.0, 9.0, 5.5])
+    assert not result.identified
+    assert result.status == "rejected not finite"

@@ -158,6 +158,18 @@ def test_every_size_equals_the_twin(native: Native, standard_14_bits: Simulation
     assert (records[0].reason != Reason.WARMING_UP).any()
 
 
+def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
+    """200 Hz, no decimation, both corrections: several stages at every sample."""
+    pendulum = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
+    run = simulate(pendulum, sensors=standard_sensors(14), sample_rate=200.0, truth="full", duration=20.0, seed=1).run
+    tables = design(L1, 200.0, NOMINAL, Sizes(window_s=0.3, decimation=1, taps=15, functions=12)).f32
+    config = WeakConfig(200.0, L1, tables, with_friction(estimator(0)), full_angle=True, friction=True)
+    assert tables.window == 61
+    assert WeakTwin(config).together >= 8
+    record = assert_lanes_equal([native], config, [config.estimator], run.phi, run.y)[0]
+    assert (record.reason == Reason.HELD_UNCERTAIN).any()  # windows are worked off, short as they are
+
+
 def hostile(simulation: Simulation) -> tuple[Samples, Samples]:
     """NaN before, inside and right after windows, infinity, overflowing steps, a dead encoder, a still pivot."""
     rng = np.random.default_rng(7)

@@ -16,7 +16,7 @@ from pvid.native import Native, Reason
 from pvid.native_q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31, WeakIdentifierQ31
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
-from pvid.setup_q31 import p_of, weak_config_q31
+from pvid.setup_q31 import counts_of, p_of, weak_config_q31
 from pvid.twin.weak_q31 import TwinRecordQ31, WeakTwinQ31
 
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
@@ -91,6 +91,17 @@ def test_forgetting_equals_the_twin(native: Native, counts: tuple[Counts, Counts
     lanes = [configuration(seed, forgetting_s=forgetting_s).estimator for seed in range(3)]
     assert lanes[0].forgetting_groups > 0
     assert_lanes_equal([native], configuration(), lanes, *counts)
+
+
+def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
+    """200 Hz without decimation: several stages at every sample."""
+    run = simulate(sensors=standard_sensors(14), sample_rate=200.0, truth="linear", duration=20.0, seed=1).run
+    settings = replace(RIG.identifier, window_s=0.3, decimation=1, smoothing_s=0.075)
+    config = weak_config_q31(replace(RIG, identifier=settings), 200.0, standard_start(0))
+    assert config.design.window == 61
+    assert WeakTwinQ31(config).together >= 5
+    twin = assert_lanes_equal([native], config, [config.estimator], *counts_of(RIG, run))
+    assert twin.estimator.counters["updates"][0] > 0
 
 
 def test_a_zeroed_encoder_equals_the_twin(native: Native, counts: tuple[Counts, Counts]) -> None:

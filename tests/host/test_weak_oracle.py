@@ -10,7 +10,7 @@ import pytest
 from pvid import oracle
 from pvid import weak_oracle as weak
 from pvid.errors import PvidError
-from pvid.native import EstimatorConfig, Native, Reason, WeakConfig
+from pvid.native import EstimatorConfig, Native, Reason, TrustConfig, WeakConfig
 from pvid.rig import (
     STANDARD_DRIVE,
     STANDARD_PENDULUM,
@@ -259,7 +259,7 @@ def test_the_core_gives_the_oracles_answer(native: Native, standard: WeakDesign,
         row_sd=given.row_sd,
         kappa_min=given.kappa_min,
     )
-    identifier = native.weak(WeakConfig(1000.0, 0.3, standard.f32, config, zero))
+    identifier = native.weak(WeakConfig(1000.0, 0.3, standard.f32, config, zero, trust=TrustConfig(renewal=0.0)))
     record = identifier.run(run.phi, run.y, sums=False, hashes=False)
     answer = identifier.assess()
     result = weak.identify_weak(run.phi, run.y, standard, given)

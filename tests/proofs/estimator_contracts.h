@@ -17,6 +17,19 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
     ensures \result == PVID_ACCUMULATED || \result == PVID_REJECTED_SATURATED; */
 pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y);
 
+/*@ requires \valid(self) && 0 <= variance.m <= 0x40000000 && -10000 <= variance.e <= 10000;
+    assigns \nothing; */
+void pvid_estimator_expect_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
+
+/*@ requires \valid(self) && part < PVID_INFORMATION_END_PARTS && factor >= 1;
+    assigns \nothing; */
+void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t factor);
+
+/*@ requires \valid(self);
+    assigns \result \from \nothing;
+    ensures 0 <= \result; */
+int32_t pvid_trust_ageing_q31(pvid_trust_q31 *self);
+
 /*@ requires \valid(self) && \valid(solve);
     assigns solve->energy \from \nothing;
     ensures 0 <= solve->energy <= 0x4000000000000000; */

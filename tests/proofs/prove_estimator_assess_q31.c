@@ -22,12 +22,23 @@ static void any_assessment(const pvid_model_q31 *model)
     /*@ assert 0 <= estimate.kappa <= 0x40000000; */
     /*@ assert 0 <= estimate.least_pivot <= 0x40000000; */
     /*@ assert 0 <= estimate.residual_sd; */
+    /*@ assert 0 <= estimate.misfit; */
     (void)pvid_estimator_assessment_stages_q31(&estimator);
     (void)pvid_estimator_stages_q31(&estimator, true);
 }
 
+/* What the sensors explain of a group of rows. */
+static void any_group(const pvid_model_q31 *model)
+{
+    pvid_estimator_q31 estimator;
+    const pvid_scaled_q31 variance = {any_i32(0, PVID_ONE_Q30), any_i32(-2000, 2000)};
+    any_state(model, &estimator);
+    pvid_estimator_expect_q31(&estimator, variance);
+}
+
 void main(void)
 {
+    any_group(&pvid_kapitza_weak_q31);
     any_assessment(&pvid_kapitza_strong_q31);
     any_assessment(&pvid_kapitza_weak_q31);
     any_assessment(&pvid_kapitza_weak_zeroed_q31);

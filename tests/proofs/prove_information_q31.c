@@ -32,6 +32,10 @@ static void any_group(void)
     for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
         pvid_information_end_group_q31(&sums, part, fresh);
     }
+    const int32_t factor = any_i32(1, INT32_MAX);
+    for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
+        pvid_information_fade_q31(&sums, part, factor);
+    }
     for (size_t i = 0; i < sums.n_sums; i++) {
         /*@ assert -0x4000000000000000 <= sums.sums[i] <= 0x4000000000000000; */
     }

@@ -36,6 +36,7 @@ static void any_estimate(const pvid_model_q31 *model, pvid_estimate_q31 *estimat
     estimate->least_pivot = any_i32(INT32_MIN, INT32_MAX);
     estimate->residual_sd = any_i32(0, INT32_MAX);
     estimate->weight = any_u32(0, UINT32_MAX);
+    estimate->misfit = any_i32(0, INT32_MAX);
 }
 
 /* A verdict after none, or some, that had a residual. */
@@ -55,12 +56,20 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     trust.shut = (uint16_t)any_u32(0, UINT16_MAX);
     trust.judged = (uint16_t)any_u32(least, most);
     trust.next = (uint8_t)any_u32(0, PVID_TRUST_SHORT - 1);
+    trust.ageing = (uint8_t)any_u32(0, UINT8_MAX);
+    trust.known = any_bool();
+    trust.near = any_bool();
     trust.published = any_bool();
     trust.misfit = any_bool();
     trust.long_mean = any_i64(-SURPLUS_MAX, SURPLUS_MAX);
     for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
         trust.recent[i] = any_i64(-SURPLUS_MAX, SURPLUS_MAX);
     }
+    for (size_t a = 0; a < PVID_MAX_P; a++) {
+        trust.anchor[a] = any_i32(-INT32_MAX, INT32_MAX);
+    }
+    const int32_t fading = pvid_trust_ageing_q31(&trust);
+    /*@ assert 0 <= fading; */
     any_estimate(model, &candidate);
     (void)pvid_trust_judge_q31(&trust, &estimator, (pvid_reason)any_i32(PVID_UPDATED, PVID_HELD_FROZEN),
                                any_i64(0, (int64_t)1 << 62), any_bool(), any_i64(-INT64_MAX, INT64_MAX), &candidate);

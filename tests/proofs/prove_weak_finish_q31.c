@@ -61,6 +61,7 @@ static void any_state(void)
     finish.energy = any_i64(0, PVID_WIDE);
     finish.size = any_i64(0, PVID_WIDE);
     finish.expected = any_scaled(1);
+    finish.ageing = any_i32(0, INT32_MAX);
     finish.gate.limit = any_scaled(0);
 }
 
@@ -142,6 +143,7 @@ static void any_window(const pvid_weak_design_q31 *design)
     }
     any_state();
     any_stage(design, STAGE_NOISE, 1);
+    any_stage(design, STAGE_FADE, PVID_INFORMATION_END_PARTS);
     any_stage(design, STAGE_ADD, functions);
     for (uint8_t stage = STAGE_SOLVE; stage <= STAGE_IDLE; stage++) {
         any_state();

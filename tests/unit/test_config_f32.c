@@ -422,6 +422,7 @@ static const bound weak_fields[] = {
     FIELD(pvid_weak_config_f32, , trust.misfit_max, KIND_FLOAT, 1.0, 1.0e6f, PVID_BAD_MISFIT_MAX),
     FIELD(pvid_weak_config_f32, , trust.groups_min, KIND_UINT16, 0.0, 65535.0, PVID_OK),
     FIELD(pvid_weak_config_f32, , trust.shut_max, KIND_UINT16, 0.0, 65535.0, PVID_OK),
+    FIELD(pvid_weak_config_f32, , trust.renewal, KIND_FLOAT, 0.01f, 1.0e3f, PVID_BAD_RENEWAL),
     OF_GATE(pvid_weak_config_f32),
     OF_ESTIMATOR(pvid_weak_config_f32, estimator.),
     FIELD(pvid_weak_config_f32, , estimator.start_sd[3], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),

@@ -329,6 +329,7 @@ static const bound weak_fields[] = {
     FIELD(pvid_weak_config_q31, , trust.misfit_max, KIND_UINT32, 65536.0, 4294967295.0, PVID_BAD_MISFIT_MAX),
     FIELD(pvid_weak_config_q31, , trust.groups_min, KIND_UINT16, 0.0, 65535.0, PVID_OK),
     FIELD(pvid_weak_config_q31, , trust.shut_max, KIND_UINT16, 0.0, 65535.0, PVID_OK),
+    FIELD(pvid_weak_config_q31, , trust.renewal, KIND_UINT32, 655.0, 65536000.0, PVID_BAD_RENEWAL),
     FIELD(pvid_weak_config_q31, , gate.sigmas, KIND_UINT32, 131072.0, 65536000.0, PVID_BAD_GATE_SIGMAS),
     FIELD(pvid_weak_config_q31, , gate.patience_groups, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_GATE_PATIENCE),
     OF_ESTIMATOR(pvid_weak_config_q31, estimator.),
@@ -463,17 +464,20 @@ static void a_table_that_would_overflow_is_refused(void **state)
     taps[1][half] = 0;
 }
 
-/* A window of nine samples has 4 x 16 free ticks at D = 24; what does not fit into four stages each is refused. */
+/* A window of nine samples has 4 free ticks at D = 1; what does not fit into 32 stages each is refused. */
 static void a_window_that_cannot_be_worked_off_is_refused(void **state)
 {
     (void)state;
     weak_settings.iterations = PVID_MAX_ITERATIONS;
     assert_int_equal(init_weak(), PVID_OK);
     design.window = 9;
+    assert_int_equal(init_weak(), PVID_OK);
+    assert_in_range(weak.together, 2, 8);
+    design.decimation = 1;
     assert_int_equal(init_weak(), PVID_BAD_ITERATIONS);
     weak_settings.iterations = 1;
     assert_int_equal(init_weak(), PVID_OK);
-    assert_in_range(weak.together, 2, 4);
+    assert_in_range(weak.together, 9, 32);
     weak_settings.iterations = 5;
     weak_settings.estimator.gain = (1 << 30) - 1; /* the law of g < 1 is a rate: one step a window */
     assert_int_equal(init_weak(), PVID_OK);

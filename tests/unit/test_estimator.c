@@ -1,4 +1,5 @@
 /* The estimator: what it refuses, what it counts, what it never does, and a model of the user's own. */
+#include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
@@ -7,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "estimator_f32.h"
 #include "pvid/pvid.h"
 
 #define INFINITE (3.4e38f * 10.0f)
@@ -129,6 +131,82 @@ static void standard_errors_of_own_model_match_the_noise(void **state)
     assert_float_equal(estimate.se[1], 0.028868f * 0.024495f, 0.00004f); /* 6 %: M itself is random */
     assert_float_equal(estimate.se[0], 0.028868f * 0.024495f / 4.1231f, 0.00001f);
     assert_float_equal(estimate.p[1], own_truth[1], 4.0f * estimate.se[1]);
+}
+
+/* Rows that fit to the last digit: what is published is no surer than the sensors allow. */
+static void no_standard_error_is_smaller_than_the_sensors_allow(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    pvid_estimate_f32 estimate;
+    feed(&estimator, 2000);
+    pvid_estimator_assess_f32(&estimator, &estimate);
+    assert_true(estimate.residual_sd < 1.0e-3f); /* nobody has said what the sensors explain */
+    assert_true(estimate.misfit <= 0.0f);
+    for (int i = 0; i < 1000; i++) { /* half as many rows again, with half the variance */
+        float n[3];
+        const float y = own_sample(n);
+        (void)pvid_estimator_add_f32(&estimator, n, y);
+        pvid_estimator_expect_f32(&estimator, (i < 500) ? 4.0e-4f : 2.0e-4f);
+        (void)pvid_estimator_update_f32(&estimator);
+    }
+    /* the first 2000 rows count with what was said of them: nothing, that is 0 */
+    const float explained = ((500.0f * 4.0e-4f) + (500.0f * 2.0e-4f)) / 3000.0f;
+    assert_float_equal(estimator.expected, explained, 0.001f * explained);
+    pvid_estimator_assess_f32(&estimator, &estimate);
+    assert_float_equal(estimate.residual_sd * estimate.residual_sd, explained, 0.001f * explained);
+    assert_float_equal(estimate.se[1], sqrtf(explained * (3.0f / 3000.0f)), 0.06f * sqrtf(explained * 0.001f));
+    assert_true((estimate.misfit >= 0.0f) && (estimate.misfit < 0.01f));
+}
+
+static void the_misfit_is_the_residual_variance_over_what_is_explained(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    pvid_estimator_f32 estimator = started(&config);
+    pvid_estimate_f32 estimate;
+    for (int i = 0; i < 5000; i++) {
+        float n[3];
+        const float y = own_sample(n);
+        (void)pvid_estimator_add_f32(&estimator, n, y + (0.05f * noise()));
+        pvid_estimator_expect_f32(&estimator, 0.0025f / 6.0f); /* half of the noise */
+        (void)pvid_estimator_update_f32(&estimator);
+    }
+    pvid_estimator_assess_f32(&estimator, &estimate);
+    assert_float_equal(estimate.misfit, 2.0f, 0.16f); /* 8 %: four times sqrt(2 / rows) */
+    assert_float_equal(estimate.residual_sd, 0.028868f, 0.0012f);
+    /* what is no number, or as large as can be, does not spoil what is published */
+    pvid_estimator_expect_f32(&estimator, NOT_A_NUMBER);
+    assert_float_equal(estimator.expected, 0.0025f / 6.0f, 1.0e-6f); /* no row was taken in since */
+    (void)pvid_estimator_add_f32(&estimator, (const float[3]){1.0f, 0.0f, 0.0f}, own_truth[0]);
+    pvid_estimator_expect_f32(&estimator, INFINITE);
+    pvid_estimator_assess_f32(&estimator, &estimate);
+    assert_true((estimate.residual_sd > 0.0f) && (estimate.residual_sd < INFINITE));
+    assert_true(estimate.misfit >= 0.0f);
+}
+
+/* A long way with large sums costs the residual its digits: what may be lost is counted, and fades as the sums do. */
+static void what_a_long_way_rounds_off_widens_the_errors(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = own_config();
+    config.divider = 1000;
+    config.step_limit = 0.9f;
+    pvid_estimator_f32 estimator = started(&config);
+    pvid_estimate_f32 estimate;
+    feed(&estimator, 999);
+    assert_true(estimator.information.rounding <= 0.0f);
+    feed(&estimator, 1); /* M of 333 a column; theta goes from (1.2, 1.44, 0.3) to (2, 4, -0.5), nearly */
+    const float lost = estimator.information.rounding;
+    const float way = 333.0f * (0.64f + (2.56f * 2.56f) + 0.64f);
+    assert_true((lost > 0.5f * 2.4e-7f * way) && (lost < 2.0f * 2.4e-7f * way));
+    (void)pvid_estimator_iterate_f32(&estimator);
+    (void)pvid_estimator_iterate_f32(&estimator);
+    pvid_estimator_assess_f32(&estimator, &estimate);
+    assert_true(estimate.residual_sd * estimate.residual_sd > 0.2f * (lost / 1000.0f)); /* rr itself may be below 0 */
+    pvid_information_fade_f32(&estimator.information, 0.5f);
+    assert_float_equal(estimator.information.rounding, 0.5f * lost, 0.1f * lost);
 }
 
 static void b_follows_the_estimate(void **state)
@@ -398,6 +476,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(own_model_is_identified),
         cmocka_unit_test(standard_errors_of_own_model_match_the_noise),
+        cmocka_unit_test(no_standard_error_is_smaller_than_the_sensors_allow),
+        cmocka_unit_test(the_misfit_is_the_residual_variance_over_what_is_explained),
+        cmocka_unit_test(what_a_long_way_rounds_off_widens_the_errors),
         cmocka_unit_test(b_follows_the_estimate),
         cmocka_unit_test(every_bad_field_has_its_own_status),
         cmocka_unit_test(every_bad_model_is_refused),

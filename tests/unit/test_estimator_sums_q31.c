@@ -15,6 +15,7 @@
 #include "estimator_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
+#include "scaled_q31.h"
 #include "strong_table_q31.h"
 
 /* ---- y = N^T p with as many entries as there may be parameters ---- */
@@ -222,6 +223,59 @@ static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
     assert_true(ldexp((double)not_found.m, not_found.e) == 4096.0);
 }
 
+/* Of rows with noise of +-100, uniform, twice, exactly and half as much as the sensors explain, in sums of any unit. */
+static void the_residuals_are_weighed_against_what_the_sensors_explain(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 estimator;
+    pvid_estimate_q31 estimate;
+    const double noise = 100.0 * 101.0 / 3.0;
+    for (int k = 0; k < 6; k++) {
+        start_again(NULL);
+        const int32_t up = (k < 3) ? 0 : 10;
+        config.row_sd <<= up;
+        assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+        const double misfit = ldexp(1.0, 1 - (k % 3));
+        const pvid_scaled_q31 told = pvid_scaled_of_q31((int64_t)floor(ldexp(noise / misfit, (2 * up) + 8)), -8);
+        for (int i = 0; i < 2000; i++) {
+            add_row(&estimator, up);
+            pvid_estimator_expect_q31(&estimator, told);
+            (void)pvid_estimator_update_q31(&estimator);
+        }
+        assert_true((up == 0) || (estimator.information.exponent > 0u));
+        pvid_estimator_assess_q31(&estimator, &estimate);
+        assert_true(fabs((estimate.misfit / 65536.0 / misfit) - 1.0) < 0.13); /* four times sqrt(2 / rows) */
+        const double sd = ldexp((double)estimate.residual_sd / 256.0, -up);
+        const double least = sqrt(noise / misfit);
+        assert_true((sd > 0.999 * least) && (sd < 1.07 * ((misfit > 1.0) ? sqrt(noise) : least)));
+    }
+    const pvid_scaled_q31 before = estimator.expected;
+    pvid_estimator_expect_q31(&estimator, pvid_scaled_of_q31(1, 60)); /* no row was taken in since */
+    assert_memory_equal(&before, &estimator.expected, sizeof before);
+}
+
+/* What is expected of all rows is a mean over them that fades as they do. */
+static void what_is_explained_is_a_mean_over_the_rows_that_are_left(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 estimator;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    for (int i = 0; i < 100; i++) {
+        add_row(&estimator, 0);
+    }
+    pvid_estimator_expect_q31(&estimator, pvid_scaled_of_q31(4000, 0));
+    (void)pvid_estimator_update_q31(&estimator);
+    for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
+        pvid_information_fade_q31(&estimator.information, part, 1 << 30); /* a half */
+    }
+    assert_int_equal(estimator.information.sums[estimator.information.n_sums - 1u], (int64_t)50 << 16);
+    for (int i = 0; i < 150; i++) {
+        add_row(&estimator, 0);
+    }
+    pvid_estimator_expect_q31(&estimator, pvid_scaled_of_q31(2000, 0));
+    assert_true(fabs(ldexp((double)estimator.expected.m, estimator.expected.e) - 2500.0) < 1.0e-3);
+}
+
 /* ---- limits ---- */
 
 static void a_row_at_its_limit_fits(void **state)
@@ -376,6 +430,8 @@ int main(void)
         cmocka_unit_test(rows_of_any_size_say_the_same),
         cmocka_unit_test_setup(the_start_weighs_the_same_beside_sums_of_any_size, start_again),
         cmocka_unit_test_setup(the_expected_noise_is_in_the_unit_of_the_sums, start_again),
+        cmocka_unit_test_setup(the_residuals_are_weighed_against_what_the_sensors_explain, start_again),
+        cmocka_unit_test_setup(what_is_explained_is_a_mean_over_the_rows_that_are_left, start_again),
         cmocka_unit_test_setup(a_row_at_its_limit_fits, start_again),
         cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),
         cmocka_unit_test_setup(steps_are_limited_and_bounded, start_again),

@@ -25,7 +25,7 @@ static int start_again(void **state)
         config.upper[i] = 100.0f;
     }
     config.row_sd = 1.0f;
-    config.update_rate_hz = 1.6f;
+    config.update_rate_hz = 4.2f;
     assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_OK);
     assert_int_equal(pvid_trust_init_f32(&trust, &pvid_trust_defaults_f32, &estimator), PVID_OK);
     return 0;
@@ -121,12 +121,12 @@ static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
-        (void)judge_good(1000.0f); /* before the first publication p is on its way: not counted */
+        (void)judge_good(1000.0f); /* p is on its way: not counted */
     }
     for (int i = 0; i < 7; i++) {
-        assert_int_equal(judge_good(2.4f), PVID_UPDATED);
+        assert_int_equal(judge_good(6.4f), PVID_UPDATED);
     }
-    assert_int_equal(judge_good(2.4f), PVID_MISFIT); /* eight groups, 2.4 > 2.25 */
+    assert_int_equal(judge_good(6.4f), PVID_MISFIT); /* eight groups, 6.4 > 6 */
     assert_true(trust.published);
     assert_int_equal(estimator.counters.misfits, 1);
     int groups = 0;
@@ -141,9 +141,9 @@ static void a_small_surplus_takes_sixteen_groups(void **state)
 {
     (void)state;
     for (int i = 0; i < 3 + 15; i++) {
-        assert_true(judge_good(1.6f) != PVID_MISFIT);
+        assert_true(judge_good(4.2f) != PVID_MISFIT);
     }
-    assert_int_equal(judge_good(1.6f), PVID_MISFIT);
+    assert_int_equal(judge_good(4.2f), PVID_MISFIT);
 }
 
 static void what_is_expected_raises_no_alarm(void **state)
@@ -173,6 +173,122 @@ static void the_alarm_can_be_switched_off(void **state)
     }
 }
 
+/* A fit whose residuals have so many times the variance that is expected, on so many rows. */
+static pvid_reason judge_fit(float misfit, int rows)
+{
+    pvid_estimate_f32 estimate = candidate(0.01f, 1.0e-2f);
+    estimate.misfit = misfit;
+    estimate.weight = (float)rows;
+    return judge(PVID_UPDATED, 1.0e-5f, true, 1.0f, estimate);
+}
+
+static void rows_that_do_not_fit_raise_the_alarm_with_the_first_publication(void **state)
+{
+    (void)state;
+    (void)judge_fit(20.0f, 20);
+    (void)judge_fit(20.0f, 30);
+    assert_int_equal(judge_fit(20.0f, 40), PVID_MISFIT);
+    assert_int_equal(judge_fit(3.9f, 50), PVID_UPDATED); /* and end it */
+    /* by chance the variance of few rows is large: 4 (1 + 3 sqrt(2 / 18)) is 8, of 196 degrees of freedom 5.21 */
+    assert_int_equal(judge_fit(7.9f, 22), PVID_UPDATED);
+    assert_int_equal(judge_fit(8.1f, 22), PVID_MISFIT);
+    assert_int_equal(judge_fit(5.2f, 200), PVID_UPDATED);
+    assert_int_equal(judge_fit(5.3f, 200), PVID_MISFIT);
+}
+
+/* Groups before which the past fades, and what is left of it. */
+static int groups_of_ageing(float *left)
+{
+    int groups = 0;
+    *left = 1.0f;
+    for (float fade = pvid_trust_ageing_f32(&trust); fade < 1.0f; fade = pvid_trust_ageing_f32(&trust)) {
+        *left *= fade;
+        groups++;
+    }
+    return groups;
+}
+
+static void judge_moved(float by, float misfit)
+{
+    estimator.p[0] = 10.0f * by;
+    (void)judge_fit(misfit, 40);
+}
+
+static void rows_of_a_poor_start_fade(void **state)
+{
+    (void)state;
+    float left;
+    judge_moved(1.15f, 20.0f); /* not far from the start */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    judge_moved(1.25f, 1.0f); /* the rows agree with where p is: from here on that counts */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    judge_moved(1.45f, 20.0f);
+    assert_int_equal(groups_of_ageing(&left), 0);
+    judge_moved(1.55f, 20.0f); /* 24 % beyond 1.25 */
+    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_true(left < 0.01f);
+    judge_moved(1.2f, 20.0f); /* and 23 % below where that was */
+    assert_int_equal(groups_of_ageing(&left), 4);
+}
+
+static void nothing_fades_before_p_has_settled_or_while_little_is_known(void **state)
+{
+    (void)state;
+    float left;
+    pvid_estimate_f32 estimate = candidate(0.01f, 1.0e-2f);
+    estimate.misfit = 20.0f;
+    estimate.weight = 40.0f;
+    estimator.p[0] = 15.0f;
+    (void)judge(PVID_UPDATED, 0.021f, true, 1.0f, estimate); /* on its way */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    (void)judge(PVID_HELD_PIVOT, 0.0f, true, 1.0f, estimate);
+    assert_int_equal(groups_of_ageing(&left), 0);
+    pvid_estimate_f32 vague = candidate(0.2f, 1.0e-2f);
+    vague.misfit = estimate.misfit;
+    vague.weight = estimate.weight;
+    (void)judge(PVID_UPDATED, 1.0e-5f, true, 1.0f, vague);
+    assert_int_equal(groups_of_ageing(&left), 0);
+    (void)judge(PVID_UPDATED, 0.019f, true, 1.0f, estimate);
+    (void)judge(PVID_UPDATED, 1.0e-5f, true, 1.0f, vague); /* what is left says too little to let it fade further */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    (void)judge(PVID_UPDATED, 1.0e-5f, true, 1.0f, estimate);
+    assert_int_equal(groups_of_ageing(&left), 4);
+    trust.config.renewal = 0.0f;
+    judge_moved(5.0f, 20.0f);
+    assert_int_equal(groups_of_ageing(&left), 0);
+}
+
+/* What the windows told while the past faded is of an estimate that has gone. */
+static void the_alarms_means_begin_anew_with_a_renewal(void **state)
+{
+    (void)state;
+    float left;
+    for (int i = 0; i < 3 + 20; i++) {
+        (void)judge_good(100.0f);
+    }
+    assert_true(trust.misfit);
+    judge_moved(1.5f, 20.0f);
+    assert_int_equal(trust.judged, 0);
+    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(judge_good(1.0f), PVID_UPDATED);
+    assert_false(trust.misfit);
+}
+
+/* Where rounding may be all that is left of the residuals the sums are renewed, wherever p came from. */
+static void sums_without_digits_fade(void **state)
+{
+    (void)state;
+    float left;
+    float *yy = &estimator.information.low[estimator.information.n_moments + estimator.information.n_theta];
+    *yy = 1.0e-6f;
+    estimator.information.rounding = 0.9e-6f;
+    judge_moved(1.0f, 1.0f);
+    assert_int_equal(groups_of_ageing(&left), 0);
+    estimator.information.rounding = 1.1e-6f;
+    judge_moved(1.0f, 1.0f);
+    assert_int_equal(groups_of_ageing(&left), 4);
+}
+
 #define REFUSED(field, value, status)                                                                                  \
     do {                                                                                                               \
         pvid_trust_config_f32 config = pvid_trust_defaults_f32;                                                        \
@@ -193,6 +309,10 @@ static void init_names_what_it_refuses(void **state)
     REFUSED(se_max, 0.0f, PVID_BAD_SE_MAX);
     REFUSED(misfit_max, 0.5f, PVID_BAD_MISFIT_MAX);
     REFUSED(misfit_max, 0.0f, PVID_OK);
+    REFUSED(renewal, 0.0f, PVID_OK);
+    REFUSED(renewal, 0.009f, PVID_BAD_RENEWAL);
+    REFUSED(renewal, NAN, PVID_BAD_RENEWAL);
+    REFUSED(renewal, 1.1e3f, PVID_BAD_RENEWAL);
 }
 
 int main(void)
@@ -206,6 +326,11 @@ int main(void)
         cmocka_unit_test_setup(a_small_surplus_takes_sixteen_groups, start_again),
         cmocka_unit_test_setup(what_is_expected_raises_no_alarm, start_again),
         cmocka_unit_test_setup(a_surplus_that_is_no_number_counts_as_large, start_again),
+        cmocka_unit_test_setup(rows_that_do_not_fit_raise_the_alarm_with_the_first_publication, start_again),
+        cmocka_unit_test_setup(rows_of_a_poor_start_fade, start_again),
+        cmocka_unit_test_setup(nothing_fades_before_p_has_settled_or_while_little_is_known, start_again),
+        cmocka_unit_test_setup(the_alarms_means_begin_anew_with_a_renewal, start_again),
+        cmocka_unit_test_setup(sums_without_digits_fade, start_again),
         cmocka_unit_test_setup(the_alarm_can_be_switched_off, start_again),
         cmocka_unit_test_setup(init_names_what_it_refuses, start_again),
     };

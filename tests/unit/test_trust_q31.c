@@ -15,8 +15,8 @@
 static pvid_estimator_q31 estimator;
 static pvid_trust_q31 trust;
 
-/* The defaults of trust.h: 3e-5, 5 %, 1.5. */
-static const pvid_trust_config_q31 defaults = {32212, 838861, 98304, 3, 16};
+/* The defaults of trust.h: 3e-5, 5 %, 4, 3, 16, 20 %. */
+static const pvid_trust_config_q31 defaults = {32212, 838861, 262144, 3, 16, 13107};
 
 static int64_t q24(double x)
 {
@@ -143,12 +143,12 @@ static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
-        (void)judge_good(1000.0); /* before the first publication p is on its way: not counted */
+        (void)judge_good(1000.0); /* p is on its way: not counted */
     }
     for (int i = 0; i < 7; i++) {
-        assert_int_equal(judge_good(2.4), PVID_UPDATED);
+        assert_int_equal(judge_good(6.4), PVID_UPDATED);
     }
-    assert_int_equal(judge_good(2.4), PVID_MISFIT); /* eight groups, 2.4 > 2.25 */
+    assert_int_equal(judge_good(6.4), PVID_MISFIT); /* eight groups, 6.4 > 6 */
     assert_true(trust.published);
     assert_int_equal(estimator.counters.misfits, 1);
     int groups = 0;
@@ -163,9 +163,110 @@ static void a_small_surplus_takes_sixteen_groups(void **state)
 {
     (void)state;
     for (int i = 0; i < 3 + 15; i++) {
-        assert_true(judge_good(1.6) != PVID_MISFIT);
+        assert_true(judge_good(4.2) != PVID_MISFIT);
     }
-    assert_int_equal(judge_good(1.6), PVID_MISFIT);
+    assert_int_equal(judge_good(4.2), PVID_MISFIT);
+}
+
+/* A fit whose residuals have so many times the variance that is expected, on so many rows. */
+static pvid_reason judge_fit(double misfit, int rows)
+{
+    pvid_estimate_q31 estimate = candidate(PER_CENT(1), 1.0e-2);
+    estimate.misfit = (int32_t)(misfit * 65536.0);
+    estimate.weight = (uint32_t)rows;
+    return judge(PVID_UPDATED, 1.0e-5, true, 1.0, estimate);
+}
+
+static void rows_that_do_not_fit_raise_the_alarm_with_the_first_publication(void **state)
+{
+    (void)state;
+    (void)judge_fit(20.0, 20);
+    (void)judge_fit(20.0, 30);
+    assert_int_equal(judge_fit(20.0, 40), PVID_MISFIT);
+    assert_int_equal(judge_fit(3.9, 50), PVID_UPDATED); /* and end it */
+    /* by chance the variance of few rows is large: 4 (1 + 3 sqrt(2 / 18)) is 8, of 196 degrees of freedom 5.21 */
+    assert_int_equal(judge_fit(7.9, 22), PVID_UPDATED);
+    assert_int_equal(judge_fit(8.1, 22), PVID_MISFIT);
+    assert_int_equal(judge_fit(5.2, 200), PVID_UPDATED);
+    assert_int_equal(judge_fit(5.3, 200), PVID_MISFIT);
+}
+
+/* Groups before which the past fades, and what is left of it. */
+static int groups_of_ageing(double *left)
+{
+    int groups = 0;
+    *left = 1.0;
+    for (double fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0; fade > 0.0; fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0) {
+        *left *= fade;
+        groups++;
+    }
+    return groups;
+}
+
+static void judge_moved(double by, double misfit)
+{
+    estimator.p[0] = (int32_t)((10 << 20) * by);
+    (void)judge_fit(misfit, 40);
+}
+
+static void rows_of_a_poor_start_fade(void **state)
+{
+    (void)state;
+    double left;
+    judge_moved(1.15, 20.0); /* not far from the start */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    judge_moved(1.25, 1.0); /* the rows agree with where p is: from here on that counts */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    judge_moved(1.45, 20.0);
+    assert_int_equal(groups_of_ageing(&left), 0);
+    judge_moved(1.55, 20.0); /* 24 % beyond 1.25 */
+    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_true(left < 0.01);
+    judge_moved(1.2, 20.0); /* and 23 % below where that was */
+    assert_int_equal(groups_of_ageing(&left), 4);
+}
+
+static void nothing_fades_before_p_has_settled_or_while_little_is_known(void **state)
+{
+    (void)state;
+    double left;
+    pvid_estimate_q31 estimate = candidate(PER_CENT(1), 1.0e-2);
+    estimate.misfit = (int32_t)(20.0 * 65536.0);
+    estimate.weight = 40;
+    estimator.p[0] = 15 << 20;
+    (void)judge(PVID_UPDATED, 0.021, true, 1.0, estimate); /* on its way */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, estimate);
+    assert_int_equal(groups_of_ageing(&left), 0);
+    pvid_estimate_q31 vague = candidate(PER_CENT(20), 1.0e-2);
+    vague.misfit = estimate.misfit;
+    vague.weight = estimate.weight;
+    (void)judge(PVID_UPDATED, 1.0e-5, true, 1.0, vague);
+    assert_int_equal(groups_of_ageing(&left), 0);
+    (void)judge(PVID_UPDATED, 0.019, true, 1.0, estimate);
+    (void)judge(PVID_UPDATED, 1.0e-5, true, 1.0, vague); /* what is left says too little to let it fade further */
+    assert_int_equal(groups_of_ageing(&left), 0);
+    (void)judge(PVID_UPDATED, 1.0e-5, true, 1.0, estimate);
+    assert_int_equal(groups_of_ageing(&left), 4);
+    trust.config.renewal = 0;
+    judge_moved(5.0, 20.0);
+    assert_int_equal(groups_of_ageing(&left), 0);
+}
+
+/* What the windows told while the past faded is of an estimate that has gone. */
+static void the_alarms_means_begin_anew_with_a_renewal(void **state)
+{
+    (void)state;
+    double left;
+    for (int i = 0; i < 3 + 20; i++) {
+        (void)judge_good(100.0);
+    }
+    assert_true(trust.misfit);
+    judge_moved(1.5, 20.0);
+    assert_int_equal(trust.judged, 0);
+    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(judge_good(1.0), PVID_UPDATED);
+    assert_false(trust.misfit);
 }
 
 /* One group that the model cannot explain at all must not outweigh thousands. */
@@ -195,6 +296,13 @@ static void a_bad_setting_is_named(void **state)
     config = defaults;
     config.misfit_max = 65535;
     assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_BAD_MISFIT_MAX);
+    config = defaults;
+    config.renewal = 654;
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_BAD_RENEWAL);
+    config.renewal = (1000u << 16) + 1u;
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_BAD_RENEWAL);
+    config.renewal = 0; /* never */
+    assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_OK);
     config.misfit_max = 0; /* no alarm */
     assert_int_equal(pvid_trust_init_q31(&trust, &config, &estimator), PVID_OK);
     for (int i = 0; i < 40; i++) {
@@ -211,6 +319,10 @@ int main(void)
         cmocka_unit_test_setup(a_step_ends_the_refusals, start_again),
         cmocka_unit_test_setup(large_residuals_raise_the_alarm_and_small_ones_end_it, start_again),
         cmocka_unit_test_setup(a_small_surplus_takes_sixteen_groups, start_again),
+        cmocka_unit_test_setup(rows_that_do_not_fit_raise_the_alarm_with_the_first_publication, start_again),
+        cmocka_unit_test_setup(rows_of_a_poor_start_fade, start_again),
+        cmocka_unit_test_setup(nothing_fades_before_p_has_settled_or_while_little_is_known, start_again),
+        cmocka_unit_test_setup(the_alarms_means_begin_anew_with_a_renewal, start_again),
         cmocka_unit_test_setup(a_surplus_beyond_all_bounds_is_held, start_again),
         cmocka_unit_test_setup(a_bad_setting_is_named, start_again),
     };

@@ -260,9 +260,10 @@ static const pvid_weak_config_q31 weak_unit = {
     .trust = {
         .kappa_min = 32212,
         .se_max = 838861,
-        .misfit_max = 98304,
+        .misfit_max = 262144,
         .groups_min = 3,
         .shut_max = 16,
+        .renewal = 13107,
     },
     .gate = {262144u, 0u},
 };

@@ -119,6 +119,9 @@ typedef struct {
     float dead_zone;              /* squared */
     float noise[PVID_NOISE_TRACES]; /* what the model's `noise` is told; written by whoever makes the rows */
     float energy;                 /* sum of e^2 of the rows since the last group's end, at the p they met */
+    float taken;                  /* their weight; these two only for models without functions of their own */
+    float expected;               /* mean over the rows in the sums of the variance that the sensors' noise gives them
+                                     [units of Y^2]: no residual variance is taken for smaller. 0: nobody has said */
     uint16_t divider;
     uint16_t phase;               /* groups since the last solve */
     pvid_counters counters;
@@ -141,8 +144,11 @@ typedef struct {
     float kappa;       /* part of p[0]'s information that the other parameters cannot imitate, 0..1 */
     float least_pivot; /* least part of any parameter's information that those after it cannot imitate, 0..1: near
                           1e-6 it is made by the rounding of float32 */
-    float residual_sd; /* of Y - N^T theta [units of Y] */
+    float residual_sd; /* of Y - N^T theta [units of Y]: what the standard errors are made of, and so no less than the
+                          sensors' noise explains */
     float weight;      /* rows remembered */
+    float misfit;      /* variance of the residuals of all rows remembered over what the sensors' noise explains of it;
+                          0: not known */
 } pvid_estimate_f32;
 
 /* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be
@@ -164,6 +170,7 @@ typedef struct {
     bool rests;      /* within the dead zone: no step is taken */
     float gain;
     float fall;      /* of rr */
+    float scale;     /* sum of M_ii dtheta_i^2: the size of the terms that cancel to it */
     float sums[PVID_MAX_SUMS];
     float c[PVID_MAX_THETA * PVID_MAX_P];
     float column[PVID_MAX_THETA]; /* M times a column of C */

@@ -109,6 +109,9 @@ typedef struct {
     uint32_t dead_zone;
     pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by whoever makes the rows */
     int64_t energy; /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
+    int64_t taken;  /* their weight, Q16 */
+    pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them [units
+                                 of Y's integer squared]: no residual variance is taken for smaller. 0: nobody has said */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
     pvid_counters counters;
@@ -177,8 +180,9 @@ typedef struct {
     int32_t correlation[PVID_MAX_P][PVID_MAX_P]; /* of the errors, Q30: covariance_ab = se_a se_b correlation_ab */
     int32_t kappa;          /* Q30, 0..1: see estimator.h */
     int32_t least_pivot;    /* likewise */
-    int32_t residual_sd;    /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1 */
+    int32_t residual_sd;    /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1: see estimator.h */
     uint32_t weight;        /* rows remembered */
+    int32_t misfit;         /* Q16, at most 2^31 - 1: see estimator.h; 0: not known */
 } pvid_estimate_q31;
 
 /* Prepares `self`. Fails iff a field of config is not as described there; the status names it:

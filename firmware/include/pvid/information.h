@@ -32,6 +32,8 @@ typedef struct {
     uint16_t age;      /* groups since the last fold, 0..block-1 */
     float retention;   /* factor on the past at a fold, in (0, 1]; 1 keeps everything */
     float row_weight;  /* what a row adds to weight; 1 where the model accumulates by itself */
+    float rounding;    /* what float32 may have taken from or added to yy where it is kept relative to an estimate that
+                          moved; fades with the sums [units of yy] */
     float high[PVID_MAX_SUMS];
     float low[PVID_MAX_SUMS];
 } pvid_information_f32;
@@ -55,6 +57,9 @@ void pvid_information_fade_f32(pvid_information_f32 *self, float factor);
 
 /* sums[0 .. n_moments + n_theta + 1] = the current values, in the layout above. */
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS]);
+
+/* tail[0] = yy, tail[1] = weight. */
+void pvid_information_tail_f32(const pvid_information_f32 *self, float tail[2]);
 
 #ifdef __cplusplus
 }

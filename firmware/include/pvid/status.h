@@ -51,7 +51,8 @@ typedef enum {
                                  bits for what full scale can make */
     PVID_BAD_U_MULTIPLIER,    /* of the q31 strong form: not positive */
     PVID_BAD_DRIVE_TICKS,     /* of the q31 strong form: outside 1..2^30 */
-    PVID_BAD_FORMAT           /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
+    PVID_BAD_FORMAT,          /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
+    PVID_BAD_RENEWAL          /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */

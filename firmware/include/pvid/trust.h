@@ -10,7 +10,15 @@
  *   PVID_HELD_UNCERTAIN     the standard errors are too wide, or p is still on its way
  *
  * Until the first one is trusted, the published estimate is the start with the start's standard deviations.
- * An estimate that was trusted stays until a better one is. Total; O(n_p^2).
+ * An estimate that was trusted stays until a better one is.
+ *
+ * The alarm compares residuals with what the sensors' noise explains, from the first judgement on: the variance of all
+ * rows in the sums at the present p, and the windows lately, at the p that they met.
+ *
+ * Rows that came in at a poor start may weigh far too much, and float32 sums with which p has come a long way have lost
+ * digits. Once p has settled, such a past is renewed: it fades before each of the next groups.
+ *
+ * Total; O(n_p^2).
  */
 #ifndef PVID_TRUST_H
 #define PVID_TRUST_H
@@ -28,15 +36,19 @@ typedef struct {
     float kappa_min;     /* least kappa and least pivot, 0 <= . < 1: what one mode of motion alone says of d1 and d2
                             is rounding, and stays below 2e-5 */
     float se_max;        /* largest standard error of the positive parameters, relative to them, > 0 */
-    float misfit_max;    /* alarm when the residuals' variance exceeds what is expected of it so many times, on
-                            the mean over PVID_TRUST_LONG groups and more; half as much again on the mean
-                            over the last PVID_TRUST_SHORT ones. At least 1; 0: no alarm */
+    float misfit_max;    /* alarm when the residuals' variance exceeds what is expected of it so many times: that of all
+                            rows remembered, 1 + 3 sqrt(2 / degrees of freedom) times as much; on the mean over
+                            PVID_TRUST_LONG groups and more; half as much again on the mean over the last
+                            PVID_TRUST_SHORT ones. At least 1; 0: no alarm */
     uint16_t groups_min; /* groups before the first publication */
     uint16_t shut_max;   /* groups in a row that say too little for a step, after which p goes back to the
                             published one, lest it stay where noise led it; 0: never */
+    float renewal;       /* the past is renewed once p has settled so far from where its rows came in, in one of its
+                            positive parameters and relative to it, while the residuals of all rows are beyond the
+                            alarm's limit; 0.01..1e3; 0: never */
 } pvid_trust_config_f32;
 
-/* kappa_min 3e-5, se_max 5 %, misfit_max 1.5, groups_min 3, shut_max 16. */
+/* kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, shut_max 16, renewal 20 %. */
 extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 
 #define PVID_TRUST_SHORT 8
@@ -47,11 +59,15 @@ typedef struct {
     pvid_trust_config_f32 config;
     uint16_t groups;  /* taken in; stops at its end */
     uint16_t shut;    /* groups in a row that said too little */
-    uint16_t judged;  /* residuals in long_mean; stops at long_memory */
+    uint16_t judged;  /* residuals in long_mean; stops at long_memory; none before p is near */
     uint16_t long_memory;
     uint8_t next;     /* place of the next residual in recent */
+    bool known;       /* whether p's standard errors are small at present: while they are not nothing fades */
+    bool near;        /* whether p has settled with small standard errors yet */
     bool published;   /* whether an estimate has been trusted yet */
     bool misfit;
+    uint8_t ageing;   /* groups before which the past is still to fade */
+    float anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
     float long_mean;  /* of residual variances relative to what is expected */
     float recent[PVID_TRUST_SHORT];
     pvid_estimate_f32 estimate; /* the published one */
@@ -65,8 +81,12 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
 /* Publishes the start again, where p was placed elsewhere before the first row. */
 void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
-/* Forgets the residuals: the rows are made in another way from now on. */
-void pvid_trust_restart_alarm_f32(pvid_trust_f32 *self);
+/* Renews the past, and the alarm with it: the rows are made in another way from now on. */
+void pvid_trust_age_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
+
+/* Factor on the sums of the past before the coming group's rows are added; 1 where nothing is renewed, or too little
+ * would be left. Call it once a group. */
+float pvid_trust_ageing_f32(pvid_trust_f32 *self);
 
 /* Largest standard error of the positive parameters, relative to them. */
 float pvid_trust_widest_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate);

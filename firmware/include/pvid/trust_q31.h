@@ -24,6 +24,8 @@ typedef struct {
     uint16_t groups_min; /* groups before the first publication */
     uint16_t shut_max;   /* groups in a row that say too little for a step, after which p goes back to the published
                             one; 0: never */
+    uint32_t renewal;    /* the past is renewed once p has settled so far from where its rows came in, see trust.h; Q16,
+                            0.01..1e3; 0: never */
 } pvid_trust_config_q31;
 
 /* State; only the functions below write to it. */
@@ -31,11 +33,15 @@ typedef struct {
     pvid_trust_config_q31 config;
     uint16_t groups; /* taken in; stops at its end */
     uint16_t shut;   /* groups in a row that said too little */
-    uint16_t judged; /* residuals in long_mean; stops at long_memory */
+    uint16_t judged; /* residuals in long_mean; stops at long_memory; none before p is near */
     uint16_t long_memory;
     uint8_t next;    /* place of the next residual in recent */
+    uint8_t ageing;  /* groups before which the past is still to fade */
+    bool known;      /* whether p's standard errors are small at present: while they are not nothing fades */
+    bool near;       /* whether p has settled with small standard errors yet */
     bool published;  /* whether an estimate has been trusted yet */
     bool misfit;
+    int32_t anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
     int64_t long_mean; /* of residual variances relative to what is expected, PVID_SURPLUS_BITS */
     int64_t recent[PVID_TRUST_SHORT];
     pvid_estimate_q31 estimate; /* the published one */
@@ -48,6 +54,10 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
 
 /* Publishes the start again, where p was placed elsewhere before the first row. */
 void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator);
+
+/* Factor on the sums of the past before the coming group's rows are added, Q31; 0 where nothing is renewed, or too
+ * little would be left. Call it once a group. */
+int32_t pvid_trust_ageing_q31(pvid_trust_q31 *self);
 
 /* Where p is to go if the coming group does not let it step; NULL: nowhere. */
 const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self);

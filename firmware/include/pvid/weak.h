@@ -20,7 +20,8 @@
  * to the windows, a slice of the functions each. In the first half, too, a complete window is turned
  * into rows and Gauss-Newton steps, one small stage a tick, while the others fill; then the estimate is judged,
  * and published or not. No tick is long: the longest costs less than three times the mean one up to K = 12, four
- * times at K = 16. What a tick does depends on its place in this schedule, not on the data: only a window that is
+ * times at K = 16, as long as a hop has a free tick for every stage. (Where it has fewer, a tick takes `together` stages
+ * of the state, and the longest tick is about so many times as long.) What a tick does depends on its place in this schedule, not on the data: only a window that is
  * dropped, for want of drive or for its angle, leaves its stages out.
  *
  * The first window that is taken in sets c to the mean of phi over it: an encoder's zero may be far from 0.
@@ -185,7 +186,6 @@ struct pvid_weak_angle_f32 {
     uint8_t channels;    /* 1, or 3 with friction */
     bool full_angle;
     bool on;             /* the estimate has settled: rows are corrected */
-    uint8_t ageing;      /* windows before which the past is still to be aged */
     bool sensible;       /* p is that of a pendulum */
     float dt;
     float inverse_l1_square; /* of rod 1 [1/m^2] */
@@ -254,8 +254,8 @@ typedef struct {
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range (the status names it), a table is
  * missing or holds a number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
  * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for less than
- * 10 K + 35 stages, 19 a Gauss-Newton step and K / 6 + W / 4 + 3 a pass of the correction, at most four of them a
- * tick. */
+ * 10 K + 35 stages, 19 a Gauss-Newton step and K / 6 + W / 4 + 3 a pass of the correction. A tick takes as many stages
+ * as that needs: one where the hop is long enough, 32 at most. */
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is

@@ -141,6 +141,7 @@ typedef struct {
     int64_t energy;           /* of the window's rows: before they are added where the gate looks at it, then since */
     pvid_gate_q31 gate;
     pvid_scaled_q31 expected; /* variance of a row's noise */
+    int32_t ageing;           /* factor on the past before this window's rows, Q31; 0: none */
     pvid_estimator_solve_q31 solve;
     pvid_estimate_q31 candidate; /* for publication */
 } pvid_weak_finish_q31;

@@ -405,6 +405,9 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
             drive_min=config.drive_min,
             full_angle=rig.identifier.full_angle,
             damping=rig.identifier.damping,
+            pivot_noise=config.pivot_noise,
+            misfit_max=config.trust.misfit_max,
+            renewal=config.trust.renewal,
         ),
     )
     # the gate and the alarm of pvid/trust.h, without the question how much of the information noise makes
@@ -425,9 +428,10 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
         judged = result.misfit[
             max(trusted[0], _FADING * int(result.corrected.any()) + int(np.argmax(result.corrected))) :
         ]
-        chi2 = _judged(float(np.mean(judged[np.isfinite(judged)]))) if np.isfinite(judged).any() else None
-        enough = np.isfinite(judged).sum() >= MISFIT_WINDOWS
-        alarm = bool(trust.misfit_max > 0 and enough and chi2 is not None and chi2 > trust.misfit_max)
+        judged = judged[np.isfinite(judged)]
+        chi2 = _judged(float(result.chi2[trusted[-1]]))
+        lately = len(judged) >= MISFIT_WINDOWS and float(np.mean(judged)) > trust.misfit_max
+        alarm = trust.misfit_max > 0 and (lately or not result.agrees[trusted[-1]])
         status = Reason.MISFIT if alarm else Reason.UPDATED
         if not good[-1]:
             status = Reason.HELD_UNCERTAIN if result.updated[-1] else Reason.HELD_NOT_EXCITED
@@ -542,10 +546,19 @@ def _trajectory(t: Float, p: Float, covariance: Float, rig: RigFile, kappa: Floa
     )
 
 
+_REJECTED = (Reason.REJECTED_NOT_FINITE, Reason.REJECTED_SATURATED)
+
+
 def _final_status(reasons: npt.NDArray[np.uint8]) -> str:
-    """The last reason in words; with a divider, the last one that followed a solve."""
+    """The last reason in words; with a divider, the last one that followed a solve. Windows that fill again after a
+    rejected sample are warming up for that reason."""
     solved = reasons[reasons != Reason.ACCUMULATED]
-    return Reason(int(solved[-1])).text if len(solved) else Reason.ACCUMULATED.text
+    if len(solved) == 0:
+        return Reason.ACCUMULATED.text
+    before = solved[solved != Reason.WARMING_UP]
+    if solved[-1] == Reason.WARMING_UP and len(before) and before[-1] in _REJECTED:
+        return Reason(int(before[-1])).text
+    return Reason(int(solved[-1])).text
 
 
 def _counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:

@@ -7,6 +7,7 @@ loaded, so a mismatch is a sentence and never a wrong number.
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -101,6 +102,7 @@ class Status(IntEnum):
     BAD_U_MULTIPLIER = 42
     BAD_DRIVE_TICKS = 43
     BAD_FORMAT = 44
+    BAD_RENEWAL = 45
 
 
 class Law(IntEnum):
@@ -153,6 +155,7 @@ class TrustConfigStruct(ctypes.Structure):
         ("misfit_max", ctypes.c_float),
         ("groups_min", ctypes.c_uint16),
         ("shut_max", ctypes.c_uint16),
+        ("renewal", ctypes.c_float),
     ]
 
 
@@ -248,6 +251,7 @@ class EstimateStruct(ctypes.Structure):
         ("least_pivot", ctypes.c_float),
         ("residual_sd", ctypes.c_float),
         ("weight", ctypes.c_float),
+        ("misfit", ctypes.c_float),
     ]
 
 
@@ -276,6 +280,7 @@ ESTIMATE_DTYPE = np.dtype(
         ("least_pivot", np.float32),
         ("residual_sd", np.float32),
         ("weight", np.float32),
+        ("misfit", np.float32),
     ]
 )
 
@@ -360,9 +365,10 @@ class TrustConfig:
 
     kappa_min: float = 3e-5
     se_max: float = 0.05
-    misfit_max: float = 1.5
+    misfit_max: float = 4.0
     groups_min: int = 3
     shut_max: int = 16
+    renewal: float = 0.2
 
 
 @dataclass(frozen=True)
@@ -457,6 +463,7 @@ def _struct_layout() -> list[int]:
         at(WeakConfigStruct, "gate"),
         ctypes.sizeof(TrustConfigStruct),
         at(TrustConfigStruct, "groups_min"),
+        at(TrustConfigStruct, "renewal"),
         ctypes.sizeof(CountersStruct),
         ctypes.sizeof(EstimateStruct),
         at(EstimateStruct, "kappa"),
@@ -501,7 +508,7 @@ class Native:
         self._estimator_size, self._counters_at = sizes[:2]
         self._strong_size, self._estimator_at = sizes[2:4]
         self._weak_size, self._weak_estimator_at, self._published_at, self._is_published_at = sizes[4:8]
-        self._misfit_at, self._angle_size = sizes[8:]
+        (self._angle_size,) = sizes[8:]
 
     @property
     def library(self) -> ctypes.CDLL:
@@ -797,8 +804,8 @@ class WeakIdentifier(_FloatStepper, Freezable[Record]):
 
     @property
     def misfit(self) -> float:
-        """Mean variance of the residuals over what the sensors' noise explains, since the first publication."""
-        return ctypes.c_float.from_buffer(self._state, self.native._misfit_at).value
+        """Variance of the residuals behind the estimate over what the sensors' noise explains; NaN: not judged."""
+        return float(self.estimate["misfit"]) or math.nan
 
     def gap(self) -> None:
         """pvid_weak_gap_f32: samples are missing before the next call of `run`."""

@@ -6,6 +6,7 @@ The structs of the public headers are mirrored here; sizes and offsets are check
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -58,13 +59,15 @@ class EstimatorConfigQ31:
 
 @dataclass(frozen=True)
 class TrustConfigQ31:
-    """Which estimates are published, as in trust_q31.h: kappa_min in Q30, se_max in Q24, misfit_max in Q16."""
+    """Which estimates are published, as in trust_q31.h: kappa_min in Q30, se_max in Q24, misfit_max and renewal in
+    Q16."""
 
     kappa_min: int = 32212
     se_max: int = 838861
-    misfit_max: int = 98304
+    misfit_max: int = 262144
     groups_min: int = 3
     shut_max: int = 16
+    renewal: int = 13107
 
 
 @dataclass(frozen=True)
@@ -149,6 +152,7 @@ class TrustConfigStruct(ctypes.Structure):
         ("misfit_max", ctypes.c_uint32),
         ("groups_min", ctypes.c_uint16),
         ("shut_max", ctypes.c_uint16),
+        ("renewal", ctypes.c_uint32),
     ]
 
 
@@ -283,6 +287,7 @@ ESTIMATE_DTYPE = np.dtype(
         ("least_pivot", np.int32),
         ("residual_sd", np.int32),
         ("weight", np.uint32),
+        ("misfit", np.int32),
     ]
 )
 
@@ -335,7 +340,6 @@ class _Layout(NamedTuple):
     weak_estimator_at: int
     weak_trust_at: int
     weak_is_published_at: int
-    weak_misfit_at: int
     weak_published_at: int
     differentiator_size: int
     strong_size: int
@@ -489,8 +493,8 @@ class WeakIdentifierQ31(_IntegerStepper, Freezable[RecordQ31]):
 
     @property
     def misfit(self) -> float:
-        """Mean of the residuals' variance over what is expected of it."""
-        return ctypes.c_int64.from_buffer(self._state, self._layout.weak_misfit_at).value / 2.0**24
+        """Variance of the residuals behind the estimate over what the sensors' noise explains; NaN: not judged."""
+        return int(self.estimate["misfit"]) / 2.0**16 or math.nan
 
     def gap(self) -> None:
         """pvid_weak_gap_q31: samples are missing before the next call of `run`."""

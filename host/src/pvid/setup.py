@@ -108,9 +108,6 @@ ZERO_SD = 0.5
 FRICTION_SD = 1e-3
 FRICTION_BOUND = 0.1
 
-# Alarm of the corrected rows: the correction's own remainder is up to four times the noise at 0.107 rad and 14 bits.
-CORRECTED_MISFIT = 6.0
-
 # Noise of a sensor in LSB: rounding, and half an LSB of its own.
 NOISE_LSB = float(np.sqrt(1 / 12 + 1 / 4))
 
@@ -168,7 +165,6 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
     extra = np.array([rig.sensor.phi_zero] * zero + [0.0] * (2 * settings.damping))
     if settings.damping and not settings.zero:
         raise PvidError("[identifier] damping needs zero = true: friction is estimated beside the encoder's zero")
-    corrected = settings.full_angle or settings.damping
     return WeakConfig(
         sample_rate=sample_rate,
         l1=rig.l1,
@@ -179,7 +175,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
         angle_limit=VALID_ANGLE if settings.full_angle else 0.0,
         drive_min=weak_drive_threshold(rig, tables),
         pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
-        trust=TrustConfig(misfit_max=CORRECTED_MISFIT) if corrected else TrustConfig(),
+        trust=TrustConfig(),
         gate=gate_config(rig),
         estimator=EstimatorConfig(
             start=np.concatenate([p, extra]).astype(np.float32),

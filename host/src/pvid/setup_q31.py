@@ -248,6 +248,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
             misfit_max=round(float_config.trust.misfit_max * 2**16),
             groups_min=float_config.trust.groups_min,
             shut_max=float_config.trust.shut_max,
+            renewal=round(float_config.trust.renewal * 2**16),
         ),
         gate=gate_config_q31(float_config.gate, windows_hz),
     )

@@ -36,9 +36,11 @@ VALID_ANGLE = 0.2  # rad
 _SETTLED_WINDOWS = 4
 _SETTLED_MOVE = 0.02
 _SETTLED_ERROR = 0.05
-# Then what the uncorrected windows said is aged: 0.3^4 = 0.8 % of it is left.
+# Then what the uncorrected windows said is aged, as is what rows of a poor start said: 0.3^4 = 0.8 % of it is left. It
+# waits while the standard errors are not below this.
 _AGEING = 0.3
 _AGEING_WINDOWS = 4
+_NEAR = 0.1
 
 _DAMPING_SD = 1e-3  # m^2/s, prior of the damping coefficients
 _DAMPING_REACH = 1e-2  # m^2/s, what the step limit refers to
@@ -299,6 +301,9 @@ class WeakSettings:
     drive_min : rms of u [1/s^2] below which a window is dropped; 0: none is
     full_angle, damping : correct for sines and cosines; estimate the two damping coefficients
     passes : of the correction, per window
+    pivot_noise : variance that the pivot sensor's noise gives a row for each (rad/s^2)^2 of mean square phi'' [s^4]
+    misfit_max : residual variance of all rows over what the sensors explain beyond which they do not fit
+    renewal : the past is aged once p has settled so far, relative, from where rows that do not fit came in; 0: never
     """
 
     start: Float
@@ -312,6 +317,9 @@ class WeakSettings:
     full_angle: bool = False
     damping: bool = False
     passes: int = 3
+    pivot_noise: float = 0.0
+    misfit_max: float = 4.0
+    renewal: float = 0.0
 
     @property
     def sd(self) -> Float:
@@ -333,7 +341,9 @@ class WeakIdentified:
     kappa : [windows]
     updated : windows that moved p
     corrected : windows that were corrected for full angles or damping
-    misfit : energy of a window's residuals against what row_sd predicts; about 1 when the model holds
+    misfit : energy of a window's residuals against what the sensors' noise predicts; about 1 when the model holds
+    chi2 : variance of the residuals of all rows remembered over what the sensors' noise explains; NaN: too few rows
+    agrees : whether that is within what chance makes of the limit
     valid : largest angle stayed below VALID_ANGLE; looked at only with the full-angle correction
     last : the last estimate
     sandwich : its standard errors with the measured effect of the overlap in place of the design's bound
@@ -347,6 +357,8 @@ class WeakIdentified:
     updated: npt.NDArray[np.bool_]
     corrected: npt.NDArray[np.bool_]
     misfit: Float
+    chi2: Float
+    agrees: npt.NDArray[np.bool_]
     valid: bool
     last: Estimate
     sandwich: Float
@@ -365,6 +377,9 @@ class WeakOracle:
     folded: int = 0
     updated: bool = False
     misfit: float = math.nan
+    size: float = math.inf
+    expected: float = 0.0
+    _known: bool = False
     _ageing: int = 0
     _previous: tuple[Float, Float] | None = field(default=None, repr=False)
 
@@ -376,6 +391,7 @@ class WeakOracle:
         n = len(self.theta())
         self.m, self.q = np.zeros((n, n)), np.zeros((n, n))
         self.b, self.rr, self.weight = np.zeros(n), 0.0, 0.0
+        self.anchor = self.p.copy()
 
     def theta(self) -> Float:
         """theta at the present p, damping coefficients last."""
@@ -407,13 +423,52 @@ class WeakOracle:
         before = self.p.copy()
         x, inverse_factor = self.rows(window_columns, phi, u)
         self.add(x, inverse_factor)
+        explained = self._explained(phi)
+        self.expected += (explained - self.expected) * (self.design.functions - 2) / self.weight
         for _ in range(self.settings.iterations):
             self.updated |= self._step()
         e = x[0] - self.theta() @ x[1:]
-        self.misfit = float(e @ e) / (self.design.functions - 2) / self.settings.row_sd**2
+        self.misfit = float(e @ e) / (self.design.functions - 2) / explained
         self.folded += 1
+        self._settle()
         if self.settings.full_angle or self.settings.damping:
             self._switch(before)
+
+    def _explained(self, phi: Float) -> float:
+        """Variance that the sensors' noise gives the rows of a window phi [W]."""
+        lag = self.design.lag
+        bend = phi[2 * lag :: lag] - 2 * phi[lag:-lag:lag] + phi[: -2 * lag : lag]
+        curvature = float(np.mean(bend**2)) / (lag * self.design.dt) ** 4 if len(bend) else 0.0
+        return self.settings.row_sd**2 + self.settings.pivot_noise * curvature
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the residuals."""
+        return self.weight - len(self.p)
+
+    @property
+    def chi2(self) -> float:
+        """Variance of the residuals of all rows over what the sensors' noise explains; NaN while there are too few."""
+        return max(self.rr, 0.0) / (self.freedom * self.expected) if self.freedom >= 1 else math.nan
+
+    @property
+    def agrees(self) -> bool:
+        """Whether that is within what chance makes of the limit."""
+        limit = self.settings.misfit_max * (1 + 3 * math.sqrt(2 / max(self.freedom, 1.0)))
+        return not self.chi2 > limit
+
+    def _settle(self) -> None:
+        """Ages rows of a poor start once p has settled elsewhere and they do not fit there."""
+        estimate = self.assess()
+        self._known = bool((estimate.se[:3] <= _NEAR * self.p[:3]).all())
+        settled = self.updated and self.size <= _SETTLED_MOVE and self._known and self._ageing == 0
+        if not settled or self.settings.renewal == 0:
+            return
+        moved = np.abs(self.p[:3] / self.anchor[:3] - 1).max() > self.settings.renewal
+        if moved and not self.agrees:
+            self._ageing = _AGEING_WINDOWS
+        if self.agrees or self._ageing > 0:
+            self.anchor = self.p.copy()
 
     def rows(self, window_columns: Float, phi: Float, u: Float) -> tuple[Float, Float]:
         """Rows Y, N.. [1 + n_theta, K] whitened at p, without a and b; and L^-1."""
@@ -438,7 +493,7 @@ class WeakOracle:
         """Sums of a window's rows, those of the past forgotten or aged first."""
         hop_s = self.design.hop_s
         keep = math.exp(-hop_s / self.settings.forgetting_s) if self.settings.forgetting_s > 0 else 1.0
-        if self._ageing > 0:
+        if self._ageing > 0 and self._known:
             keep *= _AGEING
             self._ageing -= 1
         y, n = x[0], x[1:]
@@ -474,8 +529,8 @@ class WeakOracle:
         reach = self.p.copy()
         reach[3 : self.n_core] = self.sd[3 : self.n_core]
         reach[self.n_core :] = _DAMPING_REACH
-        size = float(np.max(np.abs(dp) / reach))
-        dp *= min(1.0, self.settings.step_limit / max(size, 1e-300))
+        self.size = float(np.max(np.abs(dp) / reach))
+        dp *= min(1.0, self.settings.step_limit / max(self.size, 1e-300))
         before = self.theta()
         self.p = self.p + dp
         change = self.theta() - before
@@ -494,10 +549,11 @@ class WeakOracle:
             self._ageing = _AGEING_WINDOWS
 
     def assess(self) -> Estimate:
-        """Standard errors by (S / s^2 + 1 / start_sd^2)^-1, s^2 = overlap * rr / (weight - n_p)."""
+        """Standard errors by (S / s^2 + 1 / start_sd^2)^-1, s^2 = overlap * rr / (weight - n_p), where rr counts for no
+        less than the sensors' noise explains."""
         if self.weight <= len(self.p):
             return Estimate(self.p.copy(), self.sd.copy(), np.diag(self.sd**2), 0.0, 0.0)
-        variance = max(self.rr, 0.0) / (self.weight - len(self.p))
+        variance = max(self.rr / (self.weight - len(self.p)), self.expected)
         wide = variance * self.design.overlap
         s = self.information()
         covariance = _inverse(s + np.diag(wide / self.sd**2)) * wide
@@ -546,14 +602,14 @@ def identify_weak(
     count = len(phi_frames)
     history = np.empty((count, len(oracle.p)))
     covariance = np.empty((count, len(oracle.p), len(oracle.p)))
-    kappa, misfit = np.empty(count), np.empty(count)
-    updated, corrected = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    kappa, misfit, chi2 = np.empty(count), np.empty(count), np.empty(count)
+    updated, corrected, agrees = (np.zeros(count, np.bool_) for _ in range(3))
     for k, window_columns in enumerate(columns(phi_frames, u_frames, design)):
         corrected[k] = oracle.corrected
         oracle.window(window_columns, phi_frames[k], u_frames[k])
         estimate = oracle.assess()
         history[k], covariance[k], kappa[k] = estimate.p, estimate.covariance, estimate.kappa
-        updated[k], misfit[k] = oracle.updated, oracle.misfit
+        updated[k], misfit[k], chi2[k], agrees[k] = oracle.updated, oracle.misfit, oracle.chi2, oracle.agrees
     zero = oracle.p[3] if oracle.n_core == 4 else 0.0
     return WeakIdentified(
         t=end_times(count, design),
@@ -564,6 +620,8 @@ def identify_weak(
         updated=updated,
         corrected=corrected,
         misfit=misfit,
+        chi2=chi2,
+        agrees=agrees,
         valid=not settings.full_angle or float(np.max(np.abs(smooth - zero))) <= VALID_ANGLE,
         last=oracle.assess(),
         sandwich=oracle.sandwich(),

@@ -25,6 +25,7 @@ Float32 = npt.NDArray[np.float32]
 ROW_LIMIT = np.float32(1.0e14)
 RESIDUAL_FLOOR = np.float32(4.8e-7)
 RESIDUAL_MAX = np.float32(1e30)
+ROUNDING = np.float32(2.4e-7)  # of a step's terms
 _COUNTERS = (
     "rows",
     "updates",
@@ -239,6 +240,10 @@ class Estimator:
             s, residual = self._assessed(sums)
             return self._assess(sums, s, self._variance(sums, residual))
 
+    def misfit(self, sums: Float32) -> Float32:
+        """Residual variance over what the sensors explain; nobody has told what that is [lanes]."""
+        return np.zeros(sums.shape[1], np.float32)
+
     def _variance(self, sums: Float32, residual: Float32) -> Float32:
         """s^2 of a row [lanes]."""
         freedom = sums[-1] - np.float32(len(self.p))
@@ -266,6 +271,7 @@ class Estimator:
         out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))
         out["residual_sd"] = np.sqrt(variance)
         out["weight"] = weight
+        out["misfit"] = self.misfit(sums)
         for a in range(n_p):
             start_variance = self.start_sd[a] * self.start_sd[a]
             out["se"][:, a] = np.where(known, se[a], self.start_sd[a])
@@ -297,6 +303,8 @@ class RelativeEstimator(Estimator):
         self.noise = np.zeros((3, len(configs)), np.float32)
         self.energy = np.zeros(len(configs), np.float32)
         self.group_energy = self.energy
+        self.taken = np.zeros(len(configs), np.float32)
+        self.expected = np.zeros(len(configs), np.float32)
         self.everywhere = np.ones(len(configs), np.bool_)
         self.was_due = True
 
@@ -318,6 +326,7 @@ class RelativeEstimator(Estimator):
                 gradient = self.model.transpose_times(self.model.jacobian(self.p), n)
                 self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
             self.energy = np.where(fits, self.energy + e * e, self.energy)
+            self.taken = np.where(fits, self.taken + self.row_weight, self.taken)
             self.sums = self.information.add(self.model.terms(n, e, self.row_weight), fits)
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
@@ -340,6 +349,7 @@ class RelativeEstimator(Estimator):
         if ends_group:
             self.group_energy = self.energy
             self.energy = np.zeros_like(self.energy)
+            self.taken = np.zeros_like(self.taken)
             self.phase += 1
             self.was_due = bool(self.phase[0] >= self.divider[0])
         elif self.is_rate:
@@ -416,8 +426,10 @@ class RelativeEstimator(Estimator):
         step = theta - self.theta
         moved = pattern.times(matrix, step)
         fall = np.zeros(len(reason), np.float32)
+        size = np.zeros(len(reason), np.float32)
         for i in range(pattern.n_theta):
             fall = fall + step[i] * (b[i] + (b[i] - moved[i]))
+            size = size + matrix[i, i] * (step[i] * step[i])
         residual = self.information.low[-2] - fall
         finite = np.isfinite(fall) & np.isfinite(residual)
         overflow = stepping & ~finite
@@ -429,6 +441,8 @@ class RelativeEstimator(Estimator):
         low[places] = low[places] - moved
         low[-2] = residual
         self.information.low = np.where(moving, low, self.information.low)
+        lost = _capped(self.information.rounding + ROUNDING * size)
+        self.information.rounding = np.where(moving, lost, self.information.rounding)
         self.theta = np.where(moving, theta, self.theta)
         self.p = np.where(moving, x, self.p)
         self.counters["updates"] += moving & stepping
@@ -447,5 +461,26 @@ class RelativeEstimator(Estimator):
 
     def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
         s = self.model.project(self.model.jacobian(self.p), self.model.matrix(sums))
-        residual = _capped(sums[-2] + np.float32(0))
-        return s, np.where(residual > 0, residual, np.float32(0))
+        floor = self.expected * (sums[-1] - np.float32(len(self.p)))
+        residual = _capped(sums[-2] + self.information.rounding)
+        return s, np.where(residual > floor, residual, floor)
+
+    def expect(self, variance: Float32) -> None:
+        """pvid_estimator_expect_f32: variance [lanes] that the sensors' noise gives the rows since the last group."""
+        with np.errstate(all="ignore"):
+            part = self.taken / self.sums[-1]
+            share = np.where(self.taken < self.sums[-1], part, np.float32(1))
+            moved = self.expected + (_capped(variance) - self.expected) * share
+        self.expected = np.where(self.taken > 0, moved, self.expected)
+
+    def misfit(self, sums: Float32) -> Float32:
+        """pvid_estimator_misfit_f32 [lanes]."""
+        freedom = sums[-1] - np.float32(len(self.p))
+        explained = freedom * self.expected
+        known = (freedom >= 1) & (explained > 0) & (sums[-2] > 0)
+        return np.where(known, _capped(sums[-2] / explained), np.float32(0))
+
+    @property
+    def rounded(self) -> npt.NDArray[np.bool_]:
+        """pvid_estimator_is_rounded_f32 [lanes]."""
+        return np.asarray(self.information.rounding > self.sums[-2])

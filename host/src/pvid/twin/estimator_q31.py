@@ -118,6 +118,8 @@ class EstimatorQ31:
         self.dead_zone = lane("dead_zone")
         self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
         self.energy = np.zeros(lanes, np.int64)
+        self.taken = np.zeros(lanes, np.int64)
+        self.expected = scaled(np.zeros(lanes, np.int64), 0)
         self.group_energy = self.energy
         self.size = self.energy
         self.gain = lane("gain")
@@ -205,6 +207,7 @@ class EstimatorQ31:
         row = round_shift(np.where(fits, n, 0), self.exponent)
         upper, column = self._upper
         weight = np.where(fits, self.row_weight, 0)
+        self.taken = self.taken + weight
         self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
         if self.is_rate:
             self.fresh = self.fresh + row * e
@@ -225,6 +228,7 @@ class EstimatorQ31:
         if ends_group:
             self.group_energy = self.energy
             self.energy = np.zeros(self.lanes, np.int64)
+            self.taken = np.zeros(self.lanes, np.int64)
             self.phase += 1
             self.was_due = self.phase >= self.divider
         elif self.is_rate:
@@ -283,6 +287,14 @@ class EstimatorQ31:
         due = (self.age + 1 >= self.block) & (self.retention < 2**31 - 1)
         if due.any():
             self.sums[places] = np.where(due, times_q31(self.sums[places], self.retention), self.sums[places])
+
+    def fade(self, factor: Int) -> Iterator[None]:
+        """Multiplies all that was gathered by factor [lanes], Q31, in stages; 0: not at all."""
+        half = self.model.n_sums // 2
+        for places in (slice(0, half), slice(half, None)):
+            faded = times_q31(self.sums[places], np.maximum(factor, 1))
+            self.sums[places] = np.where(factor > 0, faded, self.sums[places])
+            yield None
 
     def _end_group(self) -> None:
         self.age = np.where(self.age + 1 >= self.block, 0, self.age + 1)
@@ -468,9 +480,36 @@ class EstimatorQ31:
 
     def _row_variance(self) -> Scaled:
         """s^2 of a row, divided by 4^exponent as the sums are."""
-        freedom = self.sums[-1] - (self.model.n_p << 16)
-        from_rows = scaled(self.sums[-2], 0).over(scaled(np.maximum(freedom, 1 << 16), -16))
-        return pick(freedom < (1 << 16), self.expected_variance, from_rows)
+        found = self._found_variance()
+        explained = self._explained_variance()
+        from_rows = pick(explained.exceeds(found), explained, found)
+        return pick(self._freedom() < (1 << 16), self.expected_variance, from_rows)
+
+    def _freedom(self) -> Int:
+        """Degrees of freedom of the residuals, Q16 [lanes]."""
+        return np.asarray(self.sums[-1] - (self.model.n_p << 16))
+
+    def _found_variance(self) -> Scaled:
+        return scaled(self.sums[-2], 0).over(scaled(np.maximum(self._freedom(), 1 << 16), -16))
+
+    def _explained_variance(self) -> Scaled:
+        """What the sensors' noise explains of it."""
+        return self.expected.shifted(-2 * self.exponent)
+
+    def expect(self, variance: Scaled) -> None:
+        """pvid_estimator_expect_q31: variance that the sensors' noise gives the rows since the last group."""
+        weight = self.sums[-1]
+        told = (self.taken > 0) & (weight >= self.taken)
+        share = scaled(self.taken, 0).over(scaled(np.maximum(weight, 1), 0))
+        self.expected = pick(told, self.expected.plus(share.times(variance.minus(self.expected))), self.expected)
+
+    def _misfit(self) -> Int:
+        """Residual variance over what the sensors explain of it, Q16; 0 where that is not known [lanes]."""
+        known = (self._freedom() >= (1 << 16)) & (self.expected.m > 0)
+        explained = self._explained_variance()
+        one = scaled(np.ones(self.lanes, np.int64), 0)
+        misfit = self._found_variance().over(pick(known, explained, one))
+        return np.where(known, clamp(misfit.fixed(16), 2**31 - 1), 0)
 
     def assess(self) -> npt.NDArray[np.void]:
         """pvid_estimator_assess_q31 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
@@ -482,6 +521,7 @@ class EstimatorQ31:
         out = np.zeros(self.lanes, ESTIMATE_DTYPE)
         out["p"][:, :n_p] = self.p.T
         out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
+        out["misfit"] = self._misfit()
         variance = self._row_variance()
         residual, residual_e = root_of(*variance)
         out["residual_sd"] = clamp(scale(residual, -(residual_e + self.exponent + 8)), 2**31 - 1)

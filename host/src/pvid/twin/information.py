@@ -37,6 +37,7 @@ class Information:
         self.block = np.full(lanes, _BLOCK_MAX)
         self.age = np.zeros(lanes, np.int64)
         self.retention = np.ones(lanes, np.float32)
+        self.rounding = np.zeros(lanes, np.float32)
         for lane, groups in enumerate(forgetting_groups):
             if groups > 0:
                 if groups < np.float32(16 * _BLOCK_MAX):
@@ -56,6 +57,7 @@ class Information:
         """Multiplies all that was gathered by factor [lanes]."""
         self.high = self.high * factor
         self.low = self.low * factor
+        self.rounding = self.rounding * factor
 
     def end_group(self, taken: npt.NDArray[np.bool_]) -> None:
         """Folds and forgets in the lanes whose block is complete."""
@@ -71,3 +73,4 @@ class Information:
         error = (high - (total - part)) + (low - part)
         self.high = np.where(due, total, self.high)
         self.low = np.where(due, error, self.low)
+        self.rounding = np.where(due, self.rounding * self.retention, self.rounding)

@@ -15,6 +15,8 @@ Mask = npt.NDArray[np.bool_]
 
 _SHORT, _LONG, _LONG_MEMORY = 8, 16, np.float32(4096)
 _ARRIVED, _SMALL_STEP, _SURPLUS_MAX = np.float32(0.3), np.float32(1e-4), np.float32(1e6)
+_SETTLED_STEP, _NEAR = np.float32(0.02), np.float32(0.1)
+_AGEING, _AGEING_GROUPS = np.float32(0.3), 4
 _COUNT_MAX = 0xFFFF
 
 
@@ -58,6 +60,9 @@ class Trust:
         memory = np.where((information.retention < 1) & (memory < _LONG_MEMORY), memory, _LONG_MEMORY)
         self.long_memory = np.maximum(memory, np.float32(_LONG)).astype(np.int64)
         self.next = np.zeros(lanes, np.int64)
+        self.ageing = np.zeros(lanes, np.int64)
+        self.known = np.zeros(lanes, np.bool_)
+        self.near = np.zeros(lanes, np.bool_)
         self.published = np.zeros(lanes, np.bool_)
         self.misfit = np.zeros(lanes, np.bool_)
         self.long_mean = np.zeros(lanes, np.float32)
@@ -71,6 +76,7 @@ class Trust:
     def place(self) -> None:
         """Publishes the start again."""
         self.estimate["p"][:, : len(self.estimator.p)] = self.estimator.p.T
+        self.anchor = self.estimator.p.copy()
 
     @property
     def refuge(self) -> tuple[Mask, Float32]:
@@ -78,7 +84,8 @@ class Trust:
         some = (self.config.shut_max > 0) & (self.shut >= self.config.shut_max)
         return some, np.ascontiguousarray(self.estimate["p"][:, : len(self.estimator.p)].T)
 
-    def _take_surplus(self, lanes: Mask, surplus: Float32) -> None:
+    def _take_surplus(self, lanes: Mask, surplus: Float32) -> Mask:
+        """Where the windows alone raise the alarm, of the given lanes."""
         x = np.where(surplus <= _SURPLUS_MAX, surplus, _SURPLUS_MAX)
         self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
         with np.errstate(all="ignore"):
@@ -93,15 +100,43 @@ class Trust:
         limit = np.float32(self.config.misfit_max)
         lately = (self.judged >= _SHORT) & (total > np.float32(1.5) * (limit * np.float32(_SHORT)))
         at_length = (self.judged >= _LONG) & (self.long_mean > limit)
-        self.misfit = np.where(lanes, (limit > 0) & (lately | at_length), self.misfit)
+        return lanes & (lately | at_length)
 
-    def restart_alarm(self, lanes: Mask) -> None:
-        """Forgets the residuals in the given lanes."""
+    def _restart_alarm(self, lanes: Mask) -> None:
         self.judged = np.where(lanes, 0, self.judged)
         self.next = np.where(lanes, 0, self.next)
         self.long_mean = np.where(lanes, np.float32(0), self.long_mean)
-        self.misfit = self.misfit & ~lanes
         self.recent = np.where(lanes, np.float32(0), self.recent)
+
+    def _all_agree(self, candidate: npt.NDArray[np.void]) -> Mask:
+        freedom = candidate["weight"] - np.float32(len(self.estimator.p))
+        chance = np.sqrt(np.float32(2) / np.where(freedom >= 1, freedom, np.float32(1)))
+        limit = np.float32(self.config.misfit_max)
+        return np.asarray(candidate["misfit"] <= limit * (np.float32(1) + np.float32(3) * chance))
+
+    def age(self, lanes: Mask) -> None:
+        """pvid_trust_age_f32 in the given lanes."""
+        self.ageing = np.where(lanes, _AGEING_GROUPS, self.ageing)
+        self.anchor = np.where(lanes, self.estimator.p, self.anchor)
+        self._restart_alarm(lanes)
+
+    def next_ageing(self) -> Float32:
+        """pvid_trust_ageing_f32 [lanes]."""
+        fading = (self.ageing > 0) & self.known
+        factor = np.where(fading, _AGEING, np.float32(1))
+        self.ageing = np.where(fading, self.ageing - 1, self.ageing)
+        return factor.astype(np.float32, copy=False)
+
+    def _settle(self, lanes: Mask, known: Mask, agrees: Mask) -> None:
+        renewal = np.float32(self.config.renewal)
+        moved = np.zeros(len(lanes), np.bool_)
+        for a, positive in enumerate(self.estimator.model.positive):
+            if positive:
+                part = self.estimator.p[a] / self.anchor[a] - np.float32(1)
+                moved = moved | (part > renewal) | (part < -renewal)
+        stale = lanes & ((known & ~agrees & moved) | self.estimator.rounded)
+        self.age(stale)
+        self.anchor = np.where(lanes & ~stale & known & agrees, self.estimator.p, self.anchor)
 
     def widest(self, candidate: npt.NDArray[np.void]) -> Float32:
         """pvid_trust_widest_f32 [lanes]."""
@@ -111,6 +146,18 @@ class Trust:
                 relative = candidate["se"][:, a] / candidate["p"][:, a]
                 widest = np.where(relative <= widest, widest, relative)
         return widest
+
+    def _raise_alarm(self, settled: Mask, known: Mask, surplus: Float32, candidate: npt.NDArray[np.void]) -> None:
+        """The alarm, and the renewal that may follow from it; where p has settled, and where it is known well."""
+        agrees = self._all_agree(candidate)
+        renewing = self.ageing > 0
+        self.known = known
+        self._restart_alarm(renewing)
+        lately = self._take_surplus(~renewing & self.near, surplus)
+        self.misfit = (self.config.misfit_max > 0) & (~agrees | lately)
+        self.near = self.near | (~renewing & settled & known & (self.groups >= self.config.groups_min))
+        if self.config.renewal > 0:
+            self._settle(settled & ~renewing, known, agrees)
 
     def judge(
         self,
@@ -126,11 +173,11 @@ class Trust:
             return reason
         stepped = reason == Reason.UPDATED
         self.shut = shut_after(self.shut, stepped, self.refuge[0])
-        self._take_surplus(self.published, surplus)
         with np.errstate(all="ignore"):
             error = self.widest(candidate)
-            near = _ARRIVED * error
-            arrived = size <= np.where(near > _SMALL_STEP, near, _SMALL_STEP)
+            part = _ARRIVED * error
+            arrived = size <= np.where(part > _SMALL_STEP, part, _SMALL_STEP)
+            self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _NEAR, surplus, candidate)
         enough_kappa = np.float32(self.config.kappa_min)
         excited = informed & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         enough = self.groups >= self.config.groups_min

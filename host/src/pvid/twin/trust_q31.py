@@ -8,7 +8,7 @@ import numpy.typing as npt
 from pvid.native import Reason
 from pvid.native_q31 import ESTIMATE_DTYPE, TrustConfigQ31
 from pvid.twin.estimator_q31 import ONE, SIZE_BITS, EstimatorQ31
-from pvid.twin.integer_q31 import Int, clamp, round_shift
+from pvid.twin.integer_q31 import Int, clamp, round_shift, square_root
 from pvid.twin.trust import shut_after, tell
 
 Mask = npt.NDArray[np.bool_]
@@ -21,6 +21,9 @@ _SMALL_STEP = (1 << SIZE_BITS) // 10000
 _SURPLUS_MAX = 1_000_000 << SURPLUS_BITS
 _ERROR_BITS = 24
 _COUNT_MAX = 0xFFFF
+_SETTLED_STEP = (1 << SIZE_BITS) // 50
+_NEAR = (1 << _ERROR_BITS) // 10
+_AGEING, _AGEING_GROUPS = 644245094, 4  # 0.3 in Q31
 
 
 class TrustQ31:
@@ -35,6 +38,9 @@ class TrustQ31:
         self.judged = np.zeros(lanes, np.int64)
         self.long_memory = np.clip((estimator.block << 31) // (2**31 - estimator.retention), _LONG, _LONG_MEMORY)
         self.next = np.zeros(lanes, np.int64)
+        self.ageing = np.zeros(lanes, np.int64)
+        self.known = np.zeros(lanes, np.bool_)
+        self.near = np.zeros(lanes, np.bool_)
         self.published = np.zeros(lanes, np.bool_)
         self.misfit = np.zeros(lanes, np.bool_)
         self.long_mean = np.zeros(lanes, np.int64)
@@ -48,6 +54,7 @@ class TrustQ31:
     def place(self) -> None:
         """Publishes the start again."""
         self.estimate["p"][:, : len(self.estimator.p)] = self.estimator.p.T
+        self.anchor = self.estimator.p.copy()
 
     @property
     def refuge(self) -> tuple[Mask, Int]:
@@ -55,7 +62,8 @@ class TrustQ31:
         some = (self.config.shut_max > 0) & (self.shut >= self.config.shut_max)
         return some, self.estimate["p"][:, : len(self.estimator.p)].T.astype(np.int64)
 
-    def _take_surplus(self, lanes: Mask, surplus: Int) -> None:
+    def _take_surplus(self, lanes: Mask, surplus: Int) -> Mask:
+        """Where the windows alone raise the alarm, of the given lanes."""
         x = clamp(surplus, _SURPLUS_MAX)
         self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
         change = x - self.long_mean
@@ -67,7 +75,48 @@ class TrustQ31:
         limit = self.config.misfit_max << (SURPLUS_BITS - 16)
         lately = (self.judged >= _SHORT) & (2 * np.sum(self.recent, axis=0) > 3 * limit * _SHORT)
         at_length = (self.judged >= _LONG) & (self.long_mean > limit)
-        self.misfit = np.where(lanes, (limit > 0) & (lately | at_length), self.misfit)
+        return np.asarray(lanes & (lately | at_length))
+
+    def _restart_alarm(self, lanes: Mask) -> None:
+        self.judged = np.where(lanes, 0, self.judged)
+        self.next = np.where(lanes, 0, self.next)
+        self.long_mean = np.where(lanes, 0, self.long_mean)
+        self.recent = np.where(lanes, 0, self.recent)
+
+    def _all_agree(self, candidate: npt.NDArray[np.void]) -> Mask:
+        freedom = np.maximum(candidate["weight"].astype(np.int64) - self.estimator.model.n_p, 1)
+        chance = square_root((1 << 33) // freedom)
+        limit = self.config.misfit_max * ((1 << 16) + 3 * chance)
+        return np.asarray((candidate["misfit"].astype(np.int64) << 16) <= limit)
+
+    def next_ageing(self) -> Int:
+        """pvid_trust_ageing_q31 [lanes]."""
+        fading = (self.ageing > 0) & self.known
+        self.ageing = np.where(fading, self.ageing - 1, self.ageing)
+        return np.where(fading, _AGEING, 0)
+
+    def _settle(self, lanes: Mask, agrees: Mask) -> None:
+        moved = np.zeros(len(lanes), np.bool_)
+        for a, positive in enumerate(self.estimator.model.positive):
+            if positive:
+                way = np.abs(self.estimator.p[a] - self.anchor[a])
+                moved = moved | ((way << 16) > self.anchor[a] * self.config.renewal)
+        stale = lanes & ~agrees & moved
+        self.ageing = np.where(stale, _AGEING_GROUPS, self.ageing)
+        self._restart_alarm(stale)
+        self.anchor = np.where(stale | (lanes & agrees), self.estimator.p, self.anchor)
+
+    def _raise_alarm(self, settled: Mask, known: Mask, surplus: Int, candidate: npt.NDArray[np.void]) -> None:
+        """The alarm, and the renewal that may follow from it; where p has settled, and where it is known well."""
+        agrees = self._all_agree(candidate)
+        renewing = self.ageing > 0
+        self.known = known
+        self._restart_alarm(renewing)
+        lately = self._take_surplus(~renewing & self.near, surplus)
+        self.misfit = (self.config.misfit_max > 0) & (~agrees | lately)
+        self.near = self.near | (~renewing & settled & known & (self.groups >= self.config.groups_min))
+        if self.config.renewal > 0:
+            self._settle(settled & known & ~renewing, agrees)
 
     def _widest(self, candidate: npt.NDArray[np.void]) -> Int:
         widest = np.zeros(len(candidate), np.int64)
@@ -86,8 +135,8 @@ class TrustQ31:
             return reason
         stepped = reason == Reason.UPDATED
         self.shut = shut_after(self.shut, stepped, self.refuge[0])
-        self._take_surplus(self.published, surplus)
         error = self._widest(candidate)
+        self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _NEAR, surplus, candidate)
         near = round_shift(clamp(error, 1 << 44) * _ARRIVED, 16 + (_ERROR_BITS - SIZE_BITS))
         arrived = size <= np.maximum(near, _SMALL_STEP)
         enough_kappa = self.config.kappa_min

@@ -15,7 +15,6 @@ Y, A, B, C1, C2 = 8, 9, 10, 11, 12
 _FUNCTIONS_A_STAGE, _SAMPLES_A_STAGE = 6, 4
 _L2_MIN = f(0.05)
 _SETTLED_GROUPS, _SETTLED_STEP, _SETTLED_ERROR, _LOST_ERROR = 4, f(0.02), f(0.05), f(0.2)
-_AGEING, _AGEING_GROUPS = f(0.3), 4
 
 
 _SIXTH, _PART_120, _PART_5040 = f(1) / f(6), f(1) / f(120), f(1) / f(5040)
@@ -62,7 +61,6 @@ class Angle:
         self.dt = f(config.design.decimation) / f(config.sample_rate)
         self.inverse_l1_square = f(1) / (f(config.l1) * f(config.l1))
         self.on = np.zeros(lanes, np.bool_)
-        self.ageing = np.zeros(lanes, np.int64)
         self.p = np.zeros((3, lanes), np.float32)
 
     @property
@@ -162,7 +160,7 @@ class Angle:
         return out
 
     def settle(self, lanes: Mask, p: Float32, worst: Float32, groups: int) -> Mask:
-        """pvid_weak_angle_settle_f32 in the given lanes; where the past is still to be aged."""
+        """pvid_weak_angle_settle_f32 in the given lanes; where it was switched on."""
         moved = np.zeros(p.shape[1], np.float32)
         for i in range(3):
             step = (p[i] / self.p[i]) - f(1)
@@ -171,11 +169,4 @@ class Angle:
         was_on = self.on
         settled = (groups >= _SETTLED_GROUPS) & (moved < _SETTLED_STEP) & (worst < _SETTLED_ERROR)
         self.on = np.where(lanes, np.where(was_on, worst <= _LOST_ERROR, settled), was_on)
-        self.ageing = np.where(lanes & ~was_on, np.where(settled, _AGEING_GROUPS, 0), self.ageing)
-        return lanes & (self.ageing > 0)
-
-    def age(self) -> Float32:
-        """pvid_weak_angle_ageing_f32 [lanes]."""
-        factor = np.where(self.ageing > 0, _AGEING, f(1))
-        self.ageing = np.maximum(self.ageing - 1, 0)
-        return factor.astype(np.float32, copy=False)
+        return np.asarray(self.on & ~was_on)

@@ -112,15 +112,15 @@ def stages(
         yield np.full(estimator.p.shape[1], Reason.REJECTED_OUTLIER, np.uint8)
         return
     estimator.noise = np.where(whitened, noise, estimator.noise)
-    if angle is not None:
-        with np.errstate(all="ignore"):
-            estimator.information.fade(angle.age())
-        estimator.sums = estimator.information.read()
+    with np.errstate(all="ignore"):
+        estimator.information.fade(trust.next_ageing())
+    estimator.sums = estimator.information.read()
     yield None
     places = _PLACES[: estimator.model.n_theta]
     for k in range(design.functions):
         added = estimator.add(x[places, k], x[_Y, k])
         yield None if (added == Reason.ACCUMULATED).all() else added
+    estimator.expect(expected)
     reason = np.full(estimator.p.shape[1], Reason.ACCUMULATED, np.uint8)
     for iteration in range(iterations):
         refuge = trust.refuge if iteration == 0 else None
@@ -141,5 +141,5 @@ def stages(
     if angle is not None:
         with np.errstate(all="ignore"):
             switched = angle.settle(stepped, estimator.p, trust.widest(candidate), trust.groups)
-        trust.restart_alarm(switched)
+        trust.age(switched)
     yield told

@@ -36,6 +36,7 @@ _ALONG_A_STAGE = 6
 _REMOVED_A_STAGE = 3
 _FITTED_A_STAGE = 3
 _FACTOR_PARTS, _TRACE_PARTS, _WHITEN_PARTS = 2, 3, 3
+_FADE_PARTS = 2
 _GRAM_22, _GRAM_DOWN, _ROW_BITS = 3, 16, 12
 INVERSE_BITS = 15
 INVERSE_LIMIT = 2**26
@@ -218,7 +219,8 @@ def _stages_before_add(design: WeakTablesQ31) -> int:
 def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: EstimatorQ31) -> int:
     """Stages of a window."""
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
-    return _stages_before_add(design) + design.functions + solves + estimator.assessment_stages + 1
+    rows = _stages_before_add(design) + _FADE_PARTS + design.functions
+    return rows + solves + estimator.assessment_stages + 1
 
 
 def _surplus(energy: Int, design: WeakTablesQ31, expected: Scaled) -> Scaled:
@@ -266,10 +268,12 @@ def stages(
         return
     yield None
     estimator.noise = noise_of(design, by, estimator)
+    yield from estimator.fade(trust.next_ageing())
     for k in range(design.functions):
         y = np.where(saturated, 2**31 - 1, x[_Y, k])
         added = estimator.add(x[: estimator.model.n_theta, k], y)
         yield None if (added == Reason.ACCUMULATED).all() else added
+    estimator.expect(expected)
     reason = np.full(estimator.lanes, Reason.ACCUMULATED, np.uint8)
     for iteration in range(iterations):
         refuge = trust.refuge if iteration == 0 else None
