@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pvid.capture import Run
-from pvid.identify import identify
+from pvid.identify import LINEAR, identify
 from pvid.native import Native, TrustConfig
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.rigfile import RigFile
@@ -29,10 +29,11 @@ def disturbed() -> Run:
 def worst(native: Native, run: Run, core: str, renewal: float, monkeypatch: pytest.MonkeyPatch) -> float:
     """Largest relative error of w, d1, d2 after a run from a poor start."""
     monkeypatch.setattr("pvid.setup.TrustConfig", lambda: TrustConfig(renewal=renewal))
-    rig = replace(RIG, identifier=replace(RIG.identifier, core=core, full_angle=False, survey=False))
+    rig = replace(RIG, identifier=replace(RIG.identifier, core=core, full_angle=False, survey=False))  # type: ignore[arg-type]
     result = identify(run, rig, native, start=POOR)
     assert result.identified
-    return max(abs(result.value[name] / p - 1) for name, p in zip(("w", "d1", "d2"), STANDARD_PENDULUM.linear))
+    pairs = zip(LINEAR, STANDARD_PENDULUM.linear, strict=True)
+    return max(float(abs(result.value[name] / p - 1)) for name, p in pairs)
 
 
 @pytest.mark.parametrize("core", ["f32", "q31", "f64"])
