@@ -1,4 +1,4 @@
-/* A weak-form identifier, for counting the instructions of its ticks: of the base size, or of another
+/* A weak-form identifier, for counting the instructions of its ticks: of the standard rig's size, or of another
  * one by -D. Zero unknown or not, three Gauss-Newton steps. The tables are noise: what a tick does depends
  * on their size alone. */
 #ifndef WEAK_RIG_H
@@ -7,16 +7,16 @@
 #include <stdint.h>
 
 #ifndef WEAK_RIG_TAPS
-#define WEAK_RIG_TAPS 71
+#define WEAK_RIG_TAPS 81
 #endif
 #ifndef WEAK_RIG_DECIMATION
-#define WEAK_RIG_DECIMATION 8
+#define WEAK_RIG_DECIMATION 9
 #endif
 #ifndef WEAK_RIG_WINDOW
-#define WEAK_RIG_WINDOW 157
+#define WEAK_RIG_WINDOW 191
 #endif
 #ifndef WEAK_RIG_FUNCTIONS
-#define WEAK_RIG_FUNCTIONS 12
+#define WEAK_RIG_FUNCTIONS 10
 #endif
 #ifndef WEAK_RIG_ZERO
 #define WEAK_RIG_ZERO 1

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT
+from linear_rig import LINEAR_RIG
 
 from pvid.capture import write_run
 from pvid.cli import commands
@@ -46,9 +47,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("q31")
     run = simulate(sensors=standard_sensors(14), truth="linear", duration=10.0, seed=2).run
     write_run(folder / "run.csv", run)
-    standard = RigFile.standard()
-    exact = replace(standard, l1_sd=0.0, sensor=replace(standard.sensor, y_gain_sd=0.0))  # else they rule the errors
-    exact.write(folder / "rig.toml")
+    exact = replace(LINEAR_RIG.sensor, y_gain_sd=0.0)  # else the errors are those of the gain and of l1
+    replace(LINEAR_RIG, l1_sd=0.0, sensor=exact).write(folder / "rig.toml")
     return folder / "run.csv", folder / "rig.toml"
 
 

@@ -13,7 +13,6 @@ from pvid.errors import PvidError
 from pvid.native import WeakConfig
 from pvid.rigfile import RigFile
 from pvid.setup import bank_of, strong_config, weak_config, weak_design_of
-from pvid.survey import fitted
 from pvid.weak_oracle import WeakOracle, WeakSettings, end_times
 from pvid.weak_windows import Windows
 
@@ -57,7 +56,9 @@ class Residuals:
 
 
 def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
-    """Of a run in the rig file's form; in the weak form with the tables that identify takes for this run.
+    """Of a run in the rig file's form.
+
+    In the weak form with the tables of the rig file: those that identify takes for a run are those of `survey.fitted`.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
     PvidError
         When the run is too short for one group of rows, or its pivot stands still.
     """
-    return _weak(run, fitted(rig, run), p) if rig.identifier.form == "weak" else _strong(run, rig, p)
+    return _weak(run, rig, p) if rig.identifier.form == "weak" else _strong(run, rig, p)
 
 
 def _weak(run: Run, rig: RigFile, p: Float) -> Residuals:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pvid.bench.spread import PERIOD
 from pvid.errors import PvidError
 
 STAGES = {
@@ -24,13 +25,14 @@ STAGES = {
     "gauss-newton": "the same with feedback_hz = 0, which needs no innovation",
     "tick": "samples in, parameters out",
     "assess": "standard errors and kappa (only when published)",
-    "weak": "weak form, samples in, parameters out: mean over its windows (K = 12, 1 kHz)",
+    "weak": "weak form, samples in, parameters out: mean over its windows (K = 10, 1 kHz)",
     "smoothing": "strong form behind two Savitzky-Golay banks of 321 points, samples in, parameters out",
     "rls": "plain packed RLS of the same 11 parameters",
     "kalman": "extended Kalman filter of 7 states, u by 71 taps, samples in, parameters out",
 }
 
-_FEW, _MANY = 2496, 4992  # multiples of the fold's block of 64 ticks and of the weak form's hop of 624
+_TICKS = 2496  # a multiple of the fold's block of 64 ticks
+_WEAK_TICKS = 3 * PERIOD
 
 
 RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32)
@@ -126,7 +128,8 @@ def stage_costs(binary: Path) -> list[StageCost]:
         raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
 
     def per_tick(stage: str) -> int:
-        return round((_instructions(binary, stage, _MANY) - _instructions(binary, stage, _FEW)) / (_MANY - _FEW))
+        ticks = _WEAK_TICKS if stage == "weak" else _TICKS
+        return round((_instructions(binary, stage, 2 * ticks) - _instructions(binary, stage, ticks)) / ticks)
 
     harness = per_tick("nothing")
     return [StageCost(stage, per_tick(stage) - harness) for stage in STAGES]

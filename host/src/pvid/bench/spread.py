@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from pvid.errors import PvidError
 
-PERIOD = 624  # ticks from window to window of tests/cost/weak_rig.h, at its base size
+PERIOD = 855  # ticks from window to window of tests/cost/weak_rig.h, at the standard rig's size
 
 _STEP = "pvid_weak_step_f32"
 
