@@ -91,7 +91,7 @@ for _command in (*LOG_COMMANDS, *CAMPAIGN_COMMANDS):
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
 @click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
-@click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
+@click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
 def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     """Simulates the standard rig and streams it into the firmware on an emulated board; compares every bit."""
     from pvid.demo import play_demo, stage
@@ -239,6 +239,8 @@ def simulate_command(**options: Any) -> int:
         l1=pendulum.l1,
         sample_rate=options["rate"],
         sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+        # linear equations have no sines to correct
+        identifier=replace(standard.identifier, full_angle=options["truth"] == "full"),
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())
