@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from conftest import ROOT
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pvid.capture import write_run
+from pvid.cli import commands
 from pvid.ctables import bank_header, float_array, float_literal
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
 from pvid.oracle import linear
+from pvid.rig import simulate, standard_sensors
+from pvid.rigfile import Nominal, RigFile
+from pvid.setup import weak_design_of
+from pvid.survey import fitted
 from pvid.weak_design import design, to_c_header
 
 
@@ -78,6 +86,27 @@ def test_the_command_prints_and_checks(tmp_path: Path) -> None:
 def test_a_name_that_is_not_c_is_refused() -> None:
     with pytest.raises(PvidError, match="3d"):
         float_array("3d", np.zeros(3, np.float32), "nothing")
+
+
+def test_weak_tables_follow_a_run(tmp_path: Path) -> None:
+    """From a poor guess the tables of what the run shows, and what a core must have room for."""
+    run = simulate(sensors=standard_sensors(14), sample_rate=2000.0, duration=12.0, truth="full", seed=1).run
+    write_run(tmp_path / "run.csv", run)
+    poor = replace(RigFile.standard(), nominal=Nominal(l2=0.25, rho2=0.05), sample_rate=2000.0)
+    poor.write(tmp_path / "poor.toml")
+    known = replace(fitted(poor, run), sample_rate=2000.0)
+    runner, table = CliRunner(), ["weak-table", "--rig", str(tmp_path / "poor.toml")]
+    shown = runner.invoke(commands, [*table, "--run", str(tmp_path / "run.csv")], catch_exceptions=False)
+    banner = "pvid weak-table --rig poor.toml --run run.csv --name weak_tables"
+    expected = to_c_header(weak_design_of(known, 2000.0), "weak_tables", banner)
+    assert shown.stdout == expected
+    assert "build the core with -DPVID_MAX_TAPS=" in " ".join(shown.stderr.split())
+    guessed = runner.invoke(commands, table, catch_exceptions=False)
+    assert guessed.stdout.splitlines()[1:3] != expected.splitlines()[1:3]
+    fixed = runner.invoke(
+        commands, [*table, "--core", "q31", "--run", str(tmp_path / "run.csv")], catch_exceptions=False
+    )
+    assert f".window = {weak_design_of(known, 2000.0).window}" in fixed.stdout
 
 
 def test_weak_tables_reach_the_core_with_their_bits(tmp_path: Path) -> None:

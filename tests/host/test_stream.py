@@ -20,10 +20,12 @@ import pytest
 from pvid.errors import PvidError
 from pvid.link import Estimate
 from pvid.native import Native, WeakConfig
+from pvid.native_q31 import WeakConfigQ31
 from pvid.port import Port
 from pvid.replay_image import SAMPLE_RATE, ReplayRun, native_hashes, standard_run
-from pvid.rig import STANDARD_PENDULUM
-from pvid.stream_rig import StreamRig
+from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.rigfile import RigFile
+from pvid.stream_rig import StreamRig, played_samples, stream_rig
 from pvid.target import HOST_TARGET, Playback, Target, judge, open_target, play, verify
 
 TICKS = 5000
@@ -278,6 +280,20 @@ def test_an_unknown_target_is_named() -> None:
         open_target("mps2", standard_rig("weak"))
     with pytest.raises(PvidError, match="there is no port /dev/nowhere"):
         open_target("/dev/nowhere", standard_rig("weak"))
+
+
+@pytest.mark.parametrize("core", ["f32", "q31"])
+def test_an_image_has_room_for_a_design_beyond_the_default_bounds(native: Native, core: str) -> None:
+    """5 kHz: longer filters and a larger decimation than pvid/config.h holds by default."""
+    rate, ticks = 5000.0, 600
+    run = simulate(sensors=standard_sensors(14), sample_rate=rate, duration=ticks / rate, seed=1).run
+    rig = replace(RigFile.standard(), identifier=replace(RigFile.standard().identifier, core=core))  # type: ignore[arg-type]
+    made_for = stream_rig(rig, rate)
+    config = made_for.config
+    assert isinstance(config, WeakConfig | WeakConfigQ31)
+    assert config.design.taps > 81 and config.design.decimation > 32
+    verdict = verify(HOST_TARGET, made_for, native, *played_samples(rig, run))
+    assert verdict.equal and verdict.playback.done == ticks
 
 
 def test_identify_and_compare_on_targets(tmp_path: Path) -> None:

@@ -32,6 +32,7 @@ from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
 from pvid.identify import UNITS, ZERO, Identification, identify
 from pvid.native import Native
+from pvid.native_q31 import WeakConfigQ31
 from pvid.rig import (
     STANDARD_DRIVE,
     STANDARD_PENDULUM,
@@ -48,11 +49,12 @@ from pvid.rigfile import RigFile, load
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
 from pvid.setup import weak_design_of
-from pvid.setup_q31 import strong_config_q31, tables_of, weak_config_q31
+from pvid.setup_q31 import config_for_run, strong_config_q31, weak_config_q31
 from pvid.strong_header_q31 import strong_header_q31
 from pvid.survey import fitted
 from pvid.weak_design import to_c_header
 from pvid.weak_header_q31 import to_c_header_q31
+from pvid.weak_sizing import SizesOfDesign, raised_bounds
 
 
 def main() -> None:
@@ -452,28 +454,46 @@ def fir_table(points: int, degree: int, difference: bool, stride: int, name: str
 @click.option("--name", default="weak_tables", show_default=True, help="Name of the design in C.")
 @click.option("--check", type=click.Path(path_type=Path), help="Only tell whether this file is what would be printed.")
 @click.option("--core", type=click.Choice(["f32", "q31"]), default="f32", show_default=True, help="Which arithmetic.")
-def weak_table(rig_path: Path, name: str, check: Path | None, core: str) -> int:
+@click.option("--run", "run_path", type=click.Path(path_type=Path), help="Tables for the rig that this run shows.")
+def weak_table(rig_path: Path, name: str, check: Path | None, core: str, run_path: Path | None) -> int:
     """Prints the weak form's tables for a rig as a C header for pvid_weak_config_f32 or _q31.
 
+    Their sizes follow the modes of the rig file's guess; with --run those that a recorded run shows, as in identify.
     For q31 the whole configuration is printed, and on standard error by how many bits each quantity stays clear of
     overflow at full scale.
     """
-    rig = load(rig_path)
+    rig = _with(load(rig_path), form="weak")
+    shown = f"--rig {rig_path.name}"
+    run = None
+    if run_path is not None:
+        run = read_input(run_path, rig)
+        rig = replace(fitted(rig, run), sample_rate=run.sample_rate)
+        shown += f" --run {run_path.name}"
     if rig.sample_rate is None:
         raise PvidError(f"{rig_path}: sample_rate is missing, and the tables hang on it")
     if core == "q31":
-        integers = tables_of(rig, rig.sample_rate)
-        margins = ", ".join(f"{name} {bits:.2f}" for name, bits in integers.margins.items())
+        config = weak_config_q31(rig, rig.sample_rate) if run is None else config_for_run(rig, run)
+        assert isinstance(config, WeakConfigQ31)  # by the form
+        margins = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
         messages.print(f"bits to spare at full scale: {margins}", highlight=False)
-        made_by = f"pvid weak-table --core q31 --rig {rig_path.name} --name {name}"
-        return _print_header(to_c_header_q31(weak_config_q31(rig, rig.sample_rate), rig.l1, name, made_by), check)
+        _print_raised(config.design)
+        made_by = f"pvid weak-table --core q31 {shown} --name {name}"
+        return _print_header(to_c_header_q31(config, rig.l1, name, made_by), check)
     tables = weak_design_of(rig, rig.sample_rate)
     messages.print(
         f"taps {tables.taps}, decimation {tables.decimation}, windows of {tables.window} samples "
         f"({tables.window_s:g} s), {tables.functions} test functions; {tables.flash_bytes} bytes of flash; "
         f"{tables.update_rate_hz:.2f} answers a second"
     )
-    return _print_header(to_c_header(tables, name, f"pvid weak-table --rig {rig_path.name} --name {name}"), check)
+    _print_raised(tables)
+    return _print_header(to_c_header(tables, name, f"pvid weak-table {shown} --name {name}"), check)
+
+
+def _print_raised(design: SizesOfDesign) -> None:
+    """On standard error what pvid/config.h must be told, where a design exceeds its defaults."""
+    raised = [f"-D{macro}={value}" for macro, value in raised_bounds(design).items()]
+    if raised:
+        messages.print(f"build the core with {' '.join(raised)}", highlight=False)
 
 
 @commands.command(name="strong-table")
