@@ -58,8 +58,8 @@ def test_the_strong_form_fails_with_a_14_bit_encoder(native: Native) -> None:
 
 
 def test_the_weak_form_is_as_good_in_float32_as_in_float64() -> None:
-    """Rounding moves the answer by less than a tenth of a standard error (test_weak_oracle), the renewal of rows that came
-    in at a poor start, which float64 has not, by up to 0.18 in these runs; both are near the bound."""
+    """Rounding moves the answer by less than a tenth of a standard error (test_weak_oracle), the renewal of rows that
+    came in at a poor start, which float64 has not, by up to 0.18 in these runs; both are near the bound."""
     same = accuracy(through_oracle(SENSORS), SENSORS, SEEDS)
     assert (np.abs(weak().errors - same.errors) < 0.25 * same.standard_errors).all()
     assert (weak().rms < 2 * cramer_rao(14)).all()  # the RMS of 3 seeds is known to 40 %, that of 60 is 1.5 bounds
