@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from linear_rig import LINEAR_RIG
 
 from pvid import snapshot
 from pvid.capture import Run
@@ -29,7 +30,7 @@ from pvid.setup_q31 import config_of_q31, counts_of
 Samples = npt.NDArray[Any]
 Identifier = StrongIdentifier | WeakIdentifier | StrongIdentifierQ31 | WeakIdentifierQ31
 
-TICKS = 2500  # past the work on the first two windows
+TICKS = 3000  # past the work on the first two windows
 RANDOM = np.random.default_rng(7)
 SETTINGS: tuple[dict[str, Any], ...] = (
     {"form": "weak"},
@@ -42,12 +43,15 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"form": "weak", "outlier_gate": 6.0},
     {"form": "strong", "outlier_gate": 6.0, "outlier_patience_s": 0.5},
 )
-FLOAT_ALONE: tuple[dict[str, Any], ...] = ({"form": "weak", "full_angle": True, "damping": True},)
+FLOAT_ALONE: tuple[dict[str, Any], ...] = (
+    {"form": "weak", "full_angle": True},
+    {"form": "weak", "full_angle": True, "damping": True},
+)
 
 
 def rig_of(**identifier: Any) -> RigFile:
     """The standard rig, an encoder of 14 bits for the weak form and of 20 for the strong."""
-    rig = RigFile.standard()
+    rig = LINEAR_RIG
     sensor = replace(rig.sensor, phi_lsb=standard_sensors(20 if identifier["form"] == "strong" else 14).phi_lsb)
     return replace(rig, identifier=replace(rig.identifier, **identifier), sensor=sensor)
 

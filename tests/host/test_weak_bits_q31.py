@@ -22,7 +22,7 @@ from pvid.twin.weak_q31 import TwinRecordQ31, WeakTwinQ31
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
 RIG = RigFile.standard()
 Counts = npt.NDArray[np.int64]
-HASHED_TICKS = 2500  # past the work on the first two windows
+HASHED_TICKS = 3000  # past the work on the first two windows
 
 
 @pytest.fixture(scope="module")
