@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from linear_rig import LINEAR_RIG
 
 from pvid.native import EstimatorConfig, Native
 from pvid.native_q31 import WeakConfigQ31, WeakIdentifierQ31
 from pvid.rig import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
-from pvid.rigfile import RigFile
 from pvid.setup import weak_config
 from pvid.setup_q31 import p_of, se_of, units_of, weak_config_q31
 
@@ -26,8 +26,7 @@ def counts_of(values: npt.NDArray[np.float64], lsb: float) -> npt.NDArray[np.int
 
 def outcomes(native: Native, bits: int, seeds: int, zero: float = 0.0) -> tuple[npt.NDArray[np.float64], ...]:
     """Relative errors of float32 and fixed point [seeds, 3], and the latter's standard errors, on the same counts."""
-    rig = RigFile.standard()
-    rig = replace(rig, sensor=replace(rig.sensor, phi_lsb=2 * np.pi / 2**bits))
+    rig = replace(LINEAR_RIG, sensor=replace(LINEAR_RIG.sensor, phi_lsb=2 * np.pi / 2**bits))
     nominal = weak_config_q31(rig, RATE)
     f32, q31, errors = [], [], []
     for seed in range(seeds):
@@ -55,7 +54,7 @@ def started(config: WeakConfigQ31, settings: EstimatorConfig) -> WeakConfigQ31:
 
 
 def test_another_start_is_all_that_a_start_changes() -> None:
-    rig, start = RigFile.standard(), standard_start(3)
+    rig, start = LINEAR_RIG, standard_start(3)
     whole = weak_config_q31(rig, RATE, start)
     by_start = started(weak_config_q31(rig, RATE), weak_config(rig, RATE, start).estimator)
     assert by_start.estimator == whole.estimator
