@@ -140,7 +140,8 @@ def test_publications_of_a_run_end_in_its_answer(native: Native) -> None:
         assert publications.t[-1] == result.trusted_s
         for at, name in enumerate(NAMES):
             assert publications.p[-1, at] == result.value[name]
-            assert publications.se[-1, at] == pytest.approx(result.se[name], rel=1e-5)
+            # what the whole run says of the answer (pvid.verdict) only widens it
+            assert publications.se[-1, at] <= result.se[name] * (1 + 1e-5)
 
 
 def test_a_refusal_is_a_record_with_its_sentence(native: Native, monkeypatch: pytest.MonkeyPatch) -> None:

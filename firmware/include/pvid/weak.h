@@ -19,7 +19,7 @@
  * complete. Of D ticks the first half smooths, a slice of the taps each; the second half adds the result
  * to the windows, a slice of the functions each. In the first half, too, a complete window is turned
  * into rows and Gauss-Newton steps, one small stage a tick, while the others fill; then the estimate is judged,
- * and published or not. No tick is long: the longest costs less than three times the mean one up to K = 12, four
+ * and published or not. No tick is long: the longest costs some three times the mean one up to K = 12, four
  * times at K = 16, as long as a hop has a free tick for every stage. (Where it has fewer, a tick takes `together` stages
  * of the state, and the longest tick is about so many times as long.) What a tick does depends on its place in this schedule, not on the data: only a window that is
  * dropped, for want of drive or for its angle, leaves its stages out.
