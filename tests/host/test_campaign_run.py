@@ -79,11 +79,11 @@ def test_an_interrupted_campaign_keeps_its_records_and_goes_on(population: Path,
     out, partial = tmp_path / "results.parquet", tmp_path / "results.partial.jsonl"
     arguments = (population, "--rigs", "300", "--workers", "1", "-o", out)
     with subprocess.Popen(command(*arguments), stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 180
         while time.monotonic() < deadline and not (partial.exists() and partial.read_bytes().count(b"\n") >= 3):
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=60)
+        _, told = process.communicate(timeout=180)
     assert process.returncode == 130
     assert "the same command goes on" in " ".join(told.split())
     assert not out.exists()
