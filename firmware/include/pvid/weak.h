@@ -21,8 +21,8 @@
  * into rows and Gauss-Newton steps, one small stage a tick, while the others fill; then the estimate is judged,
  * and published or not. No tick is long: the longest costs some three times the mean one up to K = 12, four
  * times at K = 16, as long as a hop has a free tick for every stage. (Where it has fewer, a tick takes `together` stages
- * of the state, and the longest tick is about so many times as long.) What a tick does depends on its place in this schedule, not on the data: only a window that is
- * dropped, for want of drive or for its angle, leaves its stages out.
+ * of the state, and the longest tick is about so many times as long.) What a tick does depends on its place in this
+ * schedule, not on the data: only a window that is dropped, for want of drive or for its angle, leaves its stages out.
  *
  * The first window that is taken in sets c to the mean of phi over it: an encoder's zero may be far from 0.
  *
