@@ -88,15 +88,6 @@ def test_a_name_that_is_not_c_is_refused() -> None:
         float_array("3d", np.zeros(3, np.float32), "nothing")
 
 
-@pytest.mark.parametrize("form", ["weak", "strong"])
-def test_the_unit_tests_tables_are_what_is_generated(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT / "tests" / "unit")
-    core = ["--core", "q31"] if form == "weak" else []
-    table = [f"{form}-table", *core, "--rig", f"{form}_table_q31.toml", "--name", f"{form}_unit"]
-    checked = CliRunner().invoke(commands, [*table, "--check", f"{form}_table_q31.h"], catch_exceptions=False)
-    assert "as generated" in checked.stdout
-
-
 def test_weak_tables_follow_a_run(tmp_path: Path) -> None:
     """From a poor guess the tables of what the run shows, and what a core must have room for."""
     run = simulate(sensors=standard_sensors(14), sample_rate=2000.0, duration=12.0, truth="full", seed=1).run
