@@ -17,12 +17,14 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 from pvid.errors import PvidError
+
+_Parsed = TypeVar("_Parsed")
 
 Form = Literal["weak", "strong"]
 Law = Literal["stationary", "pseudovelocity"]
@@ -128,7 +130,7 @@ class Identifier:
     divider : ticks (strong form) or windows (weak form) a solve
     disturbance : of the joints' angular accelerations, white [rad/s^2/sqrt(Hz)]: rows are weighted by it beside the
         encoder's noise; a survey finds it from the residuals
-    survey : identify a recorded run from what the whole of it says of p (start and design), not from the nominal
+    survey : search a recorded run for start and design before the core identifies it, instead of taking the nominal's
     full_angle : correct the weak form for sines and cosines; float32 only
     damping : two regressors more, for viscous friction
     zero : the encoder's zero is unknown, a fourth parameter of the weak form
@@ -266,6 +268,11 @@ class RigFile:
 
 def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile:
     """Reads a rig file; PvidError names the file and the key. `settings` come before what it holds."""
+    return parsed_file(path, lambda text: RigFile.parse(text, settings))
+
+
+def parsed_file(path: str | Path, parse: Callable[[str], _Parsed]) -> _Parsed:
+    """What `parse` makes of a file's text; PvidError names the file, and what `parse` names."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -273,7 +280,7 @@ def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile
     except ValueError as error:
         raise PvidError(f"{path}: is not UTF-8 text") from error
     try:
-        return RigFile.parse(text, settings)
+        return parse(text)
     except PvidError as error:
         raise PvidError(f"{path}: {error}") from error
 

@@ -1,4 +1,4 @@
-"""What a whole run says of p before the core sees it: a start and a design for the weak form, whatever the guess.
+"""Search of a whole run for p, before the core starts: a start and a design for the weak form, whatever the guess.
 
 The weak form's rows are summed in float64 over all windows of the run, and the least squares of these sums are searched
 from several starts about the guess. Rows depend on p in three ways: by their design (window, test functions, filters

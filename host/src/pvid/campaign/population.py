@@ -17,6 +17,7 @@ import numpy as np
 from pvid.campaign.pivot import KINDS, PivotMotion, draw_motion
 from pvid.errors import PvidError
 from pvid.rig import Pendulum
+from pvid.rigfile import parsed_file
 
 # Ranges [low, high], and how a number is drawn: log-uniform or uniform; of either sign where "sign" stands beside it.
 _RANGES: dict[str, tuple[str, ...]] = {
@@ -256,16 +257,7 @@ def shipped() -> Population:
 
 def load(path: str | Path) -> Population:
     """Reads a population; PvidError names the file and the key."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise PvidError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise PvidError(f"{path}: is not UTF-8 text") from error
-    try:
-        return parse(text)
-    except PvidError as error:
-        raise PvidError(f"{path}: {error}") from error
+    return parsed_file(path, parse)
 
 
 def parse(text: str) -> Population:
