@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/differentiator.h"
 
 #include <stddef.h>

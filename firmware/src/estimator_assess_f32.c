@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 /* What is known of p: standard errors, kappa, residual. */
 #include <math.h>
 #include <stddef.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/estimator.h"
 
 #include <math.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 /* The solve and the assessment in stages, for a model without functions of its own. */
 #include <math.h>
 #include <stddef.h>

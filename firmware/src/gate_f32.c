@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/gate.h"
 
 #include <stddef.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/strong.h"
 
 #include <stddef.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/trust.h"
 
 #include <math.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/weak.h"
 
 #include <stddef.h>

@@ -137,6 +137,7 @@ def test_pkg_config(prefix: Path, by_package: list[str], version: str, tmp_path:
         "-Wall",
         "-Wextra",
         "-Wpedantic",
+        "-Wold-style-cast",
         "-Werror",
         CONSUMER / "consumer.cpp",
         *both,
