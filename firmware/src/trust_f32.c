@@ -76,6 +76,9 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
                                 const pvid_estimator_f32 *estimator)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
+        return PVID_BAD_POINTER;
+    }
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;

@@ -60,6 +60,9 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
                                 const pvid_estimator_q31 *estimator)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
+        return PVID_BAD_POINTER;
+    }
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;

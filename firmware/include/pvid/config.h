@@ -117,7 +117,8 @@
 #error "PVID_FULL_ANGLE must be 0 or 1"
 #endif
 
-/* Called on misuse (NULL where an object is needed). Replace it by your own trap or reset. */
+/* Called on misuse with a false condition: NULL where an object is needed, an object before its init. Replace it by your
+ * own trap or reset; without one the call does nothing and returns PVID_NOT_READY or PVID_BAD_POINTER. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))
 #endif
