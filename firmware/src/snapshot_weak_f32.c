@@ -34,6 +34,7 @@ static const uint32_t layout[] = {
     PLACE(trust),
     PLACE(trust.groups),
     PLACE(trust.estimate),
+    PLACE(trust.copy),
     (uint32_t)offsetof(pvid_weak_angle_f32, lack),
     (uint32_t)offsetof(pvid_weak_angle_f32, ring),
     PVID_MAX_P,

@@ -28,6 +28,7 @@ static const uint32_t layout[] = {
     PLACE(estimator.counters),
     PLACE(trust),
     PLACE(trust.estimate),
+    PLACE(trust.copy),
     PVID_MAX_P,
     PVID_MAX_THETA_Q31,
     PVID_MAX_TAPS,

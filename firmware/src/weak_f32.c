@@ -7,6 +7,7 @@
 
 #include "count.h"
 #include "finite_f32.h"
+#include "publication.h"
 #include "weak_angle_f32.h"
 #include "weak_finish_f32.h"
 #include "weak_front_f32.h"
@@ -364,4 +365,13 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self)
 {
     return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_weak_read_f32(const pvid_weak_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_f32 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
 }

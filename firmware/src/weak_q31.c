@@ -6,6 +6,7 @@
 #include "count.h"
 #include "integer_q31.h"
 #include "scaled_q31.h"
+#include "publication.h"
 #include "weak_finish_q31.h"
 #include "weak_front_q31.h"
 #include "weak_schedule.h"
@@ -391,4 +392,13 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
 const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self)
 {
     return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_weak_read_q31(const pvid_weak_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_q31 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
 }

@@ -107,6 +107,14 @@
 /* kapitza_strong_q31.h */
 #define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
 
+/* publication.h */
+#define pvid_publication_put_f32 PVID_SIZED(pvid_publication_put_f32)
+#define pvid_publication_read_f32 PVID_SIZED(pvid_publication_read_f32)
+
+/* publication_q31.h */
+#define pvid_publication_put_q31 PVID_SIZED(pvid_publication_put_q31)
+#define pvid_publication_read_q31 PVID_SIZED(pvid_publication_read_q31)
+
 /* snapshot.h */
 #define pvid_snapshot_save_strong_f32 PVID_SIZED(pvid_snapshot_save_strong_f32)
 #define pvid_snapshot_save_strong_q31 PVID_SIZED(pvid_snapshot_save_strong_q31)
@@ -149,6 +157,7 @@
 #define pvid_weak_init_f32 PVID_SIZED(pvid_weak_init_f32)
 #define pvid_weak_step_f32 PVID_SIZED(pvid_weak_step_f32)
 #define pvid_weak_estimate_f32 PVID_SIZED(pvid_weak_estimate_f32)
+#define pvid_weak_read_f32 PVID_SIZED(pvid_weak_read_f32)
 #define pvid_weak_gap_f32 PVID_SIZED(pvid_weak_gap_f32)
 #define pvid_weak_freeze_f32 PVID_SIZED(pvid_weak_freeze_f32)
 
@@ -156,6 +165,7 @@
 #define pvid_weak_init_q31 PVID_SIZED(pvid_weak_init_q31)
 #define pvid_weak_step_q31 PVID_SIZED(pvid_weak_step_q31)
 #define pvid_weak_estimate_q31 PVID_SIZED(pvid_weak_estimate_q31)
+#define pvid_weak_read_q31 PVID_SIZED(pvid_weak_read_q31)
 #define pvid_weak_gap_q31 PVID_SIZED(pvid_weak_gap_q31)
 #define pvid_weak_freeze_q31 PVID_SIZED(pvid_weak_freeze_q31)
 
