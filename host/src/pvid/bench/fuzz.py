@@ -49,8 +49,8 @@ class ApiCalls:
     def text(self) -> str:
         """In one sentence."""
         return (
-            f"{self.calls} calls of step after {self.inits} inits ({self.accepted} accepted) and {self.snapshots} restores "
-            f"({self.restored} accepted): 0 failures; {self.sound} runs of garbage under sound settings, "
+            f"{self.calls} calls of step after {self.inits} inits ({self.accepted} accepted) and {self.snapshots} "
+            f"restores ({self.restored} accepted): 0 failures; {self.sound} runs of garbage under sound settings, "
             f"{self.published} published"
         )
 
