@@ -29,7 +29,7 @@ import numpy.typing as npt
 from cobs import cobs
 
 from pvid.errors import PvidError
-from pvid.wording import printable, shown
+from pvid.wording import shown
 
 VERSION = 1
 MAX_PAYLOAD = 2048
@@ -49,6 +49,11 @@ _WIRE = {
     "f32": ("f", 4),
     "char": ("s", 1),
 }
+
+
+def _characters(field_of: bytes) -> str:
+    """What a field of characters holds up to the zeros at its end, "?" for each that is no printable ASCII."""
+    return "".join(chr(one) if 0x20 <= one < 0x7F else "?" for one in field_of.rstrip(b"\0"))
 
 
 def wire(kind: str, count: int | None = 1) -> Any:
@@ -103,7 +108,7 @@ class Layout:
                 break
             found = struct.unpack_from(f"<{count}{code}", payload, at)
             if kind == "char":
-                values[name] = printable(found[0].rstrip(b"\0").decode("ascii", "replace"), ascii_only=True)
+                values[name] = _characters(found[0])
             else:
                 values[name] = found if count > 1 else found[0]
             at += width * count
@@ -579,6 +584,7 @@ class Decoder:
     learns: bool = False
     _pending: bytearray = field(default_factory=bytearray)
     _overflow: int = 0
+    _amidst: bool = False  # in a frame of which the beginning was left out
     _expected: dict[int, int] = field(default_factory=dict)
     _learnt: deque[int] = field(default_factory=deque)
 
@@ -595,6 +601,13 @@ class Decoder:
         """Another sender begins: the next frame of this schema is the start of its sequence."""
         self._expected.pop(schema, None)
 
+    def lose_place(self) -> None:
+        """Bytes are left out here: reading goes on behind the next 0x00, and sequences begin anew."""
+        self._pending.clear()
+        self._overflow = 0
+        self._expected.clear()
+        self._amidst = True
+
     @property
     def unfinished(self) -> int:
         """Bytes since the last 0x00."""
@@ -605,10 +618,11 @@ class Decoder:
         *ended, rest = data.split(b"\0")
         for part in ended:
             self._keep(part)
-            if self._pending or self._overflow:
+            if (self._pending or self._overflow) and not self._amidst:
                 yield bytes(self._pending), self._overflow
             self._pending.clear()
             self._overflow = 0
+            self._amidst = False
         self._keep(rest)
 
     def _keep(self, part: bytes) -> None:
@@ -648,7 +662,7 @@ class Decoder:
         yield Frame(sequence, tick, message, schema)
 
     def learn(self, text: bytes) -> None:
-        """Frames of the schema with this text come through from here on, if it is one; the oldest of MAX_LEARNT goes."""
+        """Frames of the schema with this text come through from here on, if it is one; the oldest learnt one goes."""
         schema = zlib.crc32(text)
         if schema in self.schemas:
             return

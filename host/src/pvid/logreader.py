@@ -15,8 +15,7 @@ comes: the status line, the tee, a live view.
 
 from __future__ import annotations
 
-import contextlib
-import zlib
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +23,7 @@ from typing import Protocol
 
 from pvid.errors import PvidError
 from pvid.link import (
+    MAX_PAYLOAD,
     MESSAGES,
     SCHEMA,
     Decoder,
@@ -34,13 +34,16 @@ from pvid.link import (
     Message,
     Raw,
     RawCount,
-    described_readers,
     readers,
 )
-from pvid.logfile import LOG_MESSAGES, LOG_SCHEMA, Close, LinkSchema, Mark, Rig, Segment
+from pvid.logfile import LOG_MESSAGES, LOG_SCHEMA, MAX_RIG, Close, LinkSchema, Mark, Rig, Segment
 
 _CHUNK = 1 << 16
 _HALF = 1 << 31
+_LATEST_NS = 1 << 62  # a log from elsewhere may tell of any time, and sums of two go into 64 bits
+_KEPT_SEGMENTS = 64
+_MOST_KINDS = 64
+OTHER_KINDS = "other"
 
 
 @dataclass(frozen=True)
@@ -79,13 +82,17 @@ class Record:
 
 @dataclass
 class SegmentAccount:
-    """From one link coming up to its end. `why` is None while it lasts, or when the logger was killed."""
+    """From one link coming up to its end. `why` is None while it lasts, or when the logger was killed.
+
+    `received` bytes came from the board up to the last mark or the end.
+    """
 
     number: int
     port: str
     began_ns: int
     ended_ns: int = 0
     why: str | None = None
+    received: int = 0
     frames: int = 0
     samples: int = 0
     missing_samples: int = 0
@@ -93,13 +100,15 @@ class SegmentAccount:
 
 @dataclass
 class Account:
-    """What a log holds and what it lacks.
+    """What a log holds and what it lacks; of bounded size, whatever the log holds.
 
-    frames : of the board, that came through;  by_kind : of which kind
+    frames : of the board, that came through;  by_kind : of which kind, OTHER_KINDS those beyond the first 64
     missing : frames that the sequence numbers say were sent;  damaged : pieces that were no frame;  foreign : frames
-    of a schema that nobody described;  cut : pieces where the link came up or went down amidst a frame
+    of a schema that nobody described, or of the logger's schema and not its own;  cut : pieces where the link came up
+    or went down amidst a frame;  unread : bytes that came faster than they could be decoded, and were not
     samples : that came;  missing_samples : between them;  unheard : that the board took while the link was down, as
     far as the segments before and after it tell
+    begun : how many segments;  segments : the last 64 of them;  garbled : segments that brought bytes and not one frame
     lasting : the last message of each kind;  obstacle : why the link, being down, is not taken up again, while a logger
     tries to
     """
@@ -110,13 +119,16 @@ class Account:
     damaged: int = 0
     foreign: int = 0
     cut: int = 0
+    unread: int = 0
     samples: int = 0
     missing_samples: int = 0
     unheard: int = 0
     restarts: int = 0
     bytes: int = 0
     unix_ns: int = 0
-    segments: list[SegmentAccount] = field(default_factory=list)
+    begun: int = 0
+    segments: deque[SegmentAccount] = field(default_factory=lambda: deque(maxlen=_KEPT_SEGMENTS))
+    garbled: int = 0
     lasting: dict[type[Message], Message] = field(default_factory=dict)
     obstacle: str = ""
     damaged_since: int = 0  # the last good frame: no sequence number tells of them
@@ -131,11 +143,12 @@ class Account:
     @property
     def text(self) -> str:
         """In one sentence."""
-        many = len(self.segments)
+        many = self.begun
+        unread = f"; {self.unread} bytes not decoded" if self.unread else ""
         return (
             f"{self.frames} frames, {self.samples} samples in {many} segment{'' if many == 1 else 's'}; "
             f"lost {self.missing} frames, {self.missing_samples} samples, {self.unheard} while the link was down; "
-            f"{self.damaged} damaged, {self.foreign} foreign, {self.cut} cut off, {self.restarts} restarts"
+            f"{self.damaged} damaged, {self.foreign} foreign, {self.cut} cut off, {self.restarts} restarts{unread}"
         )
 
 
@@ -168,6 +181,7 @@ class LogStream:
         self._left: tuple[int, int] | None = None  # session and next tick when the link went down
         self._joined: int | None = None  # first tick since then
         self._rig_pieces = bytearray()
+        self._key: int | None = None  # of the log (pvid.logfile)
 
     def feed(self, data: bytes) -> Iterator[Record]:
         """What these bytes completed; to be exhausted before the next call."""
@@ -175,14 +189,20 @@ class LogStream:
         ahead: Loss | None = None  # a gap in the sequence, until the frame behind it is seen
         for item in self._decoder.items(data):
             if isinstance(item, Loss):
-                if item.why == "sequence":
-                    ahead = item
-                else:
+                if item.why != "sequence":
                     yield from self._release()
                     self._held = item
+                elif item.schema != LOG_SCHEMA:
+                    ahead = item
             elif item.schema == LOG_SCHEMA:
-                ahead = None
-                yield from self._of_logger(item.message)
+                if self._key is None:
+                    self._key = item.tick
+                if item.tick == self._key:
+                    ahead = None
+                    yield from self._of_logger(item.message)
+                else:  # from the line
+                    yield from self._release()
+                    self._held = Loss("foreign", bytes=len(item.message.payload))
             else:
                 began = isinstance(item.message, Hello) and item.sequence == 0 and not self._fresh
                 yield from self._release()
@@ -199,6 +219,13 @@ class LogStream:
             self._held = Loss("malformed", bytes=self._decoder.unfinished)
         yield from self._release(cut=True)
 
+    def skip(self, count: int) -> None:
+        """The next `count` bytes are not fed: what follows is read from its first whole frame on."""
+        self.account.bytes += count
+        self.account.unread += count
+        self._decoder.lose_place()
+        self._held = self._next_tick = self._joined = self._left = None
+
     def _record(self, tick: int, item: Item) -> Record:
         number = self.account.segments[-1].number if self.account.segments else -1
         return Record(number, self.account.unix_ns, tick, item)
@@ -207,11 +234,11 @@ class LogStream:
         held, self._held = self._held, None
         if held is None:
             return
-        if cut or self._fresh:
+        if held.why == "foreign":
+            self.account.foreign += 1
+        elif cut or self._fresh:
             held = Loss("cut", bytes=held.bytes)
             self.account.cut += 1
-        elif held.why == "foreign":
-            self.account.foreign += 1
         else:
             self.account.damaged += 1
             self.account.damaged_since += 1
@@ -221,25 +248,27 @@ class LogStream:
         yield from self._release(cut=not isinstance(message, Mark))
         account = self.account
         self.is_log = True
+        if isinstance(message, Segment | Mark | Close):
+            account.unix_ns = min(message.unix_ns, _LATEST_NS)
         if isinstance(message, Segment):
-            account.unix_ns = message.unix_ns
-            port = str(message.told.get("port", ""))
-            account.segments.append(SegmentAccount(len(account.segments), port, message.unix_ns))
+            account.segments.append(SegmentAccount(account.begun, message.port, account.unix_ns))
+            account.begun += 1
             for schema in self._decoder.schemas:
                 if schema != LOG_SCHEMA:
                     self._decoder.expect_anew(schema)
             if self._next_tick is not None and self._session != 0:
                 self._left = (self._session, self._next_tick)
             self._fresh, self._next_tick, self._session, self._joined = True, None, 0, None
-        elif isinstance(message, Mark):
-            account.unix_ns = message.unix_ns
+        elif isinstance(message, Mark) and account.segments:
+            account.segments[-1].received = message.received
         elif isinstance(message, Close) and account.segments:
-            account.unix_ns = account.segments[-1].ended_ns = message.unix_ns
-            account.segments[-1].why = message.why.decode("utf-8", "replace")
+            last = account.segments[-1]
+            last.ended_ns, last.why, last.received = account.unix_ns, message.words, message.received
+            account.garbled += not last.frames and last.received > (MAX_PAYLOAD if account.frames else 0)
         elif isinstance(message, Rig):
             self._take_rig(message)
         elif isinstance(message, LinkSchema):
-            self._learn(message.text)
+            self._decoder.learn(message.text)
         yield self._record(0, message)
 
     def _of_board(self, frame: Frame, began: bool) -> Iterator[Record]:
@@ -248,6 +277,8 @@ class LogStream:
         account.damaged_since = 0
         account.frames += 1
         kind = message.kind if isinstance(message, Described) else type(message).layout().name
+        if kind not in account.by_kind and len(account.by_kind) >= _MOST_KINDS:
+            kind = OTHER_KINDS
         account.by_kind[kind] = account.by_kind.get(kind, 0) + 1
         account.lasting[type(message)] = message
         if account.segments:
@@ -283,23 +314,19 @@ class LogStream:
             yield from self._restart(tick)
             ahead = tick
         self._next_tick = (tick + samples) & 0xFFFFFFFF
-        totals: list[Account | SegmentAccount] = [self.account, *self.account.segments[-1:]]
+        totals: list[Account | SegmentAccount] = [self.account]
+        if self.account.segments:
+            totals.append(self.account.segments[-1])
         for one in totals:
             one.samples += samples
             one.missing_samples += ahead
         if ahead:
             yield self._record(tick, Gap((tick - ahead) & 0xFFFFFFFF, ahead))
 
-    def _learn(self, text: bytes) -> None:
-        schema = zlib.crc32(text)
-        if schema not in self._decoder.schemas:
-            with contextlib.suppress(PvidError, UnicodeDecodeError):
-                self._decoder.schemas[schema] = described_readers(text.decode("ascii"))
-
     def _take_rig(self, message: Rig) -> None:
         if message.offset == 0:
             self._rig_pieces.clear()
-        if message.offset == len(self._rig_pieces):
+        if message.offset == len(self._rig_pieces) and message.size <= MAX_RIG:
             self._rig_pieces += message.text
         if len(self._rig_pieces) == message.size:
             self.rig = self._rig_pieces.decode("utf-8", "replace")
@@ -337,7 +364,7 @@ class LogReader:
         except OSError as error:
             raise PvidError(f"cannot read {self.path}: {error.strerror}") from error
         yield from stream.end()
-        if stream.is_log and not stream.account.segments and not stream.account.frames:
+        if stream.is_log and not stream.account.begun and not stream.account.frames:
             raise PvidError(f"{self.path} is empty: the recording ended before the link had come up")
-        if not stream.account.frames and not stream.account.segments:
+        if not stream.account.frames and not stream.account.begun:
             raise PvidError(f"{self.path} is no log of pvid: not one frame in {stream.account.bytes} bytes")

@@ -11,7 +11,7 @@ from pvid.capture import MIN_ROWS, Run
 from pvid.errors import PvidError
 from pvid.link import Hello
 from pvid.logreader import LogReader, LogStream
-from pvid.logvalues import Values
+from pvid.logvalues import Values, is_rate
 from pvid.rigfile import RigFile
 
 LOG_SUFFIX = ".pvlog"
@@ -77,6 +77,8 @@ def run_of_log(path: Path) -> Run:
     hello = hello_of_log(path)
     if hello is None:
         raise PvidError(f"{path}: the board never said who it is, and its sample rate is not known")
+    if not is_rate(hello.sample_rate):
+        raise PvidError(f"{path}: the board's sample rate is {hello.sample_rate:g} Hz, as it says, and that is none")
     values = Values(hello=hello)
     best: list[npt.NDArray[np.float64]] = []
     parts: list[npt.NDArray[np.float64]] = []

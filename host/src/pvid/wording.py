@@ -1,4 +1,4 @@
-"""What a sentence quotes: text from a file or a board, and the reason of an error."""
+"""What a sentence quotes: text from a file, names, and the reason of an error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ def reason(error: BaseException) -> str:
     return " ".join(str(text).split()).rstrip(".")
 
 
-def printable(text: str, ascii_only: bool = False) -> str:
-    """``text`` with "?" for every character that does not print: controls and escapes, ends of lines, half pairs of
-    UTF-16, marks that turn the direction of writing; with ``ascii_only`` also for every one beyond ASCII."""
-    return "".join(one if one.isprintable() and (one.isascii() or not ascii_only) else "?" for one in text)
+def printable(text: str) -> str:
+    """``text`` on one line of a terminal: what would move the cursor, colour it or turn the text around is escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
