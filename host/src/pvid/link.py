@@ -39,6 +39,7 @@ MAX_LEARNT = 16  # schemas that a decoder keeps of those that a line brought
 _HEADER = struct.Struct("<BBIHI")
 _CRC = struct.Struct("<I")
 _LONGEST = _HEADER.size + MAX_PAYLOAD + _CRC.size
+LONGEST_FRAME = _LONGEST + _LONGEST // 254 + 2  # on the line, its 0 among it
 
 _WIRE = {
     "u8": ("B", 1),
@@ -531,12 +532,13 @@ class Frame:
 class Loss:
     """What did not: `why` is malformed, crc, foreign, layout, or sequence, of which `frames` are missing.
 
-    `schema` is that of the frame behind a gap in the sequence.
+    `pieces` between two zeros, `bytes` together;  `schema` is that of the frame behind a gap in the sequence.
     """
 
     why: str
     frames: int = 0
     bytes: int = 0
+    pieces: int = 1
     schema: int = field(default=SCHEMA, compare=False)
 
 
@@ -626,7 +628,7 @@ class Decoder:
         self._keep(rest)
 
     def _keep(self, part: bytes) -> None:
-        room = _LONGEST + _LONGEST // 254 + 2 - len(self._pending)
+        room = LONGEST_FRAME - len(self._pending)
         self._pending += part[:room]
         self._overflow += len(part[room:])
 

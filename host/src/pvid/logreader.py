@@ -17,12 +17,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
 from pvid.errors import PvidError
 from pvid.link import (
+    LONGEST_FRAME,
     MAX_PAYLOAD,
     MESSAGES,
     SCHEMA,
@@ -175,6 +176,7 @@ class LogStream:
         self.is_log = False  # whether the logger has written into it
         self._decoder = Decoder(schemas=schemas, learns=True)
         self._held: Loss | None = None  # damage, until it is known whether the link went down there
+        self._last_bytes = 0  # of its last piece
         self._fresh = True  # no frame of the board in this segment yet
         self._next_tick: int | None = None
         self._session = 0  # the last that was named, 0: none was
@@ -190,8 +192,7 @@ class LogStream:
         for item in self._decoder.items(data):
             if isinstance(item, Loss):
                 if item.why != "sequence":
-                    yield from self._release()
-                    self._held = item
+                    yield from self._hold(item)
                 elif item.schema != LOG_SCHEMA:
                     ahead = item
             elif item.schema == LOG_SCHEMA:
@@ -201,8 +202,7 @@ class LogStream:
                     ahead = None
                     yield from self._of_logger(item.message)
                 else:  # from the line
-                    yield from self._release()
-                    self._held = Loss("foreign", bytes=len(item.message.payload))
+                    yield from self._hold(Loss("foreign", bytes=len(item.message.payload)))
             else:
                 began = isinstance(item.message, Hello) and item.sequence == 0 and not self._fresh
                 yield from self._release()
@@ -215,8 +215,7 @@ class LogStream:
     def end(self) -> Iterator[Record]:
         """What was held back; the bytes have ended."""
         if self._decoder.unfinished:
-            yield from self._release()
-            self._held = Loss("malformed", bytes=self._decoder.unfinished)
+            yield from self._hold(Loss("malformed", bytes=self._decoder.unfinished))
         yield from self._release(cut=True)
 
     def skip(self, count: int) -> None:
@@ -230,19 +229,38 @@ class LogStream:
         number = self.account.segments[-1].number if self.account.segments else -1
         return Record(number, self.account.unix_ns, tick, item)
 
+    def _hold(self, loss: Loss) -> Iterator[Record]:
+        """Damage, which is one with the damage of the same kind before it: a line of garbage is few records."""
+        held = self._held
+        if held is not None and held.why == loss.why:
+            self._held = replace(held, bytes=held.bytes + loss.bytes, pieces=held.pieces + 1)
+            self._last_bytes = loss.bytes
+            return
+        yield from self._release()
+        self._held, self._last_bytes = loss, loss.bytes
+
     def _release(self, cut: bool = False) -> Iterator[Record]:
+        """What is held; `cut`: the link came up or went down behind it, and may have cut off its last piece."""
         held, self._held = self._held, None
         if held is None:
             return
+        account, tick = self.account, self._next_tick or 0
         if held.why == "foreign":
-            self.account.foreign += 1
-        elif cut or self._fresh:
-            held = Loss("cut", bytes=held.bytes)
-            self.account.cut += 1
+            account.foreign += held.pieces
+            yield self._record(tick, held)
+        elif self._fresh:
+            account.cut += held.pieces
+            yield self._record(tick, replace(held, why="cut"))
         else:
-            self.account.damaged += 1
-            self.account.damaged_since += 1
-        yield self._record(self._next_tick or 0, held)
+            last = int(cut and self._last_bytes <= LONGEST_FRAME)
+            if held.pieces > last:
+                account.damaged += held.pieces - last
+                account.damaged_since += held.pieces - last
+                rest = held.bytes - last * self._last_bytes
+                yield self._record(tick, replace(held, bytes=rest, pieces=held.pieces - last))
+            if last:
+                account.cut += 1
+                yield self._record(tick, Loss("cut", bytes=self._last_bytes))
 
     def _of_logger(self, message: Message) -> Iterator[Record]:
         yield from self._release(cut=not isinstance(message, Mark))

@@ -163,7 +163,8 @@ class Values:
                 text = f"samples of ticks {item.first} to {item.first + item.samples - 1} are missing"
                 yield self._one("events", record, event="gap", count=item.samples, text=text)
             case Loss():
-                yield self._one("events", record, event=item.why, count=item.frames or item.bytes, text="")
+                text = f"{item.pieces} pieces" if item.pieces > 1 else ""
+                yield self._one("events", record, event=item.why, count=item.frames or item.bytes, text=text)
             case Segment():
                 yield self._one("events", record, event="segment", count=item.number, text=item.port)
             case Close():

@@ -1,4 +1,4 @@
-"""HTTP connections of the live page: a slow client's is ended, where uvicorn waits for the rest of a request for good."""
+"""HTTP connections of the live page: a slow client's is ended, where uvicorn would wait for the rest of a request."""
 
 from __future__ import annotations
 
