@@ -26,8 +26,8 @@ import numpy as np
 import serial
 from rich.console import Console
 
-from pvid.bench.lies import BEHAVIOURS, Behaviour
 from pvid.bench.liar_board import TICKS, Flood, HangUp, LyingBoard, Pause, Step, honest_samples, rig
+from pvid.bench.lies import BEHAVIOURS, Behaviour
 from pvid.errors import PvidError
 from pvid.link import Raw
 from pvid.livestate import LiveState
@@ -95,7 +95,7 @@ class RehearsedSource:
 
 
 def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> list[str]:
-    """Records a behaviour with all views, reads it by the live page's state and by these commands (`export csv` ...)."""
+    """Records a behaviour with all views; the live page's state and these commands (`export csv` ...) read the log."""
     from pvid.cli_log import print_account
 
     log = folder / "liar.pvlog"
