@@ -36,6 +36,7 @@ from pvid.logfile import Close, Segment
 from pvid.logreader import Gap, Record, Restart
 from pvid.native import Reason
 
+_LONGEST_NS = 2**62  # 146 years: a clock that is further ahead is none
 PARAMETERS = {"w": "1/s^2", "d1": "1", "d2": "1", "c": "rad"}
 PHYSICAL = {"g": "m/s^2", "l2": "m", "rho2": "m"}
 
@@ -186,7 +187,8 @@ class Values:
         first, began = self._anchor
         rate = self.sample_rate
         passed = np.zeros(len(ticks)) if np.isnan(rate) else (ticks - first) / rate
-        log_time = np.maximum(began + np.rint(1e9 * passed).astype(np.int64), self._latest)
+        since_ns = np.clip(np.rint(1e9 * passed), -_LONGEST_NS, _LONGEST_NS).astype(np.int64)
+        log_time = np.maximum(began + since_ns, self._latest)
         self._latest = int(log_time[-1])
         return log_time
 
