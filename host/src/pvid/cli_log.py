@@ -195,11 +195,15 @@ _RIG = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="
 @click.command(name="verify")
 @_LOG
 @_RIG
-def verify_command(log: Path, rig_path: Path | None) -> int:
+@click.option("--partial", is_flag=True, help="Exit code 0 also when a part is not verified.")
+def verify_command(log: Path, rig_path: Path | None, partial: bool) -> int:
     """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
 
-    The first difference is named. What follows a lost sample cannot be verified until the board counts from 0 again;
-    it is listed, and counted in the summary. Exit code 1 at a difference, 3 when nothing could be verified.
+    The first difference is named. A sample is verified when an equal hash covers it. What follows a lost sample cannot
+    be verified until the board begins another session; it is listed, and counted in the summary.
+
+    Exit code 0 when every sample is verified but for those behind the last hash, when no further one was due; 1 at a
+    difference, and, without --partial, when something else is not verified; 3 when nothing is.
     """
     from pvid.logverify import Verdict, Verifier  # the twins, which other commands need not wait for
 
@@ -214,7 +218,9 @@ def verify_command(log: Path, rig_path: Path | None) -> int:
     click.echo(reader.account.text)
     if verdict.different:
         return DIFFERENT
-    return DONE if verdict.verified else NOTHING_IDENTIFIED
+    if not verdict.verified:
+        return NOTHING_IDENTIFIED
+    return DONE if partial or not verdict.left else DIFFERENT
 
 
 @click.command(name="export")

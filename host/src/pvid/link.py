@@ -3,6 +3,10 @@
     COBS(header || payload || CRC-32) || 0x00
     header: version u8, type u8, schema u32, sequence u16, tick u32; little-endian
 
+The header holds the low 32 bits of the tick. What a board sends about its ticks has the next 16 as `tick_high`, so that
+it counts on for 8900 years at 1 kHz; `Frame.tick` and `encode` have them together. The ticks of a board begin anew with
+every session: the session number, which stands in the same frames, tells a restart from a counter that has wrapped.
+
 The classes below with a `TYPE` are the one definition of what stands in a payload: the schema text that a board
 sends, its hash in every header and firmware/link/schema.h are made from them (`pvid link-schema`).
 
@@ -20,7 +24,7 @@ import struct
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from enum import IntEnum
 from typing import Any, ClassVar, Self
 
@@ -57,9 +61,13 @@ def _characters(field_of: bytes) -> str:
     return "".join(chr(one) if 0x20 <= one < 0x7F else "?" for one in field_of.rstrip(b"\0"))
 
 
-def wire(kind: str, count: int | None = 1) -> Any:
-    """A field of `count` numbers of a kind; None: all that is left of the payload, as bytes."""
-    return field(metadata={"kind": kind, "count": count})
+def wire(kind: str, count: int | None = 1, absent: int | None = None) -> Any:
+    """A field of `count` numbers of a kind; None: all that is left of the payload, as bytes.
+
+    `absent`: its value in frames of a schema that does not have it yet.
+    """
+    metadata = {"kind": kind, "count": count}
+    return field(metadata=metadata) if absent is None else field(default=absent, kw_only=True, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -146,8 +154,14 @@ class Message:
     def layout(cls) -> Layout:
         """Its wire format."""
         described = tuple((f.name, f.metadata["kind"], f.metadata["count"]) for f in fields(cls))
+        described = tuple(sorted(described, key=lambda one: one[2] is None))  # what takes the rest comes last
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
         return Layout(cls.TYPE, name, described)
+
+    @classmethod
+    def absent(cls) -> dict[str, int]:
+        """The fields that older schemas may lack, with their values there."""
+        return {f.name: f.default for f in fields(cls) if f.default is not MISSING}
 
     @property
     def payload(self) -> bytes:
@@ -215,6 +229,7 @@ class Hello(Message):
     y_lsb: float = wire("f32")
     p_unit: tuple[float, ...] = wire("f32", MAX_P)
     board: str = wire("char", 16)
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -231,7 +246,7 @@ class Configuration(Message):
 
     PC to board: starts over with these settings; the others are in the image, with its tables. Board to PC, while it
     samples by itself: the configuration in force, bit by bit as it came, beside every Hello. Whoever has it, the
-    image's settings (Hello.settings names them) and every sample from tick 0 on has all that the bits depend on.
+    image's settings (Hello.settings names them) and every sample from `first_tick` on has all that the bits depend on.
     """
 
     session: int = wire("u32")  # any number but 0; comes back in every answer
@@ -256,6 +271,7 @@ class Configure(Configuration):
     row_sd: float = wire("f32")
     forgetting_s: float = wire("f32")
     feedback_hz: float = wire("f32")
+    first_tick: int = wire("u64", absent=0)  # number of the first sample, of which the board keeps 48 bits
 
 
 @dataclass(frozen=True)
@@ -272,6 +288,7 @@ class ConfigureQ31(Configuration):
     gain: int = wire("i32")
     phi_offset: int = wire("i32")
     y_offset: int = wire("i32")
+    first_tick: int = wire("u64", absent=0)
 
 
 @dataclass(frozen=True)
@@ -310,6 +327,8 @@ class Raw(Samples):
     been sent before it."""
 
     TYPE = 5
+    session: int = wire("u32", absent=0)
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -346,6 +365,8 @@ class RawCount(Counts):
     """Board to PC: what its own sensor counted, as Raw."""
 
     TYPE = 12
+    session: int = wire("u32", absent=0)
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -364,6 +385,7 @@ class Estimate(Message):
     residual_sd: float = wire("f32")
     weight: float = wire("f32")
     reason: int = wire("u8")
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -380,6 +402,7 @@ class EstimateQ31(Message):
     residual_sd: int = wire("i32")
     weight: int = wire("u32")
     reason: int = wire("u8")
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -398,15 +421,22 @@ class Status(Message):
     malformed: int = wire("u32")
     bad_crc: int = wire("u32")
     foreign: int = wire("u32")
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
 class Hash(Message):
-    """Board to PC: the running hash (fnv.h) after the header's tick."""
+    """Board to PC: the running hashes (FNV-1a, 32 bits) after the header's tick.
+
+    `hash` covers what the identifier made of the samples (fnv.h), `sample_hash` the samples themselves: the eight bytes
+    of each, as they stand in a frame, since the session began. 0: the board does not compute it.
+    """
 
     TYPE = 8
     session: int = wire("u32")
     hash: int = wire("u32")
+    tick_high: int = wire("u16", absent=0)
+    sample_hash: int = wire("u32", absent=0)
 
 
 @dataclass(frozen=True)
@@ -417,8 +447,10 @@ class Credit(Message):
     TYPE = 9
     session: int = wire("u32")
     room: int = wire("u32")
-    hash: int = wire("u32")  # running, after that tick
+    hash: int = wire("u32")  # running, after that tick, as in Hash
     reason: int = wire("u8")  # of the last tick
+    tick_high: int = wire("u16", absent=0)
+    sample_hash: int = wire("u32", absent=0)
 
 
 MESSAGES.pop(0)
@@ -500,8 +532,15 @@ def readers(messages: Mapping[int, type[Message]]) -> Readers:
     return {number: kind.of for number, kind in messages.items()}
 
 
+def _extends(layout: Layout, today: Layout, absent: Mapping[str, int]) -> bool:
+    """Whether a message of `today` differs from that layout in no more than fields that have a value where absent."""
+    kept = tuple(one for one in today.fields if one[0] not in absent or one in layout.fields)
+    return (layout.name, layout.fields) == (today.name, kept)
+
+
 def described_readers(text: str) -> Readers:
-    """What a decoder reads frames with that `text` describes: a message of today where the layout is the same.
+    """What a decoder reads frames with that `text` describes: a message of today where the layout is the same, or was
+    before fields were added that may be absent.
 
     Raises
     ------
@@ -513,6 +552,8 @@ def described_readers(text: str) -> Readers:
         known = MESSAGES.get(layout.type)
         if known is not None and layout == LAYOUTS[layout.type]:
             return known.of
+        if known is not None and _extends(layout, LAYOUTS[layout.type], known.absent()):
+            return lambda payload: known(**layout.unpack(payload))
         return lambda payload: Described(layout.name, layout.unpack(payload))
 
     return {number: reader(layout) for number, layout in parse_schema(text).items()}
@@ -520,7 +561,7 @@ def described_readers(text: str) -> Readers:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame that came through."""
+    """A frame that came through; `tick` with its upper bits where the message has them."""
 
     sequence: int
     tick: int
@@ -560,7 +601,10 @@ class Counters:
 
 
 def encode(message: Message, sequence: int, tick: int = 0, schema: int = SCHEMA) -> bytes:
-    """A frame with its final 0x00; sequence modulo 2^16."""
+    """A frame with its final 0x00; sequence modulo 2^16. Of a tick beyond 32 bits the message takes the upper ones."""
+    if tick > 0xFFFFFFFF and hasattr(message, "tick_high"):
+        high: dict[str, Any] = {"tick_high": tick >> 32}
+        message = replace(message, **high)
     return encode_raw(message.TYPE, sequence, tick, message.payload, schema)
 
 
@@ -661,7 +705,7 @@ class Decoder:
             yield self._lost("layout", piece)
             return
         self.counters.frames += 1
-        yield Frame(sequence, tick, message, schema)
+        yield Frame(sequence, tick | getattr(message, "tick_high", 0) << 32, message, schema)
 
     def learn(self, text: bytes) -> None:
         """Frames of the schema with this text come through from here on, if it is one; the oldest learnt one goes."""

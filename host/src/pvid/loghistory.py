@@ -232,8 +232,8 @@ def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:
 
 
 def _of_parts(first: Record, parts: list[bytes]) -> Record:
-    kind = RawCount if isinstance(first.item, RawCount) else Raw
-    return replace(first, item=kind(b"".join(parts)))
+    assert isinstance(first.item, Raw | RawCount)
+    return replace(first, item=replace(first.item, phi_y=b"".join(parts)))
 
 
 def envelope(t: Float, x: Float, bins: int) -> tuple[Float, Float]:

@@ -27,6 +27,8 @@ from pvid.link import (
     MAX_PAYLOAD,
     MESSAGES,
     SCHEMA,
+    Configure,
+    ConfigureQ31,
     Decoder,
     Described,
     Frame,
@@ -38,9 +40,9 @@ from pvid.link import (
     readers,
 )
 from pvid.logfile import LOG_MESSAGES, LOG_SCHEMA, MAX_RIG, Close, LinkSchema, Mark, Rig, Segment
+from pvid.tick_count import TickCount
 
 _CHUNK = 1 << 16
-_HALF = 1 << 31
 _LATEST_NS = 1 << 62  # a log from elsewhere may tell of any time, and sums of two go into 64 bits
 _KEPT_SEGMENTS = 64
 _MOST_KINDS = 64
@@ -61,7 +63,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Restart:
-    """The board began anew: its ticks count from 0 again, and so does its frames' sequence."""
+    """The board began anew, by itself or by a new configuration: another session, whose ticks are counted anew."""
 
 
 Item = Message | Loss | Gap | Restart
@@ -72,7 +74,7 @@ class Record:
     """One thing in a log.
 
     segment : the last one that began, from 0; -1 before the first;  unix_ns : by the PC's clock when it had come, to
-    about a second, 0 where no clock has been seen;  tick : of the frame's header (of the sample after it for losses)
+    about a second, 0 where no clock has been seen;  tick : in 64 bits (of the sample after it for losses)
     """
 
     segment: int
@@ -178,8 +180,11 @@ class LogStream:
         self._held: Loss | None = None  # damage, until it is known whether the link went down there
         self._last_bytes = 0  # of its last piece
         self._fresh = True  # no frame of the board in this segment yet
+        self._ticks = TickCount()
         self._next_tick: int | None = None
         self._session = 0  # the last that was named, 0: none was
+        self._anew = False  # it has been told that the board began anew, and no samples have come since
+        self._configured = (0, 0)  # the session of the last configuration, and its first tick
         self._left: tuple[int, int] | None = None  # session and next tick when the link went down
         self._joined: int | None = None  # first tick since then
         self._rig_pieces = bytearray()
@@ -277,6 +282,7 @@ class LogStream:
             if self._next_tick is not None and self._session != 0:
                 self._left = (self._session, self._next_tick)
             self._fresh, self._next_tick, self._session, self._joined = True, None, 0, None
+            self._anew = False
         elif isinstance(message, Mark) and account.segments:
             account.segments[-1].received = message.received
         elif isinstance(message, Close) and account.segments:
@@ -301,37 +307,51 @@ class LogStream:
         account.lasting[type(message)] = message
         if account.segments:
             account.segments[-1].frames += 1
+        named = getattr(message, "session", 0)
         if began:
-            yield from self._restart(frame.tick)
-        self._session = getattr(message, "session", 0) or self._session
+            self._ticks.begin()
+            self._session = 0
+        elif self._next_tick is not None and named != 0 and self._session not in (0, named):
+            began = True
+        tick = self._ticks.of(frame.tick, named)
+        self._session = named or self._session
+        if isinstance(message, Configure | ConfigureQ31):
+            self._configured = message.session, message.first_tick
+        if isinstance(message, Raw | RawCount) and self._joined is None:
+            self._joined = tick
+        if began:
+            yield from self._restart(tick)
         if self._left is not None and self._session != 0 and self._joined is not None:
-            yield from self._rejoin(frame.tick)
+            yield from self._rejoin(tick)
         if isinstance(message, Raw | RawCount):
-            self._joined = frame.tick if self._joined is None else self._joined
-            yield from self._follow(frame.tick, len(message.values))
-        yield self._record(frame.tick, message)
+            yield from self._follow(tick, message.count)
+        yield self._record(tick, message)
 
     def _rejoin(self, tick: int) -> Iterator[Record]:
         """Tells what the board took while the link was down, now that it is known whether it is the same session."""
         assert self._left is not None and self._joined is not None
         (session, expected), self._left = self._left, None
-        unheard = (self._joined - expected) & 0xFFFFFFFF
-        if session == self._session and 0 < unheard < _HALF:
+        unheard = self._joined - expected
+        if session == self._session and unheard > 0:
             self.account.unheard += unheard
             yield self._record(tick, Gap(expected, unheard, down=True))
 
     def _restart(self, tick: int) -> Iterator[Record]:
-        self._next_tick = 0
+        self._anew = True
+        self._next_tick = None
         self.account.restarts += 1
         yield self._record(tick, Restart())
 
     def _follow(self, tick: int, samples: int) -> Iterator[Record]:
         """Holds the samples' ticks against those of the frame before."""
-        ahead = (tick - (tick if self._next_tick is None else self._next_tick)) & 0xFFFFFFFF
-        if ahead >= _HALF:
+        expected = tick if self._next_tick is None else self._next_tick
+        if tick < expected:
             yield from self._restart(tick)
-            ahead = tick
-        self._next_tick = (tick + samples) & 0xFFFFFFFF
+        if self._anew:
+            session, first = self._configured
+            expected = first if session == self._session else 0
+        self._next_tick, self._anew = tick + samples, False
+        ahead = max(0, tick - expected)
         totals: list[Account | SegmentAccount] = [self.account]
         if self.account.segments:
             totals.append(self.account.segments[-1])
@@ -339,7 +359,7 @@ class LogStream:
             one.samples += samples
             one.missing_samples += ahead
         if ahead:
-            yield self._record(tick, Gap((tick - ahead) & 0xFFFFFFFF, ahead))
+            yield self._record(tick, Gap(tick - ahead, ahead))
 
     def _take_rig(self, message: Rig) -> None:
         if message.offset == 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ from pvid.native import Native, WeakConfig
 from pvid.rigfile import RigFile
 from pvid.stream_image import settings_number
 from pvid.stream_rig import StreamRig, stream_rig
+from pvid.twin import fnv
 
 SESSION = 7
 TICKS = 800  # of the honest run: two windows of the standard rig and more
@@ -84,12 +85,14 @@ def _honest_run() -> tuple[tuple[int, Message], ...]:
     t = np.arange(TICKS) / RATE
     phi = (0.05 * np.sin(9.0 * t)).astype(np.float32)
     y = (0.004 * np.sin(13.0 * t) + 0.002 * np.sin(31.0 * t)).astype(np.float32)
+    of_samples = fnv.sample_hashes(np.stack([phi, y], axis=1))
     sent: list[tuple[int, Message]] = []
     for first in range(0, TICKS, CHECK_EVERY):
         part = slice(first, first + CHECK_EVERY)
         record = identifier.run(phi[part], y[part], sums=False)
         for tick in range(first, first + CHECK_EVERY, PER_FRAME):
-            sent.append((tick, Raw.of_values(phi[tick : tick + PER_FRAME], y[tick : tick + PER_FRAME])))
+            samples = Raw.of_values(phi[tick : tick + PER_FRAME], y[tick : tick + PER_FRAME])
+            sent.append((tick, replace(samples, session=SESSION)))
         assessed = identifier.assess()
         estimate = message(
             Estimate,
@@ -102,7 +105,10 @@ def _honest_run() -> tuple[tuple[int, Message], ...]:
             weight=float(assessed["weight"]),
             reason=int(record.reason[-1]),
         )
-        sent += [(first + CHECK_EVERY, message(Hash, session=SESSION, hash=identifier.running_hash))]
+        hashed = message(
+            Hash, session=SESSION, hash=identifier.running_hash, sample_hash=int(of_samples[first + CHECK_EVERY - 1])
+        )
+        sent += [(first + CHECK_EVERY, hashed)]
         sent += [(first + CHECK_EVERY, estimate)] if identifier.counters["updates"] else []
     return tuple(sent)
 
@@ -176,7 +182,7 @@ class LyingBoard:
 
     def samples(self, phi: float = 0.01, y: float = 0.001, count: int = PER_FRAME) -> Raw:
         """Samples that are all the same."""
-        return Raw.of_values([phi] * count, [y] * count)
+        return replace(Raw.of_values([phi] * count, [y] * count), session=SESSION)
 
     def schema(self, text: bytes, *frames: tuple[int, bytes]) -> bytes:
         """A schema text under its own number, and frames of it."""

@@ -8,8 +8,11 @@ from __future__ import annotations
 import math
 import random
 import struct
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+
+from cobs import cobs
 
 from pvid import link, logfile
 from pvid.bench.liar_board import (
@@ -659,7 +662,7 @@ def _frames_of_a_schema_that_nobody_knows(board: LyingBoard) -> Steps:
 def _frames_of_another_version_of_the_link(board: LyingBoard) -> Steps:
     for i in range(100):
         raw = struct.pack("<BBIHI", 2, 5, SCHEMA, i, i) + bytes(80)
-        yield bytes(link.cobs.encode(raw + struct.pack("<I", link.zlib.crc32(raw)))) + b"\0"
+        yield bytes(cobs.encode(raw + struct.pack("<I", zlib.crc32(raw)))) + b"\0"
 
 
 @_lie(1)
@@ -680,8 +683,9 @@ def _frames_with_a_wrong_crc(board: LyingBoard) -> Steps:
 
 @_lie()
 def _frames_of_the_longest_payload(board: LyingBoard) -> Steps:
-    for tick in range(TICKS, TICKS + 256 * 40, 256):
-        yield board.say(board.samples(count=MAX_PAYLOAD // 8), tick)
+    longest = (MAX_PAYLOAD - len(Raw(b"").payload)) // 8
+    for tick in range(TICKS, TICKS + 20 * longest, longest):
+        yield board.say(board.samples(count=longest), tick)
 
 
 @_lie(1)
