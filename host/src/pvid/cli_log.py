@@ -188,6 +188,8 @@ def _wrong(account: Account) -> list[str]:
     return sentences
 
 
+_MOST_STRETCHES = 100  # that are named
+
 _LOG = click.argument("log", type=click.Path(path_type=Path))
 _RIG = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
 
@@ -212,8 +214,11 @@ def verify_command(log: Path, rig_path: Path | None, partial: bool) -> int:
     verdict = Verdict()
     with progress_bar("verifying", None) as advance:
         for stretch in Verifier(rig, advance).stretches(reader):
-            click.echo(stretch.text)
+            if verdict.stretches < _MOST_STRETCHES or stretch.difference is not None:
+                click.echo(stretch.text)
             verdict.add(stretch)
+    if (more := verdict.stretches - _MOST_STRETCHES) > 0:
+        click.echo(f"{more} stretches more, named here where they are DIFFERENT")
     click.echo(verdict.text)
     click.echo(reader.account.text)
     if verdict.different:

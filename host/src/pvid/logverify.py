@@ -335,12 +335,18 @@ class Verifier:
                     row_sd=given.row_sd,
                     forgetting_s=given.forgetting_s,
                     feedback_hz=given.feedback_hz,
-                    law=Law(given.law),
+                    law=_law(given.law),
                     divider=given.divider,
                 )
                 return replace(config, estimator=settings)
             case _:
                 raise PvidError("the board's image holds another core than the rig file asks for")
+
+
+def _law(number: int) -> Law:
+    if number not in list(Law):
+        raise PvidError(f"the board was configured with law {number}, and there is none")
+    return Law(number)
 
 
 def _pace(configuration: Configuration) -> int:

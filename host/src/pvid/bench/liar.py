@@ -32,7 +32,7 @@ from pvid.errors import PvidError
 from pvid.link import Raw
 from pvid.livestate import LiveState
 from pvid.logger import Logger
-from pvid.logreader import LogReader
+from pvid.logreader import LogReader, Observer
 from pvid.logstatus import StatusLine
 from pvid.logview import LiveView
 from pvid.target import Target
@@ -103,7 +103,7 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
     screen, line, said = io.StringIO(), io.StringIO(), io.StringIO()
     source = RehearsedSource(behaviour)
     console = Console(file=screen, force_terminal=True, width=100)
-    views = [
+    views: list[Observer] = [
         LiveView(console, "title", rig().l1),
         StatusLine(line),
         Tee("udp://127.0.0.1:9"),
