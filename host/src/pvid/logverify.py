@@ -286,8 +286,8 @@ class Verifier:
         for tick, check in opened.checks:
             if check.session == stretch.session:
                 checks.setdefault(tick, []).append(check)
-        recomputation = _Recomputation(config, checks, stretch, self._count)
         with np.errstate(all="ignore"):  # a board may send any number, and say that it was configured with any
+            recomputation = _Recomputation(config, checks, stretch, self._count)
             recomputation.run(samples)
         stretch.verified = recomputation.covered
         allowed = _pace(configuration) + recomputation.reach
