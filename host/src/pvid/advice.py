@@ -85,6 +85,9 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
     case = Case(_shortened(run), rig)
     if result.beyond_words is not None and not result.identified:
         return (_wider_ranges(result),)
+    if result.parts_disagree and result.skew != 0.0:
+        delay = rig.sensor.y_delay + result.skew
+        return (f"phi and y are not sampled at one instant: do so, or use --set sensor.y_delay={delay:.3g}",)
     if _is_good(result):
         degrees = _angle_in_degrees(case, native)
         if degrees:

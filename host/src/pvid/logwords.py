@@ -83,7 +83,9 @@ def loss_words(account: Account) -> str:
         (account.foreign, "foreign frames"),
     ]
     told = ", ".join(f"{count} {what}" for count, what in parts if count)
-    return f"{told} ({100 * account.lost_share:.2g} %)" if told else ""
+    lost = f"{told} ({100 * account.lost_share:.2g} %)" if told else ""
+    unread = f"{account.unread / 1e6:.1f} MB recorded, but too fast to be decoded" if account.unread else ""
+    return "; ".join(filter(None, (lost, unread)))
 
 
 def reason_words(reason: str) -> str:
