@@ -128,6 +128,9 @@ class Identification:
         share of the motion that the equations leave unexplained, rms; None in the strong form
     skew
         how much later y seems to be sampled than phi [s]; 0 where that explains nothing
+    linear_error
+        what the fixed-point core's linear rows put into the standard errors, the largest of w, d1, d2, relative; 0 in
+        other cores
     parts_disagree
         the run's windows, corrected for large angles, want another estimate than the one published, or scatter, by
         much more than the core's standard errors say
@@ -173,6 +176,7 @@ class Identification:
     unexplained: float | None = None
     parts_disagree: bool = False
     skew: float = 0.0
+    linear_error: float = 0.0
     parts: dict[str, ErrorParts] = field(default_factory=dict)
     friction: tuple[float, ...] = ()
     first_publication_s: float | None = None
@@ -693,6 +697,7 @@ def _identification(
         unexplained=unexplained,
         parts_disagree=parts_disagree,
         skew=skew,
+        linear_error=0.0 if linear is None else float(np.abs(linear).max()),
         status=status,
         reasons=reasons,
         ticks=ticks,
