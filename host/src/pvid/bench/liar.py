@@ -39,7 +39,7 @@ from pvid.target import Target
 from pvid.tee import Tee
 
 _ALLOWED_LOSS = 0.001
-_SHORT_FLOOD = 400_000  # bytes
+_SHORT_FLOOD = 100_000  # bytes
 _ESCAPES = re.compile("\x1b\\]|\x07|\x1b\\[31m\x1b?X|\x1b\\[31mbye")
 EXPORTS = ("csv", "parquet", "mcap", "npz")
 
