@@ -31,6 +31,7 @@ _REASONS = {
     Reason.HELD_UNCERTAIN: "standard errors too wide, or still on the way; the last trusted estimate stays",
     Reason.HELD_OUT_OF_RANGE: "the angle went beyond what the equations are good for; that window was dropped",
     Reason.HELD_FROZEN: "frozen: nothing is taken in",
+    Reason.NOT_READY: "the identifier has no configuration yet, or refused the one that it was given",
     Reason.MISFIT: "the estimate took a step, but residuals exceed the sensors' noise: friction, large angles or "
     "another mechanism",
 }
