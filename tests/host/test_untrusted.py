@@ -23,7 +23,7 @@ from click.testing import CliRunner
 
 from pvid import link, logfile, patience
 from pvid.bench.liar import RehearsedSource
-from pvid.bench.liar_board import TICKS, Flood, LyingBoard, Step, message
+from pvid.bench.liar_board import TICKS, Flood, LyingBoard, Pause, Step, message
 from pvid.bench.lies import Behaviour
 from pvid.cli import commands
 from pvid.cli_log import print_account
@@ -174,6 +174,23 @@ def test_a_port_s_name_is_text_whatever_stands_in_a_log(about: bytes) -> None:
     assert port.isprintable() and len(port.encode()) < 40
 
 
+@pytest.mark.parametrize("when", [0, 2**62, 2**64 - 1])
+def test_a_log_from_elsewhere_may_tell_of_any_time(when: int, tmp_path: Path) -> None:
+    frames = (logfile.Segment(0, when, b"{}"), logfile.Mark(when, 2**64 - 1), logfile.Close(when, 2**64 - 1, b""))
+    begin, mark, end = (link.encode(frame, i, 5, LOG_SCHEMA) for i, frame in enumerate(frames))
+    path = tmp_path / "a.pvlog"
+    path.write_bytes(begin + LyingBoard().honest() + mark + LyingBoard().honest(board_at_the_slowest()) + end)
+    values = Values()
+    rows = [one for record in LogReader(path) for one in values.rows(record)]
+    times = np.concatenate([one.columns["log_time"] for one in rows])
+    assert len(times) > 2 * TICKS and (np.diff(times) >= 0).all() and times[0] >= 0
+
+
+def board_at_the_slowest() -> link.Hello:
+    """Of which 2^48 ticks take longest."""
+    return LyingBoard().hello(sample_rate=1e-3)
+
+
 # ---- the recorder
 
 
@@ -207,7 +224,7 @@ def recorded(path: Path, *steps: Step, **settings: object) -> Logger:
 def test_an_observer_that_fails_is_left_out_and_named(tmp_path: Path) -> None:
     failing, counting = _Failing(), _Counting()
     logger = recorded(tmp_path / "a.pvlog", LyingBoard().honest(), observers=[failing, counting])
-    assert logger.failures == ["_Failing ended with IndexError: no such\\x1b thing; the recording went on"]
+    assert logger.failures == ["_Failing failed with IndexError: no such\\x1b thing; the recording went on"]
     assert failing.taken == 3 and failing.closed
     assert logger.stream.account.samples == TICKS and counting.taken > 40 and counting.closed
 
@@ -220,6 +237,22 @@ class _Counting(_Failing):
 
     def close(self, account: Account) -> None:
         self.closed = True
+
+
+def test_a_stream_that_fails_does_not_end_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    board, count = LyingBoard(), LogStream._of_board
+
+    def stumbles(self: LogStream, frame: link.Frame, began: bool) -> Iterator[Record]:
+        if isinstance(frame.message, link.Credit):
+            raise RecursionError("deep")
+        return count(self, frame, began)
+
+    monkeypatch.setattr(LogStream, "_of_board", stumbles)
+    logger = recorded(tmp_path / "a.pvlog", board.honest(), board.say(message(link.Credit)), Pause(0.2), board.honest())
+    assert logger.failures == ["LogStream failed with RecursionError: deep; the recording went on"]
+    assert logger.stream.account.samples == 2 * TICKS
+    monkeypatch.undo()
+    assert account_of(tmp_path / "a.pvlog").by_kind["credit"] == 1
 
 
 def test_a_board_that_refuses_after_it_has_run_is_recorded_on(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ EXPORTS = ("csv", "parquet", "mcap", "npz")
 
 
 class _Line:
-    """A port that plays steps; a pause is a read without bytes."""
+    """A port that plays steps, with short pauses."""
 
     def __init__(self, steps: Iterator[Step], source: RehearsedSource) -> None:
         self._steps = steps
@@ -64,9 +64,11 @@ class _Line:
                 return data * (_SHORT_FLOOD // len(data))
             case HangUp():
                 raise serial.SerialException("disconnected")
+            case Pause(seconds):
+                time.sleep(min(seconds, 0.1))
             case None:
                 self._source.logger.duration_s = 0.0  # the recording has lasted long enough
-        time.sleep(0.001)
+                time.sleep(0.001)
         return b""
 
     def write(self, data: bytes, /) -> int | None:

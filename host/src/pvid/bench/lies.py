@@ -212,6 +212,11 @@ def _a_name_of_markup(board: LyingBoard) -> Steps:
 
 
 @_lie()
+def _a_name_of_formulas(board: LyingBoard) -> Steps:
+    yield board.say(board.hello(board="$\\frac{1}{0$"))
+
+
+@_lie()
 def _a_name_of_bytes_beyond_ascii(board: LyingBoard) -> Steps:
     payload = board.hello(board="N" * 16).payload
     name = b"\xff\xfe\xed\xa0\x80\xe2\x80\xae\x9b31m\0x\x7f"
