@@ -238,7 +238,8 @@ def perform(behaviour: Behaviour, folder: Path) -> Performance:
     rig().write(folder / "rig.toml")
     server = socket.create_server(("127.0.0.1", 0))
     server.settimeout(DURATION_S + 5)
-    threading.Thread(target=_serve, args=(server, behaviour), daemon=True).start()
+    up: list[float] = []
+    threading.Thread(target=_serve, args=(server, behaviour, up), daemon=True).start()
     port = f"socket://127.0.0.1:{server.getsockname()[1]}"
     command = [
         "log",
@@ -261,7 +262,7 @@ def perform(behaviour: Behaviour, folder: Path) -> Performance:
             done.faults.append("log does not end")
             process.kill()
             process.wait()
-        done.late_s = max(0.0, time.monotonic() - began - DURATION_S)
+        done.late_s = max(0.0, time.monotonic() - (up or [began])[0] - DURATION_S)
         out.seek(0)
         _note(done, "log", process.returncode, out.read())
     server.close()
@@ -315,12 +316,13 @@ def _peak_kb(pid: int) -> int:
     return 0
 
 
-def _serve(server: socket.socket, behaviour: Behaviour) -> None:
-    """Plays the steps, to one connection after the other, until the logger has gone."""
+def _serve(server: socket.socket, behaviour: Behaviour, up: list[float]) -> None:
+    """Plays the steps, to one connection after the other, until the logger has gone; `up` are the times [s] of each."""
     steps: Iterator[Step] = behaviour.steps(LyingBoard())
     with suppress(OSError):
         while True:
             connection, _ = server.accept()
+            up.append(time.monotonic())
             with connection:
                 threading.Thread(target=_drain, args=(connection,), daemon=True).start()
                 _play(connection, steps)
