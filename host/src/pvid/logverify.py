@@ -290,8 +290,9 @@ class Verifier:
         for tick, check in opened.checks:
             if check.session == stretch.session:
                 checks.setdefault(tick, []).append(check)
-        recomputation = _Recomputation(config, checks, stretch, self._count)
-        recomputation.run(samples)
+        with np.errstate(all="ignore"):  # a board may send any number, and say that it was configured with any
+            recomputation = _Recomputation(config, checks, stretch, self._count)
+            recomputation.run(samples)
         stretch.verified = recomputation.covered
         allowed = _pace(configuration) + recomputation.reach
         if recomputation.hashed and configuration.hash_every:
@@ -338,12 +339,18 @@ class Verifier:
                     row_sd=given.row_sd,
                     forgetting_s=given.forgetting_s,
                     feedback_hz=given.feedback_hz,
-                    law=Law(given.law),
+                    law=_law(given.law),
                     divider=given.divider,
                 )
                 return replace(config, estimator=settings)
             case _:
                 raise PvidError("the board's image holds another core than the rig file asks for")
+
+
+def _law(number: int) -> Law:
+    if number not in list(Law):
+        raise PvidError(f"the board was configured with law {number}, and there is none")
+    return Law(number)
 
 
 def _pace(configuration: Configuration) -> int:

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 from pvid.errors import PvidError
+from pvid.link import Loss
 from pvid.logreader import Account, Record
 from pvid.logvalues import TABLES, Rows, Values
 
@@ -63,6 +64,8 @@ class Tee:
 
     def take(self, record: Record, account: Account) -> None:
         """See logreader.Observer."""
+        if isinstance(record.item, Loss):
+            return  # of which a line in trouble has many
         for rows in self._values.rows(record):
             if rows.table in _TABLES:
                 for datagram in self._datagrams(rows):
