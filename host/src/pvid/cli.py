@@ -807,6 +807,18 @@ def bench_fuzz_link(runs: int) -> int:
     return DONE
 
 
+@bench.command(name="fuzz-api")
+@click.option("--calls", default=10_000_000, show_default=True)
+@click.option("--seed", default=1, show_default=True)
+def bench_fuzz_api(calls: int, seed: int) -> int:
+    """Random calls of the C core's public API, with sanitizers (needs clang)."""
+    from pvid.bench.fuzz import fuzz_api
+
+    with tempfile.TemporaryDirectory(prefix="pvid-fuzz-") as folder:
+        click.echo(fuzz_api(Path(folder), calls, seed).text)
+    return DONE
+
+
 @bench.command(name="codec")
 @click.option("--frames", default=1_000_000, show_default=True)
 def bench_codec(frames: int) -> int:
