@@ -143,7 +143,7 @@ void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_es
 {
     const pvid_model_q31 *model = self->model;
     int32_t noise[PVID_NOISE_TRACES_Q31];
-    int32_t c[PVID_MAX_P][2] = {{0, 0}}; /* the noisy rows of C, by parameters */
+    int32_t c[PVID_MAX_P][2] = {0}; /* the noisy rows of C, by parameters */
     scale_noise(self, solve, noise);
     for (size_t k = 0; k < model->n_c; k++) {
         for (size_t i = 0; i < 2u; i++) {
