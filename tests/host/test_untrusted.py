@@ -8,6 +8,8 @@ import io
 import itertools
 import json
 import socket
+import subprocess
+import sys
 import threading
 import time
 import urllib.request
@@ -394,6 +396,13 @@ def test_a_socket_loses_nothing_that_was_sent_before_it_was_opened() -> None:
             port = open_port(f"socket://127.0.0.1:{server.getsockname()[1]}")
         assert port.read(11) == b"first bytes"
         port.close()
+
+
+def test_a_logger_loads_no_package_that_it_does_not_need() -> None:
+    """What a logger does not load is memory that it does not take, for as long as it runs."""
+    code = "import sys, pvid.cli; print(*[name for name in ('scipy', 'matplotlib', 'pyarrow') if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 # ---- numbers
