@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pvid.appearing import appearing
+from pvid.appearing import write_whole
 from pvid.array_table import read_npz, read_parquet, write_npz, write_parquet
 from pvid.csv_table import read_csv, write_csv, write_csv_gz
 from pvid.errors import PvidError
@@ -148,10 +148,7 @@ def write_run(path: str | os.PathLike[str], run: Run) -> None:
         raise PvidError(f"{path} is not written: {again.notes[0]}.")
     content = write(path, {name: getattr(run, name) for name in SIGNALS})
     try:
-        with appearing(path) as temporary, temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+        write_whole(path, content)
     except OSError as error:
         raise PvidError(f"{path} cannot be written: {reason(error)}.") from error
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
-import termios
 from typing import Protocol
 
 import serial
 
 from pvid.errors import PvidError
+from pvid.wording import reason
 
 BAUD = 115200
 _READ_S = 0.02
@@ -42,7 +42,7 @@ def open_port(name: str) -> Port:
             port.dtr = False
             port.rts = False
         port.open()
-    except (serial.SerialException, OSError, ValueError, termios.error) as error:
+    except Exception as error:  # the classes that pyserial loads for URLs let through whatever their text provokes
         raise PvidError(why_not_opened(name, error)) from error
     return port
 
@@ -62,7 +62,7 @@ def why_not_opened(name: str, error: Exception) -> str:
         return words[number]
     if number in (errno.ENOTTY, errno.EISDIR):
         return f"{name} is no serial port"
-    return f"cannot open the port {name}: {error}"
+    return f"cannot open the port {name}: {reason(error)}"
 
 
 def why_gone(error: Exception) -> str:

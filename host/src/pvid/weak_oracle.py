@@ -721,7 +721,8 @@ def predict(
     alone = inverse @ noise.information() @ inverse
     shared = inverse @ c.T @ noise.q @ c @ inverse
     # As in `WeakOracle.sandwich`, shared noise may not claim that windows know more than twice as much.
-    share = min(1.0, float(np.min(0.75 * np.diag(alone) / np.maximum(-np.diag(shared), 1e-300))))
+    with np.errstate(over="ignore"):  # next to nothing is shared: all of it may count
+        share = min(1.0, float(np.min(0.75 * np.diag(alone) / np.maximum(-np.diag(shared), 1e-300))))
     covariance = variance * (alone + share * shared)
     return Prediction(oracle.p, np.sqrt(np.diag(covariance)), covariance, kappa, math.sqrt(variance), windows)
 

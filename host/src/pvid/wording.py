@@ -1,4 +1,4 @@
-"""What a sentence quotes: text from a file, and the reason of an error."""
+"""What a sentence quotes: text from a file, names, and the reason of an error."""
 
 from __future__ import annotations
 
@@ -12,3 +12,8 @@ def reason(error: BaseException) -> str:
     """What an error tells, on one line and without its full stop."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return " ".join(str(text).split()).rstrip(".")
+
+
+def printable(text: str) -> str:
+    """``text`` on one line of a terminal: what would move the cursor, colour it or turn the text around is escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
