@@ -7,8 +7,8 @@ from typing import Any
 
 from pvid.errors import PvidError
 
-# Longer ones are slips. A key of many parts takes tomllib time and memory that grow with their square: half a minute and
-# 4 GB for 60 kB.
+# Longer ones are slips. A key of many parts takes tomllib time and memory that grow with their square: half a minute
+# and 4 GB for 60 kB.
 MOST_BYTES = 64_000
 TOO_LONG = f"is longer than {MOST_BYTES // 1000} kB, and a file of settings is not"
 _LONGEST_LINE = 4000
