@@ -207,22 +207,25 @@ requirements_are_installed() { # requirements_are_installed PROFILE
     return 1
 }
 
-# The packages of the lock file, each with its hash, then pvid itself by the backend that is among them: nothing else
-# is fetched.
+# The packages of the lock file, each with its hash: those that others are built with first, for what pip fetches to
+# build with it does not check. Then pvid itself.
 install_requirements() { # install_requirements PROFILE
-    local locked=$root/tools/requirements.txt
+    local lock=$root/tools/requirements.txt pip=("$python" -m pip install --disable-pip-version-check --no-input)
     requirements_are_installed "$1" && return
     say "installing Python packages: those of tools/requirements.txt"
     rm -f "$venv"/installed-*
+    sed '/^# to use pvid$/,$d' "$lock" >"$venv/builders.txt"
     if [[ $1 != test ]]; then
-        locked=$venv/requirements.txt
-        sed '/^# for the tests alone$/,$d' "$root/tools/requirements.txt" >"$locked"
+        sed '/^# for the tests alone$/,$d' "$lock" >"$venv/requirements.txt"
+        lock=$venv/requirements.txt
     fi
-    local pip=("$python" -m pip install --disable-pip-version-check --no-input)
-    logged pip "${pip[@]}" --require-hashes --requirement "$locked" || die "pip install failed; its output is above"
+    local failed="pip install failed; its output is above"
+    logged pip-builders "${pip[@]}" --require-hashes --only-binary :all: --requirement "$venv/builders.txt" ||
+        die "$failed"
+    logged pip "${pip[@]}" --require-hashes --no-build-isolation --requirement "$lock" || die "$failed"
     # From inside host/: a path is read as a URL, which spaces break.
     logged pip-pvid env -C "$root/host" "${pip[@]}" --no-index --no-deps --no-build-isolation --editable . ||
-        die "pip install failed; its output is above"
+        die "$failed"
     write_stamp "$venv/installed-$1" "$(requirements)"
 }
 

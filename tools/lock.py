@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Writes tools/requirements.txt anew from host/pyproject.toml: run it after a change there, and for newer versions.
 
-Every package that tools/pvid installs, then those that tools/test adds, each with one version for a Python and the
-hashes of its files, for Linux on any processor and Python 3.11 and later. Needs uv (`pip install uv`).
+First what the others are built with where there is no wheel, then every package that tools/pvid installs, then those that
+tools/test adds: each with its version and the hashes of its files, for Linux on any processor and Python 3.11 and
+later. Needs uv (`pip install uv`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = ROOT / "host" / "pyproject.toml"
 LOCK = ROOT / "tools" / "requirements.txt"
-TESTS = "# for the tests alone"  # tools/bootstrap.sh reads up to this line where nothing is tested
+# Lines between which tools/bootstrap.sh takes what it installs at a time.
+USE, TESTS = "# to use pvid", "# for the tests alone"
+BUILDERS = ("flit-core", "setuptools")
 _WINDOWS = re.compile(r"os_name == 'nt'|sys_platform == 'win32'")
 HEADER = "# Written by tools/lock.py from host/pyproject.toml: do not edit.\n"
 
@@ -26,7 +29,7 @@ def compiled(extras: list[str], *options: str) -> str:
     command += ["--fork-strategy", "fewest", *options]
     command += [f"--extra={extra}" for extra in extras]
     return subprocess.run(
-        [*command, str(PROJECT), "-"], input="flit_core\n", capture_output=True, text=True, check=True
+        [*command, str(PROJECT), "-"], input="\n".join(BUILDERS), capture_output=True, text=True, check=True
     ).stdout
 
 
@@ -44,10 +47,11 @@ def main() -> None:
         needed = set(map(pinned, compiled(["campaign", "web"], "--constraint", str(fixed)).splitlines()))
     finally:
         fixed.unlink()
-    first = [block for block in blocks if pinned(block) in needed]
-    rest = [block for block in blocks if block not in first]
-    LOCK.write_text("".join([HEADER, *first, f"{TESTS}\n", *rest]), encoding="utf-8")
-    print(f"{LOCK.relative_to(ROOT)}: {len(first)} packages, {len(rest)} more for the tests")
+    builders = [block for block in blocks if block.startswith(tuple(f"{one}==" for one in BUILDERS))]
+    used = [block for block in blocks if pinned(block) in needed and block not in builders]
+    tests = [block for block in blocks if block not in builders and block not in used]
+    LOCK.write_text("".join([HEADER, *builders, f"{USE}\n", *used, f"{TESTS}\n", *tests]), encoding="utf-8")
+    print(f"{LOCK.relative_to(ROOT)}: {len(builders)} + {len(used)} packages, {len(tests)} more for the tests")
 
 
 main()
