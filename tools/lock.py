@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Writes tools/requirements.txt anew from host/pyproject.toml: run it after a change there, and for newer versions.
 
-First what the others are built with where there is no wheel, then every package that tools/pvid installs, then those that
-tools/test adds: each with its version and the hashes of its files, for Linux on any processor and Python 3.11 and
+First what the others are built with where there is no wheel, then every package that tools/pvid installs, then those
+that tools/test adds: each with its version and the hashes of its files, for Linux on any processor and Python 3.11 and
 later. Needs uv (`pip install uv`).
 """
 

@@ -33,6 +33,9 @@ Function = TypeVar("Function")
 # The shortest finite difference of order 4 takes 5 samples: fewer feed no form of the identifier.
 MIN_ROWS = 5
 
+# Beyond are damaged numbers: [s] as nanoseconds since 1970, [rad] and [m] as counts of 40 bits.
+_LARGEST = {"t": 1e19, "phi": 1e12, "y": 1e12}
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -162,9 +165,11 @@ def _checked(table: Table) -> Table:
     """The rows between the first and the last sample; refused when there are too few, or a number is infinite."""
     for signal in SIGNALS:
         data = getattr(table, signal)
-        if np.isinf(data).any():
-            row = int(np.argmax(np.isinf(data)))
-            raise table.error(row, signal, f"{data[row]} is not a finite number")
+        beyond = np.abs(data) > _LARGEST[signal]
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            why = "is not a finite number" if np.isinf(data[row]) else "is too large for any unit"
+            raise table.error(row, signal, f"{data[row]} {why}")
     there = np.isfinite(table.phi) & np.isfinite(table.y)
     rows = int(np.count_nonzero(there))
     if rows < MIN_ROWS:

@@ -43,6 +43,10 @@ _GATE: dict[Form, float] = {"weak": 4.0, "strong": 6.0}
 _PATIENCE: dict[Form, float] = {"weak": 3.0, "strong": 6.0}
 
 
+# What is no zero but smaller is a slip, and what is divided by it overflows.
+_LEAST = 1e-12
+
+
 class Unset(float):
     """A number that stands where the rig file does not say."""
 
@@ -380,8 +384,9 @@ def _check_value(key: Field[Any], value: Any, place: str) -> None:
         kind = "a whole number" if wanted is int else "a number"
         raise PvidError(f"{name} must be {kind}, not {_shown(value)}")
     low, high, unit = key.metadata["low"], key.metadata["high"], key.metadata["unit"]
-    if not low <= value <= high:
-        wide = f"from {low:g} to {high:g} {unit}".rstrip()
+    if not low <= value <= high or (low == 0 and 0 < value < _LEAST):
+        wide = f"0 or from {_LEAST:g}" if low <= value <= high else f"from {low:g}"
+        wide = f"{wide} to {high:g} {unit}".rstrip()
         raise PvidError(f"{name} must be {wide}, not {_shown(value)}")
 
 

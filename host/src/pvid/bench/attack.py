@@ -26,7 +26,7 @@ from typing import Literal
 
 from pvid import cli
 from pvid.bench.attack_commands import command_line
-from pvid.bench.attack_files import mutated_run, rig_text, written_runs
+from pvid.bench.attack_files import distorted_run, mutated_run, rig_text, written_runs
 from pvid.capture import Run, write_run
 from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.rig import simulate
@@ -190,9 +190,13 @@ def _runs(draw: random.Random, run: Run) -> _Mutants:
     """Command and run."""
     originals = written_runs(run, Path())
     while True:
-        suffix = draw.choice(list(originals))
-        mutant = Path(f"mutant{suffix}")
-        mutant.write_bytes(mutated_run(originals[suffix], draw))
+        if draw.random() < 0.5:
+            mutant = Path("mutant.csv")
+            mutant.write_bytes(distorted_run(run, draw))
+        else:
+            suffix = draw.choice(list(originals))
+            mutant = Path(f"mutant{suffix}")
+            mutant.write_bytes(mutated_run(originals[suffix], draw))
         yield ["identify", str(mutant), "--rig", "run.toml", "--json"], mutant
 
 

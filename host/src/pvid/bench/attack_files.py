@@ -7,6 +7,8 @@ import random
 from dataclasses import MISSING, fields
 from pathlib import Path
 
+import numpy as np
+
 from pvid.capture import Run, write_run
 from pvid.rigfile import Identifier, Nominal, RigFile, Sensor
 
@@ -82,6 +84,38 @@ def written_runs(run: Run, folder: Path) -> dict[str, bytes]:
         found[suffix] = path.read_bytes()
         path.unlink()
     return found
+
+
+def distorted_run(run: Run, draw: random.Random) -> bytes:
+    """CSV of a run whose signals are what other rigs, other units and broken sensors make of them."""
+    signals = {"t": run.t.copy(), "phi": run.phi.copy(), "y": run.y.copy()}
+    count = len(run)
+    for _ in range(draw.choice((1, 1, 2, 3))):
+        name = draw.choice(("phi", "phi", "y", "y", "t"))
+        data = signals[name]
+        first = draw.randrange(count)
+        part = slice(first, min(count, first + draw.choice((1, 2, 50, count))))
+        size = draw.choice((1.0, -1.0)) * 10 ** draw.choice((0, 1, 3, 6, -3, -9, draw.uniform(-320, 300)))
+        with np.errstate(all="ignore"):
+            kind = draw.randrange(8)
+            if kind == 0:
+                data *= size
+            elif kind == 1:
+                data += size
+            elif kind == 2:
+                data[part] = size
+            elif kind == 3:
+                data[part] = draw.choice((math.nan, math.inf, -math.inf, 0.0))
+            elif kind == 4:
+                data[:] = data[::-1].copy()
+            elif kind == 5:
+                data[:] = np.round(data / size) * size
+            elif kind == 6:
+                data[:] = signals[draw.choice(("t", "phi", "y"))]
+            else:
+                data += size * np.random.default_rng(draw.randrange(1 << 30)).standard_normal(count)
+    rows = zip(*(map(repr, one.tolist()) for one in signals.values()), strict=True)
+    return "\n".join(["t,phi,y", *map(",".join, rows), ""]).encode()
 
 
 def mutated_run(original: bytes, draw: random.Random) -> bytes:
