@@ -332,7 +332,8 @@ def unexplained(proof: Proof, said: str) -> list[str]:
 def command_of(proof: Proof) -> list[str]:
     program = ROOT / "tests" / "proofs" / f"prove_{proof.name}.c"
     files = [str(program), *(str(ROOT / "firmware" / source) for source in proof.sources)]
-    return ["frama-c", "-machdep", "gcc_x86_64", f"-cpp-extra-args={INCLUDES}", "-warn-signed-downcast", *files]
+    cpp = f"-cpp-extra-args={INCLUDES} -DPVID_PLAIN_NAMES"  # contracts and options name functions
+    return ["frama-c", "-machdep", "gcc_x86_64", cpp, "-warn-signed-downcast", *files]
 
 
 def deduce(proof: Proof) -> Result:

@@ -5,23 +5,23 @@
 #define PVID_LINK_VERSION 1u
 
 /* CRC-32 of the text. */
-#define PVID_LINK_SCHEMA 0xA1646BC5u
+#define PVID_LINK_SCHEMA 0xE1F24363u
 
 #define PVID_LINK_SCHEMA_TEXT \
     "pvid 1\n" \
-    "1 hello form:u8 core:u8 n_p:u8 window:u16 settings:u32 session:u32 sample_rate:f32 phi_lsb:f32 y_lsb:f32 p_unit:f32[6] board:char[16]\n" \
+    "1 hello form:u8 core:u8 n_p:u8 window:u16 settings:u32 session:u32 sample_rate:f32 phi_lsb:f32 y_lsb:f32 p_unit:f32[6] board:char[16] tick_high:u16\n" \
     "2 schema text:char[]\n" \
-    "3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32\n" \
+    "3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32 first_tick:u64\n" \
     "4 sample phi_y:f32[]\n" \
-    "5 raw phi_y:f32[]\n" \
-    "6 estimate session:u32 updates:u32 p:f32[6] covariance:f32[21] kappa:f32 residual_sd:f32 weight:f32 reason:u8\n" \
-    "7 status session:u32 code:u8 core:u8 updates:u32 rejected:u32 repeated:u32 skipped:u32 missing:u32 malformed:u32 bad_crc:u32 foreign:u32\n" \
-    "8 hash session:u32 hash:u32\n" \
-    "9 credit session:u32 room:u32 hash:u32 reason:u8\n" \
-    "10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 start:i32[6] start_sd:i32[6] lower:i32[6] upper:i32[6] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 y_offset:i32\n" \
+    "5 raw session:u32 tick_high:u16 phi_y:f32[]\n" \
+    "6 estimate session:u32 updates:u32 p:f32[6] covariance:f32[21] kappa:f32 residual_sd:f32 weight:f32 reason:u8 tick_high:u16\n" \
+    "7 status session:u32 code:u8 core:u8 updates:u32 rejected:u32 repeated:u32 skipped:u32 missing:u32 malformed:u32 bad_crc:u32 foreign:u32 tick_high:u16\n" \
+    "8 hash session:u32 hash:u32 tick_high:u16 sample_hash:u32\n" \
+    "9 credit session:u32 room:u32 hash:u32 reason:u8 tick_high:u16 sample_hash:u32\n" \
+    "10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 start:i32[6] start_sd:i32[6] lower:i32[6] upper:i32[6] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 y_offset:i32 first_tick:u64\n" \
     "11 count phi_y:i32[]\n" \
-    "12 raw_count phi_y:i32[]\n" \
-    "13 estimate_q31 session:u32 updates:u32 p:i32[6] se:i32[6] correlation:i32[21] kappa:i32 residual_sd:i32 weight:u32 reason:u8"
+    "12 raw_count session:u32 tick_high:u16 phi_y:i32[]\n" \
+    "13 estimate_q31 session:u32 updates:u32 p:i32[6] se:i32[6] correlation:i32[21] kappa:i32 residual_sd:i32 weight:u32 reason:u8 tick_high:u16"
 
 /* Frame types; offsets of their fields and the bytes before an open end. */
 
@@ -37,7 +37,8 @@
 #define PVID_HELLO_Y_LSB 21u /* f32 */
 #define PVID_HELLO_P_UNIT 25u /* f32[6] */
 #define PVID_HELLO_BOARD 49u /* char[16] */
-#define PVID_HELLO_BYTES 65u
+#define PVID_HELLO_TICK_HIGH 65u /* u16 */
+#define PVID_HELLO_BYTES 67u
 
 #define PVID_SCHEMA 2u
 #define PVID_SCHEMA_TEXT 0u /* char[] */
@@ -59,15 +60,18 @@
 #define PVID_CONFIGURE_ROW_SD 113u /* f32 */
 #define PVID_CONFIGURE_FORGETTING_S 117u /* f32 */
 #define PVID_CONFIGURE_FEEDBACK_HZ 121u /* f32 */
-#define PVID_CONFIGURE_BYTES 125u
+#define PVID_CONFIGURE_FIRST_TICK 125u /* u64 */
+#define PVID_CONFIGURE_BYTES 133u
 
 #define PVID_SAMPLE 4u
 #define PVID_SAMPLE_PHI_Y 0u /* f32[] */
 #define PVID_SAMPLE_BYTES 0u
 
 #define PVID_RAW 5u
-#define PVID_RAW_PHI_Y 0u /* f32[] */
-#define PVID_RAW_BYTES 0u
+#define PVID_RAW_SESSION 0u /* u32 */
+#define PVID_RAW_TICK_HIGH 4u /* u16 */
+#define PVID_RAW_PHI_Y 6u /* f32[] */
+#define PVID_RAW_BYTES 6u
 
 #define PVID_ESTIMATE 6u
 #define PVID_ESTIMATE_SESSION 0u /* u32 */
@@ -78,7 +82,8 @@
 #define PVID_ESTIMATE_RESIDUAL_SD 120u /* f32 */
 #define PVID_ESTIMATE_WEIGHT 124u /* f32 */
 #define PVID_ESTIMATE_REASON 128u /* u8 */
-#define PVID_ESTIMATE_BYTES 129u
+#define PVID_ESTIMATE_TICK_HIGH 129u /* u16 */
+#define PVID_ESTIMATE_BYTES 131u
 
 #define PVID_STATUS 7u
 #define PVID_STATUS_SESSION 0u /* u32 */
@@ -92,19 +97,24 @@
 #define PVID_STATUS_MALFORMED 26u /* u32 */
 #define PVID_STATUS_BAD_CRC 30u /* u32 */
 #define PVID_STATUS_FOREIGN 34u /* u32 */
-#define PVID_STATUS_BYTES 38u
+#define PVID_STATUS_TICK_HIGH 38u /* u16 */
+#define PVID_STATUS_BYTES 40u
 
 #define PVID_HASH 8u
 #define PVID_HASH_SESSION 0u /* u32 */
 #define PVID_HASH_HASH 4u /* u32 */
-#define PVID_HASH_BYTES 8u
+#define PVID_HASH_TICK_HIGH 8u /* u16 */
+#define PVID_HASH_SAMPLE_HASH 10u /* u32 */
+#define PVID_HASH_BYTES 14u
 
 #define PVID_CREDIT 9u
 #define PVID_CREDIT_SESSION 0u /* u32 */
 #define PVID_CREDIT_ROOM 4u /* u32 */
 #define PVID_CREDIT_HASH 8u /* u32 */
 #define PVID_CREDIT_REASON 12u /* u8 */
-#define PVID_CREDIT_BYTES 13u
+#define PVID_CREDIT_TICK_HIGH 13u /* u16 */
+#define PVID_CREDIT_SAMPLE_HASH 15u /* u32 */
+#define PVID_CREDIT_BYTES 19u
 
 #define PVID_CONFIGURE_Q31 10u
 #define PVID_CONFIGURE_Q31_SESSION 0u /* u32 */
@@ -123,15 +133,18 @@
 #define PVID_CONFIGURE_Q31_GAIN 120u /* i32 */
 #define PVID_CONFIGURE_Q31_PHI_OFFSET 124u /* i32 */
 #define PVID_CONFIGURE_Q31_Y_OFFSET 128u /* i32 */
-#define PVID_CONFIGURE_Q31_BYTES 132u
+#define PVID_CONFIGURE_Q31_FIRST_TICK 132u /* u64 */
+#define PVID_CONFIGURE_Q31_BYTES 140u
 
 #define PVID_COUNT 11u
 #define PVID_COUNT_PHI_Y 0u /* i32[] */
 #define PVID_COUNT_BYTES 0u
 
 #define PVID_RAW_COUNT 12u
-#define PVID_RAW_COUNT_PHI_Y 0u /* i32[] */
-#define PVID_RAW_COUNT_BYTES 0u
+#define PVID_RAW_COUNT_SESSION 0u /* u32 */
+#define PVID_RAW_COUNT_TICK_HIGH 4u /* u16 */
+#define PVID_RAW_COUNT_PHI_Y 6u /* i32[] */
+#define PVID_RAW_COUNT_BYTES 6u
 
 #define PVID_ESTIMATE_Q31 13u
 #define PVID_ESTIMATE_Q31_SESSION 0u /* u32 */
@@ -143,7 +156,8 @@
 #define PVID_ESTIMATE_Q31_RESIDUAL_SD 144u /* i32 */
 #define PVID_ESTIMATE_Q31_WEIGHT 148u /* u32 */
 #define PVID_ESTIMATE_Q31_REASON 152u /* u8 */
-#define PVID_ESTIMATE_Q31_BYTES 153u
+#define PVID_ESTIMATE_Q31_TICK_HIGH 153u /* u16 */
+#define PVID_ESTIMATE_Q31_BYTES 155u
 
 /* Status.code */
 #define PVID_CODE_WAITING 0u

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/arithmetic.h"
 
 #include <math.h>
@@ -39,6 +41,14 @@ uint32_t pvid_arithmetic_faults_f32(void)
     const volatile float third = one / three;
     if (pvid_bits_f32(third) != 0x3EAAAAABu) {
         faults |= 16u;
+    }
+    /* 2^24 swallows 1, in whatever direction is rounded (0 or 2 is left), unless sums are taken in another order. */
+    const volatile float two_to_24 = 16777216.0f;
+    const float small = one;
+    const float large = two_to_24;
+    const volatile float left = (small + large) - large;
+    if (pvid_bits_f32(left) == 0x3F800000u) {
+        faults |= 32u;
     }
     return faults;
 }

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "cholesky_f32.h"
 
 #include <math.h>

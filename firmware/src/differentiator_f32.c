@@ -1,6 +1,9 @@
+#include "uncontracted.h"
+
 #include "pvid/differentiator.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "differentiator_f32.h"
 #include "finite_f32.h"
@@ -31,10 +34,9 @@ static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
     return PVID_OK;
 }
 
-pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
+static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
                                          float sample_rate_hz)
 {
-    PVID_ASSERT((self != NULL) && (bank != NULL));
     const pvid_status status = bank_is_valid(bank);
     if (status != PVID_OK) {
         return status;
@@ -57,6 +59,18 @@ pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pv
     return PVID_OK;
 }
 
+pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
+                                         float sample_rate_hz)
+{
+    const bool given = (self != NULL) && (bank != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, bank, sample_rate_hz) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
+}
+
 void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 {
     self->head = 0;
@@ -68,7 +82,9 @@ void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 
 bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, float out[PVID_ORDERS])
 {
-    if (!pvid_fir_push_f32(self, sample)) {
+    const bool ready = (self != NULL) && (self->bank.weights != NULL);
+    PVID_ASSERT(ready);
+    if (!ready || !pvid_fir_push_f32(self, sample)) {
         return false;
     }
     const size_t half = self->bank.half;

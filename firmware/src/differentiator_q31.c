@@ -1,6 +1,7 @@
 #include "pvid/differentiator_q31.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "fir_window.h"
 #include "integer_q31.h"
@@ -92,9 +93,8 @@ static pvid_status bank_is_valid(const pvid_fir_bank_q31 *bank)
     return (phi != PVID_OK) ? phi : channel_is_valid(bank, PVID_Y_LOWEST_Q31, bank->y_max, bank->y_shift);
 }
 
-pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
+static pvid_status prepare(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
 {
-    PVID_ASSERT((self != NULL) && (bank != NULL));
     const pvid_status status = bank_is_valid(bank);
     if (status != PVID_OK) {
         return status;
@@ -103,6 +103,17 @@ pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pv
     self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);
     pvid_differentiator_reset_q31(self);
     return PVID_OK;
+}
+
+pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
+{
+    const bool given = (self != NULL) && (bank != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, bank) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
 }
 
 void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self)
@@ -123,6 +134,11 @@ static int32_t rounded(int64_t sum, uint8_t shift)
 bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, int32_t y, int32_t d_phi[PVID_ORDERS],
                                   int32_t d_y[PVID_Y_ORDERS_Q31])
 {
+    const bool ready = (self != NULL) && (self->bank.weights != NULL);
+    PVID_ASSERT(ready);
+    if (!ready) {
+        return false;
+    }
     const size_t length = self->length;
     const size_t half = self->bank.half;
     const size_t stride = self->bank.stride;

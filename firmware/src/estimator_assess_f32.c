@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 /* What is known of p: standard errors, kappa, residual. */
 #include <math.h>
 #include <stddef.h>
@@ -182,6 +184,13 @@ static void assess_at_once(const pvid_estimator_f32 *self, pvid_estimate_f32 *es
 
 void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate)
 {
+    if (estimate == NULL) {
+        return;
+    }
+    if (!pvid_estimator_is_ready_f32(self)) {
+        memset(estimate, 0, sizeof *estimate);
+        return;
+    }
     if (pvid_relative_f32(self->model)) {
         assess_in_stages(self, estimate);
     } else {

@@ -138,6 +138,13 @@ void pvid_estimator_errors_q31(const pvid_estimator_q31 *self, const pvid_estima
 
 void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31 *estimate)
 {
+    if (estimate == NULL) {
+        return;
+    }
+    if (!pvid_estimator_is_ready_q31(self)) {
+        memset(estimate, 0, sizeof *estimate);
+        return;
+    }
     pvid_estimator_solve_q31 solve;
     pvid_estimator_begin_assessment_q31(self, &solve, estimate);
     bool done = false;

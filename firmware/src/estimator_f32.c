@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/estimator.h"
 
 #include <math.h>
@@ -112,9 +114,8 @@ static float feedback_gain(const pvid_estimator_config_f32 *config)
     return ((config->feedback_hz > 0.0f) && (gain < 1.0f)) ? gain : 1.0f;
 }
 
-pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL));
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;
@@ -141,6 +142,17 @@ pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimat
     self->dead_zone = config->dead_zone * config->dead_zone;
     self->divider = config->divider;
     return PVID_OK;
+}
+
+pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+{
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
 }
 
 /* ---- rows ---- */
@@ -253,6 +265,9 @@ static inline float heard(const pvid_estimator_f32 *self, const float n[], float
 
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
+    if (!pvid_estimator_is_ready_f32(self)) {
+        return PVID_NOT_READY;
+    }
     if (pvid_relative_f32(self->model)) {
         return add_relative_row(self, n, y);
     }
@@ -430,6 +445,9 @@ pvid_reason pvid_estimator_step_known_f32(pvid_estimator_f32 *self, const float 
 
 pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
+    if (!pvid_estimator_is_ready_f32(self)) {
+        return PVID_NOT_READY;
+    }
     if (!pvid_relative_f32(self->model)) {
         float gradient[PVID_MAX_P] = {0};
         const float e = heard(self, n, y, gradient);
@@ -441,6 +459,9 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
 
 void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
 {
+    if (!pvid_estimator_is_ready_f32(self)) {
+        return;
+    }
     for (size_t a = 0; a < self->model->n_p; a++) {
         if (pvid_finite_f32(p[a])) {
             const float x = (p[a] < self->lower[a]) ? self->lower[a] : p[a];

@@ -154,4 +154,12 @@ bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PV
  * is false or the result not finite. */
 void pvid_estimator_scale_f32(const pvid_estimator_f32 *self, float wide, bool known, pvid_estimate_f32 *estimate);
 
+/* Whether init has accepted a configuration. */
+static inline bool pvid_estimator_is_ready_f32(const pvid_estimator_f32 *self)
+{
+    const bool ready = (self != NULL) && (self->model != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
 #endif

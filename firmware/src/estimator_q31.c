@@ -136,9 +136,8 @@ static void init_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q
     }
 }
 
-pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL));
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;
@@ -170,8 +169,22 @@ pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimat
     return PVID_OK;
 }
 
+pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+{
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
+}
+
 void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t value)
 {
+    if (!pvid_estimator_is_ready_q31(self)) {
+        return;
+    }
     int64_t theta[PVID_MAX_THETA_Q31];
     const int64_t above = (value < self->lower[index]) ? self->lower[index] : value;
     self->p[index] = (int32_t)((above > self->upper[index]) ? self->upper[index] : above);
@@ -219,6 +232,9 @@ void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], in
 
 pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
 {
+    if (!pvid_estimator_is_ready_q31(self)) {
+        return PVID_NOT_READY;
+    }
     int64_t e;
     if (!pvid_estimator_innovation_q31(self, n, y, &e)) {
         pvid_count_up(&self->counters.rejected_saturated);
@@ -232,6 +248,9 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
 
 static pvid_reason solve_at_once(pvid_estimator_q31 *self, bool ends_group)
 {
+    if (!pvid_estimator_is_ready_q31(self)) {
+        return PVID_NOT_READY;
+    }
     pvid_estimator_solve_q31 solve;
     pvid_estimator_begin_q31(self, &solve, ends_group);
     bool done = false;

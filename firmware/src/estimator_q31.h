@@ -114,4 +114,12 @@ void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int
 /* Calls of pvid_system_scale_rows_q31 that scale all of M. */
 size_t pvid_system_row_stages_q31(size_t n_theta);
 
+/* Whether init has accepted a configuration. */
+static inline bool pvid_estimator_is_ready_q31(const pvid_estimator_q31 *self)
+{
+    const bool ready = (self != NULL) && (self->model != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
 #endif

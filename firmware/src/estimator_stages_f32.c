@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 /* The solve and the assessment in stages, for a model without functions of its own. */
 #include <math.h>
 #include <stddef.h>
@@ -373,6 +375,9 @@ uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self)
 /* All stages of a solve at once. */
 static pvid_reason solve_in_stages(pvid_estimator_f32 *self, bool ends_group)
 {
+    if (!pvid_estimator_is_ready_f32(self)) {
+        return PVID_NOT_READY;
+    }
     pvid_estimator_solve_f32 solve;
     pvid_estimator_begin_f32(self, &solve, ends_group);
     bool done = false;

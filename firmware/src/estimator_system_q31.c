@@ -143,23 +143,23 @@ void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_es
 {
     const pvid_model_q31 *model = self->model;
     int32_t noise[PVID_NOISE_TRACES_Q31];
-    int32_t c[2][PVID_MAX_P] = {{0}, {0}}; /* the noisy rows of C */
+    int32_t c[PVID_MAX_P][2] = {{0, 0}}; /* the noisy rows of C, by parameters */
     scale_noise(self, solve, noise);
     for (size_t k = 0; k < model->n_c; k++) {
         for (size_t i = 0; i < 2u; i++) {
             if (model->c_row[k] == model->noisy[i]) {
-                c[i][model->c_column[k]] = solve->c[k];
+                c[model->c_column[k]][i] = solve->c[k];
             }
         }
     }
     for (size_t a = 0; a < model->n_p; a++) {
         int64_t t[2];
         for (size_t i = 0; i < 2u; i++) {
-            const int64_t sum = ((int64_t)noise[i] * c[0][a]) + ((int64_t)noise[i + 1u] * c[1][a]);
+            const int64_t sum = ((int64_t)noise[i] * c[a][0]) + ((int64_t)noise[i + 1u] * c[a][1]);
             t[i] = pvid_round_shift_q31(sum, PVID_S_BITS);
         }
         for (size_t b = a; b < model->n_p; b++) {
-            rest[a][b] = solve->s[a][b] - ((c[0][b] * t[0]) + (c[1][b] * t[1]));
+            rest[a][b] = solve->s[a][b] - ((c[b][0] * t[0]) + (c[b][1] * t[1]));
         }
     }
 }

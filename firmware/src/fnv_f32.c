@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/fnv.h"
 
 #include <stddef.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/gate.h"
 
 #include <stddef.h>
@@ -12,6 +14,9 @@ pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *
                                float floor)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
+    if ((self == NULL) || (config == NULL)) {
+        return PVID_BAD_POINTER;
+    }
     if (!pvid_within_f32(config->sigmas, 2.0f, 1.0e3f) && !pvid_within_f32(config->sigmas, 0.0f, 0.0f)) {
         return PVID_BAD_GATE_SIGMAS;
     }

@@ -18,6 +18,9 @@ pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *
                                pvid_scaled_q31 floor)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
+    if ((self == NULL) || (config == NULL)) {
+        return PVID_BAD_POINTER;
+    }
     if ((config->sigmas != 0u) && ((config->sigmas < SIGMAS_MIN) || (config->sigmas > SIGMAS_MAX))) {
         return PVID_BAD_GATE_SIGMAS;
     }

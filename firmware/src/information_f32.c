@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/information.h"
 
 #include <stddef.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/kapitza.h"
 
 #include <math.h>

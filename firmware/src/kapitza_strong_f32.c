@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 /* The strong form of Kapitza's pendulum (MATH.md 2): row, theta, C, and its two economies.
  *
  * Products repeat. With A = N_1, E = N_2, the entries 3..6 are -u^k phi'' and 7..11 are -u^k phi,

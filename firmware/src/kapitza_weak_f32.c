@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/kapitza_weak.h"
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2, C = PVID_KAPITZA_C };

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "misfit_f32.h"
 
 #include <stddef.h>

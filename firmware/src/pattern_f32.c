@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pattern_f32.h"
 
 void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const float x[], float out[])

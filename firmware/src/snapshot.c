@@ -27,7 +27,7 @@ enum {
 /* Whole and undamaged, whatever it is of. */
 static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
 {
-    if ((length < PVID_SNAPSHOT_HEADER + CRC_BYTES) || (pvid_get_u32(&image[AT_MAGIC]) != MAGIC)) {
+    if ((image == NULL) || (length < PVID_SNAPSHOT_HEADER + CRC_BYTES) || (pvid_get_u32(&image[AT_MAGIC]) != MAGIC)) {
         return PVID_SNAPSHOT_NONE;
     }
     const uint32_t said = pvid_get_u32(&image[AT_LENGTH]);

@@ -1,3 +1,6 @@
+#include "uncontracted.h"
+
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "fingerprint_f32.h"
@@ -31,10 +34,20 @@ static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)
     return identity;
 }
 
+/* Whether init has accepted a configuration. */
+static bool is_ready(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config, const uint8_t image[])
+{
+    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->estimator.model != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
 size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                      uint32_t generation, uint8_t image[], size_t room)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL));
+    if (!is_ready(self, config, image)) {
+        return 0;
+    }
     const pvid_snapshot_identity identity = identity_of(config);
     return pvid_snapshot_save(image, room, &identity, generation, self, &shape, NULL);
 }
@@ -42,7 +55,9 @@ size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_str
 pvid_snapshot_status pvid_snapshot_restore_strong_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                                       const uint8_t image[], size_t length)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL));
+    if (!is_ready(self, config, image)) {
+        return PVID_SNAPSHOT_NOT_READY;
+    }
     const pvid_snapshot_identity identity = identity_of(config);
     return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
 }

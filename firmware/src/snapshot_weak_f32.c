@@ -1,3 +1,6 @@
+#include "uncontracted.h"
+
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "fingerprint_f32.h"
@@ -31,6 +34,7 @@ static const uint32_t layout[] = {
     PLACE(trust),
     PLACE(trust.groups),
     PLACE(trust.estimate),
+    PLACE(trust.copy),
     (uint32_t)offsetof(pvid_weak_angle_f32, lack),
     (uint32_t)offsetof(pvid_weak_angle_f32, ring),
     PVID_MAX_P,
@@ -71,10 +75,20 @@ static pvid_snapshot_identity identity_of(const pvid_weak_config_f32 *config)
     return identity;
 }
 
+/* Whether init has accepted a configuration. */
+static bool is_ready(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, const uint8_t image[])
+{
+    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready && (self->design == config->design));
+    return ready;
+}
+
 size_t pvid_snapshot_save_weak_f32(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t generation,
                                    uint8_t image[], size_t room)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
+    if (!is_ready(self, config, image)) {
+        return 0;
+    }
     const pvid_snapshot_identity identity = identity_of(config);
     const pvid_weak_angle_f32 *behind = has_angle(config) ? self->angle : NULL;
     return pvid_snapshot_save(image, room, &identity, generation, self, &shape, behind);
@@ -83,7 +97,9 @@ size_t pvid_snapshot_save_weak_f32(const pvid_weak_f32 *self, const pvid_weak_co
 pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,
                                                     const uint8_t image[], size_t length)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
+    if (!is_ready(self, config, image)) {
+        return PVID_SNAPSHOT_NOT_READY;
+    }
     const pvid_snapshot_identity identity = identity_of(config);
     pvid_weak_angle_f32 *behind = has_angle(config) ? self->angle : NULL;
     const pvid_snapshot_status status =

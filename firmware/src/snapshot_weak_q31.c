@@ -1,3 +1,4 @@
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "fingerprint_q31.h"
@@ -27,6 +28,7 @@ static const uint32_t layout[] = {
     PLACE(estimator.counters),
     PLACE(trust),
     PLACE(trust.estimate),
+    PLACE(trust.copy),
     PVID_MAX_P,
     PVID_MAX_THETA_Q31,
     PVID_MAX_TAPS,
@@ -48,10 +50,20 @@ static pvid_snapshot_identity identity_of(const pvid_weak_config_q31 *config)
     return identity;
 }
 
+/* Whether init has accepted a configuration. */
+static bool is_ready(const pvid_weak_q31 *self, const pvid_weak_config_q31 *config, const uint8_t image[])
+{
+    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready && (self->design == config->design));
+    return ready;
+}
+
 size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_config_q31 *config, uint32_t generation,
                                    uint8_t image[], size_t room)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
+    if (!is_ready(self, config, image)) {
+        return 0;
+    }
     const pvid_snapshot_identity identity = identity_of(config);
     return pvid_snapshot_save(image, room, &identity, generation, self, &shape, NULL);
 }
@@ -59,7 +71,9 @@ size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_co
 pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config,
                                                     const uint8_t image[], size_t length)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL) && (image != NULL) && (self->design == config->design));
+    if (!is_ready(self, config, image)) {
+        return PVID_SNAPSHOT_NOT_READY;
+    }
     const pvid_snapshot_identity identity = identity_of(config);
     return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
 }

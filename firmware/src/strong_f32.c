@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/strong.h"
 
 #include <stddef.h>
@@ -14,9 +16,16 @@
 #define GATE_MEMORY_S 0.25f
 #define GATE_FLOOR 1.0e-6f
 
-pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
+/* Whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_strong_f32 *self)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL));
+    const bool ready = (self != NULL) && (self->estimator.model != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
+{
     if (!pvid_within_f32(config->l1, 1.0e-6f, 1.0e6f)) {
         return PVID_BAD_LENGTH;
     }
@@ -47,15 +56,35 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
                               GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
 }
 
+pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
+{
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
+}
+
 void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen)
 {
-    self->frozen = frozen;
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
+}
+
+static void restart(pvid_strong_f32 *self)
+{
+    pvid_differentiator_reset_f32(&self->phi);
+    pvid_differentiator_reset_f32(&self->y);
 }
 
 void pvid_strong_gap_f32(pvid_strong_f32 *self)
 {
-    pvid_differentiator_reset_f32(&self->phi);
-    pvid_differentiator_reset_f32(&self->y);
+    if (is_ready(self)) {
+        restart(self);
+    }
 }
 
 /* Takes a sample of each channel in and, once the windows are full, writes their derivatives. The windows have the
@@ -110,8 +139,11 @@ static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAP
 
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
 {
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
-        pvid_strong_gap_f32(self);
+        restart(self);
         pvid_count_up(&self->estimator.counters.rejected_not_finite);
         return PVID_REJECTED_NOT_FINITE;
     }

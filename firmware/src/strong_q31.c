@@ -41,9 +41,16 @@ static bool row_is_valid(const pvid_strong_row_q31 *row)
            shifts_are_valid(row->n_phi2, 4) && shifts_are_valid(row->n_phi0, 5);
 }
 
-pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
+/* Whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_strong_q31 *self)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL));
+    const bool ready = (self != NULL) && (self->estimator.model != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static pvid_status prepare(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
+{
     if (!row_is_valid(&config->row) || (config->u_shift > SHIFT_MAX)) {
         return PVID_BAD_SHIFT;
     }
@@ -79,14 +86,34 @@ pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config
                               gate_floor(&self->estimator));
 }
 
-void pvid_strong_gap_q31(pvid_strong_q31 *self)
+pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
+{
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
+}
+
+static void restart(pvid_strong_q31 *self)
 {
     pvid_differentiator_reset_q31(&self->differentiator);
 }
 
+void pvid_strong_gap_q31(pvid_strong_q31 *self)
+{
+    if (is_ready(self)) {
+        restart(self);
+    }
+}
+
 void pvid_strong_freeze_q31(pvid_strong_q31 *self, bool frozen)
 {
-    self->frozen = frozen;
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
 }
 
 static bool is_within(int64_t x, int32_t limit)
@@ -148,10 +175,13 @@ static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_
 
 pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
 {
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
     const int64_t angle = (int64_t)phi - self->phi_offset;
     const int64_t height = (int64_t)y - self->y_offset;
     if (!is_within(angle, self->differentiator.bank.phi_max) || !is_within(height, self->differentiator.bank.y_max)) {
-        pvid_strong_gap_q31(self);
+        restart(self);
         return refuse(self);
     }
     int32_t d_phi[PVID_ORDERS];

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/trust.h"
 
 #include <math.h>
@@ -7,6 +9,7 @@
 #include "count.h"
 #include "estimator_f32.h"
 #include "finite_f32.h"
+#include "publication.h"
 #include "trust_tell.h"
 
 const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
@@ -66,7 +69,8 @@ static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 
 
 void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
-    memcpy(self->estimate.p, estimator->p, sizeof self->estimate.p);
+    pvid_publication_write(&self->mark, self->estimate.p, self->copy.p, estimator->p, sizeof self->estimate.p,
+                           self->mark.number[0]);
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
 }
 
@@ -74,6 +78,9 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
                                 const pvid_estimator_f32 *estimator)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
+        return PVID_BAD_POINTER;
+    }
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;
@@ -88,6 +95,7 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
     }
     self->long_memory = (uint16_t)((memory < (float)PVID_TRUST_LONG) ? (float)PVID_TRUST_LONG : memory);
     publish_start(&self->estimate, estimator);
+    self->copy = self->estimate;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
     return PVID_OK;
 }
@@ -245,7 +253,9 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
     raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), surplus, candidate);
     const pvid_reason judged = verdict(self, estimator, reason, size, informed, candidate);
     if (judged == PVID_UPDATED) {
-        self->estimate = *candidate;
+        uint32_t number = self->mark.number[0];
+        pvid_count_up(&number);
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }
     return pvid_trust_tell(&estimator->counters, judged, reason, self->misfit);

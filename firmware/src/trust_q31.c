@@ -5,6 +5,7 @@
 
 #include "count.h"
 #include "estimator_q31.h"
+#include "publication.h"
 #include "trust_tell.h"
 
 /* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
@@ -52,7 +53,8 @@ static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
 
 void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
 {
-    memcpy(self->estimate.p, estimator->p, sizeof self->estimate.p);
+    pvid_publication_write(&self->mark, self->estimate.p, self->copy.p, estimator->p, sizeof self->estimate.p,
+                           self->mark.number[0]);
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
 }
 
@@ -60,6 +62,9 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
                                 const pvid_estimator_q31 *estimator)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
+        return PVID_BAD_POINTER;
+    }
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;
@@ -75,6 +80,7 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
         self->estimate.se[a] = estimator->start_sd[a];
         self->estimate.correlation[a][a] = PVID_ONE_Q30;
     }
+    self->copy = self->estimate;
     return PVID_OK;
 }
 
@@ -230,7 +236,9 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
     raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), surplus, candidate);
     const pvid_reason judged = verdict(self, estimator, reason, size, informed, candidate);
     if (judged == PVID_UPDATED) {
-        self->estimate = *candidate;
+        uint32_t number = self->mark.number[0];
+        pvid_count_up(&number);
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }
     return pvid_trust_tell(&estimator->counters, judged, reason, self->misfit);

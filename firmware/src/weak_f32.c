@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "pvid/weak.h"
 
 #include <stddef.h>
@@ -5,6 +7,7 @@
 
 #include "count.h"
 #include "finite_f32.h"
+#include "publication.h"
 #include "weak_angle_f32.h"
 #include "weak_finish_f32.h"
 #include "weak_front_f32.h"
@@ -74,9 +77,42 @@ static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f3
 /* Windows that the gate's scale remembers; it stands relative to what noise explains, below which it never falls. */
 #define GATE_MEMORY 4.0f
 
-pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+/* Whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_weak_f32 *self)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL));
+    const bool ready = (self != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static void restart_window(pvid_weak_window_f32 *window, uint16_t index)
+{
+    window->index = index;
+    window->whole = false;
+    for (size_t i = 0; i < PVID_WEAK_INTEGRALS; i++) {
+        window->before[i] = 0.0f;
+        window->once[i] = 0.0f;
+        window->twice[i] = 0.0f;
+    }
+}
+
+/* The first window begins with the next decimated sample. The second stands in its middle then: what
+ * it gathers until its own beginning, half a window later, is thrown away. */
+static void restart(pvid_weak_f32 *self)
+{
+    const uint16_t hop = pvid_weak_hop(self->design->window);
+    pvid_weak_front_reset_f32(&self->front);
+    restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
+    restart_window(&self->window[1], (uint16_t)(hop - 1u));
+    self->turn = 2;
+    self->warm = false;
+    self->bend.wait = 1;
+    self->bend.known = 0;
+    self->bend.due = false;
+}
+
+static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+{
     const pvid_weak_design_f32 *design = config->design;
     if (!pvid_within_f32(config->sample_rate_hz, 1.0e-3f, 1.0e6f)) {
         return PVID_BAD_SAMPLE_RATE;
@@ -140,39 +176,33 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
     self->window[0].buffer = 0;
     self->window[1].buffer = 1;
     self->finish.buffer = 2;
-    pvid_weak_gap_f32(self);
+    restart(self);
     return PVID_OK;
 }
 
-static void restart_window(pvid_weak_window_f32 *window, uint16_t index)
+pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
 {
-    window->index = index;
-    window->whole = false;
-    for (size_t i = 0; i < PVID_WEAK_INTEGRALS; i++) {
-        window->before[i] = 0.0f;
-        window->once[i] = 0.0f;
-        window->twice[i] = 0.0f;
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
     }
+    return status;
 }
 
-/* The first window begins with the next decimated sample. The second stands in its middle then: what
- * it gathers until its own beginning, half a window later, is thrown away. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self)
 {
-    const uint16_t hop = pvid_weak_hop(self->design->window);
-    pvid_weak_front_reset_f32(&self->front);
-    restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
-    restart_window(&self->window[1], (uint16_t)(hop - 1u));
-    self->turn = 2;
-    self->warm = false;
-    self->bend.wait = 1;
-    self->bend.known = 0;
-    self->bend.due = false;
+    if (is_ready(self)) {
+        restart(self);
+    }
 }
 
 void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen)
 {
-    self->frozen = frozen;
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
 }
 
 static void next_bend(pvid_weak_bend_f32 *self, uint8_t lag, float phi)
@@ -299,8 +329,11 @@ static void work_on(pvid_weak_f32 *self, pvid_reason *reason)
 
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
 {
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
-        pvid_weak_gap_f32(self);
+        restart(self);
         pvid_count_up(&self->estimator.counters.rejected_not_finite);
         return PVID_REJECTED_NOT_FINITE;
     }
@@ -331,5 +364,14 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
 
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self)
 {
-    return &self->trust.estimate;
+    return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_weak_read_f32(const pvid_weak_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_f32 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
 }

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "weak_front_f32.h"
 
 #include <stddef.h>

@@ -6,6 +6,7 @@
 #include "count.h"
 #include "integer_q31.h"
 #include "scaled_q31.h"
+#include "publication.h"
 #include "weak_finish_q31.h"
 #include "weak_front_q31.h"
 #include "weak_schedule.h"
@@ -110,9 +111,53 @@ static bool pivot_noise_is_valid(pvid_scaled_q31 noise)
     return (noise.m >= 0) && (noise.m <= PVID_ONE_Q30) && (noise.e >= -EXPONENT_LIMIT) && (noise.e <= EXPONENT_LIMIT);
 }
 
-pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
+/* Whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_weak_q31 *self)
 {
-    PVID_ASSERT((self != NULL) && (config != NULL));
+    const bool ready = (self != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static void restart_bend(pvid_weak_bend_q31 *self)
+{
+    self->wait = 1;
+    self->known = 0;
+    self->due = false;
+}
+
+static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
+{
+    window->index = index;
+    window->whole = false;
+    for (size_t i = 0; i < PVID_WEAK_INTEGRALS_Q31; i++) {
+        window->before[i] = 0;
+        window->once[i] = 0;
+        window->twice[i] = 0;
+    }
+    window->f_sum = 0;
+    window->u_sum = 0;
+    window->u_square_sum = 0;
+    window->bend_square_sum = 0;
+    window->bends = 0;
+}
+
+/* The first window begins with the next decimated sample. The second stands in its middle then: what it gathers until
+ * its own beginning, half a window later, is thrown away, but must not come on top of what it had. */
+static void restart(pvid_weak_q31 *self)
+{
+    const uint16_t hop = pvid_weak_hop(self->design->window);
+    pvid_weak_front_reset_q31(&self->front);
+    restart_bend(&self->bend);
+    restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
+    restart_window(&self->window[1], (uint16_t)(hop - 1u));
+    memset(self->sums[self->window[1].buffer], 0, sizeof self->sums[0]);
+    self->turn = 2;
+    self->warm = false;
+}
+
+static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
+{
     const pvid_weak_design_q31 *design = config->design;
     if ((config->drive_min < 0) || (config->drive_min > U_LIMIT)) {
         return PVID_BAD_DRIVE_MIN;
@@ -162,15 +207,19 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     self->window[0].buffer = 0;
     self->window[1].buffer = 1;
     self->finish.buffer = 2;
-    pvid_weak_gap_q31(self);
+    restart(self);
     return PVID_OK;
 }
 
-static void restart_bend(pvid_weak_bend_q31 *self)
+pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
 {
-    self->wait = 1;
-    self->known = 0;
-    self->due = false;
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
 }
 
 static void next_bend(pvid_weak_bend_q31 *self, uint8_t lag, int32_t f)
@@ -192,34 +241,11 @@ static void next_bend(pvid_weak_bend_q31 *self, uint8_t lag, int32_t f)
     self->before[0] = f;
 }
 
-static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
-{
-    window->index = index;
-    window->whole = false;
-    for (size_t i = 0; i < PVID_WEAK_INTEGRALS_Q31; i++) {
-        window->before[i] = 0;
-        window->once[i] = 0;
-        window->twice[i] = 0;
-    }
-    window->f_sum = 0;
-    window->u_sum = 0;
-    window->u_square_sum = 0;
-    window->bend_square_sum = 0;
-    window->bends = 0;
-}
-
-/* The first window begins with the next decimated sample. The second stands in its middle then: what it gathers until
- * its own beginning, half a window later, is thrown away, but must not come on top of what it had. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self)
 {
-    const uint16_t hop = pvid_weak_hop(self->design->window);
-    pvid_weak_front_reset_q31(&self->front);
-    restart_bend(&self->bend);
-    restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
-    restart_window(&self->window[1], (uint16_t)(hop - 1u));
-    memset(self->sums[self->window[1].buffer], 0, sizeof self->sums[0]);
-    self->turn = 2;
-    self->warm = false;
+    if (is_ready(self)) {
+        restart(self);
+    }
 }
 
 /* The first window's mean angle is a better start of c than none: the pendulum swings about its rest. */
@@ -236,7 +262,9 @@ static void place_zero(pvid_weak_q31 *self, const pvid_weak_window_q31 *window)
 
 void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen)
 {
-    self->frozen = frozen;
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
 }
 
 /* A window that has come round hands its sums over and goes on in the buffer that is free. Its last sample, which has
@@ -303,7 +331,7 @@ static inline void add_slice(pvid_weak_q31 *self)
 
 static pvid_reason reject(pvid_weak_q31 *self)
 {
-    pvid_weak_gap_q31(self);
+    restart(self);
     pvid_count_up(&self->estimator.counters.rejected_saturated);
     return PVID_REJECTED_SATURATED;
 }
@@ -323,6 +351,9 @@ static bool is_within(int64_t x, int32_t limit)
 
 pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
 {
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
     const pvid_weak_design_q31 *design = self->design;
     const int64_t angle = (int64_t)phi - self->phi_offset;
     const int64_t height = (int64_t)y - self->y_offset;
@@ -360,5 +391,14 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
 
 const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self)
 {
-    return &self->trust.estimate;
+    return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_weak_read_q31(const pvid_weak_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_q31 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
 }

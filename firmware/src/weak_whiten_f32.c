@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "weak_whiten_f32.h"
 
 #include <math.h>

@@ -1,3 +1,5 @@
+#include "uncontracted.h"
+
 #include "weak_window_f32.h"
 
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Identifies a little with the library it is linked with, and proves that both agree on the structs:
+/* Identifies a little with the library it is linked with, and shows that both agree on the struct:
  * init clears exactly the bytes that this file sees in the identifier.
  *
  * Prints "version MAJOR.MINOR.PATCH taps PVID_MAX_TAPS hash HASH". */

@@ -26,19 +26,22 @@ from pvid.rig import simulate, standard_sensors, standard_start
 from pvid.rigfile import RigFile
 from pvid.stream_image import settings_number
 from pvid.stream_rig import stream_rig
+from pvid.twin import fnv
 
 SAMPLES_A_FRAME = 16
 
 
 @dataclass(frozen=True)
 class Field:
-    """A board's run: samples from tick 0, an estimate and a hash every so many ticks, who it is every `hello_every`."""
+    """A board's run: an estimate and a hash every so many ticks, who it is every `hello_every`; ticks count from
+    `first_tick`, a multiple of the others."""
 
     ticks: int
     seed: int = 1
     estimate_every: int = 160  # multiples of SAMPLES_A_FRAME
     hash_every: int = 160
     hello_every: int = 2000
+    first_tick: int = 0
 
     @property
     def run(self) -> Run:
@@ -63,7 +66,8 @@ def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[i
     board = stream_rig(rig(), run.sample_rate, start=standard_start(field.seed))
     assert isinstance(board.config, WeakConfig)
     settings = settings_number(board)
-    configure = replace(board.configure(settings, field.hash_every, field.estimate_every), session=session)
+    configure = board.configure(settings, field.hash_every, field.estimate_every, first_tick=field.first_tick)
+    configure = replace(configure, session=session)
     hello = link.Hello(
         form=int(board.form),
         core=int(board.core),
@@ -80,34 +84,39 @@ def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[i
     identifier = native.weak(board.config)
     phi, y = run.phi.astype(np.float32)[: field.ticks], run.y.astype(np.float32)[: field.ticks]
     verdict = int(Reason.WARMING_UP)
+    sample_hash = fnv.START
     for first in range(0, field.ticks, SAMPLES_A_FRAME):
+        at = field.first_tick + first
         if first % field.hello_every < SAMPLES_A_FRAME:
-            yield first, hello
-            yield first, link.Schema(link.SCHEMA_TEXT.encode())
-            yield first, configure
-            yield first, link.Status(session, link.Code.RUNNING, 0, identifier.counters["updates"], *[0] * 7)
+            yield at, hello
+            yield at, link.Schema(link.SCHEMA_TEXT.encode())
+            yield at, configure
+            yield at, link.Status(session, link.Code.RUNNING, 0, identifier.counters["updates"], *[0] * 7)
         last = min(first + SAMPLES_A_FRAME, field.ticks)
-        yield first, link.Raw.of_values(phi[first:last], y[first:last])
+        raw = replace(link.Raw.of_values(phi[first:last], y[first:last]), session=session)
+        sample_hash = fnv.fold_bytes(sample_hash, raw.phi_y)
+        yield at, raw
         for tick in range(first, last):
             reason = int(identifier.run(phi[tick : tick + 1], y[tick : tick + 1], sums=False).reason[0])
             verdict = verdict if reason == Reason.ACCUMULATED else reason
+            done = field.first_tick + tick + 1
             if field.estimate_every and (tick + 1) % field.estimate_every == 0:
-                yield tick + 1, _estimate(session, identifier.counters["updates"], identifier.assess(), verdict)
+                yield done, _estimate(session, identifier.counters["updates"], identifier.assess(), verdict)
             if field.hash_every and (tick + 1) % field.hash_every == 0:
-                yield tick + 1, link.Hash(session, identifier.running_hash)
+                yield done, link.Hash(session, hash=identifier.running_hash, sample_hash=sample_hash)
 
 
 def _estimate(session: int, updates: int, assessed: npt.NDArray[np.void], reason: int) -> link.Estimate:
     covariance = assessed["covariance"][np.triu_indices(link.MAX_P)]
     return link.Estimate(
-        session,
-        updates,
-        tuple(map(float, assessed["p"])),
-        tuple(map(float, covariance)),
-        float(assessed["kappa"]),
-        float(assessed["residual_sd"]),
-        float(assessed["weight"]),
-        reason,
+        session=session,
+        updates=updates,
+        p=tuple(map(float, assessed["p"])),
+        covariance=tuple(map(float, covariance)),
+        kappa=float(assessed["kappa"]),
+        residual_sd=float(assessed["residual_sd"]),
+        weight=float(assessed["weight"]),
+        reason=reason,
     )
 
 

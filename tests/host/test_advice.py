@@ -205,9 +205,10 @@ def test_a_healthy_run_of_small_angles_gets_none_in_any_core(native: Native, cor
 
 def test_fixed_point_is_advised_to_be_float32_where_angles_are_large(native: Native) -> None:
     result, said = advised(run_of(release=1.8), with_identifier(core="q31"), native)
-    assert result is not None and result.warning is not None
+    assert result is not None and result.linear_error > 0.01
     assert said == (
-        "angles go to 0.2 rad, and fixed point does not correct sines and cosines: use --core f32, or smaller angles",
+        "angles go to 0.2 rad, and fixed point does not correct sines and cosines: use --core f32, or smaller angles; "
+        "its standard errors contain 3.8 % for that",
     )
 
 

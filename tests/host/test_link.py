@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -197,7 +198,8 @@ def test_the_c_side_withstands_fuzzing(tmp_path: Path) -> None:
 
 
 def test_a_decoder_learns_the_schema_of_another_version() -> None:
-    text = link.SCHEMA_TEXT.replace("8 hash session:u32 hash:u32", "8 hash session:u32 hash:u64 phase:u8")
+    today = link.Hash.layout().text
+    text = link.SCHEMA_TEXT.replace(today, "8 hash session:u32 hash:u64 phase:u8")
     other = zlib.crc32(text.encode())
     sent = [
         link.encode_raw(link.Schema.TYPE, 0, 0, text.encode(), other),
@@ -212,6 +214,29 @@ def test_a_decoder_learns_the_schema_of_another_version() -> None:
     ]
     assert learning.counters == link.Counters(frames=3, missing=2)
     assert link.Decoder().feed(b"".join(sent)) == [link.Loss("foreign", bytes=len(one) - 1) for one in sent]
+
+
+def test_frames_of_the_schema_before_ticks_had_48_bits_are_those_of_today() -> None:
+    text = re.sub(r" (tick_high|sample_hash|first_tick):u\d+", "", link.SCHEMA_TEXT)
+    text = re.sub(r"(raw|raw_count) session:u32", r"\1", text)
+    old = zlib.crc32(text.encode())
+    assert old == 0xA1646BC5
+    raw = link.Raw.of_values([1.0, 2.0], [3.0, 4.0])
+    sent = [
+        link.encode_raw(link.Schema.TYPE, 0, 0, text.encode(), old),
+        link.encode_raw(link.Raw.TYPE, 1, 9, raw.phi_y, old),
+        link.encode_raw(link.Hash.TYPE, 2, 9, struct.pack("<II", 7, 8), old),
+    ]
+    frames = [one for one in link.Decoder(learns=True).feed(b"".join(sent)) if isinstance(one, link.Frame)]
+    assert [one.message for one in frames[1:]] == [raw, link.Hash(7, hash=8)]
+
+
+def test_a_tick_has_48_bits_where_a_board_sends_it() -> None:
+    tick = (7 << 32) + 5
+    (frame,) = link.Decoder().feed(link.encode(link.Hash(1, hash=2), 0, tick))
+    assert frame == link.Frame(0, tick, link.Hash(1, tick_high=7, hash=2))
+    (frame,) = link.Decoder().feed(link.encode(link.Schema(b"x"), 0, tick))
+    assert frame == link.Frame(0, 5, link.Schema(b"x"))
 
 
 def test_only_a_schema_that_is_its_own_number_is_learnt() -> None:

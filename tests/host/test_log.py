@@ -229,7 +229,7 @@ def test_the_rig_file_is_in_the_log(tmp_path: Path, sent: list[bytes]) -> None:
 
 
 def test_a_log_of_another_version_opens(tmp_path: Path) -> None:
-    text = link.SCHEMA_TEXT.replace("hash session:u32 hash:u32", "hash session:u32 hash:u64")
+    text = link.SCHEMA_TEXT.replace(link.Hash.layout().text, "8 hash session:u32 hash:u64")
     number = zlib.crc32(text.encode())
     frames = [
         link.encode_raw(link.Schema.TYPE, 0, 0, text.encode(), number),

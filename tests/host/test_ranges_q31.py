@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from pvid.campaign.judge import identify_rig
+from pvid.campaign.population import shipped
+from pvid.campaign.truth import simulate_rig
 from pvid.capture import Run, write_run
 from pvid.cli import commands
 from pvid.identify import identify
@@ -42,7 +45,27 @@ def test_without_a_need_the_ranges_are_the_defaults() -> None:
     sensor = with_ranges_of(RIG, run).sensor
     assert sensor.phi_range == DEFAULT_PHI_RANGE
     assert sensor.y_range == pytest.approx(0.03)
-    assert sensor.acceleration_range == pytest.approx(4 * 9.8)
+
+
+def test_the_acceleration_range_follows_the_run_both_ways() -> None:
+    run = simulate(duration=20.0).run
+    largest = float(np.abs(pivot_acceleration(run)).max())
+    sensor = with_ranges_of(RIG, run).sensor
+    assert 1.8 * largest < sensor.acceleration_range < 2.4 * largest < 4 * 9.8
+    y = run.y.copy()
+    y[2000] += 1.0  # a fault: the default stays
+    assert with_ranges_of(RIG, replace(run, y=y)).sensor.acceleration_range == pytest.approx(4 * 9.8)
+
+
+def test_a_gentle_drive_gives_the_answers_of_float32(native: Native) -> None:
+    """With a range of 4 g, the rounding of the products of u took 10 % off d2, silently, in half of the windows."""
+    rig = simulate_rig(native, shipped(), 1, 50)
+    record, fixed = identify_rig(native, rig, "q31")
+    _, float32 = identify_rig(native, rig, "f32")
+    assert record["publications"] > 100  # type: ignore[operator]
+    assert record["publications_wrong"] == 0
+    assert fixed is not None and float32 is not None
+    assert fixed.value["d2"] == pytest.approx(float32.value["d2"], abs=0.5 * float32.se["d2"])
 
 
 def test_a_run_that_goes_further_sets_them() -> None:

@@ -4,7 +4,8 @@
  *
  * From the PC no sample is lost: samples are numbered, only the next one is taken, and each credit says which that is
  * and how many may be under way. What a line swallows or spoils is sent again; what comes twice is counted and left
- * out. Every answer carries the session number of the configuration, so that a board that has restarted is noticed.
+ * out. Every answer carries the session number of the configuration, so that a board that has restarted is noticed, and
+ * 48 bits of the tick: the header's 32 are passed in 50 days at 1 kHz.
  *
  * In field mode each sample goes to the PC exactly as the identifier gets it, before the hash or the estimate that it
  * is part of. In time (PVID_SOURCE_SENSOR) nothing waits for the line: a frame that does not fit is dropped, and the
@@ -62,10 +63,12 @@ static struct {
     pvid_status core;
     uint16_t hash_every;
     uint16_t estimate_every;
-    uint32_t ticks; /* samples worked off: the number of the next one */
+    uint32_t ticks;     /* samples worked off: the number of the next one, its lower bits */
+    uint16_t tick_high; /* and the bits above them */
     uint32_t hash;
-    pvid_reason reason;  /* of the last tick */
-    pvid_reason verdict; /* of the last one that was more than a row accumulated */
+    uint32_t sample_hash; /* of the samples themselves */
+    pvid_reason reason;   /* of the last tick */
+    pvid_reason verdict;  /* of the last one that was more than a row accumulated */
     uint32_t repeated;
     uint32_t skipped;
     pvid_link_frame samples; /* the frame in work */
@@ -76,8 +79,8 @@ static struct {
 static struct {
     uint32_t clock_us; /* at the last look */
     uint32_t due_ns;   /* time that has passed and is not sampled yet */
-    uint32_t count;    /* samples in raw, the last ones before stream.ticks */
-    uint8_t raw[SAMPLE_BYTES * RAW_SAMPLES];
+    uint32_t count;    /* samples in frame, the last ones before stream.ticks */
+    uint8_t frame[IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * RAW_SAMPLES)]; /* of samples, its payload */
 } field;
 
 /* ---- answers */
@@ -105,9 +108,10 @@ static void answer_hello(void)
     for (size_t i = 0; i < LINK_MAX_P; i++) {
         pvid_put_f32(&payload[PVID_HELLO_P_UNIT + (4u * i)], p_unit[i]);
     }
-    for (size_t i = 0; (i < (sizeof board - 1u)) && (i < (PVID_HELLO_BYTES - PVID_HELLO_BOARD)); i++) {
+    for (size_t i = 0; (i < (sizeof board - 1u)) && (i < (PVID_HELLO_TICK_HIGH - PVID_HELLO_BOARD)); i++) {
         payload[PVID_HELLO_BOARD + i] = (uint8_t)board[i];
     }
+    pvid_put_u16(&payload[PVID_HELLO_TICK_HIGH], stream.tick_high);
     answer(PVID_HELLO, payload, sizeof payload);
 }
 
@@ -127,6 +131,7 @@ static void answer_status(void)
     pvid_put_u32(&payload[PVID_STATUS_MALFORMED], received->malformed);
     pvid_put_u32(&payload[PVID_STATUS_BAD_CRC], received->bad_crc);
     pvid_put_u32(&payload[PVID_STATUS_FOREIGN], received->foreign);
+    pvid_put_u16(&payload[PVID_STATUS_TICK_HIGH], stream.tick_high);
     answer(PVID_STATUS, payload, sizeof payload);
 }
 
@@ -136,7 +141,9 @@ static void answer_credit(void)
     pvid_put_u32(&payload[PVID_CREDIT_SESSION], stream.session);
     pvid_put_u32(&payload[PVID_CREDIT_ROOM], WINDOW);
     pvid_put_u32(&payload[PVID_CREDIT_HASH], stream.hash);
+    pvid_put_u32(&payload[PVID_CREDIT_SAMPLE_HASH], stream.sample_hash);
     payload[PVID_CREDIT_REASON] = (uint8_t)stream.reason;
+    pvid_put_u16(&payload[PVID_CREDIT_TICK_HIGH], stream.tick_high);
     answer(PVID_CREDIT, payload, sizeof payload);
 }
 
@@ -145,6 +152,8 @@ static void answer_hash(void)
     uint8_t payload[PVID_HASH_BYTES];
     pvid_put_u32(&payload[PVID_HASH_SESSION], stream.session);
     pvid_put_u32(&payload[PVID_HASH_HASH], stream.hash);
+    pvid_put_u32(&payload[PVID_HASH_SAMPLE_HASH], stream.sample_hash);
+    pvid_put_u16(&payload[PVID_HASH_TICK_HIGH], stream.tick_high);
     answer(PVID_HASH, payload, sizeof payload);
 }
 
@@ -152,13 +161,21 @@ static void answer_estimate(void)
 {
     uint8_t payload[IDENTIFIER_ESTIMATE_BYTES];
     identifier_estimate(payload, stream.session, stream.verdict);
+    pvid_put_u16(&payload[IDENTIFIER_ESTIMATE_TICK_HIGH], stream.tick_high);
     answer(IDENTIFIER_ESTIMATE, payload, sizeof payload);
 }
 
 static void answer_raw(void)
 {
     if (field.count > 0u) {
-        answers_put(&stream.out, IDENTIFIER_RAW, stream.ticks - field.count, field.raw, SAMPLE_BYTES * field.count);
+        const bool wrapped = stream.ticks < field.count; /* since the first of them */
+        pvid_put_u32(&field.frame[IDENTIFIER_RAW_SESSION], stream.session);
+        pvid_put_u16(&field.frame[IDENTIFIER_RAW_TICK_HIGH], (uint16_t)(stream.tick_high - (wrapped ? 1u : 0u)));
+        answers_put(&stream.out,
+                    IDENTIFIER_RAW,
+                    stream.ticks - field.count,
+                    field.frame,
+                    IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * field.count));
         field.count = 0;
     }
 }
@@ -205,7 +222,13 @@ static void step(const uint8_t sample[SAMPLE_BYTES])
         stream.verdict = stream.reason;
     }
     stream.hash = identifier_hash(stream.hash, stream.reason);
+    for (size_t at = 0; at < SAMPLE_BYTES; at += 4u) {
+        stream.sample_hash = pvid_fnv_word(stream.sample_hash, pvid_get_u32(&sample[at]));
+    }
     stream.ticks++;
+    if (stream.ticks == 0u) {
+        stream.tick_high++;
+    }
     const bool hash_due = (stream.hash_every != 0u) && ((stream.ticks % stream.hash_every) == 0u);
     const bool estimate_due = (stream.estimate_every != 0u) && ((stream.ticks % stream.estimate_every) == 0u);
     if (hash_due || estimate_due || (field.count == RAW_SAMPLES)) {
@@ -234,7 +257,7 @@ static void step_sent(void)
 static void step_field(void)
 {
     int32_t counts[2];
-    uint8_t *sample = &field.raw[SAMPLE_BYTES * field.count];
+    uint8_t *sample = &field.frame[IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * field.count)];
     sensor_read(counts);
     identifier_sample(counts, sample);
     field.count++;
@@ -288,8 +311,10 @@ static void configure(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES])
     stream.source = payload[PVID_CONFIGURE_SOURCE];
     stream.hash_every = pvid_get_u16(&payload[PVID_CONFIGURE_HASH_EVERY]);
     stream.estimate_every = pvid_get_u16(&payload[PVID_CONFIGURE_ESTIMATE_EVERY]);
-    stream.ticks = 0;
+    stream.ticks = pvid_get_u32(&payload[IDENTIFIER_CONFIGURE_FIRST_TICK]);
+    stream.tick_high = pvid_get_u16(&payload[IDENTIFIER_CONFIGURE_FIRST_TICK + 4u]);
     stream.hash = PVID_FNV_START;
+    stream.sample_hash = PVID_FNV_START;
     stream.reason = PVID_WARMING_UP;
     stream.verdict = PVID_WARMING_UP;
     stream.repeated = 0;
@@ -318,10 +343,10 @@ static void refuse(const uint8_t payload[])
 static void take(const pvid_link_frame *frame)
 {
     const uint32_t n = (uint32_t)(frame->length / SAMPLE_BYTES);
-    const uint32_t known = (frame->tick < stream.ticks) ? (stream.ticks - frame->tick) : 0u;
+    const uint32_t known = stream.ticks - frame->tick; /* of its samples; it is ahead where that wraps */
     if (!running() || sampling()) {
         answer_status();
-    } else if (frame->tick > stream.ticks) {
+    } else if (known >= 0x80000000u) {
         stream.skipped++;
         answer_status();
     } else if (known >= n) {

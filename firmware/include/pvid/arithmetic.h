@@ -1,7 +1,8 @@
 /* pvid/arithmetic.h - does this build compute the bits that were promised?
  *
- * Bit-exactness needs IEEE-754 binary32, round to nearest even, no fused multiply-add, no flushing
- * of subnormals. Compiler flags can silently take each of these away; a board can ask at start-up.
+ * Bit-exactness needs IEEE-754 binary32, round to nearest even, no fused multiply-add, no reordered sums, no flushing
+ * of subnormals. Compiler flags can silently take each of these away; a board can ask at start-up. Against fusing, which
+ * is gcc's default outside -std=c99, the sources protect themselves.
  */
 #ifndef PVID_ARITHMETIC_H
 #define PVID_ARITHMETIC_H
@@ -14,7 +15,9 @@ extern "C" {
 
 /* 0 when float32 behaves as promised, else the sum of:
  *   1 products and sums are fused   2 subnormals are flushed   4 not rounding to nearest even
- *   8 sqrtf is not correctly rounded   16 division is not correctly rounded */
+ *   8 sqrtf is not correctly rounded   16 division is not correctly rounded
+ *   32 sums are reordered (-fassociative-math, which -funsafe-math-optimizations brings)
+ * It speaks for the options that the library's sources were compiled with. */
 uint32_t pvid_arithmetic_faults_f32(void);
 
 #ifdef __cplusplus

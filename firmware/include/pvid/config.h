@@ -2,8 +2,8 @@
  *
  * Every array of the library is sized by one of these macros: no heap, no VLA. Override with -D
  * or put the definitions into a header of your own and name it with -DPVID_CONFIG_HEADER="my.h".
- * They change the layout of the state structs: library and application must agree (the CMake
- * target passes them on to whoever links it).
+ * A size is a plain decimal number. Sizes change the layout of the state structs: an application that was compiled
+ * with others than the library does not link (sized.h). The CMake target passes them on to whoever links it.
  */
 #ifndef PVID_CONFIG_H
 #define PVID_CONFIG_H
@@ -94,6 +94,14 @@
 #error "PVID_MAX_PASSES must lie in 1..255"
 #endif
 
+/* Largest number of entries of theta in the fixed-point core (11: the strong form). */
+#ifndef PVID_MAX_THETA_Q31
+#define PVID_MAX_THETA_Q31 11
+#endif
+#if PVID_MAX_THETA_Q31 < 5 || PVID_MAX_THETA_Q31 > 12
+#error "PVID_MAX_THETA_Q31 must lie in 5..12"
+#endif
+
 /* Qualifier of the fixed-point tables: empty where constants are read from where they stand. On an AVR, whose constants
  * are copied into RAM, __flash (and -std=gnu99) leaves them in the first 64 kB of the flash. */
 #ifndef PVID_TABLE
@@ -109,9 +117,14 @@
 #error "PVID_FULL_ANGLE must be 0 or 1"
 #endif
 
-/* Called on misuse (NULL where an object is needed). Replace it by your own trap or reset. */
+/* Called on misuse with a false condition: NULL where an object is needed, an object before its init. Replace it by your
+ * own trap or reset; without one the call does nothing and returns PVID_NOT_READY or PVID_BAD_POINTER. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))
+#endif
+
+#if !defined(PVID_PLAIN_NAMES)
+#include "pvid/sized.h"
 #endif
 
 /* The bits promised need IEEE-754 binary32 evaluated as such: no excess precision, no fast-math. */

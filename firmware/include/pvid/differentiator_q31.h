@@ -26,10 +26,10 @@ extern "C" {
 #endif
 
 /* Largest magnitude of a derivative. */
-#define PVID_DERIVATIVE_LIMIT_Q31 ((int32_t)1 << 30)
+#define PVID_DERIVATIVE_LIMIT_Q31 INT32_C(1073741824) /* 2^30 */
 
 /* Largest full scale of a sensor, about its offset [counts]. */
-#define PVID_COUNTS_LIMIT_Q31 ((int32_t)1 << 24)
+#define PVID_COUNTS_LIMIT_Q31 INT32_C(16777216) /* 2^24 */
 
 /* Orders of y that are computed: 2, 3, 4. */
 #define PVID_Y_ORDERS_Q31 3

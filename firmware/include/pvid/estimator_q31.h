@@ -26,7 +26,7 @@ extern "C" {
 #endif
 
 /* Largest |N_i|, |Y| and |Y - N^T theta| of a row that is taken in. */
-#define PVID_ROW_LIMIT_Q31 ((int32_t)1 << 28)
+#define PVID_ROW_LIMIT_Q31 INT32_C(268435456) /* 2^28 */
 
 /* Layout of the sums: n_theta (n_theta + 1) / 2 of M (upper triangle by rows), n_theta of b, rr, weight (Q16). */
 #define PVID_MAX_MOMENTS_Q31 ((PVID_MAX_THETA_Q31 * (PVID_MAX_THETA_Q31 + 1)) / 2)

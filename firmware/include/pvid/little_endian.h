@@ -5,35 +5,42 @@
 #include <stdint.h>
 #include <string.h>
 
+/* A conversion that C++ compilers take for one of their own. */
+#if defined(__cplusplus)
+#define PVID_AS(type, value) static_cast<type>(value)
+#else
+#define PVID_AS(type, value) ((type)(value))
+#endif
+
 /*@ requires \valid(out + (0 .. 1));
     assigns out[0 .. 1]; */
 static inline void pvid_put_u16(uint8_t out[2], uint16_t value)
 {
-    out[0] = (uint8_t)(value & 0xFFu);
-    out[1] = (uint8_t)(value >> 8);
+    out[0] = PVID_AS(uint8_t, value & 0xFFu);
+    out[1] = PVID_AS(uint8_t, value >> 8);
 }
 
 /*@ requires \valid(out + (0 .. 3));
     assigns out[0 .. 3]; */
 static inline void pvid_put_u32(uint8_t out[4], uint32_t value)
 {
-    pvid_put_u16(out, (uint16_t)(value & 0xFFFFu));
-    pvid_put_u16(&out[2], (uint16_t)(value >> 16));
+    pvid_put_u16(out, PVID_AS(uint16_t, value & 0xFFFFu));
+    pvid_put_u16(&out[2], PVID_AS(uint16_t, value >> 16));
 }
 
 static inline uint16_t pvid_get_u16(const uint8_t in[2])
 {
-    return (uint16_t)(in[0] | ((uint16_t)in[1] << 8));
+    return PVID_AS(uint16_t, in[0] | (PVID_AS(uint16_t, in[1]) << 8));
 }
 
 static inline uint32_t pvid_get_u32(const uint8_t in[4])
 {
-    return pvid_get_u16(in) | ((uint32_t)pvid_get_u16(&in[2]) << 16);
+    return pvid_get_u16(in) | (PVID_AS(uint32_t, pvid_get_u16(&in[2])) << 16);
 }
 
 static inline void pvid_put_i32(uint8_t out[4], int32_t value)
 {
-    pvid_put_u32(out, (uint32_t)value);
+    pvid_put_u32(out, PVID_AS(uint32_t, value));
 }
 
 /* A copy, for C99 leaves the conversion of large words to the compiler. */

@@ -11,13 +11,7 @@
 
 #include "pvid/config.h"
 
-/* Largest number of entries of theta (11: the strong form) and of non-zeros of C. */
-#ifndef PVID_MAX_THETA_Q31
-#define PVID_MAX_THETA_Q31 11
-#endif
-#if PVID_MAX_THETA_Q31 < 5 || PVID_MAX_THETA_Q31 > 12
-#error "PVID_MAX_THETA_Q31 must lie in 5..12"
-#endif
+/* Largest number of non-zeros of C. */
 #define PVID_MAX_C_Q31 (2 * PVID_MAX_THETA_Q31)
 
 typedef struct {

@@ -26,6 +26,8 @@
 #include "pvid/misfit_q31.h"
 #include "pvid/model.h"
 #include "pvid/model_q31.h"
+#include "pvid/publication.h"
+#include "pvid/publication_q31.h"
 #include "pvid/snapshot.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"

@@ -50,7 +50,8 @@ typedef enum {
     PVID_SNAPSHOT_OTHER_VERSION, /* of another release */
     PVID_SNAPSHOT_OTHER_KIND,    /* of another form or core */
     PVID_SNAPSHOT_OTHER_LAYOUT,  /* of a build with other sizes, pointers or byte order */
-    PVID_SNAPSHOT_OTHER_CONFIG   /* of another configuration, or of other tables */
+    PVID_SNAPSHOT_OTHER_CONFIG,  /* of another configuration, or of other tables */
+    PVID_SNAPSHOT_NOT_READY      /* the identifier was not initialised with config, or a pointer is NULL */
 } pvid_snapshot_status;
 
 #define PVID_SNAPSHOT_HEADER 28u
@@ -75,7 +76,7 @@ typedef struct {
 pvid_snapshot_choice pvid_snapshot_choose(const uint8_t slot_0[], const uint8_t slot_1[], size_t size);
 
 /* Writes a snapshot of `self` to image[] and returns its length, or 0 with nothing written iff it does not fit into
- * `room`. config: what `self` was initialised with. Costs a copy and a checksum of the object and a hash of
+ * `room` or `self` is not initialised. config: what `self` was initialised with. Costs a copy and a checksum of the object and a hash of
  * the configuration's tables: some ticks, so do it where a tick can wait. */
 size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                      uint32_t generation, uint8_t image[], size_t room);

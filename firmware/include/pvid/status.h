@@ -2,7 +2,9 @@
 #ifndef PVID_STATUS_H
 #define PVID_STATUS_H
 
-/* Answer of every init. Each code names the field of the configuration that was refused. */
+/* Answer of every init. Each code names the field of the configuration that was refused. An object whose init was refused
+ * is all zeros, as a static one before its init: step returns PVID_NOT_READY, all else does nothing. (Memory that is
+ * neither, an automatic variable before its init, is not recognised.) */
 typedef enum {
     PVID_OK = 0,
     PVID_BAD_MODEL,           /* NULL, or larger than the PVID_MAX_ bounds */
@@ -52,7 +54,8 @@ typedef enum {
     PVID_BAD_U_MULTIPLIER,    /* of the q31 strong form: not positive */
     PVID_BAD_DRIVE_TICKS,     /* of the q31 strong form: outside 1..2^30 */
     PVID_BAD_FORMAT,          /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
-    PVID_BAD_RENEWAL          /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
+    PVID_BAD_RENEWAL,         /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
+    PVID_BAD_POINTER          /* the object, the configuration or the bank is NULL */
 } pvid_status;
 
 /* What became of a tick. An estimate never travels without one. */
@@ -70,7 +73,8 @@ typedef enum {
     PVID_HELD_OUT_OF_RANGE,      /* window dropped: the angle went beyond what the equations are good for */
     PVID_MISFIT,                 /* the parameters took a step, but the residuals are larger than the sensors'
                                     noise explains: the model is not this mechanism's */
-    PVID_HELD_FROZEN             /* not taken in, because the identifier is frozen */
+    PVID_HELD_FROZEN,            /* not taken in, because the identifier is frozen */
+    PVID_NOT_READY               /* nothing was done: no init yet, a refused one, or NULL for an object */
 } pvid_reason;
 
 #endif

@@ -27,6 +27,7 @@
 #include <stdint.h>
 
 #include "pvid/estimator.h"
+#include "pvid/publication.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -70,7 +71,9 @@ typedef struct {
     float anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
     float long_mean;  /* of residual variances relative to what is expected */
     float recent[PVID_TRUST_SHORT];
-    pvid_estimate_f32 estimate; /* the published one */
+    pvid_publication_mark mark;
+    pvid_estimate_f32 estimate; /* the published one, which the identifier itself reads */
+    pvid_estimate_f32 copy;     /* its second place, for others: see publication.h */
 } pvid_trust_f32;
 
 /* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as

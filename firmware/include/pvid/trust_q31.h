@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "pvid/estimator_q31.h"
+#include "pvid/publication.h"
 #include "pvid/trust.h"
 
 #ifdef __cplusplus
@@ -44,7 +45,9 @@ typedef struct {
     int32_t anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
     int64_t long_mean; /* of residual variances relative to what is expected, PVID_SURPLUS_BITS */
     int64_t recent[PVID_TRUST_SHORT];
-    pvid_estimate_q31 estimate; /* the published one */
+    pvid_publication_mark mark;
+    pvid_estimate_q31 estimate; /* the published one, which the identifier itself reads */
+    pvid_estimate_q31 copy;     /* its second place, for others: see publication.h */
 } pvid_trust_q31;
 
 /* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as described

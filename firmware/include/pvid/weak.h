@@ -269,6 +269,11 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
  * self->trust.published is false). The reasons of the windows since say how old it is. */
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 
+/* Copies what is published, whole, from any context while another one steps: an interrupt, the main loop, a thread (see
+ * publication.h). *number (or NULL): estimates published so far, 0: none, and it is the start. Returns false, with
+ * *estimate of no use, iff something was published during each of PVID_READ_ATTEMPTS copies, or before init. */
+bool pvid_weak_read_f32(const pvid_weak_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number);
+
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self);
 

@@ -195,6 +195,11 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y);
  * self->trust.published is false). */
 const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
 
+/* Copies what is published, whole, from any context while another one steps: an interrupt, the main loop, a thread (see
+ * publication.h). *number (or NULL): estimates published so far, 0: none, and it is the start. Returns false, with
+ * *estimate of no use, iff something was published during each of PVID_READ_ATTEMPTS copies, or before init. */
+bool pvid_weak_read_q31(const pvid_weak_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number);
+
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
 void pvid_weak_gap_q31(pvid_weak_q31 *self);
 

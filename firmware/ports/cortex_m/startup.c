@@ -22,6 +22,7 @@ typedef void (*vector)(void);
 /* Entry 0 is the initial stack pointer, 1 the reset, 2 to 15 the core's own exceptions, from 16 on the board's
  * interrupts up to the UART's. In an image without a receiver that one has no handler, and is never let through. */
 void pvid_uart_interrupt(void) __attribute__((weak));
+void pvid_systick_interrupt(void) __attribute__((weak, alias("pvid_exception"))); /* an image may have its own */
 __attribute__((section(".vectors"), used)) static const struct {
     uint32_t *stack;
     vector reset;
@@ -32,7 +33,7 @@ __attribute__((section(".vectors"), used)) static const struct {
     .reset = pvid_reset,
     .exceptions = {pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception,
                    pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception, pvid_exception,
-                   pvid_exception, pvid_exception},
+                   pvid_exception, pvid_systick_interrupt},
     .interrupts = {[PVID_UART_IRQ] = pvid_uart_interrupt},
 };
 

@@ -46,6 +46,8 @@ _MANY_STEPS = 30.0
 
 _FADING = 2.5  # rms of the swing in the first fifth of a run, over that in the last
 
+_LINEAR_TOLD = 0.005  # error of fixed point's linear rows, relative
+
 _MOST_SAMPLES = 200_000  # of a run, for trials
 _BETTER = 0.5  # chi^2 of a trial that is believed, over that without it
 _EXPLAINED = 3.0  # chi^2 at which nothing in the equations is looked for
@@ -85,7 +87,14 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
     case = Case(_shortened(run), rig)
     if result.beyond_words is not None and not result.identified:
         return (_wider_ranges(result),)
+    if result.parts_disagree and result.skew != 0.0:
+        delay = rig.sensor.y_delay + result.skew
+        return (f"phi and y are not sampled at one instant: do so, or use --set sensor.y_delay={delay:.3g}",)
     if _is_good(result):
+        if result.linear_error > _LINEAR_TOLD:
+            return (
+                f"{_not_corrected(result)}; its standard errors contain {100 * result.linear_error:.2g} % for that",
+            )
         degrees = _angle_in_degrees(case, native)
         if degrees:
             return (degrees[0].sentence,)
@@ -468,10 +477,7 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
         return
     if result.core == "q31" and _answers(now):
         if result.largest_angle > _SMALL_ANGLE:
-            yield (
-                f"angles go to {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
-                f"--core f32, or smaller angles"
-            )
+            yield _not_corrected(result)
         else:
             yield "fixed point does not resolve this run: use --core f32, which answers it"
         return
@@ -499,3 +505,10 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
             "that was tried: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
             "sampled at the same time, and does nothing rub or hit?"
         )
+
+
+def _not_corrected(result: Identification) -> str:
+    return (
+        f"angles go to {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
+        f"--core f32, or smaller angles"
+    )

@@ -852,6 +852,42 @@ def bench_log(frames: int) -> int:
     return DONE if seen.frames == frames and not seen.lost else DIFFERENT
 
 
+@bench.command(name="liar")
+@_UPDATE
+@click.option("--mutants", default=100_000, show_default=True, help="Frames changed at random.")
+@click.option("--only", metavar="BEHAVIOUR", multiple=True, help="One of those that the table names.")
+def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
+    """A board that lies, against `pvid log` and all that reads its logs: every behaviour, then mutants of frames."""
+    from pvid.bench import liar
+    from pvid.bench.liar_mutants import mutate
+    from pvid.bench.lies import BEHAVIOURS
+
+    if unknown := [name for name in only if name not in BEHAVIOURS]:
+        raise PvidError(f"the liar has no behaviour {', '.join(unknown)}")
+    chosen = [BEHAVIOURS[name] for name in only] or list(BEHAVIOURS.values())
+    performances = []
+    with tempfile.TemporaryDirectory() as folder:
+        with progress_bar("lies", len(chosen)) as advance:
+            for behaviour in chosen:
+                performances.append(liar.perform(behaviour, Path(folder)))
+                advance(len(performances))
+        with progress_bar("mutants", mutants) as advance:
+            tally = mutate(mutants, Path(folder), progress=advance)
+    faults = [f"{one.behaviour.name}: {fault}" for one in performances for fault in one.faults]
+    for fault in faults + tally.faults:
+        click.echo(fault, err=True)
+    _update_readme(update, "liar", _markdown(liar.HEADER, [one.cells() for one in performances]))
+    runs = sum(len(one.codes) for one in performances)
+    summary = (
+        f"{len(performances)} behaviours, {runs} runs of a command: {len(faults)} defects, at most "
+        f"{max((one.peak_kb for one in performances), default=0) / 1024:.0f} MB of memory, at most "
+        f"{max((one.late_s for one in performances), default=0):.1f} s late. {tally.mutants} mutants in {tally.logs} "
+        f"logs: {len(tally.faults)} defects."
+    )
+    _update_readme(update, "liar-summary", summary)
+    return DIFFERENT if faults or tally.faults else DONE
+
+
 @bench.command(name="field-log")
 @click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
 @click.option(

@@ -16,6 +16,7 @@ from pvid.figure_file import format_of
 from pvid.logrig import LOG_SUFFIX, run_of_log
 from pvid.rigfile import RigFile
 from pvid.run_columns import Columns
+from pvid.skew import aligned
 
 Command = Callable[..., Any]
 
@@ -90,8 +91,8 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
     if path.suffix == LOG_SUFFIX:
         if columns is not None:
             raise PvidError(f"{path} is a log, whose columns are known: leave --columns out")
-        return run_of_log(path)
-    run = read_run(path, rig.sample_rate, columns)
+        return aligned(run_of_log(path), rig.sensor.y_delay)
+    run = aligned(read_run(path, rig.sample_rate, columns), rig.sensor.y_delay)
     if whole:
         run = run.whole()
     print_notes(run)

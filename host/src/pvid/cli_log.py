@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from pvid.logreader import Account, LogReader, Observer
 from pvid.logrig import refuse_to_append, rig_of_log
 from pvid.logstatus import StatusLine
 from pvid.logview import LiveView
+from pvid.port import BAUD
 from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile, load
 from pvid.run_columns import Columns
@@ -114,10 +115,10 @@ def log_command(
         try:
             account = logger.run()
         except PvidError:
-            if logger.stream.account.segments:
-                print_account(logger.stream.account, 1.0)  # what was recorded before it is in the log
+            if logger.stream.account.begun:
+                print_account(logger.stream.account, 1.0, logger.failures)  # what was recorded before it is in the log
             raise
-    return print_account(account, allow_loss)
+    return print_account(account, allow_loss, logger.failures)
 
 
 def _view(title: str, l1: float | None, address: str) -> Observer:
@@ -146,18 +147,48 @@ def _configurations(board: StreamRig, source: Source) -> Callable[[], Configurat
     return lambda: board.configure(settings, every, every, source)
 
 
-def print_account(account: Account, allow_loss: float) -> int:
-    """The summary of a recording; returns the exit code."""
+def print_account(account: Account, allow_loss: float, failures: Sequence[str] = ()) -> int:
+    """The summary of a recording, of at most 64 segments; returns the exit code.
+
+    `failures` of the views are named, and are no losses.
+    """
+    if earlier := account.begun - len(account.segments):
+        samples = account.samples - sum(one.samples for one in account.segments)
+        click.echo(f"{earlier} segments before: {samples} samples")
     for one in account.segments:
         lasted = f"{(one.ended_ns - one.began_ns) / 1e9:.1f} s, {one.why}" if one.why is not None else "not closed"
         missing = f", {one.missing_samples} missing" if one.missing_samples else ""
         click.echo(f"segment {one.number}, {one.port}: {one.samples} samples{missing}, {lasted}")
     click.echo(account.text)
+    for sentence in failures:
+        click.echo(f"pvid: {sentence}", err=True)
+    wrong = _wrong(account)
+    for sentence in wrong:
+        click.echo(f"pvid: {sentence}", err=True)
+    if wrong:
+        return DIFFERENT
     if account.lost_share > allow_loss:
         tell(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed")
         return DIFFERENT
     return DONE
 
+
+def _wrong(account: Account) -> list[str]:
+    """What of a recording cannot be relied on, beside losses that were counted; a sentence each."""
+    sentences = []
+    if account.garbled:
+        of_them = "not one frame" if not account.frames else f"not one frame in {account.garbled} of the segments"
+        where = f"{account.foreign} frames of another version that did not describe itself" if account.foreign else ""
+        likely = where or f"is it the right port, and is the board's baud rate {BAUD}?"
+        sentences.append(f"what came from the board holds {of_them}: {likely}")
+    if account.unread:
+        sentences.append(
+            f"{account.unread} bytes came faster than they could be decoded: they are in the log, not in this account"
+        )
+    return sentences
+
+
+_MOST_STRETCHES = 100  # that are named
 
 _LOG = click.argument("log", type=click.Path(path_type=Path))
 _RIG = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
@@ -166,11 +197,15 @@ _RIG = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="
 @click.command(name="verify")
 @_LOG
 @_RIG
-def verify_command(log: Path, rig_path: Path | None) -> int:
+@click.option("--partial", is_flag=True, help="Exit code 0 also when a part is not verified.")
+def verify_command(log: Path, rig_path: Path | None, partial: bool) -> int:
     """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
 
-    The first difference is named. What follows a lost sample cannot be verified until the board counts from 0 again;
-    it is listed, and counted in the summary. Exit code 1 at a difference, 3 when nothing could be verified.
+    The first difference is named. A sample is verified when an equal hash covers it. What follows a lost sample cannot
+    be verified until the board begins another session; it is listed, and counted in the summary.
+
+    Exit code 0 when every sample is verified but for those behind the last hash, when no further one was due; 1 at a
+    difference, and, without --partial, when something else is not verified; 3 when nothing is.
     """
     from pvid.logverify import Verdict, Verifier  # the twins, which other commands need not wait for
 
@@ -179,13 +214,18 @@ def verify_command(log: Path, rig_path: Path | None) -> int:
     verdict = Verdict()
     with progress_bar("verifying", None) as advance:
         for stretch in Verifier(rig, advance).stretches(reader):
-            click.echo(stretch.text)
+            if verdict.stretches < _MOST_STRETCHES or stretch.difference is not None:
+                click.echo(stretch.text)
             verdict.add(stretch)
+    if (more := verdict.stretches - _MOST_STRETCHES) > 0:
+        click.echo(f"{more} stretches more, named here where they are DIFFERENT")
     click.echo(verdict.text)
     click.echo(reader.account.text)
     if verdict.different:
         return DIFFERENT
-    return DONE if verdict.verified else NOTHING_IDENTIFIED
+    if not verdict.verified:
+        return NOTHING_IDENTIFIED
+    return DONE if partial or not verdict.left else DIFFERENT
 
 
 @click.command(name="export")

@@ -12,6 +12,7 @@ from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.excitation import excitation_of
+from pvid.linear_rows import linear_error
 from pvid.modes import modes_hz
 from pvid.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
 from pvid.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
@@ -32,6 +33,8 @@ ZERO = "c"
 
 # With w known no better than this, relative, nothing is identified.
 WORST_SE = 0.1
+# The fixed-point core's linear rows err by more at angles at which nothing is identified; as the core's own se_max.
+WORST_LINEAR = 0.05
 
 # What the strong form says of an estimate that is one.
 _GOOD = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
@@ -54,6 +57,10 @@ UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", 
 _BEYOND_WARNED = 0.01
 # Each of them costs a window: with so many, one or two a second at 1 kHz, nothing else needs to be wrong.
 _BEYOND_FATAL = 1e-3
+
+
+# An answer that fewer windows published than this share, and the last ones not, is doubtful.
+_RARELY = 0.1
 
 
 # Share of the motion from which on a warning tells what is left unexplained.
@@ -119,6 +126,11 @@ class Identification:
         variance of the residuals over what the sensors' noise explains; None: not judged yet, or the strong form
     unexplained
         share of the motion that the equations leave unexplained, rms; None in the strong form
+    skew
+        how much later y seems to be sampled than phi [s]; 0 where that explains nothing
+    linear_error
+        what the fixed-point core's linear rows put into the standard errors, the largest of w, d1, d2, relative; 0 in
+        other cores
     parts_disagree
         the run's windows, corrected for large angles, want another estimate than the one published, or scatter, by
         much more than the core's standard errors say
@@ -163,6 +175,8 @@ class Identification:
     publications: Publications
     unexplained: float | None = None
     parts_disagree: bool = False
+    skew: float = 0.0
+    linear_error: float = 0.0
     parts: dict[str, ErrorParts] = field(default_factory=dict)
     friction: tuple[float, ...] = ()
     first_publication_s: float | None = None
@@ -198,12 +212,17 @@ class Identification:
                 "the rows leave more unexplained than they should: too coarse an encoder for the strong form, a jolt "
                 "in sums that do not forget it, or a mechanism that has changed; the estimate is not to be believed"
             )
-        if self.parts_disagree:
+        if self.parts_disagree and self.skew != 0.0:
+            when = "later" if self.skew > 0 else "earlier"
+            words.append(
+                f"y seems to be sampled {1e3 * abs(self.skew):.2g} ms {when} than phi; the standard errors cover it"
+            )
+        elif self.parts_disagree:
             words.append(
                 "the windows of the run disagree with the estimate or with one another: friction, large angles or a "
                 "mechanism that has changed; the standard errors cover the disagreement"
             )
-        if self.parts_disagree and self.is_old:
+        if self.is_old and (self.parts_disagree or self._share_published < _RARELY):
             words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
         if words and self.unexplained is not None and self.unexplained >= _UNEXPLAINED_TOLD:
             words.append(f"the equations leave {100 * self.unexplained:.2g} % of the motion unexplained")
@@ -216,6 +235,13 @@ class Identification:
         """Whether the run's last windows published nothing: the estimate is that of trusted_s."""
         new = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
         return self.trusted_s is not None and self.status not in new
+
+    @property
+    def _share_published(self) -> float:
+        """Of the windows of a moving pivot, those that published."""
+        published = sum(self.reasons.get(one.text, 0) for one in (Reason.UPDATED, Reason.MISFIT))
+        doubted = sum(self.reasons.get(one.text, 0) for one in (Reason.HELD_UNCERTAIN, Reason.HELD_OUT_OF_RANGE))
+        return published / max(published + doubted, 1)
 
     @property
     def verdict(self) -> str:
@@ -469,22 +495,31 @@ def _in_q31(
     if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
         p[3] += float(np.nanmean(run.phi - phi * rig.sensor.phi_lsb))
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
+    status, linear = _final_status(record.reason), np.zeros(3)
+    if isinstance(config, WeakConfigQ31) and rig.identifier.full_angle and len(trusted):
+        found = linear_error(rig, run, p)
+        if found is None or np.abs(found).max() > WORST_LINEAR:
+            trusted, status = trusted[:0], Reason.HELD_OUT_OF_RANGE.text
+        else:
+            linear = found
     told = len(trusted) > 0
     counters = identifier.counters
     publications = Publications.none()
     if isinstance(identifier, WeakIdentifierQ31):
+        published = p_of(config, record.published[trusted])[:, :3]
         publications = Publications(
             t=run.t[trusted],
-            p=p_of(config, record.published[trusted])[:, :3],
-            se=se_of(config, record.published_se[trusted])[:, :3],
+            p=published,
+            se=np.hypot(se_of(config, record.published_se[trusted])[:, :3], linear * published),
             alarm=record.reason[trusted] == Reason.MISFIT,
         )
     beyond = beyond_range(config, phi, y, counters["rejected_saturated"])
+    estimates = p_of(config, record.estimate["p"][:, :n_p])
     return _identification(
         rig,
         run,
         p=p,
-        covariance=covariance_of(config, last),
+        covariance=_with_linear_error(covariance_of(config, last), p, linear),
         kappa=float(last["kappa"]) / 2**30,
         trusted_s=float(run.t[trusted[-1]]) if told and isinstance(identifier, WeakIdentifierQ31) else None,
         first_publication_s=float(run.t[trusted[0]]) if told else None,
@@ -493,20 +528,28 @@ def _in_q31(
         beyond_words=beyond.words(with_ranges_of(rig, run).sensor),
         chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifierQ31) else None,
         alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
-        status=_final_status(record.reason),
+        status=status,
         ticks=len(run.t),
         updates=counters["updates"],
         lost=counters["rejected_saturated"],
         running_hash=identifier.running_hash,
         trajectory=_trajectory(
             run.t[::every],
-            p_of(config, record.estimate["p"][:, :n_p])[:, :3],
-            covariance_of(config, record.estimate)[:, :3, :3],
+            estimates[:, :3],
+            _with_linear_error(covariance_of(config, record.estimate), estimates, linear)[:, :3, :3],
             rig,
             record.estimate["kappa"] / 2**30,
         ),
         publications=publications,
+        linear=linear,
     )
+
+
+def _with_linear_error(covariance: Float, p: Float, linear: Float) -> Float:
+    """Covariance [..., n_p, n_p] at p [..., n_p] with the error that linear rows make, relative of w, d1, d2 [3]."""
+    error = np.zeros_like(p)
+    error[..., :3] = p[..., :3] * linear
+    return np.asarray(covariance + error[..., :, None] * error[..., None, :])
 
 
 def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
@@ -612,15 +655,21 @@ def _identification(
     friction: tuple[float, ...] = (),
     beyond: Beyond | None = None,
     beyond_words: str | None = None,
+    linear: Float | None = None,
 ) -> Identification:
+    """`linear`: relative errors of w, d1, d2 [3] that linear rows make, which the covariance contains."""
     names = (*LINEAR, ZERO)[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
-    unexplained, parts_disagree = None, False
+    unexplained, parts_disagree, skew = None, False, 0.0
     if rig.identifier.form == "weak" and trusted_s is not None:
-        over_run = verdict(rig, run, np.append(p, friction))
+        unbiased = np.append(p, friction)
+        if linear is not None:  # the verdict's rows are corrected
+            unbiased[:3] /= 1 + linear
+        over_run = verdict(rig, run, unbiased)
         wider = np.maximum(over_run.se[: len(p)] / np.sqrt(np.diag(covariance)), 1.0)
         covariance = covariance * np.outer(wider, wider)
         unexplained, parts_disagree = over_run.unexplained, bool(wider[:3].max() > DISAGREES)
+        skew = over_run.skew
     noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     physical = oracle.physical(p[:3], rig.l1)
     if np.isfinite(physical).all():
@@ -647,6 +696,8 @@ def _identification(
         alarm=alarm,
         unexplained=unexplained,
         parts_disagree=parts_disagree,
+        skew=skew,
+        linear_error=0.0 if linear is None else float(np.abs(linear).max()),
         status=status,
         reasons=reasons,
         ticks=ticks,

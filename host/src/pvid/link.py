@@ -3,6 +3,10 @@
     COBS(header || payload || CRC-32) || 0x00
     header: version u8, type u8, schema u32, sequence u16, tick u32; little-endian
 
+The header holds the low 32 bits of the tick. What a board sends about its ticks has the next 16 as `tick_high`, so that
+it counts on for 8900 years at 1 kHz; `Frame.tick` and `encode` have them together. The ticks of a board begin anew with
+every session: the session number, which stands in the same frames, tells a restart from a counter that has wrapped.
+
 The classes below with a `TYPE` are the one definition of what stands in a payload: the schema text that a board
 sends, its hash in every header and firmware/link/schema.h are made from them (`pvid link-schema`).
 
@@ -15,12 +19,12 @@ sends, its hash in every header and firmware/link/schema.h are made from them (`
 
 from __future__ import annotations
 
-import contextlib
 import re
 import struct
 import zlib
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from enum import IntEnum
 from typing import Any, ClassVar, Self
 
@@ -29,13 +33,17 @@ import numpy.typing as npt
 from cobs import cobs
 
 from pvid.errors import PvidError
+from pvid.wording import shown
 
 VERSION = 1
 MAX_PAYLOAD = 2048
 MAX_P = 6  # places for parameters; those that a model lacks are 0
+MAX_FIELDS = 64  # of a payload that a schema text describes
+MAX_LEARNT = 16  # schemas that a decoder keeps of those that a line brought
 _HEADER = struct.Struct("<BBIHI")
 _CRC = struct.Struct("<I")
 _LONGEST = _HEADER.size + MAX_PAYLOAD + _CRC.size
+LONGEST_FRAME = _LONGEST + _LONGEST // 254 + 2  # on the line, its 0 among it
 
 _WIRE = {
     "u8": ("B", 1),
@@ -48,9 +56,18 @@ _WIRE = {
 }
 
 
-def wire(kind: str, count: int | None = 1) -> Any:
-    """A field of `count` numbers of a kind; None: all that is left of the payload, as bytes."""
-    return field(metadata={"kind": kind, "count": count})
+def _characters(field_of: bytes) -> str:
+    """What a field of characters holds up to the zeros at its end, "?" for each that is no printable ASCII."""
+    return "".join(chr(one) if 0x20 <= one < 0x7F else "?" for one in field_of.rstrip(b"\0"))
+
+
+def wire(kind: str, count: int | None = 1, absent: int | None = None) -> Any:
+    """A field of `count` numbers of a kind; None: all that is left of the payload, as bytes.
+
+    `absent`: its value in frames of a schema that does not have it yet.
+    """
+    metadata = {"kind": kind, "count": count}
+    return field(metadata=metadata) if absent is None else field(default=absent, kw_only=True, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -79,7 +96,7 @@ class Layout:
         return f"{self.type} {self.name} {' '.join(words)}"
 
     def unpack(self, payload: bytes) -> dict[str, Any]:
-        """Values by field: int, float, tuple of them, str (char) or bytes (the rest).
+        """Values by field: int, float, tuple of them, str (char, printable ASCII) or bytes (the rest).
 
         Raises
         ------
@@ -100,7 +117,7 @@ class Layout:
                 break
             found = struct.unpack_from(f"<{count}{code}", payload, at)
             if kind == "char":
-                values[name] = found[0].rstrip(b"\0").decode("ascii", "replace")
+                values[name] = _characters(found[0])
             else:
                 values[name] = found if count > 1 else found[0]
             at += width * count
@@ -137,8 +154,14 @@ class Message:
     def layout(cls) -> Layout:
         """Its wire format."""
         described = tuple((f.name, f.metadata["kind"], f.metadata["count"]) for f in fields(cls))
+        described = tuple(sorted(described, key=lambda one: one[2] is None))  # what takes the rest comes last
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
         return Layout(cls.TYPE, name, described)
+
+    @classmethod
+    def absent(cls) -> dict[str, int]:
+        """The fields that older schemas may lack, with their values there."""
+        return {f.name: f.default for f in fields(cls) if f.default is not MISSING}
 
     @property
     def payload(self) -> bytes:
@@ -206,6 +229,7 @@ class Hello(Message):
     y_lsb: float = wire("f32")
     p_unit: tuple[float, ...] = wire("f32", MAX_P)
     board: str = wire("char", 16)
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -222,7 +246,7 @@ class Configuration(Message):
 
     PC to board: starts over with these settings; the others are in the image, with its tables. Board to PC, while it
     samples by itself: the configuration in force, bit by bit as it came, beside every Hello. Whoever has it, the
-    image's settings (Hello.settings names them) and every sample from tick 0 on has all that the bits depend on.
+    image's settings (Hello.settings names them) and every sample from `first_tick` on has all that the bits depend on.
     """
 
     session: int = wire("u32")  # any number but 0; comes back in every answer
@@ -247,6 +271,7 @@ class Configure(Configuration):
     row_sd: float = wire("f32")
     forgetting_s: float = wire("f32")
     feedback_hz: float = wire("f32")
+    first_tick: int = wire("u64", absent=0)  # number of the first sample, of which the board keeps 48 bits
 
 
 @dataclass(frozen=True)
@@ -263,6 +288,7 @@ class ConfigureQ31(Configuration):
     gain: int = wire("i32")
     phi_offset: int = wire("i32")
     y_offset: int = wire("i32")
+    first_tick: int = wire("u64", absent=0)
 
 
 @dataclass(frozen=True)
@@ -301,6 +327,8 @@ class Raw(Samples):
     been sent before it."""
 
     TYPE = 5
+    session: int = wire("u32", absent=0)
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -337,6 +365,8 @@ class RawCount(Counts):
     """Board to PC: what its own sensor counted, as Raw."""
 
     TYPE = 12
+    session: int = wire("u32", absent=0)
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -355,6 +385,7 @@ class Estimate(Message):
     residual_sd: float = wire("f32")
     weight: float = wire("f32")
     reason: int = wire("u8")
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -371,6 +402,7 @@ class EstimateQ31(Message):
     residual_sd: int = wire("i32")
     weight: int = wire("u32")
     reason: int = wire("u8")
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
@@ -389,15 +421,22 @@ class Status(Message):
     malformed: int = wire("u32")
     bad_crc: int = wire("u32")
     foreign: int = wire("u32")
+    tick_high: int = wire("u16", absent=0)
 
 
 @dataclass(frozen=True)
 class Hash(Message):
-    """Board to PC: the running hash (fnv.h) after the header's tick."""
+    """Board to PC: the running hashes (FNV-1a, 32 bits) after the header's tick.
+
+    `hash` covers what the identifier made of the samples (fnv.h), `sample_hash` the samples themselves: the eight bytes
+    of each, as they stand in a frame, since the session began. 0: the board does not compute it.
+    """
 
     TYPE = 8
     session: int = wire("u32")
     hash: int = wire("u32")
+    tick_high: int = wire("u16", absent=0)
+    sample_hash: int = wire("u32", absent=0)
 
 
 @dataclass(frozen=True)
@@ -408,8 +447,10 @@ class Credit(Message):
     TYPE = 9
     session: int = wire("u32")
     room: int = wire("u32")
-    hash: int = wire("u32")  # running, after that tick
+    hash: int = wire("u32")  # running, after that tick, as in Hash
     reason: int = wire("u8")  # of the last tick
+    tick_high: int = wire("u16", absent=0)
+    sample_hash: int = wire("u32", absent=0)
 
 
 MESSAGES.pop(0)
@@ -425,8 +466,16 @@ SCHEMA_TEXT = schema_text(MESSAGES)
 SCHEMA = zlib.crc32(SCHEMA_TEXT.encode())
 
 
+_NAME = "[A-Za-z_][A-Za-z0-9_]{0,31}"
+_SCHEMA_HEAD = re.compile(r"pvid [0-9]{1,9}")
+_SCHEMA_LINE = re.compile(rf"([0-9]{{1,3}}) ({_NAME})((?: {_NAME}:[a-z0-9]+(?:\[[0-9]{{0,4}}\])?)+)")
+_SCHEMA_FIELD = re.compile(rf"({_NAME}):({'|'.join(_WIRE)})(?:\[([0-9]*)\])?")
+
+
 def parse_schema(text: str) -> dict[int, Layout]:
     """Layouts by type of a schema text, of this version of pvid or another.
+
+    The text comes over the line: one that describes no payload a frame can hold is refused.
 
     Raises
     ------
@@ -434,21 +483,36 @@ def parse_schema(text: str) -> dict[int, Layout]:
         When it is not one.
     """
     head, *lines = text.split("\n")
-    if not re.fullmatch(r"pvid \d+", head):
-        raise PvidError(f"no schema of pvid: it begins with {head[:40]!r}")
-    layouts = {}
+    if not _SCHEMA_HEAD.fullmatch(head):
+        raise PvidError(f"no schema of pvid: it begins with {shown(head)}")
+    layouts: dict[int, Layout] = {}
     for line in lines:
-        words = line.split(" ")
-        found = [re.fullmatch(rf"(\w+):({'|'.join(_WIRE)})(?:\[(\d*)\])?", word) for word in words[2:]]
-        if len(words) < 3 or not words[0].isdigit() or not all(found):
-            raise PvidError(f"no line of a schema: {line[:80]!r}")
-        described: list[tuple[str, str, int | None]] = []
-        for match in found:
-            assert match is not None
-            name, kind, count = match.groups()
-            described.append((name, kind, 1 if count is None else int(count) if count else None))
-        layouts[int(words[0])] = Layout(int(words[0]), words[1], tuple(described))
+        layout = _layout(line)
+        if layout.type in layouts:
+            raise PvidError(f"a schema that describes frame type {layout.type} twice")
+        layouts[layout.type] = layout
     return layouts
+
+
+def _layout(line: str) -> Layout:
+    """Of one line of a schema text."""
+    match = _SCHEMA_LINE.fullmatch(line)
+    fields_of = [] if match is None else [_SCHEMA_FIELD.fullmatch(word) for word in match[3].split()]
+    if match is None or not all(fields_of) or int(match[1]) > 0xFF:
+        raise PvidError(f"no line of a schema: {shown(line, 80)}")
+    described: list[tuple[str, str, int | None]] = []
+    for found in fields_of:
+        assert found is not None
+        name, kind, count = found.groups()
+        described.append((name, kind, 1 if count is None else int(count) if count else None))
+    layout = Layout(int(match[1]), match[2], tuple(described))
+    if any(count == 0 for _, _, count in described) or layout.size > MAX_PAYLOAD:
+        raise PvidError(f"no payload of a frame: {shown(line, 80)} has an array of 0, or more than {MAX_PAYLOAD} bytes")
+    if any(count is None for _, _, count in described[:-1]):
+        raise PvidError(f"no payload of a frame: in {shown(line, 80)} only the last field may be open-ended")
+    if len({name for name, _, _ in described}) < len(described) or len(described) > MAX_FIELDS:
+        raise PvidError(f"no payload of a frame: {shown(line, 80)} names a field twice, or more than {MAX_FIELDS}")
+    return layout
 
 
 @dataclass(frozen=True)
@@ -468,8 +532,15 @@ def readers(messages: Mapping[int, type[Message]]) -> Readers:
     return {number: kind.of for number, kind in messages.items()}
 
 
+def _extends(layout: Layout, today: Layout, absent: Mapping[str, int]) -> bool:
+    """Whether a message of `today` differs from that layout in no more than fields that have a value where absent."""
+    kept = tuple(one for one in today.fields if one[0] not in absent or one in layout.fields)
+    return (layout.name, layout.fields) == (today.name, kept)
+
+
 def described_readers(text: str) -> Readers:
-    """What a decoder reads frames with that `text` describes: a message of today where the layout is the same.
+    """What a decoder reads frames with that `text` describes: a message of today where the layout is the same, or was
+    before fields were added that may be absent.
 
     Raises
     ------
@@ -481,6 +552,8 @@ def described_readers(text: str) -> Readers:
         known = MESSAGES.get(layout.type)
         if known is not None and layout == LAYOUTS[layout.type]:
             return known.of
+        if known is not None and _extends(layout, LAYOUTS[layout.type], known.absent()):
+            return lambda payload: known(**layout.unpack(payload))
         return lambda payload: Described(layout.name, layout.unpack(payload))
 
     return {number: reader(layout) for number, layout in parse_schema(text).items()}
@@ -488,7 +561,7 @@ def described_readers(text: str) -> Readers:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame that came through."""
+    """A frame that came through; `tick` with its upper bits where the message has them."""
 
     sequence: int
     tick: int
@@ -498,11 +571,16 @@ class Frame:
 
 @dataclass(frozen=True)
 class Loss:
-    """What did not: `why` is malformed, crc, foreign, layout, or sequence, of which `frames` are missing."""
+    """What did not: `why` is malformed, crc, foreign, layout, or sequence, of which `frames` are missing.
+
+    `pieces` between two zeros, `bytes` together;  `schema` is that of the frame behind a gap in the sequence.
+    """
 
     why: str
     frames: int = 0
     bytes: int = 0
+    pieces: int = 1
+    schema: int = field(default=SCHEMA, compare=False)
 
 
 @dataclass
@@ -523,7 +601,10 @@ class Counters:
 
 
 def encode(message: Message, sequence: int, tick: int = 0, schema: int = SCHEMA) -> bytes:
-    """A frame with its final 0x00; sequence modulo 2^16."""
+    """A frame with its final 0x00; sequence modulo 2^16. Of a tick beyond 32 bits the message takes the upper ones."""
+    if tick > 0xFFFFFFFF and hasattr(message, "tick_high"):
+        high: dict[str, Any] = {"tick_high": tick >> 32}
+        message = replace(message, **high)
     return encode_raw(message.TYPE, sequence, tick, message.payload, schema)
 
 
@@ -540,7 +621,8 @@ class Decoder:
     """Bytes in, frames and losses out; never raises and never holds more than one frame.
 
     `schemas` says what frames of which schema mean, the others are foreign; sequences are followed for each on its
-    own. With `learns` a foreign Schema frame whose text has the CRC-32 of its own header adds to them.
+    own. With `learns` a foreign Schema frame whose text has the CRC-32 of its own header adds to them, for as long as
+    no MAX_LEARNT others have come after it.
     """
 
     counters: Counters = field(default_factory=Counters)
@@ -548,7 +630,9 @@ class Decoder:
     learns: bool = False
     _pending: bytearray = field(default_factory=bytearray)
     _overflow: int = 0
+    _amidst: bool = False  # in a frame of which the beginning was left out
     _expected: dict[int, int] = field(default_factory=dict)
+    _learnt: deque[int] = field(default_factory=deque)
 
     def feed(self, data: bytes) -> list[Frame | Loss]:
         """What these bytes completed, in order."""
@@ -563,6 +647,13 @@ class Decoder:
         """Another sender begins: the next frame of this schema is the start of its sequence."""
         self._expected.pop(schema, None)
 
+    def lose_place(self) -> None:
+        """Bytes are left out here: reading goes on behind the next 0x00, and sequences begin anew."""
+        self._pending.clear()
+        self._overflow = 0
+        self._expected.clear()
+        self._amidst = True
+
     @property
     def unfinished(self) -> int:
         """Bytes since the last 0x00."""
@@ -573,14 +664,15 @@ class Decoder:
         *ended, rest = data.split(b"\0")
         for part in ended:
             self._keep(part)
-            if self._pending or self._overflow:
+            if (self._pending or self._overflow) and not self._amidst:
                 yield bytes(self._pending), self._overflow
             self._pending.clear()
             self._overflow = 0
+            self._amidst = False
         self._keep(rest)
 
     def _keep(self, part: bytes) -> None:
-        room = _LONGEST + _LONGEST // 254 + 2 - len(self._pending)
+        room = LONGEST_FRAME - len(self._pending)
         self._pending += part[:room]
         self._overflow += len(part[room:])
 
@@ -598,8 +690,8 @@ class Decoder:
             return
         version, number, schema, sequence, tick = _HEADER.unpack_from(body)
         payload = body[_HEADER.size :]
-        if self.learns and schema not in self.schemas and number == Schema.TYPE:
-            self._learn(schema, payload)
+        if self.learns and number == Schema.TYPE and zlib.crc32(payload) == schema:
+            self.learn(payload)
         if version != VERSION or schema not in self.schemas:
             yield self._lost("foreign", piece)
             return
@@ -609,16 +701,27 @@ class Decoder:
             if read is None:
                 raise PvidError(f"no frame type {number}")
             message = read(payload)
-        except PvidError:
+        except Exception:  # whatever a reader stumbles over is in the bytes, and they are the line's
             yield self._lost("layout", piece)
             return
         self.counters.frames += 1
-        yield Frame(sequence, tick, message, schema)
+        yield Frame(sequence, tick | getattr(message, "tick_high", 0) << 32, message, schema)
 
-    def _learn(self, schema: int, text: bytes) -> None:
-        if zlib.crc32(text) == schema:
-            with contextlib.suppress(PvidError, UnicodeDecodeError):
-                self.schemas[schema] = described_readers(text.decode("ascii"))
+    def learn(self, text: bytes) -> None:
+        """Frames of the schema with this text come through from here on, if it is one; the oldest learnt one goes."""
+        schema = zlib.crc32(text)
+        if schema in self.schemas:
+            return
+        try:
+            found = described_readers(text.decode("ascii"))
+        except (PvidError, UnicodeDecodeError):
+            return
+        self.schemas[schema] = found
+        self._learnt.append(schema)
+        if len(self._learnt) > MAX_LEARNT:
+            oldest = self._learnt.popleft()
+            del self.schemas[oldest]
+            self.expect_anew(oldest)
 
     def _lost(self, why: str, piece: bytes, overflow: int = 0) -> Loss:
         setattr(self.counters, why, getattr(self.counters, why) + 1)
@@ -629,7 +732,7 @@ class Decoder:
         self._expected[schema] = (sequence + 1) & 0xFFFF
         if 0 < ahead < 0x8000:  # else the sender has restarted
             self.counters.missing += ahead
-            yield Loss("sequence", frames=ahead)
+            yield Loss("sequence", frames=ahead, schema=schema)
 
 
 def c_header() -> str:

@@ -31,7 +31,10 @@ _TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css":
 _NICENESS = 5
 _MOST_CLIENTS = 32
 # Nothing but this server is ever asked; plotly.js sets styles in place and draws its icons from data.
-_POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:"
+_POLICY = (
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'; "
+    "base-uri 'none'; form-action 'none'"
+)
 
 
 def listen(at: str) -> tuple[socket.socket, str]:
@@ -102,6 +105,7 @@ def _serve(listening: socket.socket, log: Path, title: str) -> None:
     from starlette.routing import Route
 
     from pvid.livestate import LiveState
+    from pvid.patience import Impatient
 
     state = LiveState(log, title)
     headers = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff"}
@@ -119,12 +123,14 @@ def _serve(listening: socket.socket, log: Path, title: str) -> None:
     files = [*sorted(_ASSETS.iterdir()), Path(str(plotly))]
     host = listening.getsockname()[0]
     # a page elsewhere whose name is made to point here gets nothing
-    guard = [Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost", "[", "::1"])]
+    guard = [Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost", "[::1]"])]
     application = Starlette(
         routes=[*map(asset, files), Route("/state", respond_state)], middleware=guard if host in _LOOPBACK else []
     )
     state.start()
-    settings = uvicorn.Config(application, log_level="critical", limit_concurrency=_MOST_CLIENTS, lifespan="off")
+    settings = uvicorn.Config(
+        application, http=Impatient, ws="none", log_level="critical", limit_concurrency=_MOST_CLIENTS, lifespan="off"
+    )
     uvicorn.Server(settings).run(sockets=[listening])
 
 

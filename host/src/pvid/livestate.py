@@ -16,6 +16,7 @@ from pvid.axis_limits import interesting
 from pvid.errors import PvidError
 from pvid.loghistory import History, Rates, envelope
 from pvid.logreader import LogStream
+from pvid.logtail import LogTail
 from pvid.logwords import (
     PARAMETERS,
     board_words,
@@ -33,12 +34,14 @@ from pvid.rounding import with_error
 Float = npt.NDArray[np.float64]
 
 _LOOK_S = 0.1
-_CHUNK = 1 << 16
 _BINS = 400  # of the motion: twice as many points
 
 
 class LiveState(threading.Thread):
-    """Follows a log from its beginning; the file may come later. Nobody waits for it: it reads what is there."""
+    """Follows a log from its beginning; the file may come later. Nobody waits for it: it reads what is there.
+
+    A record that it fails on is left out of the page, and counted there.
+    """
 
     def __init__(self, log: Path, title: str) -> None:
         super().__init__(name="follower", daemon=True)
@@ -49,14 +52,17 @@ class LiveState(threading.Thread):
         self._history = History()
         self._rates = Rates()
         self._rig: str | None = None
+        self._failed = 0
 
     def run(self) -> None:
         """See the class."""
         while not self.log.exists():
             time.sleep(_LOOK_S)
         with self.log.open("rb") as file:
+            tail = LogTail(file, self._stream)
             while True:
-                data = file.read(_CHUNK)
+                with self._lock:
+                    data = tail.read()
                 self.take(data)
                 if not data:
                     time.sleep(_LOOK_S)
@@ -65,10 +71,13 @@ class LiveState(threading.Thread):
         """The next bytes of the log."""
         with self._lock:
             for record in self._stream.feed(data):
-                if self._stream.rig != self._rig:
-                    self._rig = self._stream.rig
-                    self._know_rig()
-                self._history.take(record)
+                try:
+                    if self._stream.rig != self._rig:
+                        self._rig = self._stream.rig
+                        self._know_rig()
+                    self._history.take(record)
+                except Exception:  # whatever a board sends, the page shows what comes after it
+                    self._failed += 1
 
     def _know_rig(self) -> None:
         if self._rig is not None:
@@ -94,7 +103,7 @@ class LiveState(threading.Thread):
             "up": up,
             "link": link,
             "received": received_words(account, *self._rates.now(account, time.monotonic())),
-            "lost": loss_words(account),
+            "lost": loss_words(account) + (f"; {self._failed} records cannot be shown" if self._failed else ""),
             "reason": history.reason,
             "reasonWords": reason_words(history.reason),
             "kappa": f"{kappa:.2g}, {kappa_words(kappa)}" if newest else "",

@@ -14,13 +14,16 @@ A frame of the logger stands only behind a 0x00, one being added where the board
 schema number of its own: taking these frames out leaves what the board sent. The file is only ever appended to. A
 logger that is killed leaves a file whose frames are whole but for the last.
 
-The logger's frames are numbered through the file; their tick is 0.
+The logger's frames are numbered through the file. Their tick is the file's key, a number drawn when the file is made,
+which no board is ever sent: a frame of the logger's schema with another tick came over the line, and is not the
+logger's. The first frame, in front of all that a board sent, shows the key.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import secrets
 import time
 import zlib
 from dataclasses import dataclass
@@ -29,11 +32,14 @@ from typing import Any
 
 from pvid import __version__, link
 from pvid.errors import PvidError
-from pvid.link import Message, Schema, wire
+from pvid.link import Decoder, Frame, Message, Schema, readers, wire
+from pvid.wording import printable
 
 MARK_NS = 1_000_000_000
 SYNC_NS = 5_000_000_000
-_RIG_PIECE = 1000  # bytes of the rig file in a frame
+MAX_RIG = 1 << 20  # bytes of a rig file in a log
+_RIG_PIECE = 1000  # of it in a frame
+_HEAD = 1 << 16  # bytes of a log among which its first frame is
 
 LOG_MESSAGES: dict[int, type[Message]] = {Schema.TYPE: Schema}
 
@@ -52,9 +58,14 @@ class Segment(Message, messages=LOG_MESSAGES):
         """`about` as an object; empty when it is none."""
         try:
             found = json.loads(self.about)
-        except ValueError:
+        except (ValueError, RecursionError):
             return {}
         return found if isinstance(found, dict) else {}
+
+    @property
+    def port(self) -> str:
+        """The port's name; empty when it is not told."""
+        return printable(str(self.told.get("port", "")))
 
 
 @dataclass(frozen=True)
@@ -74,6 +85,11 @@ class Close(Message, messages=LOG_MESSAGES):
     unix_ns: int = wire("u64")
     received: int = wire("u64")
     why: bytes = wire("char", None)
+
+    @property
+    def words(self) -> str:
+        """`why` as text."""
+        return printable(self.why.decode("utf-8", "replace"))
 
 
 @dataclass(frozen=True)
@@ -98,6 +114,16 @@ LOG_SCHEMA_TEXT = link.schema_text(LOG_MESSAGES)
 LOG_SCHEMA = zlib.crc32(LOG_SCHEMA_TEXT.encode())
 
 
+def _key_of(path: Path) -> int | None:
+    """The key of a log that is there; None when no frame of a logger is in front."""
+    decoder = Decoder(schemas={LOG_SCHEMA: readers(LOG_MESSAGES)})
+    with path.open("rb") as file:
+        for item in decoder.items(file.read(_HEAD)):
+            if isinstance(item, Frame):
+                return item.tick
+    return None
+
+
 class LogWriter:
     """Appends to a log; every call has reached the operating system when it returns.
 
@@ -120,10 +146,12 @@ class LogWriter:
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | (0 if append else os.O_EXCL), 0o644)
             self.start = os.fstat(self._file).st_size
+            key = _key_of(path) if self.start else None
         except FileExistsError as error:
             raise PvidError(f"{path} exists; --append adds to it") from error
         except OSError as error:
             raise PvidError(f"cannot write {path}: {error.strerror}") from error
+        self._key = secrets.randbits(32) if key is None else key
         self._sequence = 0
         self._segments = 0
         self._received = 0
@@ -142,7 +170,7 @@ class LogWriter:
 
     def _frame(self, message: Message) -> bytes:
         self._sequence += 1
-        return link.encode(message, self._sequence - 1, schema=LOG_SCHEMA)
+        return link.encode(message, self._sequence - 1, self._key, LOG_SCHEMA)
 
     def begin(self, port: str, usb: dict[str, Any] | None) -> None:
         """The link came up."""

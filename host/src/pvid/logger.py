@@ -2,7 +2,8 @@
 
 One thread does nothing but read the port and append to the log (pvid.logfile). The caller's thread follows the file,
 like any other reader of it might, so that a slow screen or a slow consumer costs no byte; its memory is a chunk and
-the account.
+the account. A board that sends faster than frames can be decoded does not hold it up: what it leaves out is on the
+disk, and counted (Account.unread). An observer that fails is left out from there on; the recording goes on.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import Any, Protocol
 
 import serial
 from serial.tools import list_ports
@@ -23,12 +24,17 @@ from pvid.errors import PvidError
 from pvid.link import Code, Configuration, Credit, Hello, Message, Status, encode
 from pvid.logfile import LogWriter, Segment
 from pvid.logreader import Account, LogStream, Observer, Record
+from pvid.logtail import LogTail
 from pvid.port import Port, open_port, why_gone
 from pvid.target import Target, refusal
+from pvid.wording import printable, reason
 
 _CHUNK = 1 << 14
-_RETRY_S = 0.25
+_RETRY_S = 0.25  # twice as long after every segment that lasts less than _SHORT_S, up to _LONGEST_RETRY_S
+_SHORT_S = 1.0
+_LONGEST_RETRY_S = 8.0
 _DRAIN_S = 1.0
+_CATCH_UP_S = 3.0  # for what is not decoded yet when the recording ends
 _LOOK_S = 0.05
 _RESEND_S = 1.0
 
@@ -152,9 +158,13 @@ class Recorder(threading.Thread):
         """See the class."""
         try:
             target = self.source.open()  # not being there at all is an error
+            pause = _RETRY_S
             while True:
+                began = time.monotonic()
                 self._segment(target)
-                reopened = self._reopen()
+                short = time.monotonic() - began < _SHORT_S
+                pause = min(2 * pause, _LONGEST_RETRY_S) if short else _RETRY_S
+                reopened = self._reopen(pause)
                 if reopened is None:
                     return
                 target = reopened
@@ -170,7 +180,8 @@ class Recorder(threading.Thread):
         target = self._target
         if target is not None:
             self._sent += 1
-            with contextlib.suppress(serial.SerialException, OSError):
+            # TypeError: pyserial's own, when the other thread closes the port meanwhile
+            with contextlib.suppress(serial.SerialException, OSError, TypeError):
                 target.port.write(encode(message, self._sent - 1))
 
     def _segment(self, target: Target) -> None:
@@ -201,20 +212,27 @@ class Recorder(threading.Thread):
             return f"the port is gone: {why_gone(error)}"
         return self.why
 
-    def _reopen(self) -> Target | None:
+    def _reopen(self, pause_s: float) -> Target | None:
         try:
-            while not self.stop.wait(_RETRY_S):
+            while not self.stop.wait(pause_s):
                 try:
                     return self.source.open()
                 except PvidError as error:
-                    self.obstacle = str(error)
+                    self.obstacle = printable(str(error))
+                    pause_s = _RETRY_S
             return None
         finally:
             self.obstacle = ""
 
 
+class RefusedError(PvidError):
+    """The board does not take its configuration."""
+
+
 class Starter:
     """An observer that configures a board which is not, so that it samples by itself.
+
+    A board that refuses at first ends the recording; one that refuses after it has run is recorded as it is.
 
     Parameters
     ----------
@@ -232,6 +250,7 @@ class Starter:
         self._anew = anew
         self._fresh = False  # the link has just come up
         self._wanted: Configuration | None = None
+        self._has_run = False
         self._sent = float("-inf")
 
     def take(self, record: Record, account: Account) -> None:
@@ -239,7 +258,7 @@ class Starter:
 
         Raises
         ------
-        PvidError
+        RefusedError
             When the board refuses.
         """
         match record.item:
@@ -250,8 +269,9 @@ class Starter:
                     self._wanted, self._sent = self._begin(), float("-inf")
                 self._fresh = False
             case Status() as status if self._wanted is not None and status.session == self._wanted.session:
-                if status.code != Code.RUNNING:
-                    raise PvidError(f"the board refused: {refusal(status)}")
+                self._has_run = self._has_run or status.code == Code.RUNNING
+                if not self._has_run:
+                    raise RefusedError(f"the board refused: {refusal(status)}")
                 self._wanted = None
             case _:
                 pass
@@ -302,6 +322,8 @@ class Logger:
         Ends by itself when so many have come; None: likewise.
     begin, anew
         See Starter; without `begin` nothing is configured.
+    failures
+        Of observers that ended before the recording did, in a sentence each.
     """
 
     source: Source
@@ -314,6 +336,7 @@ class Logger:
     begin: Callable[[], Configuration] | None = None
     anew: bool = False
     stream: LogStream = field(default_factory=LogStream)
+    failures: list[str] = field(default_factory=list)
     _observers: list[Observer] = field(default_factory=list)
 
     def run(self) -> Account:
@@ -333,28 +356,29 @@ class Logger:
             file.seek(writer.start)
             recorder.start()
             try:
-                self._follow(file, recorder)
+                self._follow(LogTail(file, self.stream), recorder)
                 self._hand_out(self.stream.end())
             finally:
                 recorder.stop.set()
                 recorder.join()
-                for one in self._observers:
-                    one.close(self.stream.account)
+                self._each(lambda one: one.close(self.stream.account))
         if recorder.error is not None:
-            if not self.stream.account.segments and writer.start == 0:
+            if not self.stream.account.begun and writer.start == 0:
                 self.out.unlink()
             raise recorder.error
         return self.stream.account
 
-    def _follow(self, file: BinaryIO, recorder: Recorder) -> None:
+    def _follow(self, tail: LogTail, recorder: Recorder) -> None:
         """Reads behind the recorder until both have come to the end."""
-        limit = float("inf")
+        limit = patience = float("inf")
         while True:
             ended = not recorder.is_alive()
-            if self.duration_s is not None and limit == float("inf") and self.stream.account.segments:
+            if ended and patience == float("inf"):
+                patience = time.monotonic() + _CATCH_UP_S
+            if self.duration_s is not None and limit == float("inf") and self.stream.account.begun:
                 limit = time.monotonic() + self.duration_s
             self.stream.account.obstacle = recorder.obstacle
-            if not self._catch_up(file.read(1 << 16)):
+            if not self._catch_up(tail.read(hurried=time.monotonic() > patience)):
                 if ended:
                     return
                 time.sleep(_LOOK_S)
@@ -369,11 +393,25 @@ class Logger:
 
     def _catch_up(self, data: bytes) -> bool:
         self._hand_out(self.stream.feed(data))
-        for one in self._observers:
-            one.idle(self.stream.account)
+        self._each(lambda one: one.idle(self.stream.account))
         return bool(data)
 
     def _hand_out(self, records: Iterable[Record]) -> None:
         for record in records:
-            for one in self._observers:
-                one.take(record, self.stream.account)
+            self._each(lambda one: one.take(record, self.stream.account))  # noqa: B023 - called at once
+
+    def _each(self, call: Callable[[Observer], None]) -> None:
+        """Calls every observer; one that fails is no longer among them."""
+        for one in list(self._observers):
+            try:
+                call(one)
+            except RefusedError:
+                raise
+            except Exception as error:  # the board's bytes are recorded whatever a view makes of them
+                self._observers.remove(one)
+                with contextlib.suppress(Exception):
+                    one.close(self.stream.account)
+                self.failures.append(
+                    f"{type(one).__name__} ended with {type(error).__name__}: {printable(reason(error))}; "
+                    "the recording went on"
+                )

@@ -27,7 +27,8 @@ Float = npt.NDArray[np.float64]
 
 NUMBERS = tuple(name for name, column in TABLES["estimates"].items() if column.kind == "f8" and name != "t")
 _MOST_SAMPLES = 200_000
-_MOST_ASIDE = 20_000  # records that are put aside while nobody looks
+_MOST_ASIDE = 5_000  # records that are put aside while nobody looks
+_MOST_PARTS = 1_000  # in which the samples are kept
 
 T = TypeVar("T")
 
@@ -196,6 +197,8 @@ class History:
         oldest = part[0, -1] - self.window_s
         while self._samples[0][0, -1] < oldest or self._count > _MOST_SAMPLES:
             self._count -= self._samples.popleft().shape[1]
+        if len(self._samples) > _MOST_PARTS:
+            self._samples = deque([np.concatenate(self._samples, axis=1)])
 
     def _take_estimate(self, point: _Point, rows: Rows) -> None:
         t = float(self._since_began(rows.columns["log_time"])[0])
@@ -229,8 +232,8 @@ def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:
 
 
 def _of_parts(first: Record, parts: list[bytes]) -> Record:
-    kind = RawCount if isinstance(first.item, RawCount) else Raw
-    return replace(first, item=kind(b"".join(parts)))
+    assert isinstance(first.item, Raw | RawCount)
+    return replace(first, item=replace(first.item, phi_y=b"".join(parts)))
 
 
 def envelope(t: Float, x: Float, bins: int) -> tuple[Float, Float]:

@@ -11,10 +11,11 @@ from pvid.capture import MIN_ROWS, Run
 from pvid.errors import PvidError
 from pvid.link import Hello
 from pvid.logreader import LogReader, LogStream
-from pvid.logvalues import Values
+from pvid.logvalues import Values, is_rate
 from pvid.rigfile import RigFile
 
 LOG_SUFFIX = ".pvlog"
+_LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
 
 
 def rig_of_log(path: Path) -> RigFile | None:
@@ -67,7 +68,7 @@ def hello_of_log(path: Path) -> Hello | None:
 
 
 def run_of_log(path: Path) -> Run:
-    """The longest stretch of samples in a log without a gap.
+    """The longest stretch of samples in a log without a gap; NaN where one is no number, or no rig's.
 
     Raises
     ------
@@ -77,6 +78,8 @@ def run_of_log(path: Path) -> Run:
     hello = hello_of_log(path)
     if hello is None:
         raise PvidError(f"{path}: the board never said who it is, and its sample rate is not known")
+    if not is_rate(hello.sample_rate):
+        raise PvidError(f"{path}: the board's sample rate is {hello.sample_rate:g} Hz, as it says, and that is none")
     values = Values(hello=hello)
     best: list[npt.NDArray[np.float64]] = []
     parts: list[npt.NDArray[np.float64]] = []
@@ -87,6 +90,7 @@ def run_of_log(path: Path) -> Run:
             if rows.table != "samples":
                 continue
             columns = np.stack([rows.columns[name] for name in ("t", "phi", "y")])
+            columns[1:, ~(np.abs(columns[1:]) <= _LARGEST).all(axis=0)] = np.nan
             if record.tick != expected:
                 parts, length = [], 0
             parts.append(columns)
@@ -94,7 +98,7 @@ def run_of_log(path: Path) -> Run:
             expected = record.tick + columns.shape[1]
             if length > longest:
                 best, longest = parts, length
-    if longest < MIN_ROWS:
-        raise PvidError(f"{path} holds {longest} samples in a row; a run needs at least {MIN_ROWS}")
-    t, phi, y = np.concatenate(best, axis=1)
+    t, phi, y = np.concatenate([np.empty((3, 0)), *best], axis=1)
+    if (there := int(np.isfinite(phi).sum())) < MIN_ROWS:
+        raise PvidError(f"{path} holds {there} samples in a row; a run needs at least {MIN_ROWS}")
     return Run(t=t, phi=phi, y=y, sample_rate=float(hello.sample_rate))

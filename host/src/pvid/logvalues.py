@@ -10,6 +10,7 @@ Each of TABLES has the columns written there, with their units; a number that a 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -35,6 +36,10 @@ from pvid.link import (
 from pvid.logfile import Close, Segment
 from pvid.logreader import Gap, Record, Restart
 from pvid.native import Reason
+
+_SLOWEST, _FASTEST = 1e-3, 1e9  # [Hz]
+_LONGEST_S = 3e9  # between the PC's clock and a tick: a century, which a time in ns has room for
+_MOST = (1 << 63) - 1
 
 PARAMETERS = {"w": "1/s^2", "d1": "1", "d2": "1", "c": "rad"}
 PHYSICAL = {"g": "m/s^2", "l2": "m", "rho2": "m"}
@@ -113,7 +118,7 @@ class Values:
     def __init__(self, l1: float | None = None, hello: Hello | None = None) -> None:
         self.l1 = l1
         self._hello = hello
-        self._row_sd = float("nan")
+        self._row_sd = math.nan
         self._offset = 0.0  # of the angle in fixed point [rad]
         self._anchor: tuple[int, int] | None = None  # tick and log time
         self._latest = 0
@@ -122,8 +127,9 @@ class Values:
 
     @property
     def sample_rate(self) -> float:
-        """[Hz], as the board told; NaN before it did."""
-        return float("nan") if self._hello is None else self._hello.sample_rate
+        """[Hz], as the board told; NaN before it did, and where it told a number that is no rate."""
+        rate = math.nan if self._hello is None else self._hello.sample_rate
+        return rate if is_rate(rate) else math.nan
 
     def rows(self, record: Record) -> Iterator[Rows]:
         """Those of one record: none or one table's."""
@@ -134,7 +140,7 @@ class Values:
             case Hello():
                 self._hello = item
             case Configure() | ConfigureQ31():
-                self._row_sd = item.row_sd
+                self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
                 offset = item.phi_offset if isinstance(item, ConfigureQ31) else 0
                 self._offset = offset * (self._hello.phi_lsb if self._hello else 0.0)
             case Raw() | RawCount():
@@ -157,12 +163,12 @@ class Values:
                 text = f"samples of ticks {item.first} to {item.first + item.samples - 1} are missing"
                 yield self._one("events", record, event="gap", count=item.samples, text=text)
             case Loss():
-                yield self._one("events", record, event=item.why, count=item.frames or item.bytes, text="")
+                text = f"{item.pieces} pieces" if item.pieces > 1 else ""
+                yield self._one("events", record, event=item.why, count=item.frames or item.bytes, text=text)
             case Segment():
-                yield self._one("events", record, event="segment", count=item.number, text=item.told.get("port", ""))
+                yield self._one("events", record, event="segment", count=item.number, text=item.port)
             case Close():
-                text = item.why.decode("utf-8", "replace")
-                yield self._one("events", record, event="close", count=item.received, text=text)
+                yield self._one("events", record, event="close", count=min(item.received, _MOST), text=item.words)
             case _:
                 pass
 
@@ -185,7 +191,7 @@ class Values:
             self._anchor = (int(ticks[0]), max(record.unix_ns, self._latest))
         first, began = self._anchor
         rate = self.sample_rate
-        passed = np.zeros(len(ticks)) if np.isnan(rate) else (ticks - first) / rate
+        passed = np.zeros(len(ticks)) if math.isnan(rate) else np.minimum((ticks - first) / rate, _LONGEST_S)
         log_time = np.maximum(began + np.rint(1e9 * passed).astype(np.int64), self._latest)
         self._latest = int(log_time[-1])
         return log_time
@@ -197,6 +203,7 @@ class Values:
                 columns[name] = np.array([values[name]], column.kind)
         return Rows(table, columns)
 
+    @np.errstate(all="ignore")  # a board may send any number
     def _samples(self, record: Record, item: Raw | RawCount) -> Rows:
         phi_y = item.values.astype(np.float64)
         if isinstance(item, RawCount):
@@ -205,6 +212,7 @@ class Values:
         columns = self._where(record, record.tick + np.arange(len(phi_y), dtype=np.int64))
         return Rows("samples", {**columns, "phi": phi_y[:, 0], "y": phi_y[:, 1]})
 
+    @np.errstate(all="ignore")
     def _estimate(self, record: Record, item: Estimate | EstimateQ31) -> Rows:
         n_p = min(MAX_P if self._hello is None else self._hello.n_p, len(PARAMETERS))
         p, covariance = in_si(item, self._hello, self._offset)
@@ -223,6 +231,11 @@ class Values:
         numbers["residual"] = item.residual_sd / self._row_sd
         reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)
         return self._one("estimates", record, **{**numbers, "updates": item.updates, "reason": reason})
+
+
+def is_rate(sample_rate: float) -> bool:
+    """Whether a board can have this sample rate [Hz]."""
+    return _SLOWEST <= sample_rate <= _FASTEST
 
 
 def in_si(

@@ -1,8 +1,13 @@
 """A log computed again: every estimate and every hash in it against the numpy twin, bit for bit.
 
-What the bits depend on is all in the log: the samples from tick 0 on, the configuration and, by the rig file, the
-settings and tables of the board's image. After a sample is lost the identifier's state is unknown, and what follows
-cannot be verified until the board counts from 0 again. A link that broke without costing a sample breaks nothing.
+What the bits depend on is all in the log: the samples from the session's first tick on, the configuration and, by the
+rig file, the settings and tables of the board's image. After a sample is lost the identifier's state is unknown, and
+what follows cannot be verified until another session begins. A link that broke without costing a sample breaks nothing.
+
+A sample counts as verified when a later check covers it. A hash covers all samples before it, for it contains theirs.
+One of a board that does not hash its samples, and an estimate, covers what the identifier is done with: a sample is
+part of windows that are worked off up to Schedule.reach ticks later. What the recording holds behind the last check is
+left open. It is no fault as long as no check has been due there: it is told, and the log counts as verified.
 """
 
 from __future__ import annotations
@@ -26,10 +31,11 @@ from pvid.link import (
     EstimateQ31,
     Hash,
     Hello,
+    Loss,
     Raw,
     RawCount,
 )
-from pvid.logreader import Record
+from pvid.logreader import Gap, Record, Restart
 from pvid.native import Law, Reason, StrongConfig, WeakConfig
 from pvid.native_q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.rigfile import RigFile
@@ -54,7 +60,8 @@ class Stretch:
     """Consecutive ticks of one session and what came of them.
 
     `ticks` from `first` on; `checked` estimates and hashes were equal up to the `difference`, if there is one;
-    `why_not` says why nothing could be verified, or nothing behind the last tick.
+    `verified` ticks are covered by checks that were equal; `open` says that no check of the others has been due yet;
+    `why_not` says why nothing could be verified.
     """
 
     segment: int
@@ -64,7 +71,13 @@ class Stretch:
     checked: int = 0
     difference: Difference | None = None
     why_not: str | None = None
-    verified: bool = False
+    verified: int = 0
+    open: bool = False
+
+    @property
+    def trailing(self) -> int:
+        """Ticks behind the last check."""
+        return self.ticks - self.verified
 
     @property
     def text(self) -> str:
@@ -72,9 +85,13 @@ class Stretch:
         where = f"segment {self.segment}, ticks {self.first} to {self.first + self.ticks - 1}"
         if self.difference is not None:
             return f"{where}: DIFFERENT at {self.difference}"
-        if not self.verified:
+        if self.why_not is not None:
             return f"{where}: not verified, {self.why_not}"
-        return f"{where}: {self.checked} estimates and hashes equal in every bit"
+        found = f"{where}: {self.checked} estimates and hashes equal in every bit"
+        if self.trailing:
+            why = "no check of them was due yet" if self.open else "the check of them was lost"
+            found += f"; the last {self.trailing} samples are not verified, {why}"
+        return found
 
 
 @dataclass
@@ -82,7 +99,8 @@ class Verdict:
     """What became of all stretches."""
 
     samples: int = 0
-    verified: int = 0  # samples that the twin computed to the end
+    verified: int = 0
+    trailing: int = 0  # behind the last check of their stretch, where none has been due yet
     checked: int = 0
     different: int = 0
     stretches: int = 0
@@ -96,23 +114,31 @@ class Verdict:
         self.checked += stretch.checked
         different = stretch.difference is not None
         self.different += different
-        if stretch.verified and not different:
-            self.verified += stretch.ticks
-            self.good.add(stretch.segment)
-        else:
+        if not different:
+            self.verified += stretch.verified
+            self.trailing += stretch.trailing if stretch.open else 0
+        if different or not stretch.verified:
             self.bad.add(stretch.segment)
+        else:
+            self.good.add(stretch.segment)
+
+    @property
+    def left(self) -> int:
+        """Samples that are not verified although a check of them was due, or cannot be."""
+        return self.samples - self.verified - self.trailing
 
     @property
     def text(self) -> str:
         """In one sentence."""
         if not self.stretches:
             return "nothing to verify: the log holds no samples"
-        left = self.samples - self.verified
         parts = [f"{self.checked} estimates and hashes equal in every bit, {self.verified} samples verified"]
+        if self.trailing:
+            parts.append(f"{self.trailing} behind the last check")
         if self.different:
             parts.append(f"{self.different} of {self.stretches} stretches DIFFERENT")
-        if left:
-            parts.append(f"{left} samples not verified")
+        if self.left:
+            parts.append(f"{self.left} samples not verified")
         if lacking := sorted(self.bad - self.good):
             parts.append(
                 f"nothing verified of segment{'' if len(lacking) == 1 else 's'} {', '.join(map(str, lacking))}"
@@ -122,16 +148,29 @@ class Verdict:
 
 @dataclass
 class _Open:
-    """A stretch that grows; `lacks` says what is missing before it, if it does not begin at tick 0."""
+    """A stretch that grows; `lacks` says what is missing before it, if it does not begin with its session.
+
+    `session` is 0 where the samples do not name it; `harmed` says that something was lost since the last check.
+    """
 
     stretch: Stretch
     lacks: str
+    session: int
+    late: bool = False
+    harmed: bool = False
     parts: list[npt.NDArray[Any]] = field(default_factory=list)
     checks: list[tuple[int, Check]] = field(default_factory=list)
 
     @property
     def next(self) -> int:
         return self.stretch.first + self.stretch.ticks
+
+    def begin_with(self, configuration: Configure | ConfigureQ31) -> None:
+        """Now that it is known where the session begins."""
+        if self.session in (0, configuration.session) and self.stretch.first != configuration.first_tick:
+            self.late = True
+            self.parts.clear()
+            self.checks.clear()
 
 
 class Verifier:
@@ -152,7 +191,7 @@ class Verifier:
         self._progress = progress
         self._done = 0
         self._hello: Hello | None = None
-        self._configurations: dict[int, Configuration] = {}
+        self._configurations: dict[int, Configure | ConfigureQ31] = {}
         self._open: _Open | None = None
         self._before: tuple[int, int] | None = None  # segment and tick where the last samples ended
         self._settings: dict[float, tuple[FloatConfig | FixedConfig, int]] = {}
@@ -167,26 +206,46 @@ class Verifier:
         match record.item:
             case Hello() as hello:
                 self._hello = hello
-            case Configuration() as configuration:
+            case Configure() | ConfigureQ31() as configuration:
                 self._configurations.pop(configuration.session, None)
                 self._configurations[configuration.session] = configuration
                 if len(self._configurations) > _CONFIGURATIONS:
                     del self._configurations[next(iter(self._configurations))]
+                if self._open is not None:
+                    self._open.begin_with(configuration)
             case Raw() | RawCount() as raw:
-                if self._open is None or record.tick != self._open.next:
-                    yield from self._close()
-                    self._open = _Open(Stretch(record.segment, record.tick, 0), self._lacking(record))
-                self._before = record.segment, record.tick + raw.count
-                values = raw.values
-                self._open.stretch.ticks += len(values)
-                if self._open.stretch.first == 0:  # else it will not be computed
-                    self._open.parts.append(values)
+                yield from self._take_samples(record, raw)
             case Estimate() | EstimateQ31() | Hash() | Credit() as check:
-                # ticks that are not this stretch's belong to samples that were lost
-                if self._open is not None and self._open.stretch.first == 0 and 0 < record.tick <= self._open.next:
-                    self._open.checks.append((record.tick, check))
+                self._take_check(record.tick, check)
+            case Restart():
+                yield from self._close()
+            case Gap() | Loss():
+                if self._open is not None and not (isinstance(record.item, Loss) and record.item.why == "cut"):
+                    self._open.harmed = True
             case _:
                 pass
+
+    def _take_samples(self, record: Record, raw: Raw | RawCount) -> Iterator[Stretch]:
+        opened = self._open
+        if opened is None or record.tick != opened.next or raw.session != opened.session:
+            yield from self._close()
+            opened = self._open = _Open(Stretch(record.segment, record.tick, 0), self._lacking(record), raw.session)
+            if (configuration := self._configurations.get(raw.session)) is not None:
+                opened.begin_with(configuration)
+        self._before = record.segment, record.tick + raw.count
+        opened.stretch.ticks += raw.count
+        if not opened.late:  # else it will not be computed
+            opened.parts.append(raw.values)
+
+    def _take_check(self, tick: int, check: Check) -> None:
+        opened = self._open
+        if opened is None or opened.late or opened.session not in (0, check.session):
+            return
+        if tick > opened.next:  # of samples that were lost
+            opened.harmed = True
+        elif tick > opened.stretch.first:
+            opened.checks.append((tick, check))
+            opened.harmed = False
 
     def _lacking(self, record: Record) -> str:
         """What is missing before these samples, in a sentence."""
@@ -207,12 +266,18 @@ class Verifier:
 
     def _verify(self, opened: _Open) -> None:
         stretch = opened.stretch
-        if stretch.first != 0:
+        if not opened.late and opened.checks:
+            stretch.session = opened.checks[-1][1].session
+        else:
+            stretch.session = opened.session or None
+        configuration = self._configurations.get(stretch.session or 0)
+        if opened.late or (configuration is None and stretch.first != 0):
             raise PvidError(opened.lacks)
         if not opened.checks:
-            raise PvidError("no estimate and no hash came with them")
-        stretch.session = opened.checks[-1][1].session
-        configuration = self._configurations.get(stretch.session)
+            stretch.open = configuration is not None and not opened.harmed and stretch.ticks <= _pace(configuration)
+            raise PvidError(
+                "no check of them was due yet" if stretch.open else "no estimate and no hash came with them"
+            )
         if configuration is None:
             raise PvidError("the board's configuration did not come with them")
         config = self._config(configuration)
@@ -221,8 +286,14 @@ class Verifier:
         for tick, check in opened.checks:
             if check.session == stretch.session:
                 checks.setdefault(tick, []).append(check)
-        _Recomputation(config, checks, stretch, self._count).run(samples)
-        stretch.verified = True
+        with np.errstate(all="ignore"):  # a board may send any number, and say that it was configured with any
+            recomputation = _Recomputation(config, checks, stretch, self._count)
+            recomputation.run(samples)
+        stretch.verified = recomputation.covered
+        allowed = _pace(configuration) + recomputation.reach
+        if recomputation.hashed and configuration.hash_every:
+            allowed = configuration.hash_every
+        stretch.open = not opened.harmed and stretch.trailing <= allowed
 
     def _count(self) -> None:
         self._done += 1
@@ -264,12 +335,34 @@ class Verifier:
                     row_sd=given.row_sd,
                     forgetting_s=given.forgetting_s,
                     feedback_hz=given.feedback_hz,
-                    law=Law(given.law),
+                    law=_law(given.law),
                     divider=given.divider,
                 )
                 return replace(config, estimator=settings)
             case _:
                 raise PvidError("the board's image holds another core than the rig file asks for")
+
+
+def _law(number: int) -> Law:
+    if number not in list(Law):
+        raise PvidError(f"the board was configured with law {number}, and there is none")
+    return Law(number)
+
+
+def _pace(configuration: Configuration) -> int:
+    """Ticks from an estimate or a hash to the next."""
+    return min((every for every in (configuration.hash_every, configuration.estimate_every) if every), default=0)
+
+
+def _reach(twin: Twin) -> int:
+    """Ticks from a sample to the end of what the identifier does with it."""
+    match twin:
+        case WeakTwin() | WeakTwinQ31():
+            return twin.schedule.reach
+        case StrongTwin():
+            return twin.config.window
+        case StrongTwinQ31():
+            return twin.config.design.bank.window
 
 
 def _twin_of(config: FloatConfig | FixedConfig) -> Twin:
@@ -289,7 +382,8 @@ class _DifferentError(Exception):
 
 
 class _Recomputation:
-    """One run of the twin over a stretch."""
+    """One run of the twin over a stretch: `covered` are the samples that the checks cover which were equal, `hashed`
+    says that they were hashed themselves."""
 
     def __init__(
         self,
@@ -299,15 +393,20 @@ class _Recomputation:
         count: Callable[[], None],
     ) -> None:
         self.twin = _twin_of(config)
+        self.reach = _reach(self.twin)
+        self.covered = 0
+        self.hashed = False
         self._fixed = isinstance(config, FixedConfig)
         self._checks = checks
         self._stretch = stretch
         self._count = count
         self._hash = fnv.START
+        self._sample_hashes = np.empty(0, np.uint32)
         self._verdict = int(Reason.WARMING_UP)
 
     def run(self, samples: npt.NDArray[Any]) -> None:
-        """Over samples [ticks, 2] from tick 0; the outcome is left in the stretch."""
+        """Over samples [ticks, 2] from the session's first tick; the outcome is left in the stretch."""
+        self._sample_hashes = fnv.sample_hashes(samples)
         try:
             wide = samples.astype(np.int64) if self._fixed else samples
             self.twin.follow(wide[:, 0], wide[:, 1], self._after)
@@ -320,12 +419,16 @@ class _Recomputation:
         if reason != Reason.ACCUMULATED:
             self._verdict = reason
         self._count()
-        for check in self._checks.get(tick + 1, ()):
-            for variable, logged, own in self._compared(check, reason):
+        done = self._stretch.first + tick + 1
+        for check in self._checks.get(done, ()):
+            for variable, logged, own in self._compared(check, tick, reason):
                 if logged != own:
-                    self._stretch.difference = Difference(tick + 1, variable, logged, own, "log")
+                    self._stretch.difference = Difference(done, variable, logged, own, "log")
                     raise _DifferentError
             self._stretch.checked += 1
+            hashed = isinstance(check, Hash | Credit) and check.sample_hash != 0
+            self.hashed = self.hashed or hashed
+            self.covered = max(self.covered, tick + 1 - (0 if hashed else self.reach))
 
     def _state(self, reason: int) -> bytes:
         """What the hash covers, as in fnv.h."""
@@ -337,8 +440,10 @@ class _Recomputation:
             return p.tobytes() + sums.tobytes() + exponent + word
         return estimator.p[:, 0].astype("<f4").tobytes() + estimator.sums[:, 0].astype("<f4").tobytes() + word
 
-    def _compared(self, check: Check, reason: int) -> Iterator[tuple[str, int, int]]:
+    def _compared(self, check: Check, tick: int, reason: int) -> Iterator[tuple[str, int, int]]:
         """Variable, the log's word, the twin's."""
+        if isinstance(check, Hash | Credit) and check.sample_hash != 0:
+            yield "hash of the samples", check.sample_hash, int(self._sample_hashes[tick])
         match check:
             case Hash():
                 yield "hash", check.hash, self._hash

@@ -172,7 +172,8 @@ def sparkline(x: npt.NDArray[np.float64], width: int) -> str:
     if not len(known):
         return ""
     unit = max(float(np.median(known)), 1e-300) * 2 / (len(_BLOCKS) - 1)
-    heights = np.clip(np.nan_to_num(last) / unit, 0, len(_BLOCKS) - 1)
+    with np.errstate(over="ignore"):  # 1e38 over 1e-300 is full, too
+        heights = np.clip(np.nan_to_num(last) / unit, 0, len(_BLOCKS) - 1)
     return "".join(
         _BLOCKS[round(height)] if np.isfinite(one) else " "
         for one, height in zip(last.tolist(), heights.tolist(), strict=True)

@@ -31,6 +31,7 @@ _REASONS = {
     Reason.HELD_UNCERTAIN: "standard errors too wide, or still on the way; the last trusted estimate stays",
     Reason.HELD_OUT_OF_RANGE: "the angle went beyond what the equations are good for; that window was dropped",
     Reason.HELD_FROZEN: "frozen: nothing is taken in",
+    Reason.NOT_READY: "the identifier has no configuration yet, or refused the one that it was given",
     Reason.MISFIT: "the estimate took a step, but residuals exceed the sensors' noise: friction, large angles or "
     "another mechanism",
 }
@@ -82,7 +83,9 @@ def loss_words(account: Account) -> str:
         (account.foreign, "foreign frames"),
     ]
     told = ", ".join(f"{count} {what}" for count, what in parts if count)
-    return f"{told} ({100 * account.lost_share:.2g} %)" if told else ""
+    lost = f"{told} ({100 * account.lost_share:.2g} %)" if told else ""
+    unread = f"{account.unread / 1e6:.1f} MB recorded, but too fast to be decoded" if account.unread else ""
+    return "; ".join(filter(None, (lost, unread)))
 
 
 def reason_words(reason: str) -> str:

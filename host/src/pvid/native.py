@@ -47,6 +47,7 @@ class Reason(IntEnum):
     HELD_OUT_OF_RANGE = 9
     MISFIT = 10
     HELD_FROZEN = 11
+    NOT_READY = 12
 
     @property
     def text(self) -> str:
@@ -103,6 +104,7 @@ class Status(IntEnum):
     BAD_DRIVE_TICKS = 43
     BAD_FORMAT = 44
     BAD_RENEWAL = 45
+    BAD_POINTER = 46
 
 
 class Law(IntEnum):

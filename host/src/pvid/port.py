@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
-from typing import Protocol
+from typing import Any, Protocol
 
 import serial
+from serial.urlhandler import protocol_socket
 
 from pvid.errors import PvidError
 from pvid.wording import reason
@@ -14,6 +15,13 @@ from pvid.wording import reason
 BAUD = 115200
 _READ_S = 0.02
 _WRITE_S = 8.0  # an emulator on a busy machine may not read for seconds
+
+
+class _Socket(protocol_socket.Serial):
+    """A socket, of which opening drops nothing: pyserial throws away what a board has sent by then."""
+
+    def reset_input_buffer(self) -> None:
+        """Keeps it."""
 
 
 class Port(Protocol):
@@ -36,15 +44,17 @@ def open_port(name: str) -> Port:
         When it cannot be opened; the sentence says why.
     """
     try:
-        port = serial.serial_for_url(name, do_not_open=True, baudrate=BAUD, timeout=_READ_S, write_timeout=_WRITE_S)
+        port: Any = _Socket() if name.startswith("socket://") else serial.serial_for_url(name, do_not_open=True)
+        port.port, port.baudrate, port.timeout, port.write_timeout = name, BAUD, _READ_S, _WRITE_S
         if "://" not in name:
             port.exclusive = True
             port.dtr = False
             port.rts = False
         port.open()
+        opened: Port = port
     except Exception as error:  # the classes that pyserial loads for URLs let through whatever their text provokes
         raise PvidError(why_not_opened(name, error)) from error
-    return port
+    return opened
 
 
 def why_not_opened(name: str, error: Exception) -> str:

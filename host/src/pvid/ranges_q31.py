@@ -1,4 +1,4 @@
-"""Full scales of the fixed-point core: what the rig file says, else its defaults, or more where a run needs more."""
+"""Full scales of the fixed-point core: what the rig file says, else what a run needs, else defaults."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 from pvid.capture import Run
 from pvid.rigfile import RigFile, Sensor
+from pvid.setup import weak_design_of
+from pvid.weak_oracle import front_end
 
 Float = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
@@ -25,6 +27,8 @@ _ORDINARY = 0.999
 _ORDINARY_ACCELERATION = 0.99  # a jump of y by one fault is spread by the smoother
 _FAULT = 3.0
 _SMOOTHING_S = 0.05  # of the pivot's acceleration
+# A range of acceleration twice as wide costs nothing; ten times as wide the rounding of its products biases d2.
+_ACCELERATION_MARGIN = 2.0
 
 
 def with_default_ranges(rig: RigFile) -> Sensor:
@@ -39,18 +43,36 @@ def with_default_ranges(rig: RigFile) -> Sensor:
 
 
 def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
-    """The rig with a range each; where the file leaves one open and the run goes beyond the default, what holds the
-    run and a quarter more."""
+    """The rig with a range each; where the file leaves one open, what the run needs and a margin: of phi and y no less
+    than the default."""
     default = with_default_ranges(rig)
     given = rig.sensor
     rest = 0.0 if rig.identifier.form == "strong" else None  # what the strong form counts angles from
     ranges = {
         "phi_range": given.phi_range or max(default.phi_range, _MARGIN * reach(run.phi, rest)),
         "y_range": given.y_range or max(default.y_range, _MARGIN * reach(run.y)),
-        "acceleration_range": given.acceleration_range
-        or max(default.acceleration_range, _MARGIN * reach(pivot_acceleration(run), 0.0, _ORDINARY_ACCELERATION)),
+        "acceleration_range": given.acceleration_range or _acceleration_range(rig, run, default.acceleration_range),
     }
     return replace(rig, sensor=replace(default, **ranges))
+
+
+def _acceleration_range(rig: RigFile, run: Run, default: float) -> float:
+    """What the run needs [m/s^2]. Where that is beyond the default, faults are left out of it; in the strong form,
+    whose products keep their bits, it is no less than the default."""
+    if rig.identifier.form == "weak":
+        largest = _ACCELERATION_MARGIN * _largest_acceleration(rig, run)
+        if 0 < largest <= default:
+            return largest
+    return max(default, _ACCELERATION_MARGIN * reach(pivot_acceleration(run), 0.0, _ORDINARY_ACCELERATION))
+
+
+def _largest_acceleration(rig: RigFile, run: Run) -> float:
+    """As the weak form's core sees it, noise and faults included [m/s^2]; 0 of a run that is too short."""
+    design, finite = weak_design_of(rig, run.sample_rate), np.isfinite(run.y)
+    if len(run.y) < design.taps or not finite.any():
+        return 0.0
+    height = np.interp(np.arange(len(run.y)), np.flatnonzero(finite), run.y[finite] - middle_of_travel(run.y))
+    return rig.l1 * float(np.abs(front_end(height, height, design)[1]).max())
 
 
 def middle_of_travel(x: npt.ArrayLike) -> float:

@@ -17,6 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from scipy.signal import savgol_filter, welch
 
 from pvid.advice import advice
@@ -363,22 +364,30 @@ def _spectra(recording: Recording, axis: Axes) -> None:
     found = modes_hz(recording.p)
     shown = (frequency > 0) & (frequency <= max((_LEAST_SHOWN_HZ, *(4 * one for one in found))))
     acceleration = np.sqrt(height) * (2 * np.pi * frequency) ** 2
-    drive = axis.semilogy(frequency[shown], acceleration[shown], color="C0", label="pivot's acceleration")
+    drive = _amplitude(axis, frequency[shown], acceleration[shown], color="C0", label="pivot's acceleration")
     axis.set_ylabel("acceleration [m/s²/√Hz]", color="C0")
     other = axis.twinx()
-    motion = other.semilogy(frequency[shown], np.sqrt(angle)[shown], color="C1", label="angle phi")
+    motion = _amplitude(other, frequency[shown], np.sqrt(angle)[shown], color="C1", label="angle phi")
     other.set_ylabel("angle [rad/√Hz]", color="C1")
     lines = [*drive, *motion]
     for one in found:
         lines += [axis.axvline(one, color="C3", linestyle="--", label=f"mode at {one:.3g} Hz")]
-    for scale in (axis, other):  # room for the legend
-        low, high = scale.get_ylim()
-        scale.set_ylim(low, high * (high / low) ** 0.35)
     axis.set_xlim(0, float(frequency[shown][-1]))
     axis.set_title(f"Excitation and answer against the modes of the {'estimate' if recording.estimate else 'guess'}")
     axis.set_xlabel("frequency [Hz]")
     axis.grid(alpha=0.3)
     axis.legend(handles=lines, loc="upper right", fontsize=9, ncols=2)
+
+
+def _amplitude(axis: Axes, frequency: Float, x: Float, color: str, label: str) -> list[Line2D]:
+    """Over a logarithmic scale with room for the legend; of a signal that stands still there is none."""
+    there = np.where(x > 0, x, np.nan)
+    lines = axis.plot(frequency, there, color=color, label=label)
+    if np.isfinite(there).any():
+        axis.set_yscale("log")
+        low, high = axis.get_ylim()
+        axis.set_ylim(low, high * (high / low) ** 0.35)
+    return lines
 
 
 def _phase(run: Run, axis: Axes) -> None:

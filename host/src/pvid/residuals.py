@@ -45,7 +45,7 @@ class Residuals:
 
     def autocorrelation(self, lags: int) -> Float:
         """Of groups 0 to `lags` apart, over that of 0 [lags + 1]; less where there are fewer groups."""
-        power = float((self.e**2).sum())
+        power = float((self.e**2).sum()) or 1.0  # of residuals that are all 0, too
         n = len(self.e)
         return np.array([float((self.e[lag:] * self.e[: n - lag]).sum()) / power for lag in range(min(lags + 1, n))])
 

@@ -70,18 +70,20 @@ class Sensor:
     phi_lsb : angle sensor [rad]; default 14 bits a turn
     y_lsb : pivot sensor [m]
     phi_zero : what the encoder reads at rest, roughly [rad]: needed where that is beyond 1 rad, a half turn say
+    y_delay : how much later than phi the pivot is sampled [s]; the host moves y by it, a board does not
     y_gain_sd : standard deviation of the gain of y, relative: enters the standard errors, since no run shows it
     phi_range : largest angle from rest that the fixed-point core takes in [rad]; 0: 0.5, or more where the run at hand
         needs it
     y_range : largest height of the pivot about the middle of its travel likewise [m]; 0: a tenth of l1, or more
         likewise
-    acceleration_range : largest acceleration of the pivot likewise [m/s^2]; 0: four times the nominal g, or more
-        likewise
+    acceleration_range : largest acceleration of the pivot likewise [m/s^2]; 0: twice the run's, without a run four
+        times the nominal g. Ten times the run's would cost accuracy: products of u are rounded
     """
 
     phi_lsb: float = _number(Unset(2.0 * math.pi / 2**14), "rad", 0.0, 1.0)
     y_lsb: float = _number(5e-6, "m", 0.0, 1.0)
     phi_zero: float = _number(0.0, "rad", -1e3, 1e3)
+    y_delay: float = _number(0.0, "s", -1.0, 1.0)
     y_gain_sd: float = _number(0.003, "relative", 0.0, 1.0)
     phi_range: float = _number(0.0, "rad", 0.0, 10.0)
     y_range: float = _number(0.0, "m", 0.0, 1e6)

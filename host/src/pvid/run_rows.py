@@ -17,9 +17,10 @@ import numpy.typing as npt
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.rigfile import RigFile
+from pvid.self_consistent import self_consistent
 from pvid.setup import row_sd_of, weak_drive_threshold
 from pvid.weak_design import WeakDesign, disturbance_gram
-from pvid.weak_oracle import A, N, columns, frames, front_end, jacobian, noise_gram, packed_to_square, remainder, theta
+from pvid.weak_oracle import A, N, columns, frames, front_end, jacobian, noise_gram, packed_to_square, theta
 
 Float = npt.NDArray[np.float64]
 
@@ -29,7 +30,8 @@ _WHITENINGS = 3
 _STEPS = 40
 _LONGEST_STEP = 0.5  # of log w, log d1, log d2
 _DONE = 1e-8
-_PASSES = 3  # of the correction for large angles
+# Fewer windows say nothing.
+FEWEST = 4
 _CORE = 4  # w, d1, d2, c; friction adds two
 
 
@@ -84,6 +86,7 @@ class RunRows:
     u: Float
     number: npt.NDArray[np.int64]
     part: float = 1.0  # of the run's windows
+    sound: npt.NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, rig: RigFile, run: Run, design: WeakDesign) -> RunRows:
@@ -119,7 +122,12 @@ class RunRows:
     def only(self, which: npt.NDArray[np.bool_] | slice) -> RunRows:
         """Some of the windows."""
         return replace(
-            self, columns=self.columns[which], phi=self.phi[which], u=self.u[which], number=self.number[which]
+            self,
+            columns=self.columns[which],
+            phi=self.phi[which],
+            u=self.u[which],
+            number=self.number[which],
+            sound=None if self.sound is None else self.sound[which],
         )
 
     def thinned(self, most: int) -> RunRows:
@@ -134,20 +142,24 @@ class RunRows:
 
     def corrected(self, p: Float, full_angle: bool = True) -> RunRows:
         """With what the linear rows lack at large angles taken off Y, at p; with the columns of friction where p has
-        its two coefficients."""
+        its two coefficients. `sound` tells the windows in which the lack was found; the others stay linear."""
         friction = len(p) > _CORE
         damping = p[_CORE:] if friction else np.zeros(2)
-        functions = self.design.functions
-        y, k = np.zeros((len(self.phi), functions)), np.zeros((len(self.phi), 2, functions))
-        with np.errstate(over="ignore", invalid="ignore"):  # passes diverge where p is far off
-            for window, (one, phi, u) in enumerate(zip(self.columns, self.phi, self.u, strict=True)):
-                lack = remainder(p[:_CORE], damping, one, phi, u, self.design, _PASSES, full_angle)
-                if np.isfinite(lack.y).all() and np.isfinite(lack.k).all():
-                    y[window], k[window] = lack.y, lack.k
+        y = np.zeros((len(self.phi), self.design.functions))
+        k = np.zeros((len(self.phi), 2, self.design.functions))
+        sound = np.zeros(len(self.phi), np.bool_)
+        for window, (one, phi, u) in enumerate(zip(self.columns, self.phi, self.u, strict=True)):
+            lack = self_consistent(p[:_CORE], damping, one, phi, u, self.design, full_angle)
+            if lack is not None:
+                y[window], k[window], sound[window] = lack.y, lack.k, True
         parts = [self.columns[:, :1] - y[:, None], self.columns[:, N], self.columns[:, A:]]
         if friction:
             parts.insert(2, k)
-        return replace(self, columns=np.concatenate(parts, axis=1))
+        return replace(self, columns=np.concatenate(parts, axis=1), sound=sound)
+
+    def sound_only(self) -> RunRows:
+        """The windows that could be corrected."""
+        return self if self.sound is None else self.only(self.sound)
 
     def covariance(self, p: Float) -> Float:
         """Of a window's rows at p for noise of 1 of the decimated angle [K, K]."""
@@ -177,12 +189,10 @@ class RunRows:
     def fitted(self, p: Float, disturbance: float = 0.0) -> Fit:
         """The least squares from p on, whitened at the estimate itself; windows with a jolt are left out."""
         kept = np.ones(len(self.columns), np.bool_)
-        white = self.whitened(p, disturbance)
-        for turn in range(_WHITENINGS):
-            if turn > 0:
-                white = self.whitened(p, disturbance)
-                energy = np.sum(_residuals(white, p) ** 2, axis=1)
-                kept = energy <= JOLT * np.median(energy)
+        for _ in range(_WHITENINGS):
+            white = self.whitened(p, disturbance)
+            energy = np.sum(_residuals(white, p) ** 2, axis=1)
+            kept = energy <= JOLT * np.median(energy)
             p = least_squares(np.einsum("wik,wjk->ij", white[kept], white[kept]), p)
         return self.judged(p, disturbance, kept)
 

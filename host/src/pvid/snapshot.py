@@ -33,6 +33,7 @@ class SnapshotStatus(IntEnum):
     OTHER_KIND = 5
     OTHER_LAYOUT = 6
     OTHER_CONFIG = 7
+    NOT_READY = 8
 
 
 class _ChoiceStruct(ctypes.Structure):

@@ -99,7 +99,12 @@ class StreamRig:
         return identifier.run(phi, y, sums=False).hash
 
     def configure(
-        self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC
+        self,
+        settings: int,
+        hash_every: int,
+        estimate_every: int,
+        source: Source = Source.PC,
+        first_tick: int = 0,
     ) -> Configure | ConfigureQ31:
         """The frame that configures a board whose image has these `settings`, with a new session number."""
         config, estimator = self.config, self.config.estimator
@@ -111,6 +116,7 @@ class StreamRig:
             "hash_every": hash_every,
             "estimate_every": estimate_every,
             "divider": estimator.divider,
+            "first_tick": first_tick,
             **{name: _places(getattr(estimator, name)) for name in ("start", "start_sd", "lower", "upper")},
         }
         if isinstance(config, FixedConfig):

@@ -23,7 +23,7 @@ from pvid import oracle
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.rigfile import Nominal, RigFile
-from pvid.run_rows import Fit, RunRows
+from pvid.run_rows import FEWEST, Fit, RunRows
 from pvid.setup import nominal_start, weak_design_of
 from pvid.weak_sizing import pass_hz_of, window_for_run
 
@@ -189,7 +189,9 @@ def _corrected(rows: RunRows, fit: Fit, full_angle: bool, damping: bool) -> tupl
     corrected, p = rows, np.append(fit.p, [0.0, 0.0]) if damping else fit.p
     for _ in range(_CORRECTIONS):
         try:
-            corrected = rows.corrected(p, full_angle)
+            corrected = rows.corrected(p, full_angle).sound_only()
+            if len(corrected.phi) < FEWEST:
+                return linear
             better = corrected.fitted(p)
         except np.linalg.LinAlgError:
             return linear

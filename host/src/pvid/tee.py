@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 
 from pvid.errors import PvidError
 from pvid.hosts import addresses
+from pvid.link import Loss
 from pvid.logreader import Account, Record
 from pvid.logvalues import TABLES, Rows, Values
 
@@ -61,6 +62,8 @@ class Tee:
 
     def take(self, record: Record, account: Account) -> None:
         """See logreader.Observer."""
+        if isinstance(record.item, Loss):
+            return  # of which a line in trouble has many
         for rows in self._values.rows(record):
             if rows.table in _TABLES:
                 for datagram in self._datagrams(rows):

@@ -18,16 +18,16 @@ import numpy.typing as npt
 from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.rigfile import RigFile
-from pvid.run_rows import RunRows
+from pvid.run_rows import FEWEST, RunRows
 from pvid.setup import weak_design_of
+from pvid.skew import skew_of
 from pvid.weak_oracle import VALID_ANGLE
 
 Float = npt.NDArray[np.float64]
 
 # Windows that are looked at, evenly spread over a longer run.
 _WINDOWS = 300
-# With fewer the scatter says nothing.
-_FEWEST = 4
+_WINDOWS_OF_SKEW = 100
 # Parts of the run disagree when the windows' own standard error, or what they want of p, is so many times the core's.
 DISAGREES = 3.0
 
@@ -38,12 +38,15 @@ class Verdict:
 
     Attributes
     ----------
-    se : standard errors of p [n_p] from the scatter of the windows and their distance from p; 0 where there are too few
+    se : standard errors of p [n_p] from the scatter of the windows, their distance from p, and what a skew of the
+        sensors does; 0 where there are too few windows
     unexplained : rms of the rows' residuals beyond the encoder's noise, over that of the rows (0 to about 1)
+    skew : how much later y seems to be sampled than phi [s]; 0 where that explains nothing
     """
 
     se: Float
     unexplained: float
+    skew: float = 0.0
 
 
 def verdict(rig: RigFile, run: Run, p: Float) -> Verdict:
@@ -51,20 +54,28 @@ def verdict(rig: RigFile, run: Run, p: Float) -> Verdict:
     at = p if len(p) > 3 else np.append(p, 0.0)
     nothing = Verdict(np.zeros(len(at)), 0.0)
     try:
-        rows = RunRows.of(rig, run, weak_design_of(rig, run.sample_rate)).thinned(_WINDOWS)
-        rows = rows.within(at[3], VALID_ANGLE, _FEWEST)
-        if rig.identifier.full_angle or rig.identifier.damping:
-            # the fixed-point core takes linear rows: what they lack shows as a distance
-            rows = rows.corrected(at, rig.identifier.full_angle)
+        rows = _rows(rig, run, at, _WINDOWS)
         fit = rows.judged(at)
         bare = replace(rig, identifier=replace(rig.identifier, disturbance=0.0))
         plain = replace(rows, design=weak_design_of(bare, run.sample_rate)).judged(at)
-        if len(fit.energy) < _FEWEST:
+        if len(fit.energy) < FEWEST:
             return nothing
         wanted = np.linalg.solve(fit.information, fit.scores.sum(axis=0))
+        skew, aligned_fit = skew_of(run, lambda shifted: _rows(rig, shifted, at, _WINDOWS_OF_SKEW).fitted(at))
+        by_skew = np.zeros(len(at)) if aligned_fit is None else aligned_fit.p - at
     except (PvidError, np.linalg.LinAlgError):
         return nothing
     beyond = float(plain.energy.sum()) - len(plain.energy) * (rows.design.functions - 2) * rows.row_sd**2
     unexplained = math.sqrt(max(beyond, 0.0) / max(float(plain.signal.sum()), 1e-300))
     share = rows.part  # of the windows: the whole run knows p better
-    return Verdict(np.hypot(fit.clustered_se * math.sqrt(share), wanted), min(unexplained, 1.0))
+    se = np.sqrt(fit.clustered_se**2 * share + wanted**2 + by_skew**2)
+    return Verdict(se, min(unexplained, 1.0), skew)
+
+
+def _rows(rig: RigFile, run: Run, at: Float, most: int) -> RunRows:
+    """Of the windows that can be judged, so many at most, corrected at p."""
+    rows = RunRows.of(rig, run, weak_design_of(rig, run.sample_rate)).thinned(most)
+    rows = rows.within(at[3], VALID_ANGLE, FEWEST)
+    if rig.identifier.full_angle or rig.identifier.damping:
+        rows = rows.corrected(at, rig.identifier.full_angle).sound_only()
+    return rows

@@ -197,19 +197,22 @@ def jacobian(p: Float) -> Float:
 # ---- full angles and damping
 
 
-def internal_motion(
-    p: Float, window_columns: Float, known: Float, phi: Float, u: Float, design: WeakDesign
-) -> tuple[Float, Float]:
-    """q = phi''/G and q' of one window [W] at p, a and b from its columns; `known` [K] is taken off Y.
+def boundary(p: Float, window_columns: Float, known: Float) -> Float:
+    """a [rad] and b [rad/s] of one window at p, from its columns; `known` [K] is taken off Y."""
+    th = theta(p)
+    e = window_columns[Y] - th @ window_columns[1 : 1 + len(th)] - known
+    return np.asarray(np.linalg.lstsq(window_columns[[A, B]].T, e, rcond=None)[0])
+
+
+def internal_motion(p: Float, ends: Float, phi: Float, u: Float, design: WeakDesign) -> tuple[Float, Float]:
+    """q = phi''/G and q' of one window [W] at p, with `ends` its a and b.
 
     q = a + b t - d1 phi - d2 I2(G phi); phi as measured, since a has taken in what c does to d1 phi.
     """
     w, d1, d2 = p[:3]
     c = p[3] if len(p) > 3 else 0.0
     g, angle, dt = w + u, phi - c, design.dt
-    th = theta(p)
-    e = window_columns[Y] - th @ window_columns[1 : 1 + len(th)] - known
-    a, b = np.linalg.lstsq(window_columns[[A, B]].T, e, rcond=None)[0]
+    a, b = ends
     t = dt * (np.arange(design.window) - (design.window - 1) / 2)
     rate = np.gradient(phi, dt)
     q = a + b * t - d1 * phi - d2 * integrated_twice(g * angle, dt)
@@ -224,6 +227,54 @@ class Remainder:
     k: Float
 
 
+# Below this L2 a mechanism is hardly physical, and nothing is corrected.
+L2_MIN = 0.05
+
+
+def lack(
+    p: Float, motion: tuple[Float, Float], phi: Float, u: Float, design: WeakDesign, full_angle: bool
+) -> Remainder:
+    """What the linear rows of one window lack, with q and q' of `internal_motion`.
+
+    With q known, so is the motion: phi1 = q + k phi, k = L2 (1 + L1). The exact equations are
+
+        phi'' = G q + k (e2 - e1) - e1,    q'' = -d1 phi'' - d2 G phi + d2 (e2 - e1)
+        e1 = G (a1 - sin a1) + ((1 - cos phi) a2'' + sin phi a2'^2) / L1 - c1 a1' / l1^2 + c2 phi' / l1^2
+        e2 = G (a2 - sin a2) + (1 - cos phi) a1'' - sin phi a1'^2 - c2 L1 phi' / l1^2
+
+    with a1 = phi1, a2 = phi1 + phi absolute.
+    """
+    w, d1, d2 = p[:3]
+    c = p[3] if len(p) > 3 else 0.0
+    big_l2 = d1 - d2 - 1
+    big_l1 = d2 / big_l2
+    k, l1, dt = big_l2 * (1 + big_l1), design.l1, design.dt
+    g, angle, rate = w + u, phi - c, np.gradient(phi, dt)
+    sine, versine = np.sin(angle), 1 - np.cos(angle)
+    chi2 = design.chi[:, 1]
+    q, q_rate = motion
+
+    def weakened(e1: Float, e2: Float) -> Float:
+        m1, m2 = k * (e2 - e1) - e1, d2 * (e2 - e1)
+        return np.asarray((m1 + g * integrated_twice(m2, dt)) @ chi2)
+
+    a1, v1 = q + k * angle, q_rate + k * rate
+    a2, v2 = a1 + angle, v1 + rate
+    acceleration1 = -g * a1 + big_l2 * g * angle
+    acceleration2 = -d2 * g * angle
+    y = np.zeros(design.functions)
+    if full_angle:
+        y = weakened(
+            g * (a1 - np.sin(a1)) + (versine * acceleration2 + sine * v2**2) / big_l1,
+            g * (a2 - np.sin(a2)) + versine * acceleration1 - sine * v1**2,
+        )
+    columns_of_damping = [
+        weakened(-v1 / l1**2, np.zeros_like(v1)),
+        weakened(rate / l1**2, -big_l1 * rate / l1**2),
+    ]
+    return Remainder(y, np.stack(columns_of_damping))
+
+
 def remainder(
     p: Float,
     damping: Float,
@@ -234,51 +285,17 @@ def remainder(
     passes: int = 3,
     full_angle: bool = True,
 ) -> Remainder:
-    """Rows of the full-angle remainder and of the two damping columns of one window, at p.
+    """Rows of the full-angle remainder and of the two damping columns of one window, at p, by passes as the C core
+    makes them.
 
-    With q known, so is the motion: phi1 = q + k phi, k = L2 (1 + L1). The exact equations are
-
-        phi'' = G q + k (e2 - e1) - e1,    q'' = -d1 phi'' - d2 G phi + d2 (e2 - e1)
-        e1 = G (a1 - sin a1) + ((1 - cos phi) a2'' + sin phi a2'^2) / L1 - c1 a1' / l1^2 + c2 phi' / l1^2
-        e2 = G (a2 - sin a2) + (1 - cos phi) a1'' - sin phi a1'^2 - c2 L1 phi' / l1^2
-
-    with a1 = phi1, a2 = phi1 + phi absolute. Each pass takes the last one's remainder off Y, so that a and b,
-    and with them q, improve. Outside the region L2 > 0.05 (hardly physical) nothing is corrected.
+    Each pass takes the last one's remainder off Y, so that a and b, and with them q, improve.
     """
-    nothing = Remainder(np.zeros(design.functions), np.zeros((2, design.functions)))
-    w, d1, d2 = p[:3]
-    c = p[3] if len(p) > 3 else 0.0
-    big_l2 = d1 - d2 - 1
-    if big_l2 <= 0.05:
-        return nothing
-    big_l1 = d2 / big_l2
-    k, l1, dt = big_l2 * (1 + big_l1), design.l1, design.dt
-    g, angle, rate = w + u, phi - c, np.gradient(phi, dt)
-    sine, versine = np.sin(angle), 1 - np.cos(angle)
-    chi2 = design.chi[:, 1]
-
-    def weakened(e1: Float, e2: Float) -> Float:
-        m1, m2 = k * (e2 - e1) - e1, d2 * (e2 - e1)
-        return np.asarray((m1 + g * integrated_twice(m2, dt)) @ chi2)
-
-    out = nothing
+    out = Remainder(np.zeros(design.functions), np.zeros((2, design.functions)))
+    if p[1] - p[2] - 1 <= L2_MIN:
+        return out
     for _ in range(passes):
-        q, q_rate = internal_motion(p, window_columns, out.y + damping @ out.k, phi, u, design)
-        a1, v1 = q + k * angle, q_rate + k * rate
-        a2, v2 = a1 + angle, v1 + rate
-        acceleration1 = -g * a1 + big_l2 * g * angle
-        acceleration2 = -d2 * g * angle
-        y = np.zeros(design.functions)
-        if full_angle:
-            y = weakened(
-                g * (a1 - np.sin(a1)) + (versine * acceleration2 + sine * v2**2) / big_l1,
-                g * (a2 - np.sin(a2)) + versine * acceleration1 - sine * v1**2,
-            )
-        columns_of_damping = [
-            weakened(-v1 / l1**2, np.zeros_like(v1)),
-            weakened(rate / l1**2, -big_l1 * rate / l1**2),
-        ]
-        out = Remainder(y, np.stack(columns_of_damping))
+        ends = boundary(p, window_columns, out.y + damping @ out.k)
+        out = lack(p, internal_motion(p, ends, phi, u, design), phi, u, design, full_angle)
     return out
 
 
@@ -717,8 +734,8 @@ def _predicted(
         x, inverse_factor = oracle.rows(window_columns, phi_frames[k], u_frames[k])
         oracle.add(x, inverse_factor)
         noise.add(x, inverse_factor)
-        nothing = np.zeros(design.functions)
-        motion, _ = internal_motion(oracle.p, window_columns, nothing, phi_frames[k], u_frames[k], design)
+        ends = boundary(oracle.p, window_columns, np.zeros(design.functions))
+        motion, _ = internal_motion(oracle.p, ends, phi_frames[k], u_frames[k], design)
         of_angle = residual_filters(design, oracle.p) @ inverse_factor.T
         # phi'' = (w + u) q: an error of u weighs q
         of_drive = motion[:, None] * (design.chi[:, 1] @ inverse_factor.T)

@@ -67,6 +67,11 @@ def _running(rows: Bytes, start: int) -> npt.NDArray[np.uint32]:
     return out
 
 
+def sample_hashes(samples: npt.NDArray[np.float32] | npt.NDArray[np.int32]) -> npt.NDArray[np.uint32]:
+    """Hash after every sample, of [ticks, 2] from a session's first tick on (Hash.sample_hash in pvid.link)."""
+    return _running(np.ascontiguousarray(samples, samples.dtype.newbyteorder("<")).view(np.uint8), START)
+
+
 def running_hashes(
     p: npt.NDArray[np.float32],
     sums: npt.NDArray[np.float32],

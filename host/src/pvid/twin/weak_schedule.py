@@ -84,6 +84,11 @@ class Schedule:
         functions = -(-self.functions // max(1, second_half // 2))
         return 2 * -(-self.functions // functions)
 
+    @property
+    def reach(self) -> int:
+        """Ticks from a sample to the end of the work on the last window that it is part of."""
+        return self.taps + self.job_ticks + self.window_ticks + 3 * self.hop * self.decimation
+
     def occupy(self, free: Mask, first: int, last: int, outputs: int) -> None:
         """Marks in `free` the ticks at which a stretch first..last-1 adds its decimated samples to the windows."""
         for index in range(outputs):

@@ -1,0 +1,172 @@
+/* pvid/sized.h - the names under which the linker knows the functions: with the sizes in them.
+ *
+ * Library and application must be compiled with the same sizes (config.h): otherwise the one writes behind the other's
+ * objects. So every function that is given one of the library's structs has a name of its own for each set of sizes. An
+ * application whose sizes differ does not link, in C and C++, with a static or a shared library, and the linker's
+ * message shows both sets:
+ *
+ *     undefined reference to `pvid_weak_init_f32_window321_theta11_p6_moments55_taps81_...'
+ *
+ * Cure: set the sizes in one place that the library's sources and yours see: a header of yours that
+ * -DPVID_CONFIG_HEADER names, the CMake options, or the same -D for all files. In sources the functions have their plain
+ * names; nothing of this is in the image. PVID_PLAIN_NAMES takes the check away, for tools that look a function up by
+ * its name; they compare sizes themselves.
+ */
+#ifndef PVID_SIZED_H
+#define PVID_SIZED_H
+
+/* Sizes of enumerations differ between compilers for ARM (-fshort-enums). */
+#if defined(__ARM_SIZEOF_MINIMAL_ENUM)
+#define PVID_ENUM_SIZE __ARM_SIZEOF_MINIMAL_ENUM
+#else
+#define PVID_ENUM_SIZE 0
+#endif
+
+#define PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers, \
+                      enums)                                                                                          \
+    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak  \
+        ##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_enum##enums
+#define PVID_SIZED_OF(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers, \
+                      enums)                                                                                          \
+    PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers,    \
+                  enums)
+#define PVID_SIZED(name)                                                                                               \
+    PVID_SIZED_OF(name, PVID_MAX_WINDOW, PVID_MAX_THETA, PVID_MAX_P, PVID_MAX_MOMENTS, PVID_MAX_TAPS,                  \
+                  PVID_MAX_DECIMATION, PVID_MAX_WEAK_WINDOW, PVID_MAX_FUNCTIONS, PVID_MAX_ITERATIONS, PVID_MAX_PASSES, \
+                  PVID_MAX_THETA_Q31, PVID_ENUM_SIZE)
+
+/* differentiator.h */
+#define pvid_differentiator_init_f32 PVID_SIZED(pvid_differentiator_init_f32)
+#define pvid_differentiator_reset_f32 PVID_SIZED(pvid_differentiator_reset_f32)
+#define pvid_differentiator_step_f32 PVID_SIZED(pvid_differentiator_step_f32)
+
+/* differentiator_q31.h */
+#define pvid_differentiator_init_q31 PVID_SIZED(pvid_differentiator_init_q31)
+#define pvid_differentiator_reset_q31 PVID_SIZED(pvid_differentiator_reset_q31)
+#define pvid_differentiator_step_q31 PVID_SIZED(pvid_differentiator_step_q31)
+
+/* estimator.h */
+#define pvid_estimator_init_f32 PVID_SIZED(pvid_estimator_init_f32)
+#define pvid_estimator_step_f32 PVID_SIZED(pvid_estimator_step_f32)
+#define pvid_estimator_add_f32 PVID_SIZED(pvid_estimator_add_f32)
+#define pvid_estimator_update_f32 PVID_SIZED(pvid_estimator_update_f32)
+#define pvid_estimator_iterate_f32 PVID_SIZED(pvid_estimator_iterate_f32)
+#define pvid_estimator_begin_f32 PVID_SIZED(pvid_estimator_begin_f32)
+#define pvid_estimator_advance_f32 PVID_SIZED(pvid_estimator_advance_f32)
+#define pvid_estimator_stages_f32 PVID_SIZED(pvid_estimator_stages_f32)
+#define pvid_estimator_place_f32 PVID_SIZED(pvid_estimator_place_f32)
+#define pvid_estimator_assess_f32 PVID_SIZED(pvid_estimator_assess_f32)
+#define pvid_estimator_begin_assessment_f32 PVID_SIZED(pvid_estimator_begin_assessment_f32)
+#define pvid_estimator_assess_on_f32 PVID_SIZED(pvid_estimator_assess_on_f32)
+#define pvid_estimator_assessment_stages_f32 PVID_SIZED(pvid_estimator_assessment_stages_f32)
+#define pvid_estimator_defaults_f32 PVID_SIZED(pvid_estimator_defaults_f32)
+
+/* estimator_q31.h */
+#define pvid_estimator_init_q31 PVID_SIZED(pvid_estimator_init_q31)
+#define pvid_estimator_place_q31 PVID_SIZED(pvid_estimator_place_q31)
+#define pvid_estimator_add_q31 PVID_SIZED(pvid_estimator_add_q31)
+#define pvid_estimator_update_q31 PVID_SIZED(pvid_estimator_update_q31)
+#define pvid_estimator_iterate_q31 PVID_SIZED(pvid_estimator_iterate_q31)
+#define pvid_estimator_begin_q31 PVID_SIZED(pvid_estimator_begin_q31)
+#define pvid_estimator_advance_q31 PVID_SIZED(pvid_estimator_advance_q31)
+#define pvid_estimator_stages_q31 PVID_SIZED(pvid_estimator_stages_q31)
+#define pvid_estimator_assess_q31 PVID_SIZED(pvid_estimator_assess_q31)
+#define pvid_estimator_begin_assessment_q31 PVID_SIZED(pvid_estimator_begin_assessment_q31)
+#define pvid_estimator_assess_on_q31 PVID_SIZED(pvid_estimator_assess_on_q31)
+#define pvid_estimator_assessment_stages_q31 PVID_SIZED(pvid_estimator_assessment_stages_q31)
+
+/* fnv.h */
+#define pvid_fnv_estimator_f32 PVID_SIZED(pvid_fnv_estimator_f32)
+
+/* fnv_q31.h */
+#define pvid_fnv_estimator_q31 PVID_SIZED(pvid_fnv_estimator_q31)
+
+/* gate.h */
+#define pvid_gate_init_f32 PVID_SIZED(pvid_gate_init_f32)
+#define pvid_gate_passes_f32 PVID_SIZED(pvid_gate_passes_f32)
+
+/* gate_q31.h */
+#define pvid_gate_init_q31 PVID_SIZED(pvid_gate_init_q31)
+#define pvid_gate_passes_q31 PVID_SIZED(pvid_gate_passes_q31)
+
+/* information.h */
+#define pvid_information_init_f32 PVID_SIZED(pvid_information_init_f32)
+#define pvid_information_add_f32 PVID_SIZED(pvid_information_add_f32)
+#define pvid_information_end_group_f32 PVID_SIZED(pvid_information_end_group_f32)
+#define pvid_information_fade_f32 PVID_SIZED(pvid_information_fade_f32)
+#define pvid_information_read_f32 PVID_SIZED(pvid_information_read_f32)
+#define pvid_information_tail_f32 PVID_SIZED(pvid_information_tail_f32)
+
+/* kapitza.h */
+#define pvid_kapitza_linear_f32 PVID_SIZED(pvid_kapitza_linear_f32)
+#define pvid_kapitza_physical_f32 PVID_SIZED(pvid_kapitza_physical_f32)
+
+/* kapitza_q31.h */
+#define pvid_kapitza_physical_q31 PVID_SIZED(pvid_kapitza_physical_q31)
+
+/* kapitza_strong_q31.h */
+#define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
+
+/* publication.h */
+#define pvid_publication_put_f32 PVID_SIZED(pvid_publication_put_f32)
+#define pvid_publication_read_f32 PVID_SIZED(pvid_publication_read_f32)
+
+/* publication_q31.h */
+#define pvid_publication_put_q31 PVID_SIZED(pvid_publication_put_q31)
+#define pvid_publication_read_q31 PVID_SIZED(pvid_publication_read_q31)
+
+/* snapshot.h */
+#define pvid_snapshot_save_strong_f32 PVID_SIZED(pvid_snapshot_save_strong_f32)
+#define pvid_snapshot_save_strong_q31 PVID_SIZED(pvid_snapshot_save_strong_q31)
+#define pvid_snapshot_save_weak_f32 PVID_SIZED(pvid_snapshot_save_weak_f32)
+#define pvid_snapshot_save_weak_q31 PVID_SIZED(pvid_snapshot_save_weak_q31)
+#define pvid_snapshot_restore_strong_f32 PVID_SIZED(pvid_snapshot_restore_strong_f32)
+#define pvid_snapshot_restore_strong_q31 PVID_SIZED(pvid_snapshot_restore_strong_q31)
+#define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
+#define pvid_snapshot_restore_weak_q31 PVID_SIZED(pvid_snapshot_restore_weak_q31)
+
+/* strong.h */
+#define pvid_strong_init_f32 PVID_SIZED(pvid_strong_init_f32)
+#define pvid_strong_step_f32 PVID_SIZED(pvid_strong_step_f32)
+#define pvid_strong_gap_f32 PVID_SIZED(pvid_strong_gap_f32)
+#define pvid_strong_freeze_f32 PVID_SIZED(pvid_strong_freeze_f32)
+
+/* strong_q31.h */
+#define pvid_strong_init_q31 PVID_SIZED(pvid_strong_init_q31)
+#define pvid_strong_step_q31 PVID_SIZED(pvid_strong_step_q31)
+#define pvid_strong_gap_q31 PVID_SIZED(pvid_strong_gap_q31)
+#define pvid_strong_freeze_q31 PVID_SIZED(pvid_strong_freeze_q31)
+
+/* trust.h */
+#define pvid_trust_init_f32 PVID_SIZED(pvid_trust_init_f32)
+#define pvid_trust_place_f32 PVID_SIZED(pvid_trust_place_f32)
+#define pvid_trust_age_f32 PVID_SIZED(pvid_trust_age_f32)
+#define pvid_trust_ageing_f32 PVID_SIZED(pvid_trust_ageing_f32)
+#define pvid_trust_widest_f32 PVID_SIZED(pvid_trust_widest_f32)
+#define pvid_trust_refuge_f32 PVID_SIZED(pvid_trust_refuge_f32)
+#define pvid_trust_judge_f32 PVID_SIZED(pvid_trust_judge_f32)
+
+/* trust_q31.h */
+#define pvid_trust_init_q31 PVID_SIZED(pvid_trust_init_q31)
+#define pvid_trust_place_q31 PVID_SIZED(pvid_trust_place_q31)
+#define pvid_trust_ageing_q31 PVID_SIZED(pvid_trust_ageing_q31)
+#define pvid_trust_refuge_q31 PVID_SIZED(pvid_trust_refuge_q31)
+#define pvid_trust_judge_q31 PVID_SIZED(pvid_trust_judge_q31)
+
+/* weak.h */
+#define pvid_weak_init_f32 PVID_SIZED(pvid_weak_init_f32)
+#define pvid_weak_step_f32 PVID_SIZED(pvid_weak_step_f32)
+#define pvid_weak_estimate_f32 PVID_SIZED(pvid_weak_estimate_f32)
+#define pvid_weak_read_f32 PVID_SIZED(pvid_weak_read_f32)
+#define pvid_weak_gap_f32 PVID_SIZED(pvid_weak_gap_f32)
+#define pvid_weak_freeze_f32 PVID_SIZED(pvid_weak_freeze_f32)
+
+/* weak_q31.h */
+#define pvid_weak_init_q31 PVID_SIZED(pvid_weak_init_q31)
+#define pvid_weak_step_q31 PVID_SIZED(pvid_weak_step_q31)
+#define pvid_weak_estimate_q31 PVID_SIZED(pvid_weak_estimate_q31)
+#define pvid_weak_read_q31 PVID_SIZED(pvid_weak_read_q31)
+#define pvid_weak_gap_q31 PVID_SIZED(pvid_weak_gap_q31)
+#define pvid_weak_freeze_q31 PVID_SIZED(pvid_weak_freeze_q31)
+
+#endif

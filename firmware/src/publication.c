@@ -1,0 +1,176 @@
+#include "publication.h"
+
+#include "count.h"
+#include "pvid/publication_q31.h"
+
+/* How words are shared. Atomic where the compiler has such accesses and the processor such instructions; elsewhere
+ * there is one core, whose interrupts see volatile accesses in the order of the source. An estimate's words are
+ * accessed as what they are not declared to be: gcc and clang are told so, others get its characters. */
+#if defined(__GNUC__) && defined(__GCC_HAVE_SYNC_COMPARE_AND_SWAP_4) && !defined(__FRAMAC__)
+
+typedef uint32_t __attribute__((may_alias)) word;
+
+static inline uint32_t load(const word *place)
+{
+    return __atomic_load_n(place, __ATOMIC_RELAXED);
+}
+
+static inline void store(word *place, uint32_t value)
+{
+    __atomic_store_n(place, value, __ATOMIC_RELAXED);
+}
+
+/* All that was written before is seen by whoever sees what is written after. */
+static inline void written(void)
+{
+    __atomic_thread_fence(__ATOMIC_RELEASE);
+}
+
+/* All that is read after is as new as what was read before. */
+static inline void read_so_far(void)
+{
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+}
+
+#else
+
+#if defined(__GNUC__)
+typedef uint32_t __attribute__((may_alias)) word;
+#else
+typedef unsigned char word;
+#endif
+
+static inline word load(const volatile word *place)
+{
+    return *place;
+}
+
+static inline void store(volatile word *place, word value)
+{
+    *place = value;
+}
+
+static inline void written(void)
+{
+}
+
+static inline void read_so_far(void)
+{
+}
+
+#endif
+
+static inline uint32_t load_number(const uint32_t *place)
+{
+#if defined(__GNUC__)
+    return load(place);
+#else
+    return *(const volatile uint32_t *)place;
+#endif
+}
+
+static inline void store_number(uint32_t *place, uint32_t value)
+{
+#if defined(__GNUC__)
+    store(place, value);
+#else
+    *(volatile uint32_t *)place = value;
+#endif
+}
+
+static void share(void *to, const void *from, size_t bytes)
+{
+    word *place = to;
+    const word *fresh = from;
+    for (size_t i = 0; i < (bytes / sizeof *place); i++) {
+        store(&place[i], fresh[i]);
+    }
+}
+
+static void take(void *to, const void *from, size_t bytes)
+{
+    word *own = to;
+    const word *place = from;
+    for (size_t i = 0; i < (bytes / sizeof *own); i++) {
+        own[i] = load(&place[i]);
+    }
+}
+
+void pvid_publication_write(pvid_publication_mark *mark, void *estimate, void *copy, const void *fresh, size_t bytes,
+                            uint32_t number)
+{
+    const uint32_t version = mark->version;
+    written(); /* the version, before the copy changes */
+    share(copy, fresh, bytes);
+    store_number(&mark->number[1], number);
+    written();
+    store_number(&mark->version, version + 1u);
+    written();
+    share(estimate, fresh, bytes);
+    store_number(&mark->number[0], number);
+    written();
+    store_number(&mark->version, version + 2u);
+}
+
+bool pvid_publication_read(const pvid_publication_mark *mark, const void *estimate, const void *copy, void *out,
+                           size_t bytes, uint32_t *number)
+{
+    for (uint8_t left = PVID_READ_ATTEMPTS; left > 0u; left--) {
+        const uint32_t version = load_number(&mark->version);
+        const uint32_t place = version % 2u;
+        read_so_far();
+        take(out, (place == 0u) ? estimate : copy, bytes);
+        const uint32_t count = load_number(&mark->number[place]);
+        read_so_far();
+        if (load_number(&mark->version) == version) {
+            if (number != NULL) {
+                *number = count;
+            }
+            return true;
+        }
+    }
+    return false;
+}
+
+static uint32_t next_of(const pvid_publication_mark *mark)
+{
+    uint32_t number = mark->number[0];
+    pvid_count_up(&number);
+    return number;
+}
+
+void pvid_publication_put_f32(pvid_publication_f32 *self, const pvid_estimate_f32 *estimate)
+{
+    const bool given = (self != NULL) && (estimate != NULL);
+    PVID_ASSERT(given);
+    if (given) {
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, estimate, sizeof *estimate,
+                               next_of(&self->mark));
+    }
+}
+
+bool pvid_publication_read_f32(const pvid_publication_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number)
+{
+    const bool given = (self != NULL) && (estimate != NULL);
+    PVID_ASSERT(given);
+    return given &&
+           pvid_publication_read(&self->mark, &self->estimate, &self->copy, estimate, sizeof *estimate, number);
+}
+
+void pvid_publication_put_q31(pvid_publication_q31 *self, const pvid_estimate_q31 *estimate)
+{
+    const bool given = (self != NULL) && (estimate != NULL);
+    PVID_ASSERT(given);
+    if (given) {
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, estimate, sizeof *estimate,
+                               next_of(&self->mark));
+    }
+}
+
+bool pvid_publication_read_q31(const pvid_publication_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number)
+{
+    const bool given = (self != NULL) && (estimate != NULL);
+    PVID_ASSERT(given);
+    return given &&
+           pvid_publication_read(&self->mark, &self->estimate, &self->copy, estimate, sizeof *estimate, number);
+}

@@ -1,0 +1,44 @@
+"""What linear rows lack at large angles, as an error of the estimate: the fixed-point core corrects nothing.
+
+The rows' sines and cosines bias p by some (phi / 2)^2 / 2, in every window the same way, so that no scatter of the
+windows shows it. The run's own rows tell how much it is: the least squares over them as they are, less that over the
+same rows corrected for large angles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.capture import Run
+from pvid.errors import PvidError
+from pvid.rigfile import RigFile
+from pvid.run_rows import FEWEST, RunRows
+from pvid.setup import weak_design_of
+from pvid.survey import is_pendulum
+
+Float = npt.NDArray[np.float64]
+
+_WINDOWS = 100
+_CORRECTIONS = 3
+
+
+def linear_error(rig: RigFile, run: Run, p: Float) -> Float | None:
+    """Relative errors of w, d1, d2 that the linear rows of a run make [3], about an estimate p = (w, d1, d2) or with c.
+
+    None where the run's angles are too large to be corrected.
+    """
+    try:
+        rows = RunRows.of(rig, run, weak_design_of(rig, run.sample_rate)).thinned(_WINDOWS)
+        at = rows.fitted(p if len(p) > 3 else np.append(p, 0.0)).p
+        for _ in range(_CORRECTIONS):
+            corrected = rows.corrected(at).sound_only()
+            if len(corrected.phi) < FEWEST:
+                return None
+            at = corrected.fitted(at).p
+            if not is_pendulum(at):
+                return None
+        linear = rows.only(np.isin(rows.number, corrected.number)).fitted(at)
+    except (PvidError, np.linalg.LinAlgError):
+        return None
+    return np.asarray(linear.p[:3] / at[:3] - 1)

@@ -1,0 +1,147 @@
+"""An application whose sizes are not the library's does not link: every PVID_MAX_, C and C++, static and shared."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+INCLUDE = ROOT / "firmware" / "include"
+FREESTANDING = f"-I{ROOT / 'firmware' / 'ports' / 'freestanding' / 'include'}"
+SOURCES = sorted((ROOT / "firmware" / "src").glob("*.c"))
+
+# Every size of config.h, and another value than its default that is allowed.
+OTHER = {
+    "PVID_MAX_WINDOW": 81,
+    "PVID_MAX_THETA": 12,
+    "PVID_MAX_P": 6,
+    "PVID_MAX_MOMENTS": 55,
+    "PVID_MAX_TAPS": 201,
+    "PVID_MAX_DECIMATION": 64,
+    "PVID_MAX_WEAK_WINDOW": 301,
+    "PVID_MAX_FUNCTIONS": 12,
+    "PVID_MAX_ITERATIONS": 20,
+    "PVID_MAX_PASSES": 4,
+    "PVID_MAX_THETA_Q31": 12,
+}
+
+LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
+
+# What applications of each kind call first; the last one stands for files that have no init.
+FUNCTIONS = (
+    "pvid_weak_init_f32",
+    "pvid_strong_init_f32",
+    "pvid_weak_init_q31",
+    "pvid_strong_init_q31",
+    "pvid_estimator_init_f32",
+    "pvid_estimator_init_q31",
+    "pvid_weak_estimate_f32",
+)
+USER = """#include "pvid/pvid.h"
+static pvid_weak_f32 weak; static pvid_weak_config_f32 weak_config;
+static pvid_strong_f32 strong; static pvid_strong_config_f32 strong_config;
+static pvid_weak_q31 weak_q31; static pvid_weak_config_q31 weak_config_q31;
+static pvid_strong_q31 strong_q31; static pvid_strong_config_q31 strong_config_q31;
+static pvid_estimator_f32 estimator; static pvid_estimator_config_f32 estimator_config;
+static pvid_estimator_q31 estimator_q31; static pvid_estimator_config_q31 estimator_config_q31;
+int main(void)
+{
+    (void)pvid_weak_init_f32(&weak, &weak_config);
+    (void)pvid_strong_init_f32(&strong, &strong_config);
+    (void)pvid_weak_init_q31(&weak_q31, &weak_config_q31);
+    (void)pvid_strong_init_q31(&strong_q31, &strong_config_q31);
+    (void)pvid_estimator_init_f32(&estimator, &estimator_config);
+    (void)pvid_estimator_init_q31(&estimator_q31, &estimator_config_q31);
+    return (pvid_weak_estimate_f32(&weak) != 0) ? 0 : 1;
+}
+"""
+
+
+def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(part) for part in command], capture_output=True, text=True, cwd=cwd, check=False)
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The library with the default sizes, static and shared, as who copies include and src makes it."""
+    folder = tmp_path_factory.mktemp("library")
+    done = run("gcc", "-std=c99", "-O0", "-fPIC", f"-I{INCLUDE}", "-c", *SOURCES, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    objects = sorted(folder.glob("*.o"))
+    made = {"static": folder / "libpvid.a", "shared": folder / "libpvid.so"}
+    assert run("ar", "rcs", made["static"], *objects).returncode == 0
+    assert run("gcc", "-shared", "-o", made["shared"], *objects, "-lm").returncode == 0
+    return made
+
+
+def user(folder: Path, language: str, *sizes: str) -> Path:
+    """The object of an application that was compiled with those sizes."""
+    source = folder / f"user.{language}"
+    source.write_text(USER, encoding="utf-8")
+    compiled = folder / "user.o"
+    done = run(*LANGUAGES[language], *sizes, f"-I{INCLUDE}", "-c", source, "-o", compiled)
+    assert done.returncode == 0, done.stderr
+    return compiled
+
+
+def link(folder: Path, language: str, compiled: Path, library: Path) -> subprocess.CompletedProcess[str]:
+    return run(LANGUAGES[language][0], compiled, library, "-lm", "-o", folder / "user")
+
+
+def test_every_size_of_the_headers_is_tried() -> None:
+    text = "".join(path.read_text(encoding="utf-8") for path in sorted(INCLUDE.glob("pvid/*.h")))
+    assert set(re.findall(r"#ifndef (PVID_MAX_\w+)", text)) == set(OTHER)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_same_sizes_link(language: str, libraries: dict[str, Path], tmp_path: Path) -> None:
+    compiled = user(tmp_path, language)
+    for library in libraries.values():
+        done = link(tmp_path, language, compiled, library)
+        assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", OTHER)
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_another_size_is_refused(language: str, name: str, libraries: dict[str, Path], tmp_path: Path) -> None:
+    """Each function by itself, with its name and the size in the message."""
+    compiled = user(tmp_path, language, f"-D{name}={OTHER[name]}")
+    for library in libraries.values():
+        done = link(tmp_path, language, compiled, library)
+        assert done.returncode != 0
+        refused = set(
+            re.findall(rf"undefined reference to `(pvid_\w+[fq]3[12])_window\w*[a-z]{OTHER[name]}_", done.stderr)
+        )
+        assert refused == set(FUNCTIONS), done.stderr
+
+
+def test_every_function_that_takes_a_struct_has_its_sizes_in_its_name() -> None:
+    texts = {
+        path.name: re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for path in sorted(INCLUDE.glob("pvid/*.h"))
+    }
+    all_text = "".join(texts.values())
+    structs = set(re.findall(r"^\} (pvid_\w+);", all_text, re.MULTILINE)) | set(
+        re.findall(r"struct (pvid_\w+)", all_text)
+    )
+    pointer = re.compile(rf"\b({'|'.join(sorted(structs))}) \*")
+    prototypes = re.findall(r"^(?!static|typedef|extern)([a-z][\w *]*?(pvid_\w+)\([^;{]*\));", all_text, re.MULTILINE)
+    given = {name for prototype, name in prototypes if pointer.search(prototype)}
+    listed = re.findall(r"^#define (pvid_\w+) PVID_SIZED\((pvid_\w+)\)$", texts["sized.h"], re.MULTILINE)
+    assert all(one == other for one, other in listed)
+    assert given and given | {"pvid_estimator_defaults_f32"} == {one for one, _ in listed}
+
+
+def test_a_size_costs_nothing_on_a_board(tmp_path: Path) -> None:
+    """With the check and without: the same code and data."""
+    sections = {}
+    for names in ("", "-DPVID_PLAIN_NAMES"):
+        compiled = tmp_path / "weak.o"
+        options = ("-std=c99", "-mcpu=cortex-m4", "-mthumb", "-O2", f"-I{INCLUDE}", FREESTANDING, *names.split())
+        done = run("arm-none-eabi-gcc", *options, "-c", ROOT / "firmware" / "src" / "weak_f32.c", "-o", compiled)
+        assert done.returncode == 0, done.stderr
+        sections[names] = run("arm-none-eabi-size", compiled).stdout.split()[6:10]
+    assert sections[""] == sections["-DPVID_PLAIN_NAMES"]
