@@ -888,6 +888,27 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
     return DIFFERENT if faults or tally.faults else DONE
 
 
+@bench.command(name="attack")
+@click.option("--mutants", default=10_000, show_default=True, type=click.IntRange(min=1), help="Of each kind.")
+@click.option("--seed", default=1, show_default=True, help="Of the mutants.")
+@click.option("--only", type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again.")
+@click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that broke something.")
+@_UPDATE
+def bench_attack(mutants: int, seed: int, only: tuple[str, ...], keep: Path | None, update: Path | None) -> int:
+    """Mutated rig files, runs and command lines against the command line: what breaks it."""
+    from pvid.bench.attack import HEADER, KINDS, attack
+
+    tallies = []
+    for kind in only or KINDS:
+        with progress_bar(kind, mutants) as advance, tempfile.TemporaryDirectory() as folder:
+            tallies.append(attack(kind, mutants, seed, Path(folder), advance, keep and keep.resolve()))
+    for tally in tallies:
+        for arguments, wrong, number in tally.defects:
+            tell(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
+    _update_readme(update, "attack", _markdown(HEADER, [tally.cells for tally in tallies]))
+    return DIFFERENT if any(tally.defects for tally in tallies) else DONE
+
+
 @bench.command(name="field-log")
 @click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
 @click.option(

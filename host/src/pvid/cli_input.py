@@ -93,6 +93,7 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
             raise PvidError(f"{path} is a log, whose columns are known: leave --columns out")
         return aligned(run_of_log(path), rig.sensor.y_delay)
     run = aligned(read_run(path, rig.sample_rate, columns), rig.sensor.y_delay)
+    run.refuse_damaged()
     if whole:
         run = run.whole()
     print_notes(run)

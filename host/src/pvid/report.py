@@ -163,6 +163,7 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
 
 
 def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
+    run.refuse_damaged()
     native = Native()
     whole = run.whole()  # residuals and spectra have no place for a missing sample
     given = whole if rig.identifier.core == "f64" else run

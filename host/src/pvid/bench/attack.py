@@ -22,7 +22,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
-from typing import Literal
 
 from pvid import cli
 from pvid.bench.attack_commands import command_line
@@ -32,8 +31,7 @@ from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.rig import simulate
 from pvid.rigfile import RigFile
 
-Kind = Literal["rigs", "runs", "commands"]
-KINDS: tuple[Kind, ...] = ("rigs", "runs", "commands")
+KINDS = ("rigs", "runs", "commands")
 HEADER = ("attacked with", "mutants", "seed", "answered", "nothing identified", "refused", "defects", "longest, s")
 
 LONGEST_S = 60  # of one command: the run is a few seconds long
@@ -58,7 +56,7 @@ class Outcome:
 class Tally:
     """Of the mutants of a kind; a defect is the command, what it did wrong, and the mutant's number."""
 
-    kind: Kind
+    kind: str
     seed: int
     tried: int = 0
     codes: Counter[int | None] = field(default_factory=Counter)
@@ -138,8 +136,25 @@ def complaint(outcome: Outcome) -> str | None:
     return None
 
 
-def attack(kind: Kind, mutants: int, seed: int, folder: Path, progress: Callable[[int], None] | None = None) -> Tally:
-    """Tries `mutants` mutants of a kind in `folder`, which is empty; those that broke something stay there."""
+def attack(
+    kind: str,
+    mutants: int,
+    seed: int,
+    folder: Path,
+    progress: Callable[[int], None] | None = None,
+    keep: Path | None = None,
+) -> Tally:
+    """Tries mutants of a kind in a folder.
+
+    Parameters
+    ----------
+    kind
+        One of KINDS.
+    folder
+        Empty, and written to at will.
+    keep
+        Where files that broke something go; they are dropped otherwise.
+    """
     draw = random.Random(f"{kind} {seed}")
     tally = Tally(kind, seed)
     with _at_most(_MEMORY), contextlib.chdir(folder):
@@ -158,8 +173,9 @@ def attack(kind: Kind, mutants: int, seed: int, folder: Path, progress: Callable
             wrong = complaint(outcome)
             if wrong is not None:
                 tally.defects.append((arguments, wrong, number))
-                if mutant is not None:
-                    Path(f"defect-{number}{mutant.suffix}").write_bytes(mutant.read_bytes())
+                if mutant is not None and keep is not None:
+                    keep.mkdir(parents=True, exist_ok=True)
+                    (keep / f"{kind}-{seed}-{number}{mutant.suffix}").write_bytes(mutant.read_bytes())
             if progress is not None:
                 progress(number + 1)
     return tally
