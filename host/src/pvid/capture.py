@@ -84,8 +84,8 @@ class Run:
             if beyond.any():
                 at = int(np.argmax(beyond))
                 raise PvidError(
-                    f"{name} is {getattr(self, name)[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: is the "
-                    "file damaged?"
+                    f"{name} is {getattr(self, name)[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: "
+                    "is the file damaged?"
                 )
 
     def whole(self) -> Run:
