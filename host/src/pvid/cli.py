@@ -903,19 +903,21 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
 
 
 @bench.command(name="attack")
-@click.option("--mutants", default=10_000, show_default=True, type=click.IntRange(min=1), help="Of each kind.")
+@click.option("--mutants", default=33_400, show_default=True, type=click.IntRange(min=1), help="Of each kind.")
 @click.option("--seed", default=1, show_default=True, help="Of the mutants.")
 @click.option("--only", type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again.")
+@click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that broke something.")
 @_UPDATE
-def bench_attack(mutants: int, seed: int, only: tuple[str, ...], keep: Path | None, update: Path | None) -> int:
+def bench_attack(
+    mutants: int, seed: int, only: tuple[str, ...], processes: int, keep: Path | None, update: Path | None
+) -> int:
     """Mutated rig files, runs and command lines against the command line: what breaks it."""
-    from pvid.bench.attack import HEADER, KINDS, attack
+    from pvid.bench.attack import HEADER, KINDS, campaign
 
-    tallies = []
-    for kind in only or KINDS:
-        with progress_bar(kind, mutants) as advance, tempfile.TemporaryDirectory() as folder:
-            tallies.append(attack(kind, mutants, seed, Path(folder), advance, keep and keep.resolve()))
+    kinds = only or KINDS
+    with progress_bar("mutants", mutants * len(kinds)) as advance:
+        tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve())
     for tally in tallies:
         for arguments, wrong, number in tally.defects:
             tell(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")

@@ -9,16 +9,20 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
+import multiprocessing
 import random
 import re
 import resource
 import signal
 import sys
+import tempfile
 import time
 import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
@@ -32,9 +36,20 @@ from pvid.rig import simulate
 from pvid.rigfile import RigFile
 
 KINDS = ("rigs", "runs", "commands")
-HEADER = ("attacked with", "mutants", "seed", "answered", "nothing identified", "refused", "defects", "longest, s")
+HEADER = (
+    "attacked with",
+    "mutants",
+    "seed",
+    "answered",
+    "nothing identified",
+    "refused",
+    "defects",
+    "longest, s of processor",
+)
 
-LONGEST_S = 60  # of one command: the run is a few seconds long
+LONGEST_S = 60  # of processor time, of one command: the run is a few seconds long
+_ASLEEP_S = 900  # of one command that does nothing
+_CHUNK = 1000  # mutants that are drawn one behind the other, by one process
 _MEMORY = 6 << 30  # of the process [bytes]
 _NO_NUMBER = re.compile(r"\b(nan|inf|NaN|Infinity)\b")
 _RUN_S, _RATE_HZ = 5.0, 400.0
@@ -64,6 +79,14 @@ class Tally:
     longest_s: float = 0.0
     slowest: tuple[int, list[str]] = (0, [])
 
+    def add(self, other: Tally) -> None:
+        """Takes the mutants of another tally in."""
+        self.tried += other.tried
+        self.codes += other.codes
+        self.defects += other.defects
+        if other.longest_s > self.longest_s:
+            self.longest_s, self.slowest = other.longest_s, other.slowest
+
     @property
     def cells(self) -> tuple[str, ...]:
         """In the order of HEADER."""
@@ -92,14 +115,16 @@ def call(arguments: Sequence[str | Path]) -> Outcome:
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", errors="backslashreplace") for _ in range(2))
     code: int | None = None
     trace = ""
-    before, handler = sys.argv, signal.signal(signal.SIGALRM, late)
-    begun = time.monotonic()
+    before = sys.argv
+    handlers = {number: signal.signal(number, late) for number in (signal.SIGALRM, signal.SIGPROF)}
+    begun = time.process_time()
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         try:
             sys.argv = ["pvid", *map(str, arguments)]
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-                signal.alarm(LONGEST_S)
+                signal.alarm(_ASLEEP_S)
+                signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
                 cli.main()
         except SystemExit as ended:
             code = ended.code if isinstance(ended.code, int) else DONE
@@ -109,9 +134,11 @@ def call(arguments: Sequence[str | Path]) -> Outcome:
             trace = traceback.format_exc()
         finally:
             signal.alarm(0)
-            signal.signal(signal.SIGALRM, handler)
+            signal.setitimer(signal.ITIMER_PROF, 0)
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
             sys.argv = before
-    lasted = time.monotonic() - begun
+    lasted = time.process_time() - begun
     return Outcome(code, _text(out), _text(err), tuple(str(one.message) for one in warned), trace, lasted)
 
 
@@ -136,15 +163,37 @@ def complaint(outcome: Outcome) -> str | None:
     return None
 
 
-def attack(
-    kind: str,
+def campaign(
+    kinds: Sequence[str],
     mutants: int,
     seed: int,
-    folder: Path,
+    processes: int,
     progress: Callable[[int], None] | None = None,
     keep: Path | None = None,
-) -> Tally:
-    """Tries mutants of a kind in a folder.
+) -> list[Tally]:
+    """Tries `mutants` of each kind, in chunks, in several processes; a tally of each kind."""
+    tallies = {kind: Tally(kind, seed) for kind in kinds}
+    chunks = [
+        (kind, min(_CHUNK, mutants - first), seed, first) for first in range(0, mutants, _CHUNK) for kind in kinds
+    ]
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context, max_tasks_per_child=1) as pool:
+        running = [pool.submit(_chunk, *chunk, keep) for chunk in chunks]
+        for done in as_completed(running):
+            tally = done.result()
+            tallies[tally.kind].add(tally)
+            if progress is not None:
+                progress(sum(one.tried for one in tallies.values()))
+    return list(tallies.values())
+
+
+def _chunk(kind: str, mutants: int, seed: int, first: int, keep: Path | None) -> Tally:
+    with tempfile.TemporaryDirectory(prefix="pvid-attack-") as folder:
+        return attack(kind, mutants, seed, Path(folder), first, keep)
+
+
+def attack(kind: str, mutants: int, seed: int, folder: Path, first: int = 0, keep: Path | None = None) -> Tally:
+    """Tries mutants of a kind in a folder, in this process.
 
     Parameters
     ----------
@@ -152,19 +201,19 @@ def attack(
         One of KINDS.
     folder
         Empty, and written to at will.
+    first
+        Number of the first mutant: others are drawn with another one.
     keep
         Where files that broke something go; they are dropped otherwise.
     """
-    draw = random.Random(f"{kind} {seed}")
+    draw = random.Random(f"{kind} {seed} {first}")
     tally = Tally(kind, seed)
     with _at_most(_MEMORY), contextlib.chdir(folder):
         run = simulate(duration=_RUN_S, sample_rate=_RATE_HZ, seed=seed).run
         write_run("run.csv", run)
         replace(RigFile.standard(), sample_rate=_RATE_HZ).write("run.toml")
         next_one = {"rigs": _rigs, "runs": _runs, "commands": _commands}[kind]
-        for number, (arguments, mutant) in enumerate(next_one(draw, run)):
-            if number == mutants:
-                break
+        for number, (arguments, mutant) in enumerate(itertools.islice(next_one(draw, run), mutants), first):
             outcome = call(arguments)
             tally.tried += 1
             tally.codes[outcome.code] += 1
@@ -176,8 +225,6 @@ def attack(
                 if mutant is not None and keep is not None:
                     keep.mkdir(parents=True, exist_ok=True)
                     (keep / f"{kind}-{seed}-{number}{mutant.suffix}").write_bytes(mutant.read_bytes())
-            if progress is not None:
-                progress(number + 1)
     return tally
 
 
