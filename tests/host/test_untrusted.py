@@ -424,7 +424,7 @@ def test_ticks_far_apart_at_the_slowest_rate_have_a_time() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for tick in (2**48 - 1, 0, 2**48 - 1):
-            (rows,) = values.rows(Record(0, 10**18, tick, LyingBoard().samples()))
+            (rows,) = values.rows(Record(0, 10**18, tick, LyingBoard().status()))
             assert (rows.columns["log_time"] >= 10**18).all()
 
 
