@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 import urllib.request
+import warnings
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -415,6 +416,16 @@ def test_a_sample_rate_that_is_none_leaves_times_unknown(rate: float) -> None:
     assert list(values.rows(Record(0, 10**18, 0, board.hello(sample_rate=rate)))) == []
     (rows,) = values.rows(Record(0, 10**18, 2**47, board.samples()))
     assert np.isnan(rows.columns["t"]).all() and (rows.columns["log_time"] >= 10**18).all()
+
+
+def test_ticks_far_apart_at_the_slowest_rate_have_a_time() -> None:
+    values = Values()
+    assert list(values.rows(Record(0, 10**18, 0, board_at_the_slowest()))) == []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for tick in (2**48 - 1, 0, 2**48 - 1):
+            (rows,) = values.rows(Record(0, 10**18, tick, LyingBoard().status()))
+            assert (rows.columns["log_time"] >= 10**18).all()
 
 
 def test_a_run_of_a_log_leaves_out_what_is_no_sample(tmp_path: Path) -> None:

@@ -196,7 +196,7 @@ class Values:
             self._anchor = (int(ticks[0]), max(record.unix_ns, self._latest))
         first, began = self._anchor
         rate = self.sample_rate
-        passed = np.zeros(len(ticks)) if math.isnan(rate) else np.minimum((ticks - first) / rate, _LONGEST_S)
+        passed = np.zeros(len(ticks)) if math.isnan(rate) else np.clip((ticks - first) / rate, -_LONGEST_S, _LONGEST_S)
         log_time = np.maximum(began + np.rint(1e9 * passed).astype(np.int64), self._latest)
         self._latest = int(log_time[-1])
         return log_time
