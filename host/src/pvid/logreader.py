@@ -15,6 +15,8 @@ comes: the status line, the tee, a live view.
 
 from __future__ import annotations
 
+import os
+import stat
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -400,6 +402,8 @@ class LogReader:
         stream = self._stream = LogStream()
         try:
             with self.path.open("rb") as file:
+                if stat.S_ISCHR(os.fstat(file.fileno()).st_mode):  # some never end
+                    raise PvidError(f"{self.path} is a device and no log")
                 while data := file.read(_CHUNK):
                     yield from stream.feed(data)
         except OSError as error:
