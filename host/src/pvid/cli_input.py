@@ -16,7 +16,6 @@ from pvid.figure_file import format_of
 from pvid.logrig import LOG_SUFFIX, run_of_log
 from pvid.rigfile import RigFile
 from pvid.run_columns import Columns
-from pvid.skew import aligned
 
 Command = Callable[..., Any]
 
@@ -88,6 +87,8 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
     PvidError
         When it cannot be read.
     """
+    from pvid.skew import aligned  # SciPy, whose 40 MB a logger does without
+
     if path.suffix == LOG_SUFFIX:
         if columns is not None:
             raise PvidError(f"{path} is a log, whose columns are known: leave --columns out")

@@ -382,12 +382,9 @@ def _spectra(recording: Recording, axis: Axes) -> None:
 
 def _amplitude(axis: Axes, frequency: Float, x: Float, color: str, label: str) -> list[Line2D]:
     """Over a logarithmic scale with room for the legend; of a signal that stands still there is none."""
-    there = np.where(x > 0, x, np.nan)
-    lines = axis.plot(frequency, there, color=color, label=label)
-    if np.isfinite(there).any():
-        axis.set_yscale("log")
-        low, high = axis.get_ylim()
-        axis.set_ylim(low, high * (high / low) ** 0.35)
+    lines = axis.semilogy(frequency, np.where(x > 0, x, np.nan), color=color, label=label)
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high * (high / low) ** 0.35)
     return lines
 
 
