@@ -23,7 +23,7 @@ from rich.table import Table
 from pvid import __version__, answer
 from pvid.capture import Run, write_run
 from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
-from pvid.cli_input import columns_option, read_input, rig_options
+from pvid.cli_input import columns_option, print_notes, read_input, rig_options
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
 from pvid.compare import Comparison
 from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
@@ -48,6 +48,7 @@ from pvid.rig_settings import rig_for, rig_path_of
 from pvid.rigfile import RigFile, load
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
+from pvid.sensor_steps import resolution_note, resolved
 from pvid.setup import weak_design_of
 from pvid.setup_q31 import config_for_run, strong_config_q31, weak_config_q31
 from pvid.strong_header_q31 import strong_header_q31
@@ -300,8 +301,11 @@ def identify_command(
     """
     rig = _with(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
     run = read_input(run_path, rig, columns, whole=rig.identifier.core == "f64")
+    given, rig = rig, resolved(rig, run)
+    notes = resolution_note(given, rig)
+    print_notes(notes)
     native = Native()
-    result = _identified(run, rig, native)
+    result = _identified(replace(run, notes=(*run.notes, *notes)), rig, native)
     if target is not None:
         from pvid.stream_rig import played_samples, stream_rig
         from pvid.target import verify
@@ -329,13 +333,16 @@ def identify_command(
 
 
 def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
-    """The answer with advice; a refusal has the advice behind its sentence."""
+    """The answer with advice; a refusal has the advice in front of its sentence."""
     from pvid.advice import advice, advice_on_refusal
 
     try:
         result = identify(run, rig, native)
     except PvidError as error:
-        raise PvidError("; ".join((str(error), *advice_on_refusal(run, rig, native)))) from error
+        advices = advice_on_refusal(run, rig, native)
+        if advices:  # the refusal follows from the mistake
+            raise PvidError(f"{'; '.join(advices)} (as it is: {error})") from error
+        raise
     return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
 
 
@@ -411,8 +418,8 @@ def tune_command(
     out = out or run_path.with_name(rig_path_of(run_path).stem + "-tuned.toml")
     tuned.rig.write(out)
     Console(width=None if sys.stdout.isatty() else 160).print(candidates_table(tuned))
-    if tuned.phi_lsb is not None:
-        click.echo(f"phi moves in steps of {tuned.phi_lsb:g} rad: taken as phi_lsb, which the rig file does not give")
+    for note in tuned.notes:
+        click.echo(note)
     drift = ", ".join(f"{one.forgetting_s:g} s {one.energy:.4g}" for one in tuned.forgetting if one.forgetting_s > 0)
     if drift:
         click.echo(f"residual of the next window with forgetting, over that without: {drift}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -79,11 +79,11 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
     run = aligned(read_run(path, rig.sample_rate, columns), rig.sensor.y_delay)
     if whole:
         run = run.whole()
-    print_notes(run)
+    print_notes(run.notes)
     return run
 
 
-def print_notes(run: Run) -> None:
+def print_notes(notes: Iterable[str]) -> None:
     """What was done to a run, on standard error."""
-    for note in run.notes:
+    for note in notes:
         click.echo(f"pvid: input: {note}", err=True)

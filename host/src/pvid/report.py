@@ -39,6 +39,7 @@ from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
+from pvid.sensor_steps import resolution_note, resolved
 from pvid.simulated_angle import simulated_angle
 from pvid.survey import fitted
 
@@ -165,6 +166,7 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
 
 def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     native = Native()
+    run = replace(run, notes=(*run.notes, *resolution_note(rig, resolved(rig, run))))
     whole = run.whole()  # residuals and spectra have no place for a missing sample
     given = whole if rig.identifier.core == "f64" else run
     result = identify(given, rig, native)
