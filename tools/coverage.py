@@ -29,6 +29,8 @@ sys.path.insert(0, str(ROOT / "tests" / "host"))
 
 import playback  # noqa: E402 - of tests/host
 
+from pvid.native import SIZES  # noqa: E402
+
 BUILD = ROOT / "build" / "coverage"
 PAGE = ROOT / "tests" / "COVERAGE.md"
 REASONS = ROOT / "tests" / "coverage.toml"
@@ -36,7 +38,7 @@ FIRMWARE = ROOT / "firmware"
 INCLUDES = [f"-I{FIRMWARE / name}" for name in ("include", "src", "link")]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
-NATIVE = [*FLAGS, *playback.HOST_SIZES, '-DPVID_NATIVE_BUILD="coverage"']
+NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
 PLAY = "import playback; from pvid.native import Native; [playback.digest(Native(), v) for v in playback.variants()]"
 

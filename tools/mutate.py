@@ -38,7 +38,7 @@ sys.path.insert(0, str(ROOT / "tests" / "host"))
 
 import playback  # noqa: E402 - of tests/host
 
-from pvid.native import Native  # noqa: E402
+from pvid.native import SIZES, Native  # noqa: E402
 
 BUILD = ROOT / "build" / "mutate"
 MEMORY = ROOT / "build" / "mutants.json"
@@ -197,8 +197,8 @@ class Kit:
 
 
 COMMON = ("-O1", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-w")
-SIZES = (*playback.HOST_SIZES, '-DPVID_NATIVE_BUILD="mutant"')
-NATIVE = Kit("native", "gcc", ("-std=c99", *SIZES))
+MUTANT = (*SIZES, '-DPVID_NATIVE_BUILD="mutant"')
+NATIVE = Kit("native", "gcc", ("-std=c99", *MUTANT))
 PLAIN = Kit("plain", "gcc", ("-std=c99",))
 WRAPS = f"-fsanitize-ignorelist={ROOT / 'tests' / 'sanitizers.ignore'}"
 CHECKS = "-fsanitize=address,undefined,float-cast-overflow,integer"

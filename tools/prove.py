@@ -111,7 +111,7 @@ PROOFS = (
         ("src/differentiator_q31.c", "src/integer_q31.c"),
         (
             *("-eva-min-loop-unroll", "161", "-eva-split-return", "full"),
-            *("-eva-slevel-function", "any_bank:10,pvid_differentiator_init_q31:10"),
+            *("-eva-slevel-function", "any_bank:10,prepare:10,pvid_differentiator_init_q31:10"),
         ),
         left=(
             r"signed overflow\. assert .*\* \(?(even|odd)_",
@@ -160,7 +160,7 @@ PROOFS = (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             "-eva-slevel-function",
             "main:50,any_configuration:50,any_row:50,config_is_valid:100,model_is_valid:50,parameters_are_valid:200,"
-            "pvid_estimator_init_q31:200,pvid_estimator_add_q31:20,pvid_estimator_innovation_q31:200,"
+            "prepare:200,pvid_estimator_init_q31:200,pvid_estimator_add_q31:20,pvid_estimator_innovation_q31:200,"
             "pvid_estimator_terms_q31:200",
         ),
         taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_information_init_q31"),
@@ -186,8 +186,8 @@ PROOFS = (
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             *("-inline-calls", "is_within", "-eva-domains", "equality", "-eva-slevel-function"),
-            "main:50,any_configuration:200,any_tick:200,pvid_strong_init_q31:100,pvid_gate_init_q31:50,row_is_valid:5,"
-            "shifts_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,pvid_kapitza_strong_row_q31:30,"
+            "main:50,any_configuration:200,any_tick:200,prepare:100,pvid_strong_init_q31:100,pvid_gate_init_q31:50,"
+            "row_is_valid:5,shifts_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,pvid_kapitza_strong_row_q31:30,"
             "take:4,take_powers:20,pvid_estimator_terms_q31:4,take_row:20,pvid_differentiator_step_q31:5,"
             "pvid_gate_passes_q31:5",
         ),
@@ -225,7 +225,10 @@ PROOFS = (
     Proof(
         "trust_q31",
         "any configuration of the three models; any group on top of any state that a group leaves",
-        ("src/trust_q31.c", "src/integer_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
+        (
+            *("src/trust_q31.c", "src/publication.c"),
+            *("src/integer_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
+        ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
     ),
     Proof(

@@ -4,8 +4,8 @@
 #include "pvid/publication_q31.h"
 
 /* How words are shared. Atomic where the compiler has such accesses and the processor such instructions; elsewhere
- * there is one core, whose interrupts see volatile accesses in the order of the source. An estimate's words are
- * accessed as what they are not declared to be: gcc and clang are told so, others get its characters. */
+ * there is one core, whose interrupts see volatile accesses in the order of the source. An estimate's floats are copied
+ * as words, of which gcc and clang are told. */
 #if defined(__GNUC__) && defined(__GCC_HAVE_SYNC_COMPARE_AND_SWAP_4) && !defined(__FRAMAC__)
 
 typedef uint32_t __attribute__((may_alias)) word;
@@ -37,7 +37,7 @@ static inline void read_so_far(void)
 #if defined(__GNUC__)
 typedef uint32_t __attribute__((may_alias)) word;
 #else
-typedef unsigned char word;
+typedef uint32_t word;
 #endif
 
 static inline word load(const volatile word *place)
@@ -60,22 +60,15 @@ static inline void read_so_far(void)
 
 #endif
 
+/* The version and the numbers, which are words as declared. */
 static inline uint32_t load_number(const uint32_t *place)
 {
-#if defined(__GNUC__)
-    return load(place);
-#else
-    return *(const volatile uint32_t *)place;
-#endif
+    return load((const word *)place);
 }
 
 static inline void store_number(uint32_t *place, uint32_t value)
 {
-#if defined(__GNUC__)
-    store(place, value);
-#else
-    *(volatile uint32_t *)place = value;
-#endif
+    store((word *)place, value);
 }
 
 static void share(void *to, const void *from, size_t bytes)

@@ -37,8 +37,6 @@ Identifier = WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdent
 Config = WeakConfig | StrongConfig | WeakConfigQ31 | StrongConfigQ31
 Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
-# Of the core, as host/native builds it.
-HOST_SIZES = ("-DPVID_MAX_P=6", "-DPVID_MAX_MOMENTS=55", "-DPVID_MAX_TAPS=401", "-DPVID_MAX_DECIMATION=64")
 UNIT = Path(__file__).resolve().parents[1] / "unit"
 RATE = 1000.0
 RIG = LINEAR_RIG

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
-from playback import HOST_SIZES
+
+from pvid.native import SIZES
 
 MUTANTS = {
     "estimator_f32.c": (
@@ -53,7 +54,7 @@ def test_a_changed_core_exits_1_and_names_tick_variable_and_words(source: str, r
     library = tmp_path / "libpvid_native.so"
     others = [str(path) for path in sorted(core.glob("*.c")) if path.name != source]
     includes = [f"-I{ROOT / 'firmware/include'}", f"-I{core}", '-DPVID_NATIVE_BUILD="mutant"']
-    includes += HOST_SIZES
+    includes += SIZES
     command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / source)]
     subprocess.run([*command, *others, str(ROOT / "host/native/replay.c"), "-o", str(library), "-lm"], check=True)
 

@@ -195,8 +195,8 @@ static void announce(void)
 {
     static const char schema[] = PVID_LINK_SCHEMA_TEXT;
     const uint8_t first = (uint8_t)(stream.due & (0u - stream.due));
-    const size_t longest = (first == DUE_SCHEMA) ? (sizeof schema - 1u) : (size_t)IDENTIFIER_CONFIGURE_BYTES;
-    if ((first == 0u) || !answers_fit(&stream.out, PVID_LINK_ENCODED_BYTES(longest))) {
+    const size_t room = (first == DUE_SCHEMA) ? PVID_LINK_ENCODED_BYTES(sizeof schema - 1u) : ANSWER_ROOM;
+    if ((first == 0u) || !answers_fit(&stream.out, room)) {
         return;
     }
     stream.due = (uint8_t)(stream.due - first);
@@ -205,6 +205,7 @@ static void announce(void)
     } else if (first == DUE_SCHEMA) {
         answer(PVID_SCHEMA, (const uint8_t *)schema, sizeof schema - 1u);
     } else if (first == DUE_STATUS) {
+        answer_raw(); /* whose ticks come before the status's */
         answer_status();
     } else if (sampling()) {
         answer(IDENTIFIER_CONFIGURE, stream.configuration, sizeof stream.configuration);

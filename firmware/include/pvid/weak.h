@@ -13,6 +13,7 @@
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_weak_step_f32(&identifier, phi, y);
  *   whenever:  estimate = pvid_weak_estimate_f32(&identifier);
+ *   elsewhere: if (pvid_weak_read_f32(&identifier, &copy, &number) && (number > 0)) ...
  *
  * What happens when. Samples are smoothed over `taps` and decimated by D; two windows of W decimated
  * samples, half a window apart, gather sums; every H = (W - 1) / 2 decimated samples one of them is
@@ -27,7 +28,8 @@
  * The first window that is taken in sets c to the mean of phi over it: an encoder's zero may be far from 0.
  *
  * Never allocates. Total: a sample that is not finite is rejected and starts the windows again (its
- * neighbours are no longer equidistant); the sums keep what they know. Not thread-safe.
+ * neighbours are no longer equidistant); the sums keep what they know. One context
+ * calls all functions of an object but pvid_weak_read_f32, which others may call meanwhile (publication.h).
  * RAM: sizeof(pvid_weak_f32); the tables are read where they are.
  */
 #ifndef PVID_WEAK_H
@@ -265,7 +267,7 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
  * PVID_REJECTED_.. when the sample or a window's row was not usable; else PVID_ACCUMULATED. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
 
-/* What is published: the last estimate that could be trusted, the start until there is one (then
+/* What is published, for the context that steps: the last estimate that could be trusted, the start until there is one (then
  * self->trust.published is false). The reasons of the windows since say how old it is. */
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 

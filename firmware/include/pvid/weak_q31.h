@@ -13,7 +13,8 @@
  * multiplies a test function of 11 bits with a term of 21: one 32-bit multiplication on any core.
  *
  * Never allocates, never wraps, never divides by 0. A sample beyond full scale, or a pivot's acceleration beyond u_max,
- * is counted as saturated and starts the windows again; the sums keep what they know. Not thread-safe.
+ * is counted as saturated and starts the windows again; the sums keep what they know. One
+ * context calls all functions of an object but pvid_weak_read_q31, which others may call meanwhile (publication.h).
  */
 #ifndef PVID_WEAK_Q31_H
 #define PVID_WEAK_Q31_H
@@ -191,7 +192,7 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
  * PVID_REJECTED_SATURATED. (A window that the gate keeps out: PVID_REJECTED_OUTLIER.) */
 pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y);
 
-/* What is published: the last estimate that could be trusted, the start until there is one (then
+/* What is published, for the context that steps: the last estimate that could be trusted, the start until there is one (then
  * self->trust.published is false). */
 const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
 

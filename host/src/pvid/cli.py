@@ -814,6 +814,18 @@ def bench_fuzz_link(runs: int) -> int:
     return DONE
 
 
+@bench.command(name="fuzz-api")
+@click.option("--calls", default=10_000_000, show_default=True)
+@click.option("--seed", default=1, show_default=True)
+def bench_fuzz_api(calls: int, seed: int) -> int:
+    """Random calls of the C core's public API, with sanitizers (needs clang)."""
+    from pvid.bench.fuzz import fuzz_api
+
+    with tempfile.TemporaryDirectory(prefix="pvid-fuzz-") as folder:
+        click.echo(fuzz_api(Path(folder), calls, seed).text)
+    return DONE
+
+
 @bench.command(name="codec")
 @click.option("--frames", default=1_000_000, show_default=True)
 def bench_codec(frames: int) -> int:
@@ -861,17 +873,19 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
     with tempfile.TemporaryDirectory() as folder:
         with progress_bar("lies", len(chosen)) as advance:
             for behaviour in chosen:
-                performances.append(liar.perform(behaviour, Path(folder)))
+                performances.append(one := liar.perform(behaviour, Path(folder)))
+                for fault in one.faults:
+                    click.echo(f"{behaviour.name}: {fault}", err=True)
                 advance(len(performances))
         with progress_bar("mutants", mutants) as advance:
             tally = mutate(mutants, Path(folder), progress=advance)
-    faults = [f"{one.behaviour.name}: {fault}" for one in performances for fault in one.faults]
-    for fault in faults + tally.faults:
+    for fault in tally.faults:
         click.echo(fault, err=True)
+    faults = sum(len(one.faults) for one in performances)
     _update_readme(update, "liar", _markdown(liar.HEADER, [one.cells() for one in performances]))
     runs = sum(len(one.codes) for one in performances)
     summary = (
-        f"{len(performances)} behaviours, {runs} runs of a command: {len(faults)} defects, at most "
+        f"{len(performances)} behaviours, {runs} runs of a command: {faults} defects, at most "
         f"{max((one.peak_kb for one in performances), default=0) / 1024:.0f} MB of memory, at most "
         f"{max((one.late_s for one in performances), default=0):.1f} s late. {tally.mutants} mutants in {tally.logs} "
         f"logs: {len(tally.faults)} defects."
@@ -899,6 +913,29 @@ def bench_field_log(target: str, samples: int, out: Path) -> int:
     click.echo(account.text)
     whole = len(verdict.good) == len(account.segments) and not verdict.different and not account.missing_samples
     return DONE if whole else DIFFERENT
+
+
+@bench.command(name="year")
+@click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
+@click.option("--core", default="f32", show_default=True, type=click.Choice(["f32", "q31"]))
+@click.option("--form", default="weak", show_default=True, type=click.Choice(["weak", "strong"]))
+@click.option("--samples", default=20_000, show_default=True, help="At each passage.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("year.pvlog"), show_default=True)
+def bench_year(target: str, core: str, form: str, samples: int, out: Path) -> int:
+    """A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page."""
+    from pvid.bench.year import emulated_year, passages_of_a_year, rig_of
+
+    if out.exists():
+        raise PvidError(f"{out} exists")
+    rig = rig_of(core, form)
+    passages = tuple(range(1, 1 + passages_of_a_year(rig.sample_rate or 0.0)))
+    with progress_bar("verifying", None) as advance:
+        year = emulated_year(target, passages, samples, out, rig, advance)
+    click.echo(f"{year.passages} passages of 2^32 ticks; {year.verdict.text}")
+    click.echo(year.account.text)
+    for sentence in year.faults:
+        click.echo(f"pvid: {sentence}", err=True)
+    return DIFFERENT if year.faults or not year.verdict.verified else DONE
 
 
 @bench.command(name="side-by-side")

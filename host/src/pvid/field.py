@@ -5,7 +5,7 @@
     phi, y = record.samples(0, 5000)                   # exactly what the identifier got
 
 What the frames mean is written in link.py. Whoever has the image's settings, the configuration and every sample from
-tick 0 on can compute every bit again.
+the session's first tick on can compute every bit again.
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ from pvid.wording import printable
 
 MARK_NS = 1_000_000_000
 SYNC_NS = 5_000_000_000
+_SYNC_BYTES = 1 << 25  # or after so many: what is not on the disk yet at the end has to be waited for
 MAX_RIG = 1 << 20  # bytes of a rig file in a log
 _RIG_PIECE = 1000  # of it in a frame
 _HEAD = 1 << 16  # bytes of a log among which its first frame is
@@ -155,12 +156,14 @@ class LogWriter:
         self._sequence = 0
         self._segments = 0
         self._received = 0
+        self._unsynced = 0
         self._between = self.start == 0  # whether the last byte was the end of a frame
         self._marked = self._synced = time.time_ns()
         self._write(b"" if self._between else b"\0")
         self._write(self._frame(Schema(LOG_SCHEMA_TEXT.encode())))
 
     def _write(self, data: bytes) -> None:
+        self._unsynced += len(data)
         view = memoryview(data)
         try:
             while view:
@@ -201,6 +204,8 @@ class LogWriter:
         self._received += len(data)
         self._write(data)
         self._between = data.endswith(b"\0") if data else self._between
+        if self._unsynced >= _SYNC_BYTES:
+            self._sync(now)
 
     def end(self, why: str) -> None:
         """The link is down."""
@@ -210,8 +215,9 @@ class LogWriter:
         self._sync(None)
 
     def _sync(self, now: int | None) -> None:
-        if now is None or now - self._synced >= SYNC_NS:
+        if now is None or now - self._synced >= SYNC_NS or self._unsynced >= _SYNC_BYTES:
             self._synced = time.time_ns() if now is None else now
+            self._unsynced = 0
             try:
                 os.fsync(self._file)
             except OSError as error:

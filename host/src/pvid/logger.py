@@ -34,6 +34,7 @@ _RETRY_S = 0.25  # twice as long after every segment that lasts less than _SHORT
 _SHORT_S = 1.0
 _LONGEST_RETRY_S = 8.0
 _DRAIN_S = 1.0
+_MOST_FAILURES = 8  # that are named
 _CATCH_UP_S = 3.0  # for what is not decoded yet when the recording ends
 _LOOK_S = 0.05
 _RESEND_S = 1.0
@@ -323,7 +324,7 @@ class Logger:
     begin, anew
         See Starter; without `begin` nothing is configured.
     failures
-        Of observers that ended before the recording did, in a sentence each.
+        Of observers, and of the stream that reads the log for them, in a sentence each.
     """
 
     source: Source
@@ -357,7 +358,7 @@ class Logger:
             recorder.start()
             try:
                 self._follow(LogTail(file, self.stream), recorder)
-                self._hand_out(self.stream.end())
+                self._hand_out(self.stream.end)
             finally:
                 recorder.stop.set()
                 recorder.join()
@@ -392,13 +393,19 @@ class Logger:
                 recorder.stop.set()
 
     def _catch_up(self, data: bytes) -> bool:
-        self._hand_out(self.stream.feed(data))
+        self._hand_out(lambda: self.stream.feed(data))
         self._each(lambda one: one.idle(self.stream.account))
         return bool(data)
 
-    def _hand_out(self, records: Iterable[Record]) -> None:
-        for record in records:
-            self._each(lambda one: one.take(record, self.stream.account))  # noqa: B023 - called at once
+    def _hand_out(self, records: Callable[[], Iterable[Record]]) -> None:
+        try:
+            for record in records():
+                self._each(lambda one: one.take(record, self.stream.account))  # noqa: B023 - called at once
+        except RefusedError:
+            raise
+        except Exception as error:  # of the stream: what is behind this chunk is read all the same
+            self.stream.skip(0)
+            self._fail(self.stream, error)
 
     def _each(self, call: Callable[[Observer], None]) -> None:
         """Calls every observer; one that fails is no longer among them."""
@@ -411,7 +418,9 @@ class Logger:
                 self._observers.remove(one)
                 with contextlib.suppress(Exception):
                     one.close(self.stream.account)
-                self.failures.append(
-                    f"{type(one).__name__} ended with {type(error).__name__}: {printable(reason(error))}; "
-                    "the recording went on"
-                )
+                self._fail(one, error)
+
+    def _fail(self, what: object, error: Exception) -> None:
+        told = f"{type(what).__name__} failed with {type(error).__name__}: {printable(reason(error))}"
+        if len(self.failures) < _MOST_FAILURES:
+            self.failures.append(f"{told}; the recording went on")

@@ -165,9 +165,13 @@ class _Open:
     def next(self) -> int:
         return self.stretch.first + self.stretch.ticks
 
+    def is_of(self, session: int) -> bool:
+        """Whether that can be its session."""
+        return 0 in (session, self.session) or session == self.session
+
     def begin_with(self, configuration: Configure | ConfigureQ31) -> None:
         """Now that it is known where the session begins."""
-        if self.session in (0, configuration.session) and self.stretch.first != configuration.first_tick:
+        if self.is_of(configuration.session) and self.stretch.first != configuration.first_tick:
             self.late = True
             self.parts.clear()
             self.checks.clear()
@@ -227,7 +231,7 @@ class Verifier:
 
     def _take_samples(self, record: Record, raw: Raw | RawCount) -> Iterator[Stretch]:
         opened = self._open
-        if opened is None or record.tick != opened.next or raw.session != opened.session:
+        if opened is None or record.tick != opened.next or not opened.is_of(raw.session):
             yield from self._close()
             opened = self._open = _Open(Stretch(record.segment, record.tick, 0), self._lacking(record), raw.session)
             if (configuration := self._configurations.get(raw.session)) is not None:
@@ -239,7 +243,7 @@ class Verifier:
 
     def _take_check(self, tick: int, check: Check) -> None:
         opened = self._open
-        if opened is None or opened.late or opened.session not in (0, check.session):
+        if opened is None or opened.late or not opened.is_of(check.session):
             return
         if tick > opened.next:  # of samples that were lost
             opened.harmed = True

@@ -30,6 +30,14 @@ MAX_THETA = 11
 MAX_MOMENTS = 55
 MAX_SUMS = MAX_MOMENTS + MAX_THETA + 2
 MAX_WINDOW = 321
+# Compiler options of the library and of whatever links with it (host/native/CMakeLists.txt).
+SIZES = (
+    "-DPVID_PLAIN_NAMES",
+    "-DPVID_MAX_P=6",
+    "-DPVID_MAX_MOMENTS=55",
+    "-DPVID_MAX_TAPS=401",
+    "-DPVID_MAX_DECIMATION=64",
+)
 
 
 class Reason(IntEnum):

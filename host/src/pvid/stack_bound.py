@@ -101,7 +101,7 @@ def _frames(tree: Path) -> dict[str, int]:
             place, size, kind = line.split("\t")
             if kind not in ("static", "dynamic,bounded"):  # the second: with what it pushes for its callees
                 raise PvidError(f"{place}: a frame whose size is not known before it runs ({kind})")
-            name = place.rsplit(":", 1)[1]
+            name = place.rsplit(":", 1)[1].split(".")[0]  # a part that the compiler split off is no less deep
             frames[name] = max(frames.get(name, 0), int(size))
     return frames
 

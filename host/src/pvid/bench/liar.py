@@ -39,7 +39,7 @@ from pvid.target import Target
 from pvid.tee import Tee
 
 _ALLOWED_LOSS = 0.001
-_SHORT_FLOOD = 400_000  # bytes
+_SHORT_FLOOD = 100_000  # bytes
 _ESCAPES = re.compile("\x1b\\]|\x07|\x1b\\[31m\x1b?X|\x1b\\[31mbye")
 EXPORTS = ("csv", "parquet", "mcap", "npz")
 
@@ -48,7 +48,7 @@ EXPORTS = ("csv", "parquet", "mcap", "npz")
 
 
 class _Line:
-    """A port that plays steps; a pause is a read without bytes."""
+    """A port that plays steps, with short pauses."""
 
     def __init__(self, steps: Iterator[Step], source: RehearsedSource) -> None:
         self._steps = steps
@@ -64,9 +64,11 @@ class _Line:
                 return data * (_SHORT_FLOOD // len(data))
             case HangUp():
                 raise serial.SerialException("disconnected")
+            case Pause(seconds):
+                time.sleep(min(seconds, 0.1))
             case None:
                 self._source.logger.duration_s = 0.0  # the recording has lasted long enough
-        time.sleep(0.001)
+                time.sleep(0.001)
         return b""
 
     def write(self, data: bytes, /) -> int | None:
@@ -236,7 +238,8 @@ def perform(behaviour: Behaviour, folder: Path) -> Performance:
     rig().write(folder / "rig.toml")
     server = socket.create_server(("127.0.0.1", 0))
     server.settimeout(DURATION_S + 5)
-    threading.Thread(target=_serve, args=(server, behaviour), daemon=True).start()
+    up: list[float] = []
+    threading.Thread(target=_serve, args=(server, behaviour, up), daemon=True).start()
     port = f"socket://127.0.0.1:{server.getsockname()[1]}"
     command = [
         "log",
@@ -259,7 +262,7 @@ def perform(behaviour: Behaviour, folder: Path) -> Performance:
             done.faults.append("log does not end")
             process.kill()
             process.wait()
-        done.late_s = max(0.0, time.monotonic() - began - DURATION_S)
+        done.late_s = max(0.0, time.monotonic() - (up or [began])[0] - DURATION_S)
         out.seek(0)
         _note(done, "log", process.returncode, out.read())
     server.close()
@@ -313,12 +316,13 @@ def _peak_kb(pid: int) -> int:
     return 0
 
 
-def _serve(server: socket.socket, behaviour: Behaviour) -> None:
-    """Plays the steps, to one connection after the other, until the logger has gone."""
+def _serve(server: socket.socket, behaviour: Behaviour, up: list[float]) -> None:
+    """Plays the steps, to one connection after the other, until the logger has gone; `up` are the times [s] of each."""
     steps: Iterator[Step] = behaviour.steps(LyingBoard())
     with suppress(OSError):
         while True:
             connection, _ = server.accept()
+            up.append(time.monotonic())
             with connection:
                 threading.Thread(target=_drain, args=(connection,), daemon=True).start()
                 _play(connection, steps)

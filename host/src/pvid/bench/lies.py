@@ -177,7 +177,7 @@ def _schema_of_the_logger_s_frames(board: LyingBoard) -> Steps:
 def _schemas_without_end(board: LyingBoard) -> Steps:
     fields = b" ".join(b"a%d:u8" % i for i in range(12))
     front = b"pvid 1\n" + b"\n".join(b"%d k%d " % (i, i) + fields for i in range(1, 20))
-    for i in range(3000):
+    for i in range(500):
         yield board.schema(front + b"\n99 x%d a:u8" % i, (99, b"\1"))
 
 
@@ -212,9 +212,15 @@ def _a_name_of_markup(board: LyingBoard) -> Steps:
 
 
 @_lie()
+def _a_name_of_formulas(board: LyingBoard) -> Steps:
+    yield board.say(board.hello(board="$\\frac{1}{0$"))
+
+
+@_lie()
 def _a_name_of_bytes_beyond_ascii(board: LyingBoard) -> Steps:
-    payload = board.hello(board="").payload
-    yield board.raw(Hello.TYPE, payload[:-16] + b"\xff\xfe\xed\xa0\x80\xe2\x80\xae\x9b31m\0x\x7f\x08\n")
+    payload = board.hello(board="N" * 16).payload
+    name = b"\xff\xfe\xed\xa0\x80\xe2\x80\xae\x9b31m\0x\x7f"
+    yield board.raw(Hello.TYPE, payload.replace(b"N" * 16, name.ljust(16)))
 
 
 @_lie()

@@ -24,6 +24,7 @@ from pvid.boards import ROOT
 from pvid.compare_q31 import identifier_q31
 from pvid.errors import PvidError
 from pvid.native import (
+    SIZES,
     Native,
     Reason,
     StrongIdentifier,
@@ -318,6 +319,7 @@ def build_library(folder: Path) -> ctypes.CDLL:
     library, core = folder / LIBRARY, default_library().resolve()
     folder.mkdir(parents=True, exist_ok=True)
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=default"]
+    command += SIZES
     command += [f"-I{path}" for path in (include, here, cost)]
     linked = [str(core), f"-Wl,-rpath,{core.parent}", "-lm"]
     try:

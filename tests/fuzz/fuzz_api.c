@@ -1,0 +1,727 @@
+/* Random calls of the public API with hostile configurations, tables, samples, snapshots and orders of calls.
+ *
+ *     fuzz_api CALLS SEED
+ *
+ * To be built with sanitizers, which see what is out of bounds or undefined. What must hold besides: p is finite and
+ * within its bounds, an estimate is finite, a reason is one of status.h, what init has once accepted it accepts again,
+ * a damaged snapshot is not restored, an object that is not ready does nothing, and garbage of twelve kinds under sound
+ * settings is not published. Prints what was done; exit code 0 iff all of it held. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "hostile.h"
+#include "pvid/pvid.h"
+#include "strong_table_q31.h"
+#include "weak_table.h"
+#include "weak_table_q31.h"
+
+#define LAST_REASON PVID_NOT_READY
+#define ROOM ((size_t)PVID_SNAPSHOT_WEAK_ANGLE_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
+#define MOST_TOLD 20u
+
+static struct {
+    unsigned long calls;
+    unsigned long inits;
+    unsigned long accepted;
+    unsigned long snapshots;
+    unsigned long restored;
+    unsigned long sound; /* runs of garbage under sound settings */
+    unsigned long published;
+    unsigned long bad;
+    unsigned long reasons[LAST_REASON + 1];
+} done;
+
+static void require(bool holds, const char *what)
+{
+    if (!holds) {
+        printf("FAIL %s, call %lu\n", what, done.calls);
+        if (++done.bad > MOST_TOLD) {
+            exit(1);
+        }
+    }
+}
+
+/* One of the four identifiers, with whatever configuration it was last given. */
+typedef struct {
+    const char *name;
+    void (*configure)(bool sound);
+    pvid_status (*init)(void);
+    pvid_reason (*step)(uint32_t kind, unsigned long tick);
+    void (*gap)(void);
+    void (*freeze)(bool frozen);
+    void (*check)(bool published); /* the state, and what is published or assessed */
+    size_t (*save)(uint8_t image[], size_t room);
+    pvid_snapshot_status (*restore)(const uint8_t image[], size_t length);
+    bool (*has_published)(void);
+    void (*clear)(void); /* as before init */
+    unsigned long ticks; /* most of a run: what a step costs differs */
+} form;
+
+static void check_p_f32(const pvid_estimator_f32 *estimator)
+{
+    for (size_t i = 0; i < estimator->model->n_p; i++) {
+        const float p = estimator->p[i];
+        require(isfinite(p) && (p >= estimator->lower[i]) && (p <= estimator->upper[i]), "p within its bounds");
+    }
+}
+
+static void check_estimate_f32(const pvid_estimate_f32 *estimate, size_t n_p)
+{
+    for (size_t i = 0; i < n_p; i++) {
+        require(isfinite(estimate->p[i]) && isfinite(estimate->se[i]), "a finite estimate");
+        for (size_t j = 0; j < n_p; j++) {
+            require(isfinite(estimate->covariance[i][j]), "a finite covariance");
+        }
+    }
+    require((estimate->kappa >= 0.0f) && (estimate->kappa <= 1.0f), "kappa in 0..1");
+    require(isfinite(estimate->residual_sd) && isfinite(estimate->weight), "a finite residual");
+}
+
+static void check_p_q31(const pvid_estimator_q31 *estimator)
+{
+    for (size_t i = 0; i < estimator->model->n_p; i++) {
+        require((estimator->p[i] >= estimator->lower[i]) && (estimator->p[i] <= estimator->upper[i]),
+                "q31 p within its bounds");
+    }
+}
+
+static const float starts[4] = {31.0f, 8.0f, 5.0f, 0.0f};
+
+static void spoil(float *const fields[], size_t n)
+{
+    for (uint32_t left = 1u + below(3); left > 0u; left--) {
+        *fields[below((uint32_t)n)] = hostile_float();
+    }
+}
+
+static void spoil_estimator_f32(pvid_estimator_config_f32 *config)
+{
+    float *const fields[] = {
+        &config->start[below(4)], &config->start_sd[below(4)], &config->lower[below(4)], &config->upper[below(4)],
+        &config->row_sd,          &config->forgetting_s,       &config->feedback_hz,     &config->correlation,
+        &config->row_weight,      &config->step_limit,         &config->kappa_min,       &config->noise_margin,
+        &config->dead_zone,       &config->update_rate_hz,
+    };
+    spoil(fields, sizeof fields / sizeof fields[0]);
+    if (one_in(8)) {
+        config->law = (pvid_law)below(3);
+    }
+    if (one_in(8)) {
+        config->divider = (uint16_t)any_word();
+    }
+}
+
+static void spoil_estimator_q31(pvid_estimator_config_q31 *config)
+{
+    int32_t *const fields[] = {&config->start[below(4)], &config->start_sd[below(4)], &config->lower[below(4)],
+                               &config->upper[below(4)], &config->row_sd,             &config->gain,
+                               &config->kappa_min};
+    uint32_t *const counts[] = {&config->forgetting_groups, &config->correlation, &config->row_weight,
+                                &config->step_limit, &config->noise_margin, &config->dead_zone};
+    for (uint32_t left = 1u + below(3); left > 0u; left--) {
+        if (one_in(2)) {
+            *fields[below((uint32_t)(sizeof fields / sizeof fields[0]))] = any_size_i32();
+        } else {
+            *counts[below((uint32_t)(sizeof counts / sizeof counts[0]))] = (uint32_t)any_size_i32();
+        }
+    }
+    if (one_in(6)) {
+        config->p_bits[below(4)] = (int8_t)any_i32();
+    }
+    if (one_in(6)) {
+        config->n_bits[below(8)] = (int8_t)any_i32();
+    }
+    if (one_in(6)) {
+        config->y_bits = (int8_t)any_i32();
+    }
+    if (one_in(6)) {
+        config->divider = (uint16_t)any_word();
+    }
+}
+
+/* ---- weak, float32 ---- */
+
+static struct {
+    pvid_weak_f32 self;
+    pvid_weak_angle_f32 angle;
+    pvid_weak_config_f32 config;
+    pvid_weak_design_f32 design;
+    float smooth[2];
+    float second[2];
+    float chi[sizeof table_chi / sizeof table_chi[0]];
+    float gram[sizeof table_gram / sizeof table_gram[0]];
+} weak;
+
+static void spoil_tables(void)
+{
+    if (one_in(5)) {
+        for (size_t i = 0; i < sizeof weak.chi / sizeof weak.chi[0]; i++) {
+            weak.chi[i] = one_in(50) ? hostile_float() : (table_chi[i] * (1.0f + (0.5f * any_part())));
+        }
+        weak.design.chi = weak.chi;
+    }
+    if (one_in(5)) {
+        for (size_t i = 0; i < sizeof weak.gram / sizeof weak.gram[0]; i++) {
+            weak.gram[i] = one_in(50) ? hostile_float() : table_gram[i];
+        }
+        weak.design.gram = weak.gram;
+    }
+    if (one_in(5)) {
+        for (size_t i = 0; i < 2u; i++) {
+            weak.smooth[i] = hostile_float();
+            weak.second[i] = hostile_float();
+        }
+        weak.design.smooth = weak.smooth;
+        weak.design.second = weak.second;
+    }
+}
+
+static void configure_weak(bool sound)
+{
+    pvid_weak_config_f32 *config = &weak.config;
+    weak.design = table_design;
+    *config = table_config(starts);
+    config->design = &weak.design;
+    config->gate.sigmas = one_in(3) ? 4.0f : 0.0f;
+    config->gate.patience_s = one_in(2) ? 10.0f : 0.0f;
+    config->estimator.forgetting_s = one_in(3) ? 5.0f : 0.0f;
+    config->drive_min = one_in(4) ? 0.1f : 0.0f;
+    config->estimator.dead_zone = one_in(4) ? 1.0f : 0.0f;
+    config->zero_unknown = !one_in(4);
+    if (one_in(4)) {
+        config->angle = &weak.angle;
+        config->full_angle = true;
+        config->passes = 3;
+        config->angle_limit = one_in(2) ? 0.12f : 0.0f;
+    }
+    if (sound) {
+        return;
+    }
+    float *const fields[] = {&config->sample_rate_hz,   &config->l1,
+                             &config->drive_min,        &config->pivot_noise,
+                             &config->angle_limit,      &config->trust.kappa_min,
+                             &config->trust.se_max,     &config->trust.misfit_max,
+                             &config->trust.renewal,    &config->gate.sigmas,
+                             &config->gate.patience_s,  &weak.design.overlap};
+    if (one_in(2)) {
+        spoil(fields, sizeof fields / sizeof fields[0]);
+    }
+    if (one_in(2)) {
+        spoil_estimator_f32(&config->estimator);
+    }
+    spoil_tables();
+    weak.design.taps = one_in(8) ? (uint16_t)any_word() : weak.design.taps;
+    weak.design.decimation = one_in(8) ? (uint16_t)below(40) : weak.design.decimation;
+    weak.design.window = one_in(8) ? (uint16_t)(2u * below(79) + below(2)) : weak.design.window;
+    weak.design.functions = one_in(8) ? (uint8_t)below(7) : weak.design.functions;
+    weak.design.lag = one_in(8) ? (uint8_t)any_word() : weak.design.lag;
+    if (weak.design.taps > 5u) { /* longer than the tables */
+        weak.design.smooth = NULL;
+    }
+    config->iterations = one_in(8) ? (uint8_t)any_word() : config->iterations;
+    config->passes = one_in(8) ? (uint8_t)any_word() : config->passes;
+    config->trust.groups_min = one_in(8) ? (uint16_t)any_word() : config->trust.groups_min;
+    config->trust.shut_max = one_in(8) ? (uint16_t)below(3) : config->trust.shut_max;
+    config->angle = one_in(8) ? NULL : config->angle;
+    config->full_angle = one_in(8) ? true : config->full_angle;
+    config->friction = one_in(8);
+    config->design = one_in(20) ? NULL : config->design;
+}
+
+static pvid_status init_weak(void)
+{
+    return pvid_weak_init_f32(&weak.self, &weak.config);
+}
+
+static pvid_reason step_weak(uint32_t kind, unsigned long tick)
+{
+    float phi;
+    float y;
+    hostile_sample(kind, tick, &phi, &y);
+    return pvid_weak_step_f32(&weak.self, phi, y);
+}
+
+static void gap_weak(void)
+{
+    pvid_weak_gap_f32(&weak.self);
+}
+
+static void freeze_weak(bool frozen)
+{
+    pvid_weak_freeze_f32(&weak.self, frozen);
+}
+
+static void check_weak(bool published)
+{
+    check_p_f32(&weak.self.estimator);
+    if (!published) {
+        return;
+    }
+    pvid_estimate_f32 copy;
+    uint32_t number;
+    pvid_kapitza_f32 value;
+    pvid_kapitza_f32 se;
+    const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(&weak.self);
+    check_estimate_f32(estimate, weak.self.estimator.model->n_p);
+    require(pvid_weak_read_f32(&weak.self, &copy, &number) && ((number > 0u) == weak.self.trust.published) &&
+                (memcmp(&copy, estimate, sizeof copy) == 0),
+            "a read estimate is the published one");
+    if (pvid_kapitza_physical_f32(estimate, weak.config.l1, &value, &se)) {
+        require(isfinite(value.g) && isfinite(se.g) && isfinite(value.l2) && isfinite(se.rho2), "finite parameters");
+    }
+    pvid_estimator_assess_f32(&weak.self.estimator, &copy);
+    check_estimate_f32(&copy, weak.self.estimator.model->n_p);
+}
+
+static size_t save_weak(uint8_t image[], size_t room)
+{
+    return pvid_snapshot_save_weak_f32(&weak.self, &weak.config, any_word(), image, room);
+}
+
+static pvid_snapshot_status restore_weak(const uint8_t image[], size_t length)
+{
+    return pvid_snapshot_restore_weak_f32(&weak.self, &weak.config, image, length);
+}
+
+static bool weak_has_published(void)
+{
+    return weak.self.trust.published;
+}
+
+static void clear_weak(void)
+{
+    memset(&weak.self, 0, sizeof weak.self);
+}
+
+/* ---- strong, float32 ---- */
+
+static struct {
+    pvid_strong_f32 self;
+    pvid_strong_config_f32 config;
+    pvid_publication_f32 shared;
+    float bank[PVID_ORDERS * 16];
+} strong;
+
+static void configure_strong(bool sound)
+{
+    static const pvid_strong_config_f32 fresh = {.sample_rate_hz = 1000.0f, .l1 = 0.3f};
+    pvid_strong_config_f32 *config = &strong.config;
+    *config = fresh;
+    config->bank = (pvid_fir_bank_f32){2, 20, pvid_five_points_f32};
+    config->estimator = pvid_estimator_defaults_f32;
+    for (size_t i = 0; i < 3u; i++) {
+        config->estimator.start[i] = starts[i];
+        config->estimator.start_sd[i] = 0.5f * starts[i];
+        config->estimator.lower[i] = starts[i] / 20.0f;
+        config->estimator.upper[i] = starts[i] * 20.0f;
+    }
+    config->estimator.row_sd = 1.0e5f;
+    config->estimator.feedback_hz = one_in(2) ? 10.0f : 0.0f;
+    config->estimator.forgetting_s = one_in(3) ? 3.0f : 0.0f;
+    config->estimator.law = (pvid_law)below(2);
+    config->estimator.divider = (uint16_t)(1u + below(5));
+    config->drive_min = one_in(2) ? 0.1f : 0.0f;
+    config->gate.sigmas = one_in(2) ? 6.0f : 0.0f;
+    if (sound) {
+        return;
+    }
+    float *const fields[] = {&config->sample_rate_hz, &config->l1, &config->drive_min, &config->gate.sigmas,
+                             &config->gate.patience_s};
+    if (one_in(2)) {
+        spoil(fields, sizeof fields / sizeof fields[0]);
+    }
+    if (one_in(2)) {
+        spoil_estimator_f32(&config->estimator);
+    }
+    if (one_in(4)) {
+        for (size_t i = 0; i < sizeof strong.bank / sizeof strong.bank[0]; i++) {
+            strong.bank[i] = one_in(200) ? hostile_float() : ((any_part() - 0.5f) * 10.0f);
+        }
+        config->bank.half = (uint16_t)(2u + below(14));
+        config->bank.stride = (uint16_t)(1u + below(12));
+        config->bank.weights = strong.bank;
+    }
+    config->bank.stride = one_in(8) ? (uint16_t)any_word() : config->bank.stride;
+    if (one_in(8)) {
+        config->bank.half = (uint16_t)any_word();
+        config->bank.weights = (config->bank.half > 16u) ? NULL : strong.bank;
+    }
+}
+
+static pvid_status init_strong(void)
+{
+    return pvid_strong_init_f32(&strong.self, &strong.config);
+}
+
+static pvid_reason step_strong(uint32_t kind, unsigned long tick)
+{
+    float phi;
+    float y;
+    hostile_sample(kind, tick, &phi, &y);
+    return pvid_strong_step_f32(&strong.self, phi, y);
+}
+
+static void gap_strong(void)
+{
+    pvid_strong_gap_f32(&strong.self);
+}
+
+static void freeze_strong(bool frozen)
+{
+    pvid_strong_freeze_f32(&strong.self, frozen);
+}
+
+static void check_strong(bool published)
+{
+    check_p_f32(&strong.self.estimator);
+    if (published && one_in(50)) {
+        pvid_estimate_f32 estimate;
+        pvid_estimate_f32 copy;
+        pvid_estimator_assess_f32(&strong.self.estimator, &estimate);
+        check_estimate_f32(&estimate, 3);
+        pvid_publication_put_f32(&strong.shared, &estimate);
+        require(pvid_publication_read_f32(&strong.shared, &copy, NULL) &&
+                    (memcmp(&copy, &estimate, sizeof copy) == 0),
+                "a read estimate is the one that was put");
+    }
+}
+
+static size_t save_strong(uint8_t image[], size_t room)
+{
+    return pvid_snapshot_save_strong_f32(&strong.self, &strong.config, any_word(), image, room);
+}
+
+static pvid_snapshot_status restore_strong(const uint8_t image[], size_t length)
+{
+    return pvid_snapshot_restore_strong_f32(&strong.self, &strong.config, image, length);
+}
+
+static void clear_strong(void)
+{
+    memset(&strong.self, 0, sizeof strong.self);
+}
+
+/* ---- weak, integers ---- */
+
+static struct {
+    pvid_weak_q31 self;
+    pvid_weak_config_q31 config;
+    pvid_weak_design_q31 design;
+} weak_q31;
+
+static void configure_weak_q31(bool sound)
+{
+    pvid_weak_config_q31 *config = &weak_q31.config;
+    weak_q31.design = weak_unit_design;
+    *config = weak_unit;
+    config->design = &weak_q31.design;
+    config->zero_unknown = !one_in(3);
+    config->estimator.forgetting_groups = one_in(3) ? 8u : 0u;
+    config->gate.sigmas = one_in(3) ? 0u : config->gate.sigmas;
+    config->drive_min = one_in(3) ? 0 : config->drive_min;
+    if (sound) {
+        return;
+    }
+    if (one_in(2)) {
+        spoil_estimator_q31(&config->estimator);
+    }
+    config->pivot_noise.m = one_in(6) ? any_i32() : config->pivot_noise.m;
+    config->pivot_noise.e = one_in(6) ? any_i32() : config->pivot_noise.e;
+    config->phi_offset = one_in(6) ? any_i32() : config->phi_offset;
+    config->y_offset = one_in(6) ? any_i32() : config->y_offset;
+    config->iterations = one_in(6) ? (uint8_t)any_word() : config->iterations;
+    config->trust.kappa_min = one_in(6) ? any_i32() : config->trust.kappa_min;
+    config->trust.se_max = one_in(6) ? any_size_i32() : config->trust.se_max;
+    config->trust.misfit_max = one_in(6) ? (uint32_t)any_size_i32() : config->trust.misfit_max;
+    config->trust.renewal = one_in(6) ? (uint32_t)any_size_i32() : config->trust.renewal;
+    config->drive_min = one_in(6) ? any_size_i32() : config->drive_min;
+    weak_q31.design.lag = one_in(6) ? (uint8_t)any_word() : weak_q31.design.lag;
+    weak_q31.design.taps = one_in(12) ? (uint16_t)below(weak_q31.design.taps + 1u) : weak_q31.design.taps;
+    weak_q31.design.decimation = one_in(12) ? (uint16_t)any_word() : weak_q31.design.decimation;
+    weak_q31.design.window = one_in(12) ? (uint16_t)below(weak_q31.design.window + 1u) : weak_q31.design.window;
+    weak_q31.design.phi_max = one_in(12) ? any_size_i32() : weak_q31.design.phi_max;
+    weak_q31.design.sum_shift = one_in(12) ? (uint8_t)below(70) : weak_q31.design.sum_shift;
+    weak_q31.design.chi = one_in(20) ? NULL : weak_q31.design.chi;
+    config->design = one_in(20) ? NULL : config->design;
+}
+
+static pvid_status init_weak_q31(void)
+{
+    return pvid_weak_init_q31(&weak_q31.self, &weak_q31.config);
+}
+
+static pvid_reason step_weak_q31(uint32_t kind, unsigned long tick)
+{
+    static const double lsb[2] = {3.835e-4, 5.0e-6};
+    static const int32_t full_scale[2] = {1304, 6000};
+    int32_t phi;
+    int32_t y;
+    hostile_counts(kind, tick, lsb, full_scale, &phi, &y);
+    return pvid_weak_step_q31(&weak_q31.self, phi, y);
+}
+
+static void gap_weak_q31(void)
+{
+    pvid_weak_gap_q31(&weak_q31.self);
+}
+
+static void freeze_weak_q31(bool frozen)
+{
+    pvid_weak_freeze_q31(&weak_q31.self, frozen);
+}
+
+static void check_weak_q31(bool published)
+{
+    check_p_q31(&weak_q31.self.estimator);
+    pvid_estimate_q31 copy;
+    uint32_t number;
+    if (published) {
+        require(pvid_weak_read_q31(&weak_q31.self, &copy, &number) &&
+                    ((number > 0u) == weak_q31.self.trust.published) &&
+                    (memcmp(&copy, pvid_weak_estimate_q31(&weak_q31.self), sizeof copy) == 0),
+                "a read q31 estimate is the published one");
+        pvid_estimator_assess_q31(&weak_q31.self.estimator, &copy);
+    }
+}
+
+static size_t save_weak_q31(uint8_t image[], size_t room)
+{
+    return pvid_snapshot_save_weak_q31(&weak_q31.self, &weak_q31.config, any_word(), image, room);
+}
+
+static pvid_snapshot_status restore_weak_q31(const uint8_t image[], size_t length)
+{
+    return pvid_snapshot_restore_weak_q31(&weak_q31.self, &weak_q31.config, image, length);
+}
+
+static bool weak_q31_has_published(void)
+{
+    return weak_q31.self.trust.published;
+}
+
+static void clear_weak_q31(void)
+{
+    memset(&weak_q31.self, 0, sizeof weak_q31.self);
+}
+
+/* ---- strong, integers ---- */
+
+static struct {
+    pvid_strong_q31 self;
+    pvid_strong_config_q31 config;
+} strong_q31;
+
+static void configure_strong_q31(bool sound)
+{
+    pvid_strong_config_q31 *config = &strong_q31.config;
+    *config = strong_unit;
+    if (sound) {
+        return;
+    }
+    if (one_in(2)) {
+        spoil_estimator_q31(&config->estimator);
+    }
+    config->u_multiplier = one_in(5) ? any_i32() : config->u_multiplier;
+    config->u_shift = one_in(5) ? (uint8_t)below(70) : config->u_shift;
+    config->drive_min = one_in(5) ? any_i32() : config->drive_min;
+    config->drive_ticks = one_in(5) ? any_word() : config->drive_ticks;
+    config->bank.phi_shift[0] = one_in(5) ? (uint8_t)below(70) : config->bank.phi_shift[0];
+    config->bank.phi_max = one_in(5) ? any_i32() : config->bank.phi_max;
+    config->bank.centre = one_in(5) ? any_i32() : config->bank.centre;
+    config->bank.stride = one_in(8) ? (uint16_t)any_word() : config->bank.stride;
+    config->bank.weights = one_in(20) ? NULL : config->bank.weights;
+    config->phi_offset = one_in(5) ? any_i32() : config->phi_offset;
+    config->row.n_a = one_in(8) ? (uint8_t)below(70) : config->row.n_a;
+    config->row.y = one_in(8) ? (uint8_t)below(70) : config->row.y;
+    config->gate.sigmas = one_in(8) ? any_word() : config->gate.sigmas;
+}
+
+static pvid_status init_strong_q31(void)
+{
+    return pvid_strong_init_q31(&strong_q31.self, &strong_q31.config);
+}
+
+static pvid_reason step_strong_q31(uint32_t kind, unsigned long tick)
+{
+    static const double lsb[2] = {6.0e-6, 5.0e-6};
+    static const int32_t full_scale[2] = {83443, 6000};
+    int32_t phi;
+    int32_t y;
+    hostile_counts(kind, tick, lsb, full_scale, &phi, &y);
+    return pvid_strong_step_q31(&strong_q31.self, phi, y);
+}
+
+static void gap_strong_q31(void)
+{
+    pvid_strong_gap_q31(&strong_q31.self);
+}
+
+static void freeze_strong_q31(bool frozen)
+{
+    pvid_strong_freeze_q31(&strong_q31.self, frozen);
+}
+
+static void check_strong_q31(bool published)
+{
+    check_p_q31(&strong_q31.self.estimator);
+    if (published && one_in(50)) {
+        pvid_estimate_q31 estimate;
+        pvid_estimator_assess_q31(&strong_q31.self.estimator, &estimate);
+    }
+}
+
+static size_t save_strong_q31(uint8_t image[], size_t room)
+{
+    return pvid_snapshot_save_strong_q31(&strong_q31.self, &strong_q31.config, any_word(), image, room);
+}
+
+static pvid_snapshot_status restore_strong_q31(const uint8_t image[], size_t length)
+{
+    return pvid_snapshot_restore_strong_q31(&strong_q31.self, &strong_q31.config, image, length);
+}
+
+static void clear_strong_q31(void)
+{
+    memset(&strong_q31.self, 0, sizeof strong_q31.self);
+}
+
+static bool publishes_nothing(void)
+{
+    return false;
+}
+
+static const form forms[] = {
+    {"weak f32", configure_weak, init_weak, step_weak, gap_weak, freeze_weak, check_weak, save_weak, restore_weak,
+     weak_has_published, clear_weak, 12000},
+    {"strong f32", configure_strong, init_strong, step_strong, gap_strong, freeze_strong, check_strong, save_strong,
+     restore_strong, publishes_nothing, clear_strong, 6000},
+    {"weak q31", configure_weak_q31, init_weak_q31, step_weak_q31, gap_weak_q31, freeze_weak_q31, check_weak_q31,
+     save_weak_q31, restore_weak_q31, weak_q31_has_published, clear_weak_q31, 12000},
+    {"strong q31", configure_strong_q31, init_strong_q31, step_strong_q31, gap_strong_q31, freeze_strong_q31,
+     check_strong_q31, save_strong_q31, restore_strong_q31, publishes_nothing, clear_strong_q31, 3000},
+};
+
+/* ---- the calls ---- */
+
+static uint8_t image[ROOM];
+static size_t saved;
+
+static void restore(const form *one, size_t length, bool expected)
+{
+    done.snapshots++;
+    const bool restored = one->restore(image, length) == PVID_SNAPSHOT_RESTORED;
+    done.restored += restored ? 1u : 0u;
+    require(restored == expected, "a snapshot is restored iff it is whole");
+}
+
+/* One of the things that seldom happen between two ticks. */
+static void disturb(const form *one, uint32_t *kind)
+{
+    switch (below(9)) {
+    case 0:
+        one->gap();
+        break;
+    case 1:
+        one->freeze(one_in(2));
+        break;
+    case 2:
+        require(one->init() == PVID_OK, "what was accepted is accepted again");
+        break;
+    case 3:
+        saved = one->save(image, sizeof image);
+        require((saved > 0u) && (one->save(image, saved - 1u) == 0u), "a snapshot fits where it fits");
+        break;
+    case 4:
+        if (saved > 0u) {
+            restore(one, saved, true);
+        }
+        break;
+    case 5:
+        if (saved > 0u) {
+            image[below((uint32_t)saved)] ^= (uint8_t)(1u << below(8));
+            restore(one, saved, false);
+            saved = 0;
+        }
+        break;
+    case 6:
+        for (size_t i = 0; i < sizeof image; i++) {
+            image[i] = (uint8_t)any_word();
+        }
+        restore(one, below((uint32_t)sizeof image + 1u), false);
+        (void)pvid_snapshot_choose(image, image, below((uint32_t)sizeof image));
+        saved = 0;
+        break;
+    default:
+        *kind = below(HOSTILE_SIGNALS);
+        break;
+    }
+}
+
+static void call_before_init(const form *one, uint32_t kind)
+{
+    for (unsigned long tick = 0; tick < 20u; tick++) {
+        done.calls++;
+        require(one->step(kind, tick) == PVID_NOT_READY, "an object that is not ready says so");
+    }
+    one->gap();
+    one->freeze(true);
+    require(one->save(image, sizeof image) == 0u, "no snapshot before init");
+    require(one->restore(image, sizeof image) == PVID_SNAPSHOT_NOT_READY, "nothing is restored before init");
+}
+
+static void play(const form *one)
+{
+    const bool sound = one_in(2);
+    uint32_t kind = below(HOSTILE_SIGNALS);
+    saved = 0;
+    one->configure(sound);
+    if (one_in(10)) {
+        one->clear();
+        call_before_init(one, kind);
+    }
+    done.inits++;
+    const pvid_status status = one->init();
+    require(!sound || (status == PVID_OK), "sound settings are accepted");
+    if (status != PVID_OK) {
+        call_before_init(one, kind);
+        return;
+    }
+    done.accepted++;
+    const unsigned long ticks = 100u + below((uint32_t)one->ticks / (one_in(4) ? 1u : 20u));
+    for (unsigned long tick = 0; tick < ticks; tick++) {
+        done.calls++;
+        const pvid_reason reason = one->step(kind, tick);
+        require((unsigned int)reason < (unsigned int)LAST_REASON, "a reason of status.h");
+        done.reasons[((unsigned int)reason <= (unsigned int)LAST_REASON) ? reason : LAST_REASON]++;
+        one->check((reason == PVID_UPDATED) || (reason == PVID_MISFIT));
+        if (one_in(400)) {
+            disturb(one, &kind);
+        }
+    }
+    if (sound) {
+        done.sound++;
+        done.published += one->has_published() ? 1u : 0u;
+    }
+}
+
+int main(int argc, char **argv)
+{
+    if (argc != 3) {
+        fprintf(stderr, "usage: fuzz_api CALLS SEED\n");
+        return 2;
+    }
+    const unsigned long wanted = strtoul(argv[1], NULL, 10);
+    hostile_seed(strtoull(argv[2], NULL, 10));
+    make_table();
+    while (done.calls < wanted) {
+        play(&forms[below((uint32_t)(sizeof forms / sizeof forms[0]))]);
+    }
+    require(done.published == 0u, "garbage under sound settings is not published");
+    printf("calls %lu inits %lu accepted %lu snapshots %lu restored %lu sound %lu published %lu failed %lu\nreasons",
+           done.calls, done.inits, done.accepted, done.snapshots, done.restored, done.sound, done.published, done.bad);
+    for (size_t i = 0; i <= (size_t)LAST_REASON; i++) {
+        printf(" %lu", done.reasons[i]);
+    }
+    printf("\n");
+    return (done.bad == 0u) ? 0 : 1;
+}
