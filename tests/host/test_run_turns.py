@@ -18,7 +18,7 @@ TURN = 2 * np.pi
 LSB = TURN / 4096
 T = np.arange(3000) / 500
 NOISE = np.random.default_rng(1).integers(-1, 2, T.size)
-SWING: Float = LSB * (np.rint(0.1 * np.sin(15 * T) / LSB) + NOISE)
+SWING: Float = np.float64(LSB) * (np.rint(0.1 * np.sin(15 * T) / LSB) + NOISE)
 
 
 @pytest.mark.parametrize("rest", [0.0, 0.05, np.pi, -2.0])

@@ -347,8 +347,8 @@ def _rate(table: Table, measured: float, error: float, promised: float | None) -
     if promised is None:
         low, high = _RATE_RANGE_HZ
         if not low <= measured <= high:
-            off = f"a sample rate of {measured:.6g} Hz is out of range"
-            raise PvidError(f"{table.path}, column {name}: {off}{_unit(name, measured)}.")
+            told = f"a sample rate of {measured:.6g} Hz is out of range"
+            raise PvidError(f"{table.path}, column {name}: {told}{_unit(name, measured)}.")
         return _shortest_decimal(measured, 1e-9 + 3 * error), ()
     off = measured / promised - 1
     # t is trusted only to within the jitter at each end
