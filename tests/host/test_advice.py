@@ -166,6 +166,12 @@ MISTAKES = {
         "--set identifier.damping=true",
         lambda run, rig: (run, with_identifier(damping=True)),
     ),
+    "linear equations": Mistake(  # which an emulated board's sensor has
+        lambda: (run_of(truth="linear"), RIG),
+        "the run follows the equations of small angles",
+        "--set identifier.full_angle=false",
+        lambda run, rig: (run, with_identifier(full_angle=False)),
+    ),
     "large angles": Mistake(
         lambda: (run_of(), with_identifier(full_angle=False)),
         "angles go to 0.096 rad, and sin phi is not phi there",
@@ -378,6 +384,17 @@ def test_identify_prints_its_advice(tmp_path: Path) -> None:
     assert {one["value"] for one in answer["parameters"].values()} == {None}
     assert answer["chi2"] is None and answer["modes_hz"] is None and answer["first_publication_s"] is None
     assert sum(answer["reasons"].values()) == answer["ticks"] == 7500
+
+
+def test_tune_gives_the_advice_where_nothing_can_be_tuned(tmp_path: Path) -> None:
+    write_run(tmp_path / "run.csv", replace(run_of(), y=-run_of().y))
+    with pytest.raises(PvidError, match=r"^y is counted downwards.* \(as it is: nothing is identified from this run"):
+        CliRunner().invoke(
+            commands,
+            ["tune", str(tmp_path / "run.csv"), "--set", "l1=0.25"],
+            standalone_mode=False,
+            catch_exceptions=False,
+        )
 
 
 def test_a_refusal_has_the_advice_in_front_of_it(tmp_path: Path) -> None:

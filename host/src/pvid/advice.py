@@ -120,6 +120,11 @@ def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]
     return tuple(_put_right(Case(_shortened(run), rig), native)[0])
 
 
+def behind(advices: tuple[str, ...], error: PvidError) -> PvidError:
+    """A refusal behind the mistakes that it follows from."""
+    return PvidError(f"{'; '.join(advices)} (as it is: {error})" if advices else str(error))
+
+
 def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str], Case, Identification | None]:
     """What is found, the case without it, and what this gives; without `units` only sensors and equations are looked
     at."""
@@ -417,6 +422,12 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
             f"angles go to {largest:.2g} rad, and sin phi is not phi there: use --set identifier.full_angle=true"
             + (" with --core f32" if rig.identifier.core == "q31" else ""),
             with_identifier(full_angle=True),
+        )
+    elif rig.identifier.form == "weak" and rig.identifier.core != "q31":
+        yield Cure(
+            "the run follows the equations of small angles, as a simulation of them does: use "
+            "--set identifier.full_angle=false",
+            with_identifier(full_angle=False),
         )
     if not rig.identifier.damping and rig.identifier.zero:
         yield Cure(

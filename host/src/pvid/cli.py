@@ -334,15 +334,12 @@ def identify_command(
 
 def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
     """The answer with advice; a refusal has the advice in front of its sentence."""
-    from pvid.advice import advice, advice_on_refusal
+    from pvid.advice import advice, advice_on_refusal, behind
 
     try:
         result = identify(run, rig, native)
     except PvidError as error:
-        advices = advice_on_refusal(run, rig, native)
-        if advices:  # the refusal follows from the mistake
-            raise PvidError(f"{'; '.join(advices)} (as it is: {error})") from error
-        raise
+        raise behind(advice_on_refusal(run, rig, native), error) from error
     return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
 
 
@@ -413,8 +410,14 @@ def tune_command(
 
     rig = rig_for(run_path, rig_path, settings)
     run = read_input(run_path, rig, columns)
-    with progress_bar("tuning", STEPS) as advance:
-        tuned = tune(run, rig, Native(), advance)
+    native = Native()
+    try:
+        with progress_bar("tuning", STEPS) as advance:
+            tuned = tune(run, rig, native, advance)
+    except PvidError as error:
+        from pvid.advice import behind
+
+        raise behind(_identified(run, resolved(rig, run), native).advice, error) from error
     out = out or run_path.with_name(rig_path_of(run_path).stem + "-tuned.toml")
     tuned.rig.write(out)
     Console(width=None if sys.stdout.isatty() else 160).print(candidates_table(tuned))

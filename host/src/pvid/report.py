@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from scipy.signal import savgol_filter, welch
 
-from pvid.advice import advice
+from pvid.advice import advice, advice_on_refusal, behind
 from pvid.appearing import appearing
 from pvid.axis_limits import interesting
 from pvid.capture import Run, is_run, read_run
@@ -169,7 +169,10 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     run = replace(run, notes=(*run.notes, *resolution_note(rig, resolved(rig, run))))
     whole = run.whole()  # residuals and spectra have no place for a missing sample
     given = whole if rig.identifier.core == "f64" else run
-    result = identify(given, rig, native)
+    try:
+        result = identify(given, rig, native)
+    except PvidError as error:
+        raise behind(advice_on_refusal(given, rig, native), error) from error
     names = [name for name in (*LINEAR, ZERO) if name in result.value]
     advices = tuple(f"advice: {sentence}" for sentence in advice(given, rig, result, native))
     return Recording(
