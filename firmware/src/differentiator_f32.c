@@ -82,7 +82,7 @@ void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 
 bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, float out[PVID_ORDERS])
 {
-    const bool ready = (self != NULL) && (self->bank.weights != NULL);
+    const bool ready = self->bank.weights != NULL;
     PVID_ASSERT(ready);
     if (!ready || !pvid_fir_push_f32(self, sample)) {
         return false;

@@ -134,7 +134,7 @@ static int32_t rounded(int64_t sum, uint8_t shift)
 bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, int32_t y, int32_t d_phi[PVID_ORDERS],
                                   int32_t d_y[PVID_Y_ORDERS_Q31])
 {
-    const bool ready = (self != NULL) && (self->bank.weights != NULL);
+    const bool ready = self->bank.weights != NULL;
     PVID_ASSERT(ready);
     if (!ready) {
         return false;

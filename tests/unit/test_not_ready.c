@@ -199,8 +199,10 @@ static void estimators_and_differentiators_do_nothing_either(void **state)
         assert_int_equal(pvid_estimator_update_q31(self_q31), PVID_NOT_READY);
         assert_int_equal(pvid_estimator_iterate_q31(self_q31), PVID_NOT_READY);
         pvid_estimator_place_q31(self_q31, 0, 1);
-        assert_false(pvid_differentiator_step_f32((i == 0) ? &differentiator : NULL, 1.0f, out));
-        assert_false(pvid_differentiator_step_q31((i == 0) ? &differentiator_q31 : NULL, 1, 1, d_phi, d_y));
+    }
+    for (int i = 0; i < 2 * PVID_MAX_WINDOW; i++) {
+        assert_false(pvid_differentiator_step_f32(&differentiator, 1.0f, out));
+        assert_false(pvid_differentiator_step_q31(&differentiator_q31, 1, 1, d_phi, d_y));
     }
 }
 

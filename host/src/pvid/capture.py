@@ -18,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pvid.appearing import appearing
+from pvid.appearing import write_whole
 from pvid.array_table import read_npz, read_parquet, write_npz, write_parquet
 from pvid.csv_table import read_csv, write_csv, write_csv_gz
 from pvid.errors import PvidError
@@ -34,6 +34,8 @@ Function = TypeVar("Function")
 
 # The shortest finite difference of order 4 takes 5 samples: fewer feed no form of the identifier.
 MIN_ROWS = 5
+
+_LARGEST = 1e12  # [rad] or [m]: counts of 40 bits
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +72,23 @@ class Run:
 
     def __len__(self) -> int:
         return int(self.t.size)
+
+    def refuse_damaged(self) -> None:
+        """Refuses numbers that no unit explains, and that overflow what is computed with them.
+
+        Raises
+        ------
+        PvidError
+            Naming the first.
+        """
+        for name in ("phi", "y"):
+            beyond = np.abs(getattr(self, name)) > _LARGEST
+            if beyond.any():
+                at = int(np.argmax(beyond))
+                raise PvidError(
+                    f"{name} is {getattr(self, name)[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: "
+                    "is the file damaged?"
+                )
 
     def whole(self) -> Run:
         """The longest stretch without a missing tick, for what cannot leave ticks out; this run when none is missing.
@@ -150,10 +169,7 @@ def write_run(path: str | os.PathLike[str], run: Run) -> None:
         raise PvidError(f"{path} is not written: {again.notes[0]}.")
     content = write(path, {name: getattr(run, name) for name in SIGNALS})
     try:
-        with appearing(path) as temporary, temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+        write_whole(path, content)
     except OSError as error:
         raise PvidError(f"{path} cannot be written: {reason(error)}.") from error
 

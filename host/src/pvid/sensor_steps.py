@@ -17,6 +17,7 @@ _LEAST_LEVELS = 4
 # Of values that are whole numbers of steps the resultant of their phases is 1; of steps rounded to decimals of a third
 # of a step it is 0.83; of values that lie anywhere it is below this, whatever step is tried.
 _LEAST_RESULTANT = 0.7
+_LEAST_STEP = 1e-12  # [rad] or [m], as in a rig file: finer ones are rounding
 _LEAST_PART = 1e-6  # of the travel: float32's own steps are finer
 _NEAR = 12  # levels
 _TRIED = np.linspace(0.7, 1.4, 701)
@@ -75,6 +76,8 @@ def resolution_of(values: npt.ArrayLike) -> float | None:
         return None
     gaps = np.diff(levels)
     for guess in (float(np.quantile(gaps, 0.25)), float(gaps.min())):
+        if guess < _LEAST_STEP:
+            continue
         step = _refined(levels, guess)
         if step is not None and step > _LEAST_PART * (levels[-1] - levels[0]):
             return step

@@ -101,7 +101,7 @@ def _frames(tree: Path) -> dict[str, int]:
             place, size, kind = line.split("\t")
             if kind not in ("static", "dynamic,bounded"):  # the second: with what it pushes for its callees
                 raise PvidError(f"{place}: a frame whose size is not known before it runs ({kind})")
-            name = place.rsplit(":", 1)[1].split(".")[0]  # a part that the compiler split off is no less deep
+            name = place.rsplit(":", 1)[1]
             frames[name] = max(frames.get(name, 0), int(size))
     return frames
 
@@ -151,7 +151,7 @@ def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
         return own + sum(arithmetic(callee, seen) for callee in functions[name].callees)
 
     def deepest(name: str, callers: tuple[str, ...]) -> int:
-        compiled = frames.get(name.split(".")[0])
+        compiled = frames.get(name, frames.get(name.split(".")[0]))  # a part split off has a frame of its own
         if compiled is None:
             return arithmetic(name, set())
         if name in callers:

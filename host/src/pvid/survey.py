@@ -84,7 +84,11 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
         return rig
     found = survey(rig, run)
     if found is not None:
-        rig = with_nominal(rig, found.p)
+        try:
+            rig = with_nominal(rig, found.p)
+        except PvidError:  # a length that no rig has
+            found = None
+    if found is not None:
         own = rig.identifier
         own = replace(
             own,
@@ -95,6 +99,7 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     return sized_for(replace(rig, identifier=replace(rig.identifier, survey=False)), run)
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
 def survey(rig: RigFile, run: Run) -> Survey | None:
     """Searches a run for p; None where no start leads to a pendulum."""
     if not np.isfinite(run.phi).any():
@@ -123,6 +128,8 @@ def survey(rig: RigFile, run: Run) -> Survey | None:
     if ratio > 0:
         fit = rows.fitted(fit.p, ratio)
     density = ratio * rows.row_sd * math.sqrt(rows.design.dt)
+    if not (is_pendulum(fit.p[:4]) and math.isfinite(fit.chi2) and math.isfinite(density)):
+        return None
     return Survey(fit.p[:4], fit.chi2, density, agreeing, tried)
 
 
@@ -176,7 +183,7 @@ def _search(rig: RigFile, run: Run) -> tuple[RigFile, Fit] | None:
     for _ in range(_RENEWALS):
         at = sized_for(rig, run)
         fit = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).fitted(p)
-        if not is_pendulum(fit.p):
+        if not is_pendulum(fit.p) or not math.isfinite(fit.chi2):
             return None
         moved, p = _apart(fit.p, p), fit.p
         if moved < _MOVED:

@@ -13,7 +13,7 @@ from pvid.errors import PvidError
 
 PERIOD = 855  # ticks from window to window of tests/cost/weak_rig.h, at the standard rig's size
 
-_STEP = "pvid_weak_step_f32_window*"  # the linker's name goes on with the sizes
+_STEP = "pvid_weak_step_f32"
 
 
 @dataclass(frozen=True)
