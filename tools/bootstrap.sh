@@ -5,7 +5,8 @@
 # Standard output belongs to the program; everything here speaks on standard error, one line a step, and
 # leaves the full output of each step in build/log.
 
-root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd)
+root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && printf '%s/' "$PWD") # a newline at its end stays
+root=${root%/}
 build=$root/build
 venv=$build/venv
 python=$venv/bin/python
@@ -21,6 +22,13 @@ die() {
     exit 2
 }
 
+case $root in
+*[\"\$\;\|\>:\\]* | *[[:cntrl:]]*)
+    printf -v shown %q "$root"
+    die "nothing can be built in $shown: CMake or venv stumble over \", \$, ;, |, >, :, \\ or a line break in a folder's name"
+    ;;
+esac
+
 # logged NAME COMMAND...: runs a step; its output goes to build/log/NAME.log, the end of it to the terminal
 # when the step fails.
 logged() {
@@ -34,7 +42,7 @@ logged() {
 
 # One preparation at a time; the program itself runs unlocked.
 lock() {
-    mkdir -p "$build/log" || die "cannot write $build"
+    mkdir -p "$build/log" 2>/dev/null || die "cannot write $build: its folder belongs to $(stat -c %U "$root")"
     exec 9>"$build/.lock"
     flock -n 9 || {
         say "waiting for another run to finish its preparation"
@@ -187,19 +195,38 @@ make_environment() {
     write_stamp "$venv/made" "$(environment_identity)"
 }
 
-install_requirements() { # install_requirements PROFILE
-    local pinned stamp extras=campaign,web
-    pinned=$(sha256sum <"$root/host/pyproject.toml")
+# What the installed packages hang on.
+requirements() { cat "$root/host/pyproject.toml" "$root/tools/requirements.txt" | sha256sum; }
+
+requirements_are_installed() { # requirements_are_installed PROFILE
+    local wanted stamp
+    wanted=$(requirements)
     for stamp in "$venv/installed-test" "$venv/installed-$1"; do
-        [[ -f $stamp && $(<"$stamp") == "$pinned" ]] && return
+        [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && return
     done
-    [[ $1 == test ]] && extras+=,test
-    say "installing Python packages: pvid[$extras] of host/pyproject.toml"
+    return 1
+}
+
+# The packages of the lock file, each with its hash: those that others are built with first, for what pip fetches to
+# build with it does not check. Then pvid itself.
+install_requirements() { # install_requirements PROFILE
+    local lock=$root/tools/requirements.txt pip=("$python" -m pip install --disable-pip-version-check --no-input)
+    requirements_are_installed "$1" && return
+    say "installing Python packages: those of tools/requirements.txt"
     rm -f "$venv"/installed-*
-    # From inside host/: a path in front of [extras] is read as a URL, which spaces break.
-    logged pip env -C "$root/host" "$python" -m pip install --disable-pip-version-check --no-input -e ".[$extras]" ||
-        die "pip install failed; its output is above"
-    write_stamp "$venv/installed-$1" "$pinned"
+    sed '/^# to use pvid$/,$d' "$lock" >"$venv/builders.txt"
+    if [[ $1 != test ]]; then
+        sed '/^# for the tests alone$/,$d' "$lock" >"$venv/requirements.txt"
+        lock=$venv/requirements.txt
+    fi
+    local failed="pip install failed; its output is above"
+    logged pip-builders "${pip[@]}" --require-hashes --only-binary :all: --requirement "$venv/builders.txt" ||
+        die "$failed"
+    logged pip "${pip[@]}" --require-hashes --no-build-isolation --requirement "$lock" || die "$failed"
+    # From inside host/: a path is read as a URL, which spaces break.
+    logged pip-pvid env -C "$root/host" "${pip[@]}" --no-index --no-deps --no-build-isolation --editable . ||
+        die "$failed"
+    write_stamp "$venv/installed-$1" "$(requirements)"
 }
 
 # ---- the C core ----
@@ -239,10 +266,31 @@ build_core() {
         die "the C core did not build; see above"
 }
 
+# ---- another user's clone ----
+
+# What somebody else has prepared, root for instance, is used as it is.
+is_ours() { [[ ! -e $build || -w $build && -w $build/log && (! -e $build/.lock || -w $build/.lock) ]]; }
+
+# use_as_it_is PROFILE: ends the program when something is missing or older than its sources.
+use_as_it_is() {
+    if ! { environment_is_ready && requirements_are_installed "$1" && core_is_built; }; then
+        die "$build belongs to $(stat -c %U "$build") and is not ready: let them run tools/pvid, or use your own clone"
+    fi
+}
+
+core_is_built() {
+    [[ -f $build/host/build.ninja ]] &&
+        ninja -C "$build/host" -n pvid_native 2>/dev/null | grep -q 'no work to do'
+}
+
 # prepare PROFILE: as above.
 prepare() {
     local profile=$1 python_profile="pvid"
     [[ $1 != test ]] || python_profile="test"
+    if ! is_ours; then
+        use_as_it_is "$python_profile"
+        return
+    fi
     lock
     # The demo does without a board where nobody may install one, and says so.
     if [[ $profile == demo ]] && ! can_install; then profile=pvid; fi

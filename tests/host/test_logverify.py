@@ -19,6 +19,7 @@ from pvid.errors import PvidError
 from pvid.logfile import LogWriter
 from pvid.logreader import LogReader
 from pvid.logrig import rig_of_log
+from pvid.logvalues import Values
 from pvid.logverify import Stretch, Verdict, Verifier
 from pvid.native import Native
 from pvid.rigfile import RigFile
@@ -222,6 +223,29 @@ def test_a_restart_far_behind_2_to_the_31_is_told_by_the_session(tmp_path: Path,
         reader = LogReader(tmp_path / name)
         list(reader)
         assert (reader.account.restarts, reader.account.missing_samples) == (1, 0)
+
+
+def test_a_board_that_waits_for_its_configuration_is_at_tick_0_again(tmp_path: Path, native: Native) -> None:
+    """Whatever was counted before it was switched off, and though the next session counts on from far beyond it."""
+    first, second = 2**32 - 800, 2 * 2**32 - 800
+    runs = [
+        list(field_board.messages(field_board.Field(1600, first_tick=tick), native, session=session))
+        for tick, session in ((first, 7), (second, 8))
+    ]
+    words = [(0, link.Status(0, link.Code.WAITING, *[0] * 9)), (0, link.Credit(0, 256, 1, 0))]
+    stretches = verified(
+        tmp_path / "a.pvlog", list(field_board.frames(runs[0])), list(field_board.frames([*words, *runs[1]]))
+    )
+    assert [(one.first, one.verified) for one in stretches] == [(first, 1600), (second, 1600)]
+    reader, values = LogReader(tmp_path / "a.pvlog"), Values()
+    times = {}
+    for record in reader:
+        if isinstance(record.item, link.Status) and record.item.session == 0:
+            assert record.tick == 0
+        for rows in values.rows(record):
+            if rows.table == "samples":
+                times[record.segment] = abs(int(rows.columns["log_time"][-1]) - record.unix_ns)
+    assert times.keys() == {0, 1} and max(times.values()) < 10e9
 
 
 def test_what_follows_a_lost_sample_is_not_verified_until_the_board_starts_over(tmp_path: Path, sent: Sent) -> None:

@@ -284,12 +284,12 @@ def test_a_board_that_began_anew_is_marked(native: Native, tmp_path: Path) -> No
 
 def test_what_cannot_be_drawn_is_refused_in_a_sentence(log: Path, native: Native, tmp_path: Path) -> None:
     recording = recording_of(log, None)
-    with pytest.raises(PvidError, match="cannot write the report .*out.xyz"):
+    with pytest.raises(PvidError, match="out.xyz .*must end in .png, .svg, .pdf"):
         write_report(recording, tmp_path / "out.xyz")
-    with pytest.raises(PvidError, match="cannot write the report"):
+    with pytest.raises(PvidError, match="cannot write the figure"):
         write_report(recording, tmp_path / "no" / "folder.png")
     (tmp_path / "taken.png").mkdir()
-    with pytest.raises(PvidError, match="cannot write the report .*taken.png: Is a directory"):
+    with pytest.raises(PvidError, match="cannot write the figure .*taken.png: Is a directory"):
         write_report(recording, tmp_path / "taken.png")
     assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]  # nothing half written is left
     writer = LogWriter(tmp_path / "short.pvlog", rig=field_board.rig().text())

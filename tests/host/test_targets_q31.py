@@ -29,17 +29,6 @@ def test_the_host_computes_the_integers_of_the_twin(form: str, native: Native) -
     assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
 
 
-# Also with a floating-point unit: integers are the same everywhere.
-@pytest.mark.parametrize("board", ["microbit", "virt-rv32imac", "mps2-an386"])
-def test_a_board_computes_the_integers_of_the_host(board: str, native: Native) -> None:
-    report = played(board, "q31")
-    expected = native_hashes(standard_run("weak", TICKS, "q31"), native)
-    assert report.ticks == TICKS
-    assert len(report.hashes) == TICKS // 500
-    assert all(value == expected[tick - 1] for tick, value in report.hashes.items())
-    assert report.hash == int(expected[-1])
-
-
 @pytest.mark.parametrize("board", ["microbit", "virt-rv32imac"])
 def test_integers_cost_a_fifth_of_soft_float_at_most(board: str) -> None:
     integers, soft_float = played(board, "q31"), played(board, "f32")

@@ -13,19 +13,24 @@ import numpy.typing as npt
 
 from pvid.errors import PvidError
 from pvid.run_columns import SIGNALS, Columns
+from pvid.run_size import refuse_beyond
 from pvid.run_table import Table, row_place
 from pvid.wording import reason
 
 FloatArray = npt.NDArray[np.float64]
 
+_LONGEST_NUMBER = 16  # bytes of one in an archive
+
 
 def read_npz(path: Path, columns: Columns) -> Table:
     """Reads the arrays of an archive; PvidError for whatever is wrong with it."""
     try:
-        archive = np.load(path, allow_pickle=False)
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise PvidError(f"{path} holds one bare array, where an archive of t, phi and y is wanted.")
-        with archive:
+        with path.open("rb") as file:  # which np.load would leave open where it fails
+            archive = np.load(file, allow_pickle=False)
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise PvidError(f"{path} holds one bare array, where an archive of t, phi and y is wanted.")
+            members = archive.zip.infolist() if archive.zip is not None else []
+            refuse_beyond(path, max((member.file_size for member in members), default=0) // _LONGEST_NUMBER)
             return _table(path, list(archive.files), archive.__getitem__, columns)
     except PvidError:
         raise
@@ -50,6 +55,7 @@ def read_parquet(path: Path, columns: Columns) -> Table:
 
     try:
         with pyarrow.parquet.ParquetFile(path) as file:
+            refuse_beyond(path, file.metadata.num_rows)
             names = file.schema_arrow.names
 
             def column(name: str) -> npt.NDArray[Any]:

@@ -14,11 +14,12 @@ from pathlib import Path
 from filelock import FileLock
 
 from pvid.errors import PvidError
+from pvid.user_cache import built_under
 
 ROOT = Path(__file__).resolve().parents[3]
-BUILD = ROOT / "build" / "targets"
+BUILD = built_under(ROOT / "build") / "targets"
 SIMAVR_STDIO = BUILD / "simavr_stdio"
-COMPILED = ROOT / "build" / "cache" / "ccache"  # objects of all trees
+COMPILED = built_under(ROOT / "build") / "cache" / "ccache"  # objects of all trees
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """Recorded runs on disk: text tables, NPZ and Parquet, with every check a stranger's file needs.
 
 A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order and among others; `Columns` maps other names
-and units. Its clock is made uniform (`run_clock`) and short gaps are interpolated (`run_gaps`); what was done is in
-`Run.notes`, and a run that needs nothing keeps every bit. Whatever is wrong with a file is told in one sentence, as a
-`PvidError`, that names the file and, where there is one, the line and the column.
+and units. Jumps of a whole turn are joined (`run_turns`), its clock is made uniform (`run_clock`) and short gaps are
+interpolated (`run_gaps`); what was done is in `Run.notes`, and a run that needs nothing keeps every bit. Whatever is
+wrong with a file is told in one sentence, as a `PvidError`, that names the file and, where there is one, the line and
+the column.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pvid.appearing import appearing
+from pvid.appearing import write_whole
 from pvid.array_table import read_npz, read_parquet, write_npz, write_parquet
 from pvid.csv_table import read_csv, write_csv, write_csv_gz
 from pvid.errors import PvidError
@@ -25,6 +26,7 @@ from pvid.run_clock import Uniform, uniform
 from pvid.run_columns import SIGNALS, Columns
 from pvid.run_gaps import bridge, stretches
 from pvid.run_table import Table, row_place
+from pvid.run_turns import joined
 from pvid.wording import reason
 
 FloatArray = npt.NDArray[np.float64]
@@ -32,6 +34,8 @@ Function = TypeVar("Function")
 
 # The shortest finite difference of order 4 takes 5 samples: fewer feed no form of the identifier.
 MIN_ROWS = 5
+
+_LARGEST = 1e12  # [rad] or [m]: counts of 40 bits
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +72,23 @@ class Run:
 
     def __len__(self) -> int:
         return int(self.t.size)
+
+    def refuse_damaged(self) -> None:
+        """Refuses numbers that no unit explains, and that overflow what is computed with them.
+
+        Raises
+        ------
+        PvidError
+            Naming the first.
+        """
+        for name in ("phi", "y"):
+            beyond = np.abs(getattr(self, name)) > _LARGEST
+            if beyond.any():
+                at = int(np.argmax(beyond))
+                raise PvidError(
+                    f"{name} is {getattr(self, name)[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: "
+                    "is the file damaged?"
+                )
 
     def whole(self) -> Run:
         """The longest stretch without a missing tick, for what cannot leave ticks out; this run when none is missing.
@@ -148,10 +169,7 @@ def write_run(path: str | os.PathLike[str], run: Run) -> None:
         raise PvidError(f"{path} is not written: {again.notes[0]}.")
     content = write(path, {name: getattr(run, name) for name in SIGNALS})
     try:
-        with appearing(path) as temporary, temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+        write_whole(path, content)
     except OSError as error:
         raise PvidError(f"{path} cannot be written: {reason(error)}.") from error
 
@@ -191,6 +209,11 @@ def _checked(table: Table) -> Table:
 
 
 def _run(table: Table, rate: float | None) -> Run:
+    phi, jumps = joined(table.phi)
+    if jumps:
+        name = table.columns["phi"].name
+        note = f"{name} jumps by a turn, {jumps} times: joined (the encoder starts over there)"
+        table = replace(table, phi=phi, notes=(*table.notes, note))
     clocked = uniform(table, rate)
     firsts, ends = bridge(clocked.phi, clocked.y, clocked.sample_rate)
     notes = (*clocked.notes, *_gap_notes(clocked, firsts, ends))

@@ -1,11 +1,13 @@
 """The command line: `./tools/pvid COMMAND`.
 
-Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage (one sentence), 3 nothing identified.
+Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, or output that cannot be written (one sentence),
+3 nothing identified, 130 interrupted, 141 the reader of the output has gone.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -21,12 +23,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from pvid import __version__, answer
+from pvid.appearing import write_whole
 from pvid.capture import Run, write_run
 from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
-from pvid.cli_input import columns_option, read_input, rig_options
+from pvid.cli_input import FigurePath, columns_option, print_notes, read_input, rig_options
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
 from pvid.compare import Comparison
-from pvid.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
+from pvid.console import BAD_INPUT, DIFFERENT, DONE, INTERRUPTED, NOTHING_IDENTIFIED, progress_bar, tell
 from pvid.ctables import bank_header
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
@@ -48,29 +51,42 @@ from pvid.rig_settings import rig_for, rig_path_of
 from pvid.rigfile import RigFile, load
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
+from pvid.sensor_steps import resolution_note, resolved
 from pvid.setup import weak_design_of
 from pvid.setup_q31 import config_for_run, strong_config_q31, weak_config_q31
+from pvid.streams import watch
 from pvid.strong_header_q31 import strong_header_q31
 from pvid.survey import fitted
 from pvid.weak_design import to_c_header
 from pvid.weak_header_q31 import to_c_header_q31
 from pvid.weak_sizing import SizesOfDesign, raised_bounds
+from pvid.wording import reason
 
 
 def main() -> None:
     """Runs a command and turns every refusal into one sentence and its exit code."""
+    watch()
+    os.environ.pop("MPLBACKEND", None)  # figures are files here, and matplotlib stumbles over a backend it lacks
     try:
         code = commands.main(prog_name="pvid", standalone_mode=False)
+        sys.stdout.flush()
     except click.exceptions.Abort:
-        messages.print("pvid: interrupted")
-        code = 130
+        tell("pvid: interrupted")
+        code = INTERRUPTED
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         help_hint = f" (see {context.command_path} --help)" if context is not None else ""
-        click.echo(f"pvid: {error.format_message()}{help_hint}", err=True)
+        tell(f"pvid: {error.format_message()}{help_hint}")
         code = BAD_INPUT
     except PvidError as error:
-        click.echo(f"pvid: {error}", err=True)
+        tell(f"pvid: {error}")
+        code = BAD_INPUT
+    except OSError as error:
+        tell(f"pvid: {'' if error.filename is None else f'{error.filename}: '}{reason(error)}")
+        code = BAD_INPUT
+    except MemoryError as error:
+        told = f" ({reason(error)})" if str(error) else ""
+        tell(f"pvid: there is not enough memory{told}: is a length, a rate or a count too large?")
         code = BAD_INPUT
     sys.exit(code if isinstance(code, int) else DONE)
 
@@ -89,7 +105,7 @@ for _command in (*LOG_COMMANDS, *CAMPAIGN_COMMANDS):
 
 
 @commands.command()
-@click.option("--figure", type=click.Path(path_type=Path), default=Path("pvid-demo.png"), help="Where the figure goes.")
+@click.option("--figure", type=FigurePath(), default=Path("pvid-demo.png"), help="Where the figure goes.")
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
 @click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
@@ -100,7 +116,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
 
     on = stage()
     if on.lacking is not None:
-        messages.print(f"{on.lacking}: the firmware runs on {on.where}")
+        tell(f"{on.lacking}: the firmware runs on {on.where}")
     simulation = simulate(sensors=standard_sensors(bits), truth=truth, seed=seed)  # type: ignore[arg-type]
     run = simulation.run
     standard = RigFile.standard()
@@ -112,7 +128,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     cores = ("f32", "q31") if form == "weak" else ("f32",)  # the strong form's twins take a solve a tick
     rigs = [replace(rig, identifier=replace(rig.identifier, core=core)) for core in cores]  # type: ignore[arg-type]
     start = standard_start(seed)
-    messages.print(
+    tell(
         f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
         f"start {', '.join(f'{100 * (s / p - 1):+.0f} %' for s, p in zip(start, simulation.p, strict=True))} off"
     )
@@ -155,7 +171,7 @@ def _print_result(result: Identification, rig: RigFile, truths: dict[str, float]
 
 def _print_warning(result: Identification) -> None:
     if result.warning is not None:
-        click.echo(f"pvid: warning: {result.warning}", err=True)
+        tell(f"pvid: warning: {result.warning}")
 
 
 def _print_comparison(comparison: Comparison, label: str = "C core against the numpy twin") -> None:
@@ -246,7 +262,7 @@ def simulate_command(**options: Any) -> int:
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())
-    messages.print(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
+    tell(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
     return DONE
 
 
@@ -277,7 +293,7 @@ def _with(rig: RigFile, **overrides: str | None) -> RigFile:
     "--on", "target", metavar="TARGET", help="An emulator, stream-host or a serial port: computed there, too."
 )
 @click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
-@click.option("--figure", type=click.Path(path_type=Path), help="Writes the convergence (png, svg, pdf).")
+@click.option("--figure", type=FigurePath(), help="Writes the convergence (png, svg, pdf).")
 def identify_command(
     run_path: Path,
     rig_path: Path | None,
@@ -300,8 +316,11 @@ def identify_command(
     """
     rig = _with(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
     run = read_input(run_path, rig, columns, whole=rig.identifier.core == "f64")
+    given, rig = rig, resolved(rig, run)
+    notes = resolution_note(given, rig)
+    print_notes(notes)
     native = Native()
-    result = _identified(run, rig, native)
+    result = _identified(replace(run, notes=(*run.notes, *notes)), rig, native)
     if target is not None:
         from pvid.stream_rig import played_samples, stream_rig
         from pvid.target import verify
@@ -309,9 +328,9 @@ def identify_command(
         image = stream_rig(fitted(rig, run), run.sample_rate, run)
         with progress_bar(f"streaming to {target}", len(run.t)) as advance:
             verdict = verify(target, image, native, *played_samples(rig, run), progress=advance)
-        messages.print(f"{target}: {verdict.playback.account}")
+        tell(f"{target}: {verdict.playback.account}")
         if not verdict.equal:
-            click.echo(f"pvid: {target}: {verdict.text}", err=True)
+            tell(f"pvid: {target}: {verdict.text}")
             return DIFFERENT
         result = replace(result, on=target)
     if as_json:
@@ -322,20 +341,20 @@ def identify_command(
         _write_figure(result, figure, None)
     _print_warning(result)
     if not result.identified:
-        click.echo(f"pvid: nothing identified: {result.verdict}", err=True)
+        tell(f"pvid: nothing identified: {result.verdict}")
     for sentence in result.advice:
-        click.echo(f"pvid: advice: {sentence}", err=True)
+        tell(f"pvid: advice: {sentence}")
     return DONE if result.identified else NOTHING_IDENTIFIED
 
 
 def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
-    """The answer with advice; a refusal has the advice behind its sentence."""
-    from pvid.advice import advice, advice_on_refusal
+    """The answer with advice; a refusal has the advice in front of its sentence."""
+    from pvid.advice import advice, advice_on_refusal, behind
 
     try:
         result = identify(run, rig, native)
     except PvidError as error:
-        raise PvidError("; ".join((str(error), *advice_on_refusal(run, rig, native)))) from error
+        raise behind(advice_on_refusal(run, rig, native), error) from error
     return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
 
 
@@ -406,13 +425,19 @@ def tune_command(
 
     rig = rig_for(run_path, rig_path, settings)
     run = read_input(run_path, rig, columns)
-    with progress_bar("tuning", STEPS) as advance:
-        tuned = tune(run, rig, Native(), advance)
+    native = Native()
+    try:
+        with progress_bar("tuning", STEPS) as advance:
+            tuned = tune(run, rig, native, advance)
+    except PvidError as error:
+        from pvid.advice import behind
+
+        raise behind(_identified(run, resolved(rig, run), native).advice, error) from error
     out = out or run_path.with_name(rig_path_of(run_path).stem + "-tuned.toml")
     tuned.rig.write(out)
     Console(width=None if sys.stdout.isatty() else 160).print(candidates_table(tuned))
-    if tuned.phi_lsb is not None:
-        click.echo(f"phi moves in steps of {tuned.phi_lsb:g} rad: taken as phi_lsb, which the rig file does not give")
+    for note in tuned.notes:
+        click.echo(note)
     drift = ", ".join(f"{one.forgetting_s:g} s {one.energy:.4g}" for one in tuned.forgetting if one.forgetting_s > 0)
     if drift:
         click.echo(f"residual of the next window with forgetting, over that without: {drift}")
@@ -475,12 +500,12 @@ def weak_table(rig_path: Path, name: str, check: Path | None, core: str, run_pat
         config = weak_config_q31(rig, rig.sample_rate) if run is None else config_for_run(rig, run)
         assert isinstance(config, WeakConfigQ31)  # by the form
         margins = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
-        messages.print(f"bits to spare at full scale: {margins}", highlight=False)
+        tell(f"bits to spare at full scale: {margins}")
         _print_raised(config.design)
         made_by = f"pvid weak-table --core q31 {shown} --name {name}"
         return _print_header(to_c_header_q31(config, rig.l1, name, made_by), check)
     tables = weak_design_of(rig, rig.sample_rate)
-    messages.print(
+    tell(
         f"taps {tables.taps}, decimation {tables.decimation}, windows of {tables.window} samples "
         f"({tables.window_s:g} s), {tables.functions} test functions; {tables.flash_bytes} bytes of flash; "
         f"{tables.update_rate_hz:.2f} answers a second"
@@ -493,7 +518,7 @@ def _print_raised(design: SizesOfDesign) -> None:
     """On standard error what pvid/config.h must be told, where a design exceeds its defaults."""
     raised = [f"-D{macro}={value}" for macro, value in raised_bounds(design).items()]
     if raised:
-        messages.print(f"build the core with {' '.join(raised)}", highlight=False)
+        tell(f"build the core with {' '.join(raised)}")
 
 
 @commands.command(name="strong-table")
@@ -511,7 +536,7 @@ def strong_table(rig_path: Path, name: str, check: Path | None) -> int:
         raise PvidError(f"{rig_path}: sample_rate is missing, and the formats hang on it")
     config = strong_config_q31(rig, rig.sample_rate)
     margins = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
-    messages.print(f"bits to spare at full scale: {margins}", highlight=False)
+    tell(f"bits to spare at full scale: {margins}")
     made_by = f"pvid strong-table --rig {rig_path.name} --name {name}"
     return _print_header(strong_header_q31(config, rig.l1, name, made_by), check)
 
@@ -606,8 +631,8 @@ def _update_readme(readme: Path | None, marker: str, text: str) -> None:
         raise PvidError(f"{readme} has no place for this table: the lines {opening} and {closing}")
     head, rest = old.split(opening, 1)
     tail = rest.split(closing, 1)[1]
-    readme.write_text(f"{head}{opening}\n{text}\n{closing}{tail}", encoding="utf-8")
-    messages.print(f"{readme}: table {marker} written")
+    write_whole(readme, f"{head}{opening}\n{text}\n{closing}{tail}")
+    tell(f"{readme}: table {marker} written")
 
 
 _UPDATE = click.option(
@@ -702,8 +727,8 @@ def bench_design_cost(update: bool) -> int:
         spreads = design_cost.measured_grid(advance)
     mean, longest = design_cost.fit(spreads) if update else weak_cost.coefficients()
     if update:
-        weak_cost.COEFFICIENTS_FILE.write_text(design_cost.as_toml(mean, longest), encoding="utf-8")
-        messages.print(f"{weak_cost.COEFFICIENTS_FILE.name} written")
+        write_whole(weak_cost.COEFFICIENTS_FILE, design_cost.as_toml(mean, longest))
+        tell(f"{weak_cost.COEFFICIENTS_FILE.name} written")
     click.echo(_markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
     return DONE
 
@@ -797,7 +822,7 @@ def bench_reading(update: Path | None) -> int:
 
 
 @bench.command(name="fuzz-link")
-@click.option("--runs", default=10_000_000, show_default=True)
+@click.option("--runs", default=10_000_000, show_default=True, type=click.IntRange(min=1))
 def bench_fuzz_link(runs: int) -> int:
     """The C side of the serial link under libFuzzer, with sanitizers (needs clang)."""
     from pvid.bench.fuzz import fuzz_link
@@ -820,7 +845,7 @@ def bench_fuzz_api(calls: int, seed: int) -> int:
 
 
 @bench.command(name="codec")
-@click.option("--frames", default=1_000_000, show_default=True)
+@click.option("--frames", default=1_000_000, show_default=True, type=click.IntRange(min=1))
 def bench_codec(frames: int) -> int:
     """Corrupted frames of every length against both decoders of the serial link."""
     from pvid.bench.codec import corrupt
@@ -835,7 +860,7 @@ def bench_codec(frames: int) -> int:
 
 
 @bench.command(name="log")
-@click.option("--frames", default=200_000, show_default=True)
+@click.option("--frames", default=200_000, show_default=True, type=click.IntRange(min=1000))
 def bench_log(frames: int) -> int:
     """Frames a minute of processor time through `pvid log`, losses, memory."""
     from pvid.bench.field import throughput
@@ -887,9 +912,34 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
     return DIFFERENT if faults or tally.faults else DONE
 
 
+@bench.command(name="attack")
+@click.option("--mutants", default=33_400, show_default=True, type=click.IntRange(min=1), help="Of each kind.")
+@click.option("--seed", default=1, show_default=True, help="Of the mutants.")
+@click.option("--only", type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again.")
+@click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
+@click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that broke something.")
+@_UPDATE
+def bench_attack(
+    mutants: int, seed: int, only: tuple[str, ...], processes: int, keep: Path | None, update: Path | None
+) -> int:
+    """Mutated rig files, runs and command lines against the command line: what breaks it."""
+    from pvid.bench.attack import HEADER, KINDS, campaign
+
+    kinds = only or KINDS
+    with progress_bar("mutants", mutants * len(kinds)) as advance:
+        tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve())
+    for tally in tallies:
+        for arguments, wrong, number in tally.defects:
+            tell(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
+    _update_readme(update, "attack", _markdown(HEADER, [tally.cells for tally in tallies]))
+    return DIFFERENT if any(tally.defects for tally in tallies) else DONE
+
+
 @bench.command(name="field-log")
 @click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
-@click.option("--samples", default=3_600_000, show_default=True, help="An hour at 1 kHz.")
+@click.option(
+    "--samples", default=3_600_000, show_default=True, type=click.IntRange(min=10_000), help="An hour at 1 kHz."
+)
 @click.option("--out", type=click.Path(path_type=Path), default=Path("field-log.pvlog"), show_default=True)
 def bench_field_log(target: str, samples: int, out: Path) -> int:
     """An hour in the field, shortened in time: the board killed twice, its line closed once, every segment verified."""
@@ -975,7 +1025,7 @@ def sizes_command(update: Path | None, budget: Path | None, check: Path | None, 
         sizes.write_budget(budget, footprints)
     excess = sizes.over_budget(check, footprints) if check is not None else []
     for sentence in excess:
-        click.echo(f"pvid: over budget: {sentence}", err=True)
+        tell(f"pvid: over budget: {sentence}")
     return DIFFERENT if excess else DONE
 
 

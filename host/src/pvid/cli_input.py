@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from pvid.capture import Run, read_run
+from pvid.console import tell
 from pvid.errors import PvidError
+from pvid.figure_file import format_of
 from pvid.logrig import LOG_SUFFIX, run_of_log
 from pvid.rigfile import RigFile
 from pvid.run_columns import Columns
-from pvid.skew import aligned
 
 Command = Callable[..., Any]
 
@@ -59,6 +61,19 @@ class ColumnsType(click.ParamType[Columns]):
         return value if isinstance(value, Columns) else Columns.parse(value)
 
 
+class FigurePath(click.Path):
+    """Name of a figure to write: its format is looked at before anything is computed."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """See click."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        format_of(path)
+        return path
+
+
 def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whole: bool = False) -> Run:
     """The run in a file or a log; prints what was done to it.
 
@@ -72,18 +87,21 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
     PvidError
         When it cannot be read.
     """
+    from pvid.skew import aligned  # SciPy, whose 40 MB a logger does without
+
     if path.suffix == LOG_SUFFIX:
         if columns is not None:
             raise PvidError(f"{path} is a log, whose columns are known: leave --columns out")
         return aligned(run_of_log(path), rig.sensor.y_delay)
     run = aligned(read_run(path, rig.sample_rate, columns), rig.sensor.y_delay)
+    run.refuse_damaged()
     if whole:
         run = run.whole()
-    print_notes(run)
+    print_notes(run.notes)
     return run
 
 
-def print_notes(run: Run) -> None:
+def print_notes(notes: Iterable[str]) -> None:
     """What was done to a run, on standard error."""
-    for note in run.notes:
-        click.echo(f"pvid: input: {note}", err=True)
+    for note in notes:
+        tell(f"pvid: input: {note}")

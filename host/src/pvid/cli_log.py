@@ -10,8 +10,8 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from pvid.cli_input import columns_option, print_notes, rig_options
-from pvid.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, messages, progress_bar
+from pvid.cli_input import FigurePath, columns_option, print_notes, rig_options
+from pvid.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, tell
 from pvid.errors import PvidError
 from pvid.link import Configuration, Source
 from pvid.livepage import DEFAULT as LIVE_PAGE
@@ -124,13 +124,13 @@ def log_command(
 def _view(title: str, l1: float | None, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
     if address and not is_local(address):
-        messages.print(f"whoever reaches this machine can look at {address}", highlight=False)
+        tell(f"whoever reaches this machine can look at {address}")
     console = Console()
     if sys.stdout.isatty() and not console.is_dumb_terminal:
         return LiveView(console, title, l1, address)
-    messages.print(f"{title}; Ctrl-C ends the recording", highlight=False)
+    tell(f"{title}; Ctrl-C ends the recording")
     if address:
-        messages.print(f"live page: {address}", highlight=False)
+        tell(f"live page: {address}")
     return StatusLine(sys.stderr)
 
 
@@ -168,7 +168,7 @@ def print_account(account: Account, allow_loss: float, failures: Sequence[str] =
     if wrong:
         return DIFFERENT
     if account.lost_share > allow_loss:
-        click.echo(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed", err=True)
+        tell(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed")
         return DIFFERENT
     return DONE
 
@@ -252,7 +252,7 @@ def export_command(log: Path, rig_path: Path | None, form: str, out: Path | None
 @click.argument("log", metavar="LOG|RUN", type=click.Path(path_type=Path))
 @rig_options
 @columns_option
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="png, svg or pdf.  [default: LOG with .png]")
+@click.option("-o", "--out", type=FigurePath(), help="png, svg or pdf.  [default: LOG with .png]")
 def plot_command(
     log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
 ) -> int:
@@ -263,7 +263,7 @@ def plot_command(
     from pvid.report import recording_of, write_report  # matplotlib and scipy, which others need not wait for
 
     recording = recording_of(log, rig_for(log, rig_path, settings), columns)
-    print_notes(recording.run)
+    print_notes(recording.run.notes)
     out = out or log.with_suffix(".png")
     write_report(recording, out)
     click.echo(out)

@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from pvid.wording import printable
+
 DONE, DIFFERENT, BAD_INPUT, NOTHING_IDENTIFIED = 0, 1, 2, 3
+INTERRUPTED = 130
 
 messages = Console(stderr=True)
+
+
+def tell(sentence: str) -> None:
+    """A line on standard error; the names in it are taken as they are."""
+    click.echo(printable(sentence), err=True)
 
 
 @contextmanager

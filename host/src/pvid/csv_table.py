@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from pvid.errors import PvidError
 from pvid.run_columns import SIGNALS, Columns
+from pvid.run_size import refuse_beyond
 from pvid.run_table import Table
 from pvid.wording import reason, shown
 
@@ -100,6 +101,7 @@ def read_csv(path: Path, columns: Columns) -> Table:
             tail = [text for _, text in _data_lines(block[-64 * _TAIL :], 1)][1:]
         for signal, values in _numbers(path, block, line, layout, places).items():
             signals[signal].extend(columns[signal].in_si(values))
+        refuse_beyond(path, signals["t"].size)
     if layout is None:
         raise PvidError(f"{path} is empty.")
     t, phi, y = (one.values for one in signals.values())
@@ -281,6 +283,11 @@ class _Growing:
     def __init__(self) -> None:
         self._buffer = np.empty(1 << 17)
         self._size = 0
+
+    @property
+    def size(self) -> int:
+        """How many there are."""
+        return self._size
 
     @property
     def values(self) -> FloatArray:

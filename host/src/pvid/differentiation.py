@@ -27,6 +27,7 @@ Kind = Literal["finite-difference", "savitzky-golay"]
 
 ORDERS = 5
 MAX_DEGREE = 12
+LONGEST_WINDOW = 8191  # samples: what PVID_MAX_WINDOW can be raised to
 
 
 class Folded:
@@ -107,6 +108,7 @@ def finite_difference(stride: int = 1) -> FirBank:
     the centre sample itself. Exact on polynomials of degree 4.
     """
     _require_stride(stride)
+    _require_window(5, stride)
     weights = np.array(
         [
             [0.0, 0.0],
@@ -141,6 +143,7 @@ def savitzky_golay(window: int, degree: int, stride: int = 1) -> FirBank:
         raise PvidError(f"a Savitzky-Golay polynomial must have degree 4 to {MAX_DEGREE}, not {degree}")
     if window % 2 == 0 or window <= degree:
         raise PvidError(f"a Savitzky-Golay window must be odd and above the degree {degree}, not {window} points")
+    _require_window(window, stride)
     half = (window - 1) // 2
     weights = np.empty((ORDERS, half))
     for parity in (0, 1):
@@ -168,3 +171,12 @@ def _legendre_derivative(degree: int, order: int) -> float:
 def _require_stride(stride: int) -> None:
     if stride < 1:
         raise PvidError(f"the stride of a differentiator must be 1 sample or more, not {stride}")
+
+
+def _require_window(points: int, stride: int) -> None:
+    samples = (points - 1) * stride + 1
+    if samples > LONGEST_WINDOW:
+        raise PvidError(
+            f"a differentiator of {points} points, {stride} samples apart, spans {samples} samples, and no core takes "
+            f"more than {LONGEST_WINDOW}"
+        )

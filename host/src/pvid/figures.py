@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.axis_limits import interesting
-from pvid.errors import PvidError
+from pvid.figure_file import save
 from pvid.identify import PHYSICAL, UNITS, Identification
 
 Float = npt.NDArray[np.float64]
@@ -29,7 +29,12 @@ LABELS = {
 def convergence(result: Identification, path: Path, *, truth: dict[str, float] | None = None, title: str = "") -> None:
     """Writes the estimates of g*, l2 and rho2 over time with a +-2 s.e. band; the truth as a line if known.
 
-    The format follows the suffix of `path` (png, svg, pdf). Raises PvidError when it cannot be written.
+    The format follows the suffix of `path` (png, svg, pdf).
+
+    Raises
+    ------
+    PvidError
+        When it cannot be written.
     """
     trajectory = result.trajectory
     figure, axes = plt.subplots(3, 1, sharex=True, figsize=(8, 8), layout="constrained")
@@ -52,8 +57,6 @@ def convergence(result: Identification, path: Path, *, truth: dict[str, float] |
     axes[-1].set_xlim(trajectory.t[0], trajectory.t[-1])
     figure.suptitle(title or f"{result.form} form, {result.law} law, core {result.core} on {result.on}")
     try:
-        figure.savefig(path, dpi=130)
-    except (OSError, ValueError) as error:
-        raise PvidError(f"cannot write the figure {path}: {error}") from error
+        save(figure, path, dpi=130)
     finally:
         plt.close(figure)

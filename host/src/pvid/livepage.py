@@ -21,6 +21,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pvid.errors import PvidError
+from pvid.hosts import addresses
+from pvid.wording import reason
 
 DEFAULT = "127.0.0.1:8765"
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
@@ -47,11 +49,12 @@ def listen(at: str) -> tuple[socket.socket, str]:
     if match is None or int(match[2]) > 65535:
         raise PvidError(f"--web takes HOST:PORT, as in {DEFAULT}, and {at!r} is none")
     host, port = match[1].strip("[]"), int(match[2])
+    refused = f"cannot serve the live page at {at}"
+    family, address = addresses(host, port, socket.SOCK_STREAM, refused)[0]
     try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         listening = socket.create_server(address[:2], family=family)
     except OSError as error:
-        raise PvidError(f"cannot serve the live page at {at}: {error.strerror or error}") from error
+        raise PvidError(f"{refused}: {reason(error)}") from error
     shown = f"[{host}]" if ":" in host else host
     return listening, f"http://{shown}:{listening.getsockname()[1]}/"
 

@@ -15,6 +15,8 @@ comes: the status line, the tee, a live view.
 
 from __future__ import annotations
 
+import os
+import stat
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -29,6 +31,7 @@ from pvid.link import (
     SCHEMA,
     Configure,
     ConfigureQ31,
+    Credit,
     Decoder,
     Described,
     Frame,
@@ -37,6 +40,7 @@ from pvid.link import (
     Message,
     Raw,
     RawCount,
+    Status,
     readers,
 )
 from pvid.logfile import LOG_MESSAGES, LOG_SCHEMA, MAX_RIG, Close, LinkSchema, Mark, Rig, Segment
@@ -308,11 +312,12 @@ class LogStream:
         if account.segments:
             account.segments[-1].frames += 1
         named = getattr(message, "session", 0)
-        if began:
+        waits = named == 0 and isinstance(message, Hello | Status | Credit)  # for a configuration: it has just started
+        if self._next_tick is not None and (waits or (named != 0 and self._session not in (0, named))):
+            began = True
+        if began or waits:
             self._ticks.begin()
             self._session = 0
-        elif self._next_tick is not None and named != 0 and self._session not in (0, named):
-            began = True
         tick = self._ticks.of(frame.tick, named)
         self._session = named or self._session
         if isinstance(message, Configure | ConfigureQ31):
@@ -397,6 +402,8 @@ class LogReader:
         stream = self._stream = LogStream()
         try:
             with self.path.open("rb") as file:
+                if stat.S_ISCHR(os.fstat(file.fileno()).st_mode):  # some never end
+                    raise PvidError(f"{self.path} is a device and no log")
                 while data := file.read(_CHUNK):
                     yield from stream.feed(data)
         except OSError as error:

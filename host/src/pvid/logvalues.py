@@ -124,6 +124,7 @@ class Values:
         self._latest = 0
         self._runs = 0
         self._segment = -1
+        self._session: int | None = None  # None: not named in this segment
 
     @property
     def sample_rate(self) -> float:
@@ -135,7 +136,11 @@ class Values:
         """Those of one record: none or one table's."""
         item = record.item
         if record.segment != self._segment or isinstance(item, Restart):
-            self._segment, self._anchor = record.segment, None
+            self._segment, self._session, self._anchor = record.segment, None, None
+        if isinstance(item, Hello | Status) and item.session != self._session:
+            if self._session is not None:  # it was configured: its ticks count from elsewhere
+                self._anchor = None
+            self._session = item.session
         match item:
             case Hello():
                 self._hello = item
@@ -191,7 +196,7 @@ class Values:
             self._anchor = (int(ticks[0]), max(record.unix_ns, self._latest))
         first, began = self._anchor
         rate = self.sample_rate
-        passed = np.zeros(len(ticks)) if math.isnan(rate) else np.minimum((ticks - first) / rate, _LONGEST_S)
+        passed = np.zeros(len(ticks)) if math.isnan(rate) else np.clip((ticks - first) / rate, -_LONGEST_S, _LONGEST_S)
         log_time = np.maximum(began + np.rint(1e9 * passed).astype(np.int64), self._latest)
         self._latest = int(log_time[-1])
         return log_time

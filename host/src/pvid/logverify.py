@@ -243,7 +243,7 @@ class Verifier:
 
     def _take_check(self, tick: int, check: Check) -> None:
         opened = self._open
-        if opened is None or opened.late or not opened.is_of(check.session):
+        if opened is None or opened.late or check.session == 0 or not opened.is_of(check.session):
             return
         if tick > opened.next:  # of samples that were lost
             opened.harmed = True

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import termios
 from typing import Any, Protocol
 
 import serial
 from serial.urlhandler import protocol_socket
 
 from pvid.errors import PvidError
+from pvid.wording import reason
 
 BAUD = 115200
 _READ_S = 0.02
@@ -52,7 +52,7 @@ def open_port(name: str) -> Port:
             port.rts = False
         port.open()
         opened: Port = port
-    except (serial.SerialException, OSError, ValueError, termios.error) as error:
+    except Exception as error:  # the classes that pyserial loads for URLs let through whatever their text provokes
         raise PvidError(why_not_opened(name, error)) from error
     return opened
 
@@ -72,7 +72,7 @@ def why_not_opened(name: str, error: Exception) -> str:
         return words[number]
     if number in (errno.ENOTTY, errno.EISDIR):
         return f"{name} is no serial port"
-    return f"cannot open the port {name}: {error}"
+    return f"cannot open the port {name}: {reason(error)}"
 
 
 def why_gone(error: Exception) -> str:

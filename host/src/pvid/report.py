@@ -20,11 +20,11 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from scipy.signal import savgol_filter, welch
 
-from pvid.advice import advice
-from pvid.appearing import appearing
+from pvid.advice import advice, advice_on_refusal, behind
 from pvid.axis_limits import interesting
 from pvid.capture import Run, is_run, read_run
 from pvid.errors import PvidError
+from pvid.figure_file import drawable, save
 from pvid.figures import LABELS
 from pvid.identify import LINEAR, PHYSICAL, ZERO, identify
 from pvid.link import Estimate, Form, Hello
@@ -39,6 +39,7 @@ from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
+from pvid.sensor_steps import resolution_note, resolved
 from pvid.simulated_angle import simulated_angle
 from pvid.survey import fitted
 
@@ -164,10 +165,15 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
 
 
 def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
+    run.refuse_damaged()
     native = Native()
+    run = replace(run, notes=(*run.notes, *resolution_note(rig, resolved(rig, run))))
     whole = run.whole()  # residuals and spectra have no place for a missing sample
     given = whole if rig.identifier.core == "f64" else run
-    result = identify(given, rig, native)
+    try:
+        result = identify(given, rig, native)
+    except PvidError as error:
+        raise behind(advice_on_refusal(given, rig, native), error) from error
     names = [name for name in (*LINEAR, ZERO) if name in result.value]
     advices = tuple(f"advice: {sentence}" for sentence in advice(given, rig, result, native))
     return Recording(
@@ -222,14 +228,9 @@ def write_report(recording: Recording, path: Path) -> None:
         figure.align_ylabels([axes["angle"], axes["difference"], *left])
         figure.align_ylabels(right)
         lines = [recording.title, *_last(recording), recording.account]
-        folded = [part for line in lines for part in textwrap.wrap(line, _LINE) or [""]]
-        figure.suptitle("\n".join(folded), fontsize=12)
-        with appearing(path) as temporary:
-            figure.savefig(temporary, dpi=110, format=path.suffix[1:] or "png")
-    except OSError as error:
-        raise PvidError(f"cannot write the report {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise PvidError(f"cannot write the report {path}: {error}") from error
+        folded = [part for line in lines for part in textwrap.wrap(drawable(line), _LINE) or [""]]
+        figure.suptitle("\n".join(folded), fontsize=12, parse_math=False)
+        save(figure, path, dpi=110)
     finally:
         plt.close(figure)
 
@@ -387,12 +388,9 @@ def _spectra(recording: Recording, axis: Axes) -> None:
 
 def _amplitude(axis: Axes, frequency: Float, x: Float, color: str, label: str) -> list[Line2D]:
     """Over a logarithmic scale with room for the legend; of a signal that stands still there is none."""
-    there = np.where(x > 0, x, np.nan)
-    lines = axis.plot(frequency, there, color=color, label=label)
-    if np.isfinite(there).any():
-        axis.set_yscale("log")
-        low, high = axis.get_ylim()
-        axis.set_ylim(low, high * (high / low) ** 0.35)
+    lines = axis.semilogy(frequency, np.where(x > 0, x, np.nan), color=color, label=label)
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high * (high / low) ** 0.35)
     return lines
 
 

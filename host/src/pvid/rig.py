@@ -30,6 +30,11 @@ _ATOL = 1e-14
 _MAX_EVALUATIONS_PER_S = 50_000
 _MAX_EVALUATIONS_PER_PERIOD = 2_000
 _RUNAWAY = "The simulated motion grows without bound or turns too fast: choose a weaker drive or other tones."
+# Those of a rig file. The mass matrix loses its digits with the square of rho2/l2.
+_LEAST_M, _MOST_M = 1e-6, 1e6
+_MOST_GRAVITY = 1e3
+_LEAST_RATIO = 1e-5
+
 _MAX_SAMPLES = 10_000_000  # 10 hours at 278 Hz; beyond, the request is a slip of units
 
 
@@ -351,6 +356,7 @@ def simulate(
         drive = Drive(tuple(drive))
     if sensors is None:
         sensors = standard_sensors()
+    check_lengths(pendulum)
     _check_request(drive, sample_rate, duration, release, truth, seed)
     state, exact = _truth(
         pendulum, drive, float(sample_rate), float(duration), (float(release[0]), float(release[1])), truth
@@ -360,6 +366,27 @@ def simulate(
     phi_measured, y_measured = sensors.measure(state[:, 1] - state[:, 0], y, seed)
     run = Run(t=t, phi=phi_measured, y=y_measured, sample_rate=float(sample_rate))
     return Simulation(run=run, pendulum=pendulum, p=pendulum.linear, state=state, exact=exact)
+
+
+def check_lengths(pendulum: Pendulum) -> None:
+    """Refuses a pendulum whose equations of motion float64 cannot solve.
+
+    Raises
+    ------
+    PvidError
+        Naming the length.
+    """
+    for name in ("l1", "l2", "rho2"):
+        length = getattr(pendulum, name)
+        if not _LEAST_M <= length <= _MOST_M:
+            raise PvidError(f"The pendulum's {name} must be from {_LEAST_M:g} to {_MOST_M:g} m, not {length:g}.")
+    if pendulum.g > _MOST_GRAVITY:
+        raise PvidError(f"The pendulum's g must be up to {_MOST_GRAVITY:g} m/s^2, not {pendulum.g:g}.")
+    if pendulum.rho2 < _LEAST_RATIO * pendulum.l2:
+        raise PvidError(
+            f"The pendulum's rho2 of {pendulum.rho2:g} m is less than {_LEAST_RATIO:g} of its l2 of {pendulum.l2:g} m: "
+            f"body 2 would be a point, and its rotation cannot be computed."
+        )
 
 
 def _check_request(
@@ -423,8 +450,10 @@ def _truth(
             # No step may leap over a ramp unseen.
             max_step=math.inf if drive.on == _ALWAYS else drive.ramp_s / 2,
         )
+    if not solution.success:  # its y may be an empty list then
+        raise PvidError(_RUNAWAY)
     state = np.ascontiguousarray(solution.y.T)
-    if not solution.success or not np.isfinite(state).all():
+    if not np.isfinite(state).all():
         raise PvidError(_RUNAWAY)
     state.setflags(write=False)
     if truth == "full":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from pvid.capture import is_run
 from pvid.errors import PvidError
 from pvid.logrig import rig_of_log
 from pvid.rigfile import RigFile, check_setting, load
+from pvid.toml_text import toml_document
 from pvid.wording import shown
 
 
@@ -69,8 +69,8 @@ def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
         if not equals or not key or not text:
             raise PvidError(f"--set {shown(setting)} is not KEY=VALUE, as in --set l1=0.25")
         try:
-            value = tomllib.loads(f"value = {text}")["value"]
-        except ValueError:
+            value = toml_document(f"value = {text}")["value"]
+        except PvidError:
             value = text
         table, dot, name = key.rpartition(".")
         try:

@@ -16,13 +16,14 @@ becomes a PvidError that names it.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
+from pvid.appearing import write_whole
 from pvid.errors import PvidError
+from pvid.toml_text import MOST_BYTES, TOO_LONG, toml_document
 
 _Parsed = TypeVar("_Parsed")
 
@@ -40,6 +41,10 @@ _GATE: dict[Form, float] = {"weak": 4.0, "strong": 6.0}
 # Until it believes in a change [time constants of forgetting]: windows of a changed mechanism pass no sooner; of its
 # rows enough do wherever their residuals cross zero.
 _PATIENCE: dict[Form, float] = {"weak": 3.0, "strong": 6.0}
+
+
+# What is no zero but smaller is a slip, and what is divided by it overflows.
+_LEAST = 1e-12
 
 
 class Unset(float):
@@ -230,15 +235,7 @@ class RigFile:
         settings
             Keys and tables that come before those of the text.
         """
-        try:
-            document = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise PvidError(f"is not TOML: {error}") from error
-        except ValueError as error:  # an integer of more digits than Python reads
-            raise PvidError("is not a rig file: a number in it has thousands of digits") from error
-        except RecursionError as error:
-            raise PvidError("is not a rig file: its tables are nested too deeply") from error
-        top = _known(cls, _merged(document, settings or {}), "")
+        top = _known(cls, _merged(toml_document(text), settings or {}), "")
         if "l1" not in top:
             raise PvidError("l1 is missing: the length of rod 1 [m]")
         tables = {name: _table(top.pop(name, {}), name) for name in _TABLES}
@@ -263,7 +260,7 @@ class RigFile:
     def write(self, path: str | Path) -> None:
         """Writes `text` to a file."""
         try:
-            Path(path).write_text(self.text(), encoding="utf-8")
+            write_whole(Path(path), self.text())
         except OSError as error:
             raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
 
@@ -276,9 +273,14 @@ def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile
 def parsed_file(path: str | Path, parse: Callable[[str], _Parsed]) -> _Parsed:
     """What `parse` makes of a file's text; PvidError names the file, and what `parse` names."""
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        with Path(path).open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
     except OSError as error:
         raise PvidError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(data) > MOST_BYTES:
+        raise PvidError(f"{path}: {TOO_LONG}")
+    try:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except ValueError as error:
         raise PvidError(f"{path}: is not UTF-8 text") from error
     try:
@@ -384,8 +386,9 @@ def _check_value(key: Field[Any], value: Any, place: str) -> None:
         kind = "a whole number" if wanted is int else "a number"
         raise PvidError(f"{name} must be {kind}, not {_shown(value)}")
     low, high, unit = key.metadata["low"], key.metadata["high"], key.metadata["unit"]
-    if not low <= value <= high:
-        wide = f"from {low:g} to {high:g} {unit}".rstrip()
+    if not low <= value <= high or (low == 0 and 0 < value < _LEAST):
+        wide = f"0 or from {_LEAST:g}" if low <= value <= high else f"from {low:g}"
+        wide = f"{wide} to {high:g} {unit}".rstrip()
         raise PvidError(f"{name} must be {wide}, not {_shown(value)}")
 
 

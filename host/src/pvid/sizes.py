@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from pvid.appearing import write_whole
 from pvid.boards import BOARDS, Board
 from pvid.errors import PvidError
 from pvid.replay_image import ReplayReport, build_image, play, standard_run
@@ -163,9 +164,7 @@ def write_budget(path: Path, footprints: dict[Configuration, Footprint]) -> None
     if OPENING not in old or CLOSING not in old:
         raise PvidError(f"{path} has no place for the budget: the lines {OPENING} and {CLOSING}")
     head, rest = old.split(OPENING, 1)
-    path.write_text(
-        f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}", encoding="utf-8"
-    )
+    write_whole(path, f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}")
 
 
 def over_budget(path: Path, footprints: dict[Configuration, Footprint]) -> list[str]:

@@ -24,6 +24,7 @@ from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.rigfile import Nominal, RigFile
 from pvid.run_rows import FEWEST, Fit, RunRows
+from pvid.sensor_steps import resolved
 from pvid.setup import nominal_start, weak_design_of
 from pvid.weak_sizing import pass_hz_of, window_for_run
 
@@ -74,14 +75,20 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     """The rig file with the run's survey as its nominal pendulum, the disturbance found, and a window that the run
     holds often enough.
 
-    Unchanged where the rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the
-    survey finds no pendulum the guess stays.
+    The encoder's resolution is what the run shows where the rig file does not give it. All else is unchanged where the
+    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds no
+    pendulum the guess stays.
     """
+    rig = resolved(rig, run)
     if rig.identifier.form != "weak" or not rig.identifier.survey:
         return rig
     found = survey(rig, run)
     if found is not None:
-        rig = with_nominal(rig, found.p)
+        try:
+            rig = with_nominal(rig, found.p)
+        except PvidError:  # a length that no rig has
+            found = None
+    if found is not None:
         own = rig.identifier
         own = replace(
             own,
@@ -92,6 +99,7 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     return sized_for(replace(rig, identifier=replace(rig.identifier, survey=False)), run)
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
 def survey(rig: RigFile, run: Run) -> Survey | None:
     """Searches a run for p; None where no start leads to a pendulum."""
     if not np.isfinite(run.phi).any():
@@ -120,6 +128,8 @@ def survey(rig: RigFile, run: Run) -> Survey | None:
     if ratio > 0:
         fit = rows.fitted(fit.p, ratio)
     density = ratio * rows.row_sd * math.sqrt(rows.design.dt)
+    if not (is_pendulum(fit.p[:4]) and math.isfinite(fit.chi2) and math.isfinite(density)):
+        return None
     return Survey(fit.p[:4], fit.chi2, density, agreeing, tried)
 
 
@@ -173,7 +183,7 @@ def _search(rig: RigFile, run: Run) -> tuple[RigFile, Fit] | None:
     for _ in range(_RENEWALS):
         at = sized_for(rig, run)
         fit = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).fitted(p)
-        if not is_pendulum(fit.p):
+        if not is_pendulum(fit.p) or not math.isfinite(fit.chi2):
             return None
         moved, p = _apart(fit.p, p), fit.p
         if moved < _MOVED:

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 from pvid.errors import PvidError
+from pvid.hosts import addresses
 from pvid.link import Loss
 from pvid.logreader import Account, Record
 from pvid.logvalues import TABLES, Rows, Values
@@ -46,21 +47,18 @@ class Tee:
     """
 
     def __init__(self, address: str, l1: float | None = None) -> None:
-        parts = urlsplit(address)
         try:
-            host, port = parts.hostname, parts.port
+            parts = urlsplit(address)
+            scheme, host, port = parts.scheme, parts.hostname, parts.port
         except ValueError:
-            host, port = None, None
-        if parts.scheme not in ("udp", "teleplot") or not host or not port:
+            scheme, host, port = "", None, None
+        if scheme not in ("udp", "teleplot") or not host or not port:
             raise PvidError(f"{address!r} is no address to send to: udp://host:port or teleplot://host:port")
-        try:
-            found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        except OSError as error:
-            raise PvidError(f"cannot send to {address}: {error.strerror}") from error
-        self._datagrams = _teleplot if parts.scheme == "teleplot" else _json
+        found = addresses(host, port, socket.SOCK_DGRAM, f"cannot send to {address}")[0]
+        self._datagrams = _teleplot if scheme == "teleplot" else _json
         self._values = Values(l1)
         self._socket = socket.socket(found[0], socket.SOCK_DGRAM)
-        self._to = found[4]
+        self._to = found[1]
 
     def take(self, record: Record, account: Account) -> None:
         """See logreader.Observer."""

@@ -705,8 +705,22 @@ def predict(
     Raises
     ------
     PvidError
-        When the run does not fill a window, or says nothing of w.
+        When the run does not fill a window, or says nothing of w, or its numbers are beyond those of float64.
     """
+    beyond = "nothing can be predicted: lengths, drive or resolutions are too far apart for numbers of 64 bits"
+    try:
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # judged by what comes of it
+            found = _predicted(phi, y, design, p, sensors, forgetting_s)
+    except np.linalg.LinAlgError as error:
+        raise PvidError(beyond) from error
+    if not (np.isfinite(found.covariance).all() and (found.se > 0).all() and 0 < found.row_sd < math.inf):
+        raise PvidError(beyond)
+    return found
+
+
+def _predicted(
+    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors, forgetting_s: float
+) -> Prediction:
     smooth, u = front_end(phi, y, design)
     phi_frames, u_frames = frames(smooth, design), frames(u, design)
     oracle = WeakOracle(design, WeakSettings(np.asarray(p, np.float64), row_sd=1.0, forgetting_s=forgetting_s))

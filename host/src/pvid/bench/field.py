@@ -77,7 +77,8 @@ def throughput(count: int) -> Throughput:
         )
         try:
             quarter = count * len(encode_raw(Raw.TYPE, 0, 0, bytes(8 * _SAMPLES_A_FRAME))) // 4
-            while logger.poll() is None and (not log.exists() or log.stat().st_size < quarter):
+            ended = os.WEXITED | os.WNOHANG | os.WNOWAIT  # how it ended is asked below, with what it used
+            while os.waitid(os.P_PID, logger.pid, ended) is None and (not log.exists() or log.stat().st_size < quarter):
                 time.sleep(0.01)
             early = late = _resident_kb(logger.pid)
             while True:

@@ -1,7 +1,8 @@
 """The lying board against everything that reads it: `pvid log` and its views, and every command that takes a log.
 
 `rehearse` plays a behaviour within this process, in a fraction of a second; `perform` plays it over a socket to the
-program, with its floods, and runs every command on the log. Both return what went wrong, a sentence each.
+program, with its floods. Both then run commands on the log, within this process, and return what went wrong, a sentence
+each.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
         if code not in behaviour.log:
             faults.append(f"log: exit code {code} in place of {behaviour.log[-1]}: {account.text}")
         for command in commands:
-            faults += _invoked(command, log, folder)
+            faults += _invoked(command, log, folder)[1]
     faults += [f"{len(account.segments)} segments"] if account.begun > 9 else []
     faults += _unreadable(behaviour, log)
     for text in (screen, line, said):
@@ -136,19 +137,24 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
     return faults
 
 
-def _invoked(command: str, log: Path, folder: Path) -> list[str]:
-    """A command of the program in this process."""
+def _invoked(command: str, log: Path, folder: Path) -> tuple[int | None, list[str]]:
+    """A command of the program in this process: its exit code, and what went wrong; a warning is an error here."""
     from pvid.cli import commands as program
 
-    try:
-        code = program.main(_arguments(command, log, folder), prog_name="pvid", standalone_mode=False)
-    except PvidError as error:
-        code, text = 2, str(error)
-        if not text.isprintable():
-            return [f"{command}: a sentence that does not print: {text!r}"]
-    except Exception:
-        return [f"{command}: {traceback.format_exc()}"]
-    return [] if code in _codes(command) else [f"{command}: exit code {code}"]
+    said = io.StringIO()
+    with warnings.catch_warnings(), redirect_stdout(said), redirect_stderr(said):
+        warnings.simplefilter("error")
+        try:
+            code = program.main(_arguments(command, log, folder), prog_name="pvid", standalone_mode=False)
+        except PvidError as error:
+            code = 2
+            said.write(str(error))
+        except Exception:
+            return None, [f"{command}: {traceback.format_exc()}"]
+    faults = [] if code in _codes(command) else [f"{command}: exit code {code}"]
+    if unprintable := [line for line in said.getvalue().split("\n") if not line.isprintable()]:
+        faults.append(f"{command}: {unprintable[0]!r}")
+    return code, faults
 
 
 def _arguments(command: str, log: Path, folder: Path) -> list[str]:
@@ -223,7 +229,7 @@ HEADER = (
     "late, s",
     "defects",
 )
-DURATION_S = 4.0
+DURATION_S = 3.0
 MOST_KB = 150 * 1024
 LATEST_S = 8.0
 _READ_WHOLE = 12_000_000  # bytes of a log that the other commands read in reasonable time
@@ -275,30 +281,13 @@ def perform(behaviour: Behaviour, folder: Path) -> Performance:
         done.faults.append(f"log: ends {done.late_s:.0f} s late")
     if done.log_bytes <= _READ_WHOLE:
         for one in COMMANDS:
-            _run(done, one, log, folder)
+            done.codes[one], faults = _invoked(one, log, folder)
+            done.faults += faults
     done.faults += _unreadable(behaviour, log)
     return done
 
 
 _PROGRAM = (sys.executable, "-P", "-m", "pvid")
-
-
-def _run(done: Performance, command: str, log: Path, folder: Path) -> None:
-    try:
-        ended = subprocess.run(
-            [*_PROGRAM, *_arguments(command, log, folder)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            cwd=folder,
-            timeout=300,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        done.faults.append(f"{command} does not end")
-        return
-    _note(done, command, ended.returncode, ended.stdout)
-    if ended.returncode not in _codes(command):
-        done.faults.append(f"{command}: exit code {ended.returncode}")
 
 
 def _note(done: Performance, command: str, code: int, said: bytes) -> None:

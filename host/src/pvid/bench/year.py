@@ -19,6 +19,7 @@ from pvid.errors import PvidError
 from pvid.export import FORMATS, export_log
 from pvid.link import Configuration, Raw, RawCount, Source
 from pvid.livestate import LiveState
+from pvid.logfile import Segment
 from pvid.logger import EmulatorSource, Logger
 from pvid.logreader import Account, LogReader
 from pvid.logvalues import Rows, Values
@@ -30,6 +31,7 @@ from pvid.stream_rig import stream_rig
 from pvid.target import HOST_TARGET, open_target
 
 TURN = 1 << 32
+_SOON_NS = 600 * 10**9  # from the link's coming up to the first sample
 YEAR_S = 365.25 * 86_400
 
 
@@ -106,6 +108,7 @@ def emulated_year(
         faults.append(verdict.text)
     if reader.account.missing_samples or reader.account.restarts:
         faults.append(reader.account.text)
+    faults += _faults_of_board(log)
     faults += _faults_of_times(log, rig)
     faults += _faults_of_exports(log, rig)
     faults += _faults_of_page(log)
@@ -132,6 +135,20 @@ def _samples(log: Path, rig: RigFile) -> Iterator[Rows]:
                 yield rows
 
 
+def _faults_of_board(log: Path) -> Iterator[str]:
+    """Of the firmware: the upper bits of the tick in every frame, also of samples on both sides of a passage."""
+    for record in LogReader(log):
+        high = getattr(record.item, "tick_high", None)
+        if high is not None and high != record.tick // TURN:
+            yield f"a frame of tick {record.tick} has the upper bits {high}"
+
+
+def _began(log: Path, number: int) -> int:
+    """Unix time of a segment [ns]."""
+    found = (record for record in LogReader(log) if isinstance(record.item, Segment))
+    return next(record.unix_ns for record in found if record.segment == number)
+
+
 def _faults_of_times(log: Path, rig: RigFile) -> Iterator[str]:
     """Of the columns that exports, views and tee share: a step of a tick in t and in log_time, within a segment."""
     assert rig.sample_rate is not None
@@ -146,6 +163,8 @@ def _faults_of_times(log: Path, rig: RigFile) -> Iterator[str]:
             if np.any(np.abs(np.diff(column) - step) > 0.01 * step):
                 yield f"{name} does not go on by a tick at tick {columns['tick'][0]}"
             latest[name] = columns[name][-1]
+        if not same and abs(int(columns["log_time"][0]) - _began(log, int(columns["segment"][0]))) > _SOON_NS:
+            yield f"log_time of segment {columns['segment'][0]} begins at {columns['log_time'][0]}"
         latest["segment"] = columns["segment"][-1]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import resources
@@ -18,6 +17,7 @@ from pvid.campaign.pivot import KINDS, PivotMotion, draw_motion
 from pvid.errors import PvidError
 from pvid.rig import Pendulum
 from pvid.rigfile import parsed_file
+from pvid.toml_text import toml_document
 
 # Ranges [low, high], and how a number is drawn: log-uniform or uniform; of either sign where "sign" stands beside it.
 _RANGES: dict[str, tuple[str, ...]] = {
@@ -262,10 +262,7 @@ def load(path: str | Path) -> Population:
 
 def parse(text: str) -> Population:
     """From TOML text: tables [base] and [conditions.NAME]. Base keys that are missing are those of `shipped`."""
-    try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
-        raise PvidError(f"is not TOML: {error}") from error
+    document = toml_document(text)
     for key in document:
         if key not in ("base", "conditions"):
             raise PvidError(f"{key!a} is not a key of a population; here are known [base] and [conditions.NAME]")
