@@ -21,6 +21,7 @@ from pvid.identify import Identification, identify
 from pvid.native import Native, Reason
 from pvid.rig import STANDARD_DRIVE, Pendulum, Tone, simulate, standard_sensors
 from pvid.rigfile import Nominal, RigFile
+from pvid.sensor_steps import resolved
 
 LSB = 2 * np.pi / 2**12
 RIG = RigFile.parse(f"l1 = 0.25\n[sensor]\nphi_lsb = {LSB!r}\n")
@@ -165,6 +166,12 @@ MISTAKES = {
         "--set identifier.damping=true",
         lambda run, rig: (run, with_identifier(damping=True)),
     ),
+    "linear equations": Mistake(  # which an emulated board's sensor has
+        lambda: (run_of(truth="linear"), RIG),
+        "the run follows the equations of small angles",
+        "--set identifier.full_angle=false",
+        lambda run, rig: (run, with_identifier(full_angle=False)),
+    ),
     "large angles": Mistake(
         lambda: (run_of(), with_identifier(full_angle=False)),
         "angles go to 0.096 rad, and sin phi is not phi there",
@@ -190,6 +197,56 @@ def test_what_is_typed_cures_it(native: Native, name: str) -> None:
     assert said == ()
     # 15 s of a 12-bit encoder: some 0.5 % of noise; friction and the correction's remainder leave more
     assert result.value["g"] == pytest.approx(9.81, rel=0.03)
+
+
+def without_a_rig_file(run: Run) -> RigFile:
+    """As with --set l1=0.25 alone: the encoder's resolution, 12 bits, is not given."""
+    return resolved(RigFile.parse("l1 = 0.25"), run)
+
+
+@pytest.mark.parametrize("name", ["y in mm", "y's sign turned", "phi in degrees", "friction"])
+def test_a_mistake_gets_its_sentence_without_a_rig_file_too(native: Native, name: str) -> None:
+    run, _ = MISTAKES[name].spoilt()
+    _, said = advised(run, without_a_rig_file(run), native)
+    assert len(said) == 1, said
+    assert MISTAKES[name].said in said[0]
+
+
+@pytest.mark.parametrize(
+    ("run", "said"),
+    [
+        (lambda: run_of(), ()),
+        (lambda: replace(run_of(), y=0 * run_of().y), ("the pivot does not move",)),
+        (lambda: run_of(release=3.0), ("angles go to 0.25 rad",)),
+        (lambda: run_of(friction=2e-3), ("the swing dies away",)),
+    ],
+)
+def test_advice_without_a_rig_file_is_on_the_cause(
+    native: Native, run: Callable[[], Run], said: tuple[str, ...]
+) -> None:
+    _, advices = advised(run(), without_a_rig_file(run()), native)
+    assert len(advices) == len(said)
+    assert all(one.startswith(start) for one, start in zip(advices, said, strict=True))
+
+
+def test_a_wrong_resolution_does_not_hide_the_cause(native: Native) -> None:
+    rig = replace(RIG, sensor=replace(RIG.sensor, phi_lsb=LSB / 4))
+    _, said = advised(run_of(release=3.0), rig, native)
+    assert [one[:14] for one in said] == ["phi moves in s", "angles go to 0"]
+
+
+def test_columns_in_one_anothers_place_are_told(native: Native) -> None:
+    run = run_of()
+    for rig in (RIG, without_a_rig_file(replace(run, phi=run.y))):
+        _, said = advised(replace(run, phi=run.y, y=run.phi), rig, native)
+        assert len(said) == 1 and said[0].startswith("phi and y are exchanged") and "--columns phi=y,y=phi" in said[0]
+
+
+def test_degrees_of_an_encoder_that_starts_over_are_told(native: Native) -> None:
+    run = run_of()
+    over = replace(run, phi=np.degrees(run.phi) % 360.0)
+    _, said = advised(over, without_a_rig_file(over), native)
+    assert len(said) == 1 and "--columns phi=phi:deg" in said[0]
 
 
 def test_a_healthy_run_gets_no_advice(native: Native) -> None:
@@ -329,11 +386,24 @@ def test_identify_prints_its_advice(tmp_path: Path) -> None:
     assert sum(answer["reasons"].values()) == answer["ticks"] == 7500
 
 
-def test_a_refusal_has_the_advice_behind_it(tmp_path: Path) -> None:
+def test_tune_gives_the_advice_where_nothing_can_be_tuned(tmp_path: Path) -> None:
+    write_run(tmp_path / "run.csv", replace(run_of(), y=-run_of().y))
+    with pytest.raises(PvidError, match=r"^y is counted downwards.* \(as it is: nothing is identified from this run"):
+        CliRunner().invoke(
+            commands,
+            ["tune", str(tmp_path / "run.csv"), "--set", "l1=0.25"],
+            standalone_mode=False,
+            catch_exceptions=False,
+        )
+
+
+def test_a_refusal_has_the_advice_in_front_of_it(tmp_path: Path) -> None:
     run = run_of()
     write_run(tmp_path / "run.csv", replace(run, t=1e3 * run.t, sample_rate=0.5))
     RIG.write(tmp_path / "run.toml")
-    with pytest.raises(PvidError, match="window_s = .* s is 1 samples.*; t looks like milliseconds .*use --columns"):
+    with pytest.raises(
+        PvidError, match=r"^t looks like milliseconds .*use --columns t=t:ms \(as it is: window_s = .*\)$"
+    ):
         CliRunner().invoke(
             commands,
             ["identify", str(tmp_path / "run.csv"), "--rig", str(tmp_path / "run.toml")],

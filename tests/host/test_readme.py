@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from conftest import ROOT
 
 from pvid.rig import STANDARD_PENDULUM, simulate
@@ -31,7 +32,7 @@ def test_the_example_identifies_the_standard_rig(tmp_path: Path) -> None:
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
     includes = [f"-I{ROOT / 'firmware' / 'include'}", f"-I{tmp_path}"]
     subprocess.run(["gcc", *flags, *includes, str(tmp_path / "example.c"), *core, "-o", str(binary), "-lm"], check=True)
-    run = simulate(truth="linear").run  # 14 bits
+    run = simulate(truth="full").run  # 14 bits: what `pvid simulate` gives
     samples = "\n".join(f"{phi:.9g} {y:.9g}" for phi, y in zip(run.phi, run.y, strict=True))
     printed = subprocess.run([str(binary)], input=samples, capture_output=True, text=True, check=True).stdout
     numbers = np.array([float(number) for number in re.findall(r"-?\d+\.\d+", printed)])
@@ -40,6 +41,17 @@ def test_the_example_identifies_the_standard_rig(tmp_path: Path) -> None:
     errors, standard_errors = np.abs(numbers[::2] - truth), numbers[1::2]
     assert (errors < 4 * standard_errors).all(), printed
     assert (standard_errors < 2e-3 * truth).all(), printed
+
+
+@pytest.mark.parametrize("standard", ["c++14", "c++20"])
+def test_the_example_is_cpp_too(standard: str, tmp_path: Path) -> None:
+    (tmp_path / "example.cpp").write_text(example(), encoding="utf-8")
+    declared = '#include "pvid/weak.h"\nextern "C" const pvid_weak_design_f32 weak_tables;\n'
+    (tmp_path / "tables.h").write_text(declared, encoding="utf-8")
+    command = ["g++", f"-std={standard}", "-fsyntax-only", "-Wall"]
+    includes = [f"-I{ROOT / 'firmware' / 'include'}", f"-I{tmp_path}"]
+    done = subprocess.run([*command, *includes, str(tmp_path / "example.cpp")], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_every_command_the_readme_names_exists() -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pvid.sensor_steps import resolution_of
+from pvid.capture import Run
+from pvid.rigfile import RigFile, Unset
+from pvid.sensor_steps import resolution_note, resolution_of, resolved
 
 T = np.arange(0.0, 15.0, 1 / 500)
 SWING = np.sin(5 * T) + 0.3 * np.sin(17 * T + 1)
@@ -57,3 +59,25 @@ def test_values_that_are_not_numbers_are_left_out() -> None:
     values[::7] = np.nan
     values[::11] = np.inf
     assert resolution_of(values) == pytest.approx(0.01, rel=1e-6)
+
+
+def test_interpolated_samples_do_not_show_another_step() -> None:
+    step = 2 * np.pi / 2**12
+    values = recorded(step, 0.1)
+    filled = np.random.default_rng(3).choice(np.arange(1, T.size - 1), 60, replace=False)
+    values[filled] = (values[filled - 1] + values[filled + 1]) / 2
+    values[filled[::2]] += 0.3 * step
+    assert resolution_of(values) == pytest.approx(step, rel=1e-3)
+
+
+def test_a_step_that_the_rig_file_does_not_give_is_the_runs() -> None:
+    step = 2 * np.pi / 2**12
+    run = Run(T, recorded(step, 0.1), 0 * T, 500.0)
+    silent = RigFile.parse("l1 = 0.3")
+    rig = resolved(silent, run)
+    assert rig.sensor.phi_lsb == float(f"{step:.4g}") and isinstance(rig.sensor.phi_lsb, Unset)
+    assert resolution_note(silent, rig) == ("phi moves in steps of 0.001534 rad: taken as phi_lsb, which is not given",)
+    given = RigFile.parse("l1 = 0.3\n[sensor]\nphi_lsb = 1e-4")
+    assert resolved(given, run) == given and resolution_note(given, given) == ()
+    for other in (np.degrees(run.phi), 0.1 * SWING, recorded(2 * np.pi / 2**14, 0.1)):  # coarse, none, the default
+        assert resolved(silent, Run(T, other, 0 * T, 500.0)) is silent

@@ -177,12 +177,12 @@ def test_a_resolution_that_the_file_does_not_give_is_found(native: Native) -> No
     silent = RigFile.parse("l1 = 0.3")
     step = 2 * np.pi / 2**12
     found = tune(run, silent, native)
-    assert found.phi_lsb == pytest.approx(step, rel=1e-3)
-    assert found.rig.sensor.phi_lsb == found.phi_lsb
+    assert found.rig.sensor.phi_lsb == pytest.approx(step, rel=1e-3)
+    assert found.notes == ("phi moves in steps of 0.001534 rad: taken as phi_lsb, which is not given",)
 
 
 def test_a_resolution_that_the_file_gives_is_kept() -> None:
-    assert tuned(STANDARD).phi_lsb is None
+    assert tuned(STANDARD).notes == ()
     assert tuned(STANDARD).rig.sensor == STANDARD.rig.sensor
     assert isinstance(RigFile.parse("l1 = 0.3").sensor.phi_lsb, Unset)
     written = RigFile.parse(RigFile.parse("l1 = 0.3").text()).sensor

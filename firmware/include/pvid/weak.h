@@ -85,7 +85,7 @@ typedef struct {
     pvid_weak_angle_f32 *angle; /* storage for the two that follow, which must outlive the identifier; NULL where
                              neither is asked for */
     bool full_angle;      /* correct the rows for sines and cosines once the estimate has settled; set angle_limit
-                             to 0.12 rad, beyond which this is no longer enough */
+                             to 0.2 rad, beyond which this is no longer enough */
     bool friction;        /* p = (w, d1, d2, c, c1, c2): two viscous frictions absorb what damps the motion. Needs
                              zero_unknown, PVID_MAX_P 6 and PVID_MAX_MOMENTS 55 */
     uint8_t passes;       /* of the correction, 1..PVID_MAX_PASSES; 3 is good */

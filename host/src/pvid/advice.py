@@ -21,7 +21,8 @@ from pvid.identify import Identification, identify
 from pvid.modes import modes_hz
 from pvid.native import Native, Reason
 from pvid.ranges_q31 import pivot_acceleration, reach
-from pvid.rigfile import RigFile
+from pvid.rigfile import RigFile, Unset
+from pvid.run_turns import joined
 from pvid.sensor_steps import resolution_of
 from pvid.setup import nominal_start
 from pvid.survey import fitted
@@ -39,10 +40,12 @@ _MOST_ACCELERATION = 3.0  # of the pivot [gravity], rms
 _LIKELY_ACCELERATION = (0.005, 2.0)
 _WIDE_SWING = 1.0  # rad: a swing of a few degrees looks like it when it is read as radians
 _SMALL_ANGLE = 0.05  # rad: below, what sines leave is within a 14-bit encoder's noise
+_USUAL_SWING = 0.75 * VALID_ANGLE  # small angles do not show the counts of a turn: it is taken for one of these
 _FULL_TURN = 2 * math.pi
 _FAR_REST = 1.5  # rad
 _LSB_OFF = 0.3
 _MANY_STEPS = 30.0
+_WHOLE_BITS = 0.01  # a turn of 2 pi is off by 0.16
 
 _FADING = 2.5  # rms of the swing in the first fifth of a run, over that in the last
 
@@ -104,6 +107,8 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
         found, case, now = _put_right(case, native)
     if not found:
         found = list(_remaining(case, result, now))
+    elif not _is_good(result) and not _answers(now):  # there is more to it
+        found += _remaining(case, now or result, now)
     answer = now if now is not None and _answers(now) else result
     if answer.identified:
         found += _clock_of(answer, rig)
@@ -113,6 +118,11 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
 def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]:
     """Sentences on a run whose rig file's settings were refused."""
     return tuple(_put_right(Case(_shortened(run), rig), native)[0])
+
+
+def behind(advices: tuple[str, ...], error: PvidError) -> PvidError:
+    """A refusal behind the mistakes that it follows from."""
+    return PvidError(f"{'; '.join(advices)} (as it is: {error})" if advices else str(error))
 
 
 def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str], Case, Identification | None]:
@@ -126,7 +136,7 @@ def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str
         found.append(cure.sentence)
         case = cure.case
     now = _trial(case, native)
-    for search in (_step_of, _equation_mistake):
+    for search in (_exchanged, _step_of, _equation_mistake):
         for _ in range(_MOST_ROUNDS):
             cure = None if search is _equation_mistake and _is_explained(now) else search(case, now, native)
             if cure is None or cure.sentence in found:
@@ -241,8 +251,8 @@ def _angle_in_counts(case: Case) -> list[Cure]:
     _, swing = _swing(case.run)
     if swing < _MANY_STEPS or (phi != np.rint(phi)).any():
         return []
-    counts = next((n for n in (2**bits for bits in range(9, 21)) if _FULL_TURN * swing / n < 0.5), 2**20)
-    right = replace(case.run, phi=case.run.phi * _FULL_TURN / counts)
+    counts = next((n for n in (2**bits for bits in range(9, 21)) if _FULL_TURN * swing / n < _USUAL_SWING), 2**20)
+    right = replace(case.run, phi=joined(case.run.phi * _FULL_TURN / counts)[0])
     lsb = replace(case.rig.sensor, phi_lsb=_FULL_TURN / counts)
     return [
         Cure(
@@ -258,11 +268,10 @@ def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
     run = case.run
     _, swing = _swing(run)
     step = resolution_of(run.phi)
-    lsb = case.rig.sensor.phi_lsb
-    by_step = step is not None and lsb > 0 and abs(math.degrees(lsb) / step - 1) < 0.1
+    by_step = step is not None and _is_step_in_degrees(step, case.rig.sensor.phi_lsb)
     if swing < _WIDE_SWING and not by_step:
         return []
-    in_degrees = Case(replace(run, phi=np.radians(run.phi)), case.rig)
+    in_degrees = Case(replace(run, phi=joined(np.radians(run.phi))[0]), case.rig)
     if swing < _FULL_TURN and not by_step and not _is_better(_trial(in_degrees, native), _trial(case, native)):
         return []
     return [
@@ -271,6 +280,15 @@ def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
             in_degrees,
         )
     ]
+
+
+def _is_step_in_degrees(step: float, lsb: float) -> bool:
+    """Whether an encoder's step is what the rig file gives, in degrees; or, where it does not give it, a turn of 360
+    over a power of two."""
+    if not isinstance(lsb, Unset):
+        return lsb > 0 and abs(math.degrees(lsb) / step - 1) < 0.1
+    bits = math.log2(360.0 / step)
+    return bits > 6 and abs(bits - round(bits)) < _WHOLE_BITS
 
 
 def _far_rest(case: Case) -> list[Cure]:
@@ -329,6 +347,26 @@ def _height_units(case: Case) -> list[Cure]:
 # ---- sensors
 
 
+def _exchanged(case: Case, now: Identification | None, native: Native) -> Cure | None:
+    """phi and y in one another's place, where the run is answered only with both in their own."""
+    if now is not None and now.identified:
+        return None
+    sensor = case.rig.sensor
+    steps = [resolution_of(values) for values in (case.run.y, case.run.phi)]
+    try:
+        lsb = replace(sensor, phi_lsb=steps[0] or sensor.phi_lsb, y_lsb=steps[1] or sensor.y_lsb)
+        right = Case(replace(case.run, phi=case.run.y, y=case.run.phi), replace(case.rig, sensor=lsb))
+    except PvidError:
+        return None
+    trial = _trial(right, native)
+    if not (_is_good(trial) and _answers(trial)):
+        return None
+    return Cure(
+        "phi and y are exchanged, it seems (the other way round the run is explained): use --columns phi=y,y=phi",
+        right,
+    )
+
+
 def _step_of(case: Case, now: Identification | None, native: Native) -> Cure | None:
     return next(iter(_steps(case)), None)
 
@@ -340,7 +378,7 @@ def _steps(case: Case) -> list[Cure]:
         ("phi_lsb", case.run.phi, sensor.phi_lsb, "rad"),
         ("y_lsb", case.run.y, sensor.y_lsb, "m"),
     ):
-        step = resolution_of(values)
+        step = None if isinstance(given, Unset) else resolution_of(values)
         if step is None or abs(math.log(max(given, 1e-12) / step)) <= math.log(1 + _LSB_OFF):
             continue
         right = replace(sensor, **{name: float(f"{step:.4g}")})
@@ -384,6 +422,12 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
             f"angles go to {largest:.2g} rad, and sin phi is not phi there: use --set identifier.full_angle=true"
             + (" with --core f32" if rig.identifier.core == "q31" else ""),
             with_identifier(full_angle=True),
+        )
+    elif rig.identifier.form == "weak" and rig.identifier.core != "q31":
+        yield Cure(
+            "the run follows the equations of small angles, as a simulation of them does: use "
+            "--set identifier.full_angle=false",
+            with_identifier(full_angle=False),
         )
     if not rig.identifier.damping and rig.identifier.zero:
         yield Cure(

@@ -1,9 +1,10 @@
 """Recorded runs on disk: text tables, NPZ and Parquet, with every check a stranger's file needs.
 
 A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order and among others; `Columns` maps other names
-and units. Its clock is made uniform (`run_clock`) and short gaps are interpolated (`run_gaps`); what was done is in
-`Run.notes`, and a run that needs nothing keeps every bit. Whatever is wrong with a file is told in one sentence, as a
-`PvidError`, that names the file and, where there is one, the line and the column.
+and units. Jumps of a whole turn are joined (`run_turns`), its clock is made uniform (`run_clock`) and short gaps are
+interpolated (`run_gaps`); what was done is in `Run.notes`, and a run that needs nothing keeps every bit. Whatever is
+wrong with a file is told in one sentence, as a `PvidError`, that names the file and, where there is one, the line and
+the column.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from pvid.run_clock import Uniform, uniform
 from pvid.run_columns import SIGNALS, Columns
 from pvid.run_gaps import bridge, stretches
 from pvid.run_table import Table, row_place
+from pvid.run_turns import joined
 from pvid.wording import reason
 
 FloatArray = npt.NDArray[np.float64]
@@ -207,6 +209,11 @@ def _checked(table: Table) -> Table:
 
 
 def _run(table: Table, rate: float | None) -> Run:
+    phi, jumps = joined(table.phi)
+    if jumps:
+        name = table.columns["phi"].name
+        note = f"{name} jumps by a turn, {jumps} times: joined (the encoder starts over there)"
+        table = replace(table, phi=phi, notes=(*table.notes, note))
     clocked = uniform(table, rate)
     firsts, ends = bridge(clocked.phi, clocked.y, clocked.sample_rate)
     notes = (*clocked.notes, *_gap_notes(clocked, firsts, ends))

@@ -26,7 +26,7 @@ from pvid import __version__, answer
 from pvid.appearing import write_whole
 from pvid.capture import Run, write_run
 from pvid.cli_campaign import COMMANDS as CAMPAIGN_COMMANDS
-from pvid.cli_input import FigurePath, columns_option, read_input, rig_options
+from pvid.cli_input import FigurePath, columns_option, print_notes, read_input, rig_options
 from pvid.cli_log import COMMANDS as LOG_COMMANDS
 from pvid.compare import Comparison
 from pvid.console import BAD_INPUT, DIFFERENT, DONE, INTERRUPTED, NOTHING_IDENTIFIED, progress_bar, tell
@@ -51,6 +51,7 @@ from pvid.rig_settings import rig_for, rig_path_of
 from pvid.rigfile import RigFile, load
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
+from pvid.sensor_steps import resolution_note, resolved
 from pvid.setup import weak_design_of
 from pvid.setup_q31 import config_for_run, strong_config_q31, weak_config_q31
 from pvid.streams import watch
@@ -315,8 +316,11 @@ def identify_command(
     """
     rig = _with(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
     run = read_input(run_path, rig, columns, whole=rig.identifier.core == "f64")
+    given, rig = rig, resolved(rig, run)
+    notes = resolution_note(given, rig)
+    print_notes(notes)
     native = Native()
-    result = _identified(run, rig, native)
+    result = _identified(replace(run, notes=(*run.notes, *notes)), rig, native)
     if target is not None:
         from pvid.stream_rig import played_samples, stream_rig
         from pvid.target import verify
@@ -344,13 +348,13 @@ def identify_command(
 
 
 def _identified(run: Run, rig: RigFile, native: Native) -> Identification:
-    """The answer with advice; a refusal has the advice behind its sentence."""
-    from pvid.advice import advice, advice_on_refusal
+    """The answer with advice; a refusal has the advice in front of its sentence."""
+    from pvid.advice import advice, advice_on_refusal, behind
 
     try:
         result = identify(run, rig, native)
     except PvidError as error:
-        raise PvidError("; ".join((str(error), *advice_on_refusal(run, rig, native)))) from error
+        raise behind(advice_on_refusal(run, rig, native), error) from error
     return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
 
 
@@ -421,13 +425,19 @@ def tune_command(
 
     rig = rig_for(run_path, rig_path, settings)
     run = read_input(run_path, rig, columns)
-    with progress_bar("tuning", STEPS) as advance:
-        tuned = tune(run, rig, Native(), advance)
+    native = Native()
+    try:
+        with progress_bar("tuning", STEPS) as advance:
+            tuned = tune(run, rig, native, advance)
+    except PvidError as error:
+        from pvid.advice import behind
+
+        raise behind(_identified(run, resolved(rig, run), native).advice, error) from error
     out = out or run_path.with_name(rig_path_of(run_path).stem + "-tuned.toml")
     tuned.rig.write(out)
     Console(width=None if sys.stdout.isatty() else 160).print(candidates_table(tuned))
-    if tuned.phi_lsb is not None:
-        click.echo(f"phi moves in steps of {tuned.phi_lsb:g} rad: taken as phi_lsb, which the rig file does not give")
+    for note in tuned.notes:
+        click.echo(note)
     drift = ", ".join(f"{one.forgetting_s:g} s {one.energy:.4g}" for one in tuned.forgetting if one.forgetting_s > 0)
     if drift:
         click.echo(f"residual of the next window with forgetting, over that without: {drift}")

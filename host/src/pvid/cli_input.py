@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -97,11 +97,11 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
     run.refuse_damaged()
     if whole:
         run = run.whole()
-    print_notes(run)
+    print_notes(run.notes)
     return run
 
 
-def print_notes(run: Run) -> None:
+def print_notes(notes: Iterable[str]) -> None:
     """What was done to a run, on standard error."""
-    for note in run.notes:
+    for note in notes:
         tell(f"pvid: input: {note}")

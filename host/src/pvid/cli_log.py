@@ -263,7 +263,7 @@ def plot_command(
     from pvid.report import recording_of, write_report  # matplotlib and scipy, which others need not wait for
 
     recording = recording_of(log, rig_for(log, rig_path, settings), columns)
-    print_notes(recording.run)
+    print_notes(recording.run.notes)
     out = out or log.with_suffix(".png")
     write_report(recording, out)
     click.echo(out)

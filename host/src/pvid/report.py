@@ -20,9 +20,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from scipy.signal import savgol_filter, welch
 
-from pvid.advice import advice
+from pvid.advice import advice, advice_on_refusal, behind
 from pvid.axis_limits import interesting
 from pvid.capture import Run, is_run, read_run
+from pvid.errors import PvidError
 from pvid.figure_file import drawable, save
 from pvid.figures import LABELS
 from pvid.identify import LINEAR, PHYSICAL, ZERO, identify
@@ -38,6 +39,7 @@ from pvid.rig_settings import rig_for
 from pvid.rigfile import RigFile
 from pvid.rounding import with_error
 from pvid.run_columns import Columns
+from pvid.sensor_steps import resolution_note, resolved
 from pvid.simulated_angle import simulated_angle
 from pvid.survey import fitted
 
@@ -165,9 +167,13 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
 def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     run.refuse_damaged()
     native = Native()
+    run = replace(run, notes=(*run.notes, *resolution_note(rig, resolved(rig, run))))
     whole = run.whole()  # residuals and spectra have no place for a missing sample
     given = whole if rig.identifier.core == "f64" else run
-    result = identify(given, rig, native)
+    try:
+        result = identify(given, rig, native)
+    except PvidError as error:
+        raise behind(advice_on_refusal(given, rig, native), error) from error
     names = [name for name in (*LINEAR, ZERO) if name in result.value]
     advices = tuple(f"advice: {sentence}" for sentence in advice(given, rig, result, native))
     return Recording(

@@ -41,6 +41,7 @@ _RATE_TOLERANCE = 1e-4
 # has another unit, or the rig file is another one's.
 _RATE_LIMIT = 0.05
 _RATE_RANGE_HZ = (1e-3, 1e9)
+_USUAL_RATES = (20.0, 20_000.0)  # Hz
 _LONGEST_S = 1e20  # nanoseconds taken for seconds, since 1970, are 2e18
 # Rows on either side of a gap that their mean tells the number of missing ticks from: jitter averages out.
 _ROWS_BESIDE_GAP = 20
@@ -346,9 +347,8 @@ def _rate(table: Table, measured: float, error: float, promised: float | None) -
     if promised is None:
         low, high = _RATE_RANGE_HZ
         if not low <= measured <= high:
-            raise PvidError(
-                f"{table.path}, column {name}: a sample rate of {measured:.6g} Hz is out of range (is t in seconds?)."
-            )
+            told = f"a sample rate of {measured:.6g} Hz is out of range"
+            raise PvidError(f"{table.path}, column {name}: {told}{_unit(name, measured)}.")
         return _shortest_decimal(measured, 1e-9 + 3 * error), ()
     off = measured / promised - 1
     # t is trusted only to within the jitter at each end
@@ -369,6 +369,14 @@ def _cause(name: str, ratio: float, measured: float) -> str:
         if abs(ratio * per_second - 1) < 2 * _RATE_LIMIT:
             return f": t looks like {unit}: use --columns t={name}:{unit}"
     return f": if t is right, use --set sample_rate={_shortest_decimal(measured, 1e-3):g}"
+
+
+def _unit(name: str, rate: float) -> str:
+    """What unit t is in, likely, where its rate in seconds [Hz] is impossible."""
+    for unit, per_second in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+        if _USUAL_RATES[0] <= rate * per_second <= _USUAL_RATES[1]:
+            return f": t looks like {unit}: use --columns t={name}:{unit}"
+    return " (is t in seconds?)"
 
 
 def _shortest_decimal(value: float, tolerance: float) -> float:

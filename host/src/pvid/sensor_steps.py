@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
+
+from pvid.capture import Run
+from pvid.rigfile import RigFile, Unset
 
 Float = npt.NDArray[np.float64]
 
@@ -16,6 +21,31 @@ _LEAST_STEP = 1e-12  # [rad] or [m], as in a rig file: finer ones are rounding
 _LEAST_PART = 1e-6  # of the travel: float32's own steps are finer
 _NEAR = 12  # levels
 _TRIED = np.linspace(0.7, 1.4, 701)
+# A level that a sensor gives is seen about as often as its neighbours; interpolated samples are seen once each.
+_RARE = 0.05
+_COARSEST = 0.05  # rad: an encoder of 7 bits
+_DIGITS = 4
+_SAME = 0.01
+
+
+def resolved(rig: RigFile, run: Run) -> RigFile:
+    """The rig with the encoder's resolution that the run shows, where the rig file does not give it.
+
+    It still counts as not given, so that the same run in another unit shows another.
+    """
+    if not isinstance(rig.sensor.phi_lsb, Unset):
+        return rig
+    step = resolution_of(run.phi)
+    if step is None or step > _COARSEST or abs(step / rig.sensor.phi_lsb - 1) < _SAME:
+        return rig
+    return replace(rig, sensor=replace(rig.sensor, phi_lsb=Unset(f"{step:.{_DIGITS}g}")))
+
+
+def resolution_note(given: RigFile, rig: RigFile) -> tuple[str, ...]:
+    """What `resolved` made of the rig that was given, as a sentence."""
+    if rig.sensor.phi_lsb == given.sensor.phi_lsb:
+        return ()
+    return (f"phi moves in steps of {rig.sensor.phi_lsb:g} rad: taken as phi_lsb, which is not given",)
 
 
 def resolution_of(values: npt.ArrayLike) -> float | None:
@@ -32,17 +62,19 @@ def resolution_of(values: npt.ArrayLike) -> float | None:
     """
     given = np.asarray(values, np.float64)[:_MOST_SAMPLES]
     given = given[np.isfinite(given)]
-    levels = np.unique(given)
+    levels, seen = np.unique(given, return_counts=True)
     if len(levels) < _LEAST_LEVELS:
         return None
     gaps = np.diff(levels)
     # decimals of text, or float32, leave copies of one level beside each other
-    copies = gaps < 1e-3 * np.median(gaps)
-    if copies.any():
-        levels = levels[np.concatenate([[True], ~copies])]
-        gaps = np.diff(levels)
+    first = np.concatenate([[True], gaps >= 1e-3 * np.median(gaps)])
+    seen = np.add.reduceat(seen, np.flatnonzero(first))
+    levels = levels[first]
+    usual = np.median(np.repeat(seen, seen))  # how often the level of a typical sample is seen
+    levels = levels[seen > _RARE * usual]
     if len(levels) < _LEAST_LEVELS:
         return None
+    gaps = np.diff(levels)
     for guess in (float(np.quantile(gaps, 0.25)), float(gaps.min())):
         if guess < _LEAST_STEP:
             continue

@@ -24,6 +24,7 @@ from pvid.capture import Run
 from pvid.errors import PvidError
 from pvid.rigfile import Nominal, RigFile
 from pvid.run_rows import FEWEST, Fit, RunRows
+from pvid.sensor_steps import resolved
 from pvid.setup import nominal_start, weak_design_of
 from pvid.weak_sizing import pass_hz_of, window_for_run
 
@@ -74,9 +75,11 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     """The rig file with the run's survey as its nominal pendulum, the disturbance found, and a window that the run
     holds often enough.
 
-    Unchanged where the rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the
-    survey finds no pendulum the guess stays.
+    The encoder's resolution is what the run shows where the rig file does not give it. All else is unchanged where the
+    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds no
+    pendulum the guess stays.
     """
+    rig = resolved(rig, run)
     if rig.identifier.form != "weak" or not rig.identifier.survey:
         return rig
     found = survey(rig, run)

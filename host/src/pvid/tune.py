@@ -26,8 +26,8 @@ from pvid.errors import PvidError
 from pvid.held_back import HeldBack, sigmas
 from pvid.identify import LINEAR, Identification, identify, largest_angle
 from pvid.native import Native
-from pvid.rigfile import Identifier, Nominal, RigFile, Unset
-from pvid.sensor_steps import resolution_of
+from pvid.rigfile import Identifier, Nominal, RigFile
+from pvid.sensor_steps import resolution_note, resolved
 from pvid.setup import weak_design_of
 from pvid.survey import fitted, sized_for
 from pvid.weak_oracle import VALID_ANGLE
@@ -146,7 +146,7 @@ class Tuned:
     chosen, default : the settings chosen, and the rig file's own with what the survey of the run adds
     candidates : all that were tried, in that order
     forgetting : what forgetting does
-    phi_lsb : the encoder's resolution [rad] found in the run, where the rig file does not give it
+    notes : what was found beside the settings, a sentence each
     reason : why `chosen` was chosen, in words
     """
 
@@ -156,7 +156,7 @@ class Tuned:
     default: Judged
     candidates: tuple[Judged, ...]
     forgetting: tuple[Forgetting, ...]
-    phi_lsb: float | None
+    notes: tuple[str, ...]
     reason: str
 
 
@@ -177,10 +177,7 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
     PvidError
         When nothing can be identified from the run, with the rig file's own settings or others.
     """
-    phi_lsb = resolution_of(run.phi) if isinstance(rig.sensor.phi_lsb, Unset) else None
-    if phi_lsb is not None:
-        phi_lsb = _rounded(phi_lsb, _DIGITS[0])
-        rig = replace(rig, sensor=replace(rig.sensor, phi_lsb=phi_lsb))
+    given, rig = rig, resolved(rig, run)
     if rig.identifier.form != "weak":  # its window is a differentiator's
         rig = replace(rig, identifier=replace(rig.identifier, form="weak", window_s=0.0))
     bench = _Bench(run, rig, native, progress)
@@ -208,7 +205,7 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
         default=default,
         candidates=tuple(bench.tried),
         forgetting=forgetting,
-        phi_lsb=phi_lsb,
+        notes=resolution_note(given, rig),
         reason=_reason(chosen, default, bench, keep),
     )
 

@@ -108,6 +108,7 @@ def emulated_year(
         faults.append(verdict.text)
     if reader.account.missing_samples or reader.account.restarts:
         faults.append(reader.account.text)
+    faults += _faults_of_board(log)
     faults += _faults_of_times(log, rig)
     faults += _faults_of_exports(log, rig)
     faults += _faults_of_page(log)
@@ -132,6 +133,14 @@ def _samples(log: Path, rig: RigFile) -> Iterator[Rows]:
         for rows in values.rows(record):
             if rows.table == "samples":
                 yield rows
+
+
+def _faults_of_board(log: Path) -> Iterator[str]:
+    """Of the firmware: the upper bits of the tick in every frame, also of samples on both sides of a passage."""
+    for record in LogReader(log):
+        high = getattr(record.item, "tick_high", None)
+        if high is not None and high != record.tick // TURN:
+            yield f"a frame of tick {record.tick} has the upper bits {high}"
 
 
 def _began(log: Path, number: int) -> int:
