@@ -326,6 +326,7 @@ def _play(connection: socket.socket, steps: Iterator[Step]) -> None:
                 case Pause(seconds):
                     time.sleep(seconds)
                 case HangUp():
+                    time.sleep(_READ_S)
                     return
                 case Flood(data):
                     while True:
@@ -337,6 +338,7 @@ def _play(connection: socket.socket, steps: Iterator[Step]) -> None:
                 return
 
 
+_READ_S = 0.5  # what the logger has not read by the time that a socket is closed may be lost in the system
 _ESTABLISHED = 1  # of Linux's tcp_info.tcpi_state
 
 
