@@ -1,7 +1,7 @@
-/* No a * b + c of this file becomes one fused instruction, whatever the compiler's options say: gcc's default standard
- * (gnu17, gnu11 in many IDEs) would fuse them on every processor that can, and the bits would not be those promised.
- * To be included before everything else. Not for clang with -ffp-contract=fast, which does not obey;
- * pvid_arithmetic_faults_f32 finds that. */
+/* Disables fused multiply-add (a * b + c in one instruction) for this file, independent of the compiler's options.
+ * gcc's default standard (gnu17; gnu11 in many IDEs) enables it on every processor that has it, and the bits would
+ * change. Include this header before all others. clang with -ffp-contract=fast ignores the pragma;
+ * pvid_arithmetic_faults_f32 detects this. */
 #ifndef PVID_UNCONTRACTED_H
 #define PVID_UNCONTRACTED_H
 

@@ -1,8 +1,8 @@
 /* pvid/arithmetic.h - does this build compute the bits that were promised?
  *
  * Bit-exactness needs IEEE-754 binary32, round to nearest even, no fused multiply-add, no reordered sums, no flushing
- * of subnormals. Compiler flags can silently take each of these away; a board can ask at start-up. Against fusing, which
- * is gcc's default outside -std=c99, the sources protect themselves.
+ * of subnormals. Compiler flags can silently break each of these; a board can test them at start-up. The sources
+ * themselves disable fusing, which is gcc's default without -std=c99.
  */
 #ifndef PVID_ARITHMETIC_H
 #define PVID_ARITHMETIC_H
@@ -17,7 +17,7 @@ extern "C" {
  *   1 products and sums are fused   2 subnormals are flushed   4 not rounding to nearest even
  *   8 sqrtf is not correctly rounded   16 division is not correctly rounded
  *   32 sums are reordered (-fassociative-math, which -funsafe-math-optimizations brings)
- * It speaks for the options that the library's sources were compiled with. */
+ * The result is valid for the compiler options of the library's sources. */
 uint32_t pvid_arithmetic_faults_f32(void);
 
 #ifdef __cplusplus

@@ -3,7 +3,7 @@
  * Every array of the library is sized by one of these macros: no heap, no VLA. Override with -D
  * or put the definitions into a header of your own and name it with -DPVID_CONFIG_HEADER="my.h".
  * A size is a plain decimal number. Sizes change the layout of the state structs: an application that was compiled
- * with others than the library does not link (sized.h). The CMake target passes them on to whoever links it.
+ * with other sizes than the library does not link (sized.h). The CMake target passes its sizes on to its users.
  */
 #ifndef PVID_CONFIG_H
 #define PVID_CONFIG_H
@@ -117,8 +117,8 @@
 #error "PVID_FULL_ANGLE must be 0 or 1"
 #endif
 
-/* Called on misuse with a false condition: NULL where an object is needed, an object before its init. Replace it by your
- * own trap or reset; without one the call does nothing and returns PVID_NOT_READY or PVID_BAD_POINTER. */
+/* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your own
+ * trap or reset here; without one the misused function does nothing and returns PVID_NOT_READY or PVID_BAD_POINTER. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))
 #endif

@@ -202,7 +202,7 @@ pvid_reason pvid_estimator_update_f32(pvid_estimator_f32 *self);
 pvid_reason pvid_estimator_iterate_f32(pvid_estimator_f32 *self);
 
 /* The same solve in stages that cost about as much as a row each, for a loop that cannot wait (of an initialised
- * estimator: only the functions above ask):
+ * estimator: only the functions above check this):
  *
  *   pvid_estimator_begin_f32(&estimator, &solve, true);        true: as update, false: as iterate
  *   each tick:  if (pvid_estimator_advance_f32(&estimator, &solve)) use solve.reason

@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
-/* A conversion that C++ compilers take for one of their own. */
+/* A type conversion that raises no warning of an old-style cast in C++. */
 #if defined(__cplusplus)
 #define PVID_AS(type, value) static_cast<type>(value)
 #else

@@ -1,26 +1,26 @@
-/* pvid/publication.h - an estimate that others read while a tick runs: whole, and without a lock.
+/* pvid/publication.h - other contexts read an estimate while a tick runs: consistently, and without a lock.
  *
- * One context writes (the one that calls step), any number read: an interrupt, the main loop, a thread, another core.
- * There are two copies and a version. A put writes `copy`, makes the version odd, writes `estimate`, makes the version
- * even again; a read takes `copy` while the version is odd and `estimate` while it is even, and begins again if the
- * version has changed meanwhile. So one copy is whole at every instant:
+ * One context writes (the one that calls step). Any number of contexts read: interrupts, main loop, threads, cores.
+ * There are two copies and a version number. A put writes `copy`, makes the version odd, writes `estimate` and makes
+ * the version even again. A read copies `copy` while the version is odd and `estimate` while it is even, and starts again
+ * if the version has changed meanwhile. So one of the two copies is consistent at every instant:
  *
- *   - step in an interrupt, read in the main loop: the read is begun again if an estimate was published meanwhile;
- *   - step in the main loop, read in an interrupt: the read succeeds at once, wherever the put stands;
- *   - threads, several cores: neither waits for the other. With gcc and clang every word is an atomic one, with the
- *     fences between them that other cores need; no data race in the sense of C11.
+ *   - step in an interrupt, read in the main loop: the read starts again if an estimate was published meanwhile;
+ *   - step in the main loop, read in an interrupt: the read succeeds at the first attempt, even in the middle of a put;
+ *   - threads, several cores: neither waits for the other. With gcc and clang every access to a word is atomic, with
+ *     the memory fences that other cores need; there is no data race in the sense of C11.
  *
- * The weak form has this built in (pvid_weak_read_f32). For the strong form, whose estimate is assessed only when asked:
+ * The weak form has this built in (pvid_weak_read_f32). The strong form computes an estimate only on request:
  *
  *   static pvid_publication_f32 shared;                     (all zeros: nothing has been published)
- *   where step is called, every so many ticks:
+ *   in the context that calls step, every N ticks:
  *       pvid_estimator_assess_f32(&identifier.estimator, &estimate);
  *       pvid_publication_put_f32(&shared, &estimate);
- *   anywhere:
+ *   in any context:
  *       if (pvid_publication_read_f32(&shared, &estimate, &number) && (number > 0)) ...
  *
- * Compilers other than gcc and clang get volatile accesses, which are enough for one core: an interrupt sees them in
- * the order of the source. So do cores without atomic instructions (Cortex-M0, AVR), which are single ones.
+ * Other compilers than gcc and clang use volatile accesses, which are enough on one core: an interrupt sees them in
+ * the order of the source. Cores without atomic instructions (Cortex-M0, AVR) use them, too: these are single cores.
  * RAM: two estimates and 12 bytes.
  */
 #ifndef PVID_PUBLICATION_H
@@ -35,13 +35,13 @@
 extern "C" {
 #endif
 
-/* Copies that a read makes before it gives up. Each is lost only to a publication during the copy itself. */
+/* Attempts of a read before it returns false. An attempt fails only if a put happens during the copy. */
 #define PVID_READ_ATTEMPTS 8
 
 /* Only the functions below write to it. */
 typedef struct {
-    uint32_t version;   /* odd while `estimate` is being written; comes round */
-    uint32_t number[2]; /* estimates published so far, as of `estimate` and of `copy`; stops at 2^32 - 1 */
+    uint32_t version;   /* odd while `estimate` is being written; wraps at 2^32 */
+    uint32_t number[2]; /* of estimates published so far, for `estimate` and for `copy`; stops at 2^32 - 1 */
 } pvid_publication_mark;
 
 typedef struct {
@@ -50,12 +50,12 @@ typedef struct {
     pvid_estimate_f32 copy;
 } pvid_publication_f32;
 
-/* Publishes an estimate. For one context alone. Costs two copies of it. */
+/* Publishes an estimate. Call it from one context only. Cost: two copies of the estimate. */
 void pvid_publication_put_f32(pvid_publication_f32 *self, const pvid_estimate_f32 *estimate);
 
-/* Copies the published estimate, whole; *number (or NULL, where nobody asks): how many have been published, 0: none, and
- * the estimate is all zeros. Returns false, with *estimate of no use, iff something was published during each of
- * PVID_READ_ATTEMPTS copies, or a pointer is NULL: try again later. */
+/* Copies the published estimate consistently. *number: how many have been published; 0: none, and *estimate is all
+ * zeros; the pointer may be NULL. Returns false, with *estimate undefined, iff an estimate was published during each of
+ * PVID_READ_ATTEMPTS attempts (call it again later), or `self` or `estimate` is NULL. */
 bool pvid_publication_read_f32(const pvid_publication_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number);
 
 #ifdef __cplusplus

@@ -1,16 +1,16 @@
-/* pvid/sized.h - the names under which the linker knows the functions: with the sizes in them.
+/* pvid/sized.h - linker symbols that contain the array sizes, so that mismatched sizes are a link error.
  *
- * Library and application must be compiled with the same sizes (config.h): otherwise the one writes behind the other's
- * objects. So every function that is given one of the library's structs has a name of its own for each set of sizes. An
- * application whose sizes differ does not link, in C and C++, with a static or a shared library, and the linker's
- * message shows both sets:
+ * Library and application must be compiled with the same sizes (config.h): otherwise one writes beyond the end of the
+ * other's objects. So every function with a parameter of one of the library's structs has a symbol of its own for each
+ * set of sizes. An application with other sizes does not link, in C and C++, with a static or a shared library, and
+ * the linker's message shows its sizes:
  *
  *     undefined reference to `pvid_weak_init_f32_window321_theta11_p6_moments55_taps81_...'
  *
- * Cure: set the sizes in one place that the library's sources and yours see: a header of yours that
- * -DPVID_CONFIG_HEADER names, the CMake options, or the same -D for all files. In sources the functions have their plain
- * names; nothing of this is in the image. PVID_PLAIN_NAMES takes the check away, for tools that look a function up by
- * its name; they compare sizes themselves.
+ * Solution: set the sizes in one place for the library's sources and yours: a header of yours named by
+ * -DPVID_CONFIG_HEADER, the CMake options, or the same -D for all files. Source code uses the plain names; the symbols
+ * take no space in the image. PVID_PLAIN_NAMES disables the check, for tools that look up a function by its plain
+ * name; such tools compare the sizes themselves.
  */
 #ifndef PVID_SIZED_H
 #define PVID_SIZED_H

@@ -45,7 +45,7 @@ extern "C" {
 typedef enum {
     PVID_SNAPSHOT_RESTORED = 0,
     PVID_SNAPSHOT_NONE,          /* no snapshot begins here */
-    PVID_SNAPSHOT_CUT_SHORT,     /* fewer bytes than it says it has */
+    PVID_SNAPSHOT_CUT_SHORT,     /* fewer bytes than its header states */
     PVID_SNAPSHOT_DAMAGED,       /* the checksum is wrong */
     PVID_SNAPSHOT_OTHER_VERSION, /* of another release */
     PVID_SNAPSHOT_OTHER_KIND,    /* of another form or core */
@@ -75,9 +75,9 @@ typedef struct {
  * are compared modulo 2^32. Costs the checksums of both. */
 pvid_snapshot_choice pvid_snapshot_choose(const uint8_t slot_0[], const uint8_t slot_1[], size_t size);
 
-/* Writes a snapshot of `self` to image[] and returns its length, or 0 with nothing written iff it does not fit into
- * `room` or `self` is not initialised. config: what `self` was initialised with. Costs a copy and a checksum of the object and a hash of
- * the configuration's tables: some ticks, so do it where a tick can wait. */
+/* Writes a snapshot of `self` to image[] and returns its length [bytes], or 0 with nothing written iff it does not fit
+ * into `room` [bytes] or `self` is not initialised. config: the configuration that `self` was initialised with. Cost: a
+ * copy and a checksum of the object and a hash of the tables, as long as some ticks: call it where a tick can wait. */
 size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                      uint32_t generation, uint8_t image[], size_t room);
 size_t pvid_snapshot_save_strong_q31(const pvid_strong_q31 *self, const pvid_strong_config_q31 *config,

@@ -2,9 +2,9 @@
 #ifndef PVID_STATUS_H
 #define PVID_STATUS_H
 
-/* Answer of every init. Each code names the field of the configuration that was refused. An object whose init was refused
- * is all zeros, as a static one before its init: step returns PVID_NOT_READY, all else does nothing. (Memory that is
- * neither, an automatic variable before its init, is not recognised.) */
+/* Return value of every init. Each code names the refused field of the configuration. After a refused init the object
+ * is all zeros, like a static object before its init: step returns PVID_NOT_READY, all other functions do nothing. (An
+ * automatic variable before its init is not all zeros, and this misuse is not detected.) */
 typedef enum {
     PVID_OK = 0,
     PVID_BAD_MODEL,           /* NULL, or larger than the PVID_MAX_ bounds */
@@ -58,23 +58,23 @@ typedef enum {
     PVID_BAD_POINTER          /* the object, the configuration or the bank is NULL */
 } pvid_status;
 
-/* What became of a tick. An estimate never travels without one. */
+/* Result of a tick. Every estimate is reported together with one of these. */
 typedef enum {
-    PVID_UPDATED = 0,            /* the parameters took a step, or are within the dead zone and need none */
+    PVID_UPDATED = 0,            /* the parameters were updated, or are within the dead zone and need no step */
     PVID_WARMING_UP,             /* the window of samples is not full yet */
     PVID_ACCUMULATED,            /* data taken in, no solve due at this tick (divider) */
-    PVID_HELD_NOT_EXCITED,       /* the data say nothing of w: no drive, kappa below its threshold, or no more
+    PVID_HELD_NOT_EXCITED,       /* w is not identifiable: no drive, kappa below its threshold, or no more
                                     information than noise makes */
     PVID_HELD_PIVOT,             /* the system could not be solved, or its solution was not finite */
     PVID_REJECTED_NOT_FINITE,    /* NaN or infinity in the sample or in its row */
     PVID_REJECTED_OUTLIER,       /* a residual far beyond the usual: see gate.h */
     PVID_REJECTED_SATURATED,     /* a row beyond PVID_ROW_LIMIT */
-    PVID_HELD_UNCERTAIN,         /* not published: standard errors too wide, or p still on its way */
-    PVID_HELD_OUT_OF_RANGE,      /* window dropped: the angle went beyond what the equations are good for */
-    PVID_MISFIT,                 /* the parameters took a step, but the residuals are larger than the sensors'
-                                    noise explains: the model is not this mechanism's */
-    PVID_HELD_FROZEN,            /* not taken in, because the identifier is frozen */
-    PVID_NOT_READY               /* nothing was done: no init yet, a refused one, or NULL for an object */
+    PVID_HELD_UNCERTAIN,         /* not published: standard errors too large, or p not converged yet */
+    PVID_HELD_OUT_OF_RANGE,      /* window dropped: the angle exceeded the range of the equations */
+    PVID_MISFIT,                 /* the parameters were updated, but the residuals are larger than the sensors'
+                                    noise explains: the model does not fit the mechanism */
+    PVID_HELD_FROZEN,            /* window not used, because the identifier is frozen */
+    PVID_NOT_READY               /* nothing was done: no init yet, a refused init, or NULL instead of an object */
 } pvid_reason;
 
 #endif

@@ -8,8 +8,8 @@
  *   if (pvid_strong_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_strong_step_f32(&identifier, phi, y);
  *
- * The strong form differentiates the angle four times: it needs a sensor of about 20 bits. One context calls all
- * functions of an object; how it hands an estimate to others while it steps: publication.h.
+ * The strong form differentiates the angle four times: it needs a sensor of about 20 bits. Call all functions of an
+ * object from one context; publication.h passes an estimate to other contexts.
  * RAM: sizeof(pvid_strong_f32), mostly the two windows.
  */
 #ifndef PVID_STRONG_H

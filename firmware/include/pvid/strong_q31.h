@@ -13,8 +13,8 @@
  * as saturated and changes no sum.
  *
  * The strong form differentiates the angle four times: it needs a sensor of about 20 bits whose zero is the
- * equilibrium. Never allocates, never divides by 0. One context calls all functions of an object; how it hands an
- * estimate to others while it steps: publication_q31.h.
+ * equilibrium. Never allocates, never divides by 0. Call all functions of an object from one context;
+ * publication_q31.h passes an estimate to other contexts.
  */
 #ifndef PVID_STRONG_Q31_H
 #define PVID_STRONG_Q31_H

@@ -72,8 +72,8 @@ typedef struct {
     float long_mean;  /* of residual variances relative to what is expected */
     float recent[PVID_TRUST_SHORT];
     pvid_publication_mark mark;
-    pvid_estimate_f32 estimate; /* the published one, which the identifier itself reads */
-    pvid_estimate_f32 copy;     /* its second place, for others: see publication.h */
+    pvid_estimate_f32 estimate; /* the published one, for the context that calls step */
+    pvid_estimate_f32 copy;     /* its second copy, for other contexts: see publication.h */
 } pvid_trust_f32;
 
 /* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as

@@ -46,8 +46,8 @@ typedef struct {
     int64_t long_mean; /* of residual variances relative to what is expected, PVID_SURPLUS_BITS */
     int64_t recent[PVID_TRUST_SHORT];
     pvid_publication_mark mark;
-    pvid_estimate_q31 estimate; /* the published one, which the identifier itself reads */
-    pvid_estimate_q31 copy;     /* its second place, for others: see publication.h */
+    pvid_estimate_q31 estimate; /* the published one, for the context that calls step */
+    pvid_estimate_q31 copy;     /* its second copy, for other contexts: see publication.h */
 } pvid_trust_q31;
 
 /* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as described

@@ -12,7 +12,7 @@
  *                                   .trust = pvid_trust_defaults_f32 };
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_weak_step_f32(&identifier, phi, y);
- *   whenever:  estimate = pvid_weak_estimate_f32(&identifier);
+ *   there:     estimate = pvid_weak_estimate_f32(&identifier);
  *   elsewhere: if (pvid_weak_read_f32(&identifier, &copy, &number) && (number > 0)) ...
  *
  * What happens when. Samples are smoothed over `taps` and decimated by D; two windows of W decimated
@@ -27,9 +27,9 @@
  *
  * The first window that is taken in sets c to the mean of phi over it: an encoder's zero may be far from 0.
  *
- * Never allocates. Total: a sample that is not finite is rejected and starts the windows again (its
- * neighbours are no longer equidistant); the sums keep what they know. One context
- * calls all functions of an object but pvid_weak_read_f32, which others may call meanwhile (publication.h).
+ * Never allocates. Defined for every input: a sample that is not finite is rejected and restarts the windows (its
+ * neighbours are no longer equidistant); the sums are kept. Call all functions of an object from one context; only
+ * pvid_weak_read_f32 may be called from other contexts at the same time (publication.h).
  * RAM: sizeof(pvid_weak_f32); the tables are read where they are.
  */
 #ifndef PVID_WEAK_H
@@ -82,10 +82,10 @@ typedef struct {
                              phi'' [s^4]; 0: an exact pivot. For the alarm only */
     float angle_limit;    /* largest |phi - c| [rad] that a window may hold; 0: no limit */
     const pvid_weak_design_f32 *design; /* must outlive the identifier, as must its tables */
-    pvid_weak_angle_f32 *angle; /* storage for the two that follow, which must outlive the identifier; NULL where
-                             neither is asked for */
+    pvid_weak_angle_f32 *angle; /* memory for full_angle and friction; must outlive the identifier. NULL if both
+                             are false */
     bool full_angle;      /* correct the rows for sines and cosines once the estimate has settled; set angle_limit
-                             to 0.2 rad, beyond which this is no longer enough */
+                             to 0.2 rad: the correction is not accurate beyond that */
     bool friction;        /* p = (w, d1, d2, c, c1, c2): two viscous frictions absorb what damps the motion. Needs
                              zero_unknown, PVID_MAX_P 6 and PVID_MAX_MOMENTS 55 */
     uint8_t passes;       /* of the correction, 1..PVID_MAX_PASSES; 3 is good */
@@ -267,13 +267,13 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
  * PVID_REJECTED_.. when the sample or a window's row was not usable; else PVID_ACCUMULATED. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
 
-/* What is published, for the context that steps: the last estimate that could be trusted, the start until there is one (then
- * self->trust.published is false). The reasons of the windows since say how old it is. */
+/* The published estimate, for the context that calls step: the last trusted estimate, or the start as long as there is
+ * none (then self->trust.published is false). Count the windows since its PVID_UPDATED for its age. */
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 
-/* Copies what is published, whole, from any context while another one steps: an interrupt, the main loop, a thread (see
- * publication.h). *number (or NULL): estimates published so far, 0: none, and it is the start. Returns false, with
- * *estimate of no use, iff something was published during each of PVID_READ_ATTEMPTS copies, or before init. */
+/* Copies the published estimate consistently, from any context, while another context calls step (publication.h).
+ * *number: estimates published so far; 0: none, and *estimate is the start; the pointer may be NULL. Returns false,
+ * with *estimate undefined, iff an estimate was published during each of PVID_READ_ATTEMPTS attempts, or before init. */
 bool pvid_weak_read_f32(const pvid_weak_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */

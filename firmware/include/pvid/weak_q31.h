@@ -13,8 +13,8 @@
  * multiplies a test function of 11 bits with a term of 21: one 32-bit multiplication on any core.
  *
  * Never allocates, never wraps, never divides by 0. A sample beyond full scale, or a pivot's acceleration beyond u_max,
- * is counted as saturated and starts the windows again; the sums keep what they know. One
- * context calls all functions of an object but pvid_weak_read_q31, which others may call meanwhile (publication.h).
+ * is counted as saturated and restarts the windows; the sums are kept. Call all functions of an object from one
+ * context; only pvid_weak_read_q31 may be called from other contexts at the same time (publication.h).
  */
 #ifndef PVID_WEAK_Q31_H
 #define PVID_WEAK_Q31_H
@@ -192,13 +192,13 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
  * PVID_REJECTED_SATURATED. (A window that the gate keeps out: PVID_REJECTED_OUTLIER.) */
 pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y);
 
-/* What is published, for the context that steps: the last estimate that could be trusted, the start until there is one (then
- * self->trust.published is false). */
+/* The published estimate, for the context that calls step: the last trusted estimate, or the start as long as there is
+ * none (then self->trust.published is false). */
 const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
 
-/* Copies what is published, whole, from any context while another one steps: an interrupt, the main loop, a thread (see
- * publication.h). *number (or NULL): estimates published so far, 0: none, and it is the start. Returns false, with
- * *estimate of no use, iff something was published during each of PVID_READ_ATTEMPTS copies, or before init. */
+/* Copies the published estimate consistently, from any context, while another context calls step (publication.h).
+ * *number: estimates published so far; 0: none, and *estimate is the start; the pointer may be NULL. Returns false,
+ * with *estimate undefined, iff an estimate was published during each of PVID_READ_ATTEMPTS attempts, or before init. */
 bool pvid_weak_read_q31(const pvid_weak_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
