@@ -2,8 +2,8 @@
  *
  * One context writes (the one that calls step). Any number of contexts read: interrupts, main loop, threads, cores.
  * There are two copies and a version number. A put writes `copy`, makes the version odd, writes `estimate` and makes
- * the version even again. A read copies `copy` while the version is odd and `estimate` while it is even, and starts again
- * if the version has changed meanwhile. So one of the two copies is consistent at every instant:
+ * the version even again. A read copies `copy` while the version is odd and `estimate` while it is even. It starts
+ * again if the version has changed meanwhile. So one of the two copies is consistent at every instant:
  *
  *   - step in an interrupt, read in the main loop: the read starts again if an estimate was published meanwhile;
  *   - step in the main loop, read in an interrupt: the read succeeds at the first attempt, even in the middle of a put;

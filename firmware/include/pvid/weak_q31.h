@@ -198,7 +198,7 @@ const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self);
 
 /* Copies the published estimate consistently, from any context, while another context calls step (publication.h).
  * *number: estimates published so far; 0: none, and *estimate is the start; the pointer may be NULL. Returns false,
- * with *estimate undefined, iff an estimate was published during each of PVID_READ_ATTEMPTS attempts, or before init. */
+ * with *estimate undefined, iff an estimate was published during each of PVID_READ_ATTEMPTS tries, or before init. */
 bool pvid_weak_read_q31(const pvid_weak_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number);
 
 /* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
