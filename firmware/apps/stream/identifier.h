@@ -57,7 +57,7 @@ pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES]);
 /* The running hash (fnv.h) with the present state and `reason`. */
 uint32_t identifier_hash(uint32_t hash, pvid_reason reason);
 
-/* The payload of an Estimate frame but for the upper bits of its tick. */
+/* The payload of an Estimate frame, without the upper bits of its tick. */
 void identifier_estimate(uint8_t payload[IDENTIFIER_ESTIMATE_BYTES], uint32_t session, pvid_reason reason);
 
 const pvid_counters *identifier_counters(void);

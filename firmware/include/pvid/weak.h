@@ -268,7 +268,7 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
 
 /* The published estimate, for the context that calls step: the last trusted estimate, or the start as long as there is
- * none (then self->trust.published is false). Count the windows since its PVID_UPDATED for its age. */
+ * none (then self->trust.published is false). Its age: time since step last returned PVID_UPDATED or PVID_MISFIT. */
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 
 /* Copies the published estimate consistently, from any context, while another context calls step (publication.h).
