@@ -385,7 +385,7 @@ static void obey(const pvid_link_frame *frame)
     }
 }
 
-/* Takes bytes in up to the end of a frame; returns whether there was one. */
+/* Decodes received bytes up to the end of a frame; returns whether there were any bytes. */
 static bool listen(void)
 {
     static uint8_t bytes[CHUNK];
@@ -431,9 +431,9 @@ int main(void)
                 step_field();
             }
         } else if (!heard && answers_fit(&stream.out, ANSWERS_BYTES)) {
-            pvid_receiver_rest(); /* nothing is to be done or said */
+            pvid_receiver_rest(); /* nothing to process or to send */
         } else {
-            /* on with it */
+            /* continue at once */
         }
     }
 }
