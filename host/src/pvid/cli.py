@@ -198,9 +198,9 @@ def _tone(text: str) -> Tone:
 @click.option("--rate", default=1000.0, show_default=True, help="Sample rate [Hz].")
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(4, 32), help="Encoder resolution.")
-@click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no zero.")
+@click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no offset.")
 @click.option("--noise", type=float, help="White noise of the encoder [LSB].  [default: 0.5]")
-@click.option("--zero", default=0.0, show_default=True, help="Zero error of the encoder [rad].")
+@click.option("--zero", default=0.0, show_default=True, help="Offset of the encoder [rad].")
 @click.option("--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s].")
 @click.option("--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable.")
 @click.option(
@@ -288,12 +288,12 @@ def _with(rig: RigFile, **overrides: str | None) -> RigFile:
 @commands.command(name="identify")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
 @_form_options
-@click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Overrides the rig file.")
+@click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
 @click.option(
-    "--on", "target", metavar="TARGET", help="An emulator, stream-host or a serial port: computed there, too."
+    "--on", "target", metavar="TARGET", help="Also compute on an emulator, stream-host or a serial port."
 )
 @click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
-@click.option("--figure", type=FigurePath(), help="Writes the convergence (png, svg, pdf).")
+@click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 def identify_command(
     run_path: Path,
     rig_path: Path | None,
@@ -308,10 +308,10 @@ def identify_command(
 ) -> int:
     """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m], or what --columns names.
 
-    A rig file is not needed: --set l1=0.25, the length of rod 1, is enough. Missing samples and a clock that is not
-    uniform are bridged, and told.
+    A rig file is not needed: --set l1=0.25, the length of rod 1 [m], is enough. Short gaps are interpolated, long ones
+    stay empty, a clock that is not uniform is corrected; all of these are reported.
 
-    With --on the run is streamed to a target as well, and the answer is given only if the target reached the same
+    With --on the run is also streamed to a target, and the result is printed only if the target computed the same
     bits at every tick that it reported and at the end.
     """
     rig = _with(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
@@ -877,15 +877,15 @@ def bench_log(frames: int) -> int:
 @bench.command(name="liar")
 @_UPDATE
 @click.option("--mutants", default=100_000, show_default=True, help="Frames changed at random.")
-@click.option("--only", metavar="BEHAVIOUR", multiple=True, help="One of those that the table names.")
+@click.option("--only", metavar="BEHAVIOUR", multiple=True, help="A behaviour named in the table; repeatable.")
 def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
-    """A board that lies, against `pvid log` and all that reads its logs: every behaviour, then mutants of frames."""
+    """A board that sends false data, against `pvid log` and all readers of its logs; then mutants of frames."""
     from pvid.bench import liar
     from pvid.bench.liar_mutants import mutate
     from pvid.bench.lies import BEHAVIOURS
 
     if unknown := [name for name in only if name not in BEHAVIOURS]:
-        raise PvidError(f"the liar has no behaviour {', '.join(unknown)}")
+        raise PvidError(f"there is no behaviour {', '.join(unknown)}")
     chosen = [BEHAVIOURS[name] for name in only] or list(BEHAVIOURS.values())
     performances = []
     with tempfile.TemporaryDirectory() as folder:
@@ -917,12 +917,12 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
 @click.option("--seed", default=1, show_default=True, help="Of the mutants.")
 @click.option("--only", type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again.")
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
-@click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that broke something.")
+@click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that caused a defect.")
 @_UPDATE
 def bench_attack(
     mutants: int, seed: int, only: tuple[str, ...], processes: int, keep: Path | None, update: Path | None
 ) -> int:
-    """Mutated rig files, runs and command lines against the command line: what breaks it."""
+    """Runs mutated rig files, runs and command lines, and counts defects."""
     from pvid.bench.attack import HEADER, KINDS, campaign
 
     kinds = only or KINDS

@@ -33,8 +33,8 @@ def rig_options(command: Command) -> Command:
         "settings",
         metavar="KEY=VALUE",
         multiple=True,
-        help="A key of the rig file, before what the file holds, as l1=0.25 or sensor.phi_lsb=0.0015; repeatable. "
-        "l1 is all that is needed.",
+        help="Value of a key of the rig file; overrides the file: l1=0.25 [m] or sensor.phi_lsb=0.0015 [rad]. "
+        "Only l1 is needed. Repeatable.",
     )
     return rig(settings(command))
 
@@ -45,9 +45,9 @@ def columns_option(command: Command) -> Command:
         "--columns",
         metavar="MAP",
         type=ColumnsType(),
-        help="Which columns of RUN are t, phi and y, and their units: t=time_ms:ms,phi=angle_deg:deg,y=h:mm. A number "
-        "is the column's place; units are s ms us ns min, rad mrad deg rev turn, m cm mm um in, a number of SI units, "
-        "or one of them divided (rev/4096) or turned (-mm).",
+        help="Columns of RUN for t, phi and y, and their units: t=time_ms:ms,phi=angle_deg:deg,y=h:mm. A number "
+        "is the position of the column, from 1; units are s ms us ns min, rad mrad deg rev turn, m cm mm um in, a "
+        "number of SI units, or one of these divided (rev/4096) or with opposite sign (-mm).",
     )(command)
 
 
@@ -62,7 +62,7 @@ class ColumnsType(click.ParamType[Columns]):
 
 
 class FigurePath(click.Path):
-    """Name of a figure to write: its format is looked at before anything is computed."""
+    """Path of a figure to write; its format is checked before any computation."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)

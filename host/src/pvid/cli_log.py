@@ -34,33 +34,33 @@ from pvid.tee import Tee
 @click.command(name="log")
 @click.argument("port")
 @click.argument("out", type=click.Path(path_type=Path))
-@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file: goes into the log, for verify.")
-@click.option("--append", is_flag=True, help="OUT may exist: the new segments go behind its old ones.")
-@click.option("--anew", is_flag=True, help="The board starts over whenever the link comes up (needs --rig).")
-@click.option("--paced", is_flag=True, help="A board that is started samples as fast as the line goes, not in time.")
-@click.option("--duration", type=click.FloatRange(min=0), help="Ends after so many seconds.  [default: at Ctrl-C]")
-@click.option("--samples", type=click.IntRange(min=1), help="Ends when so many have come.")
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file; copied into the log, for verify.")
+@click.option("--append", is_flag=True, help="OUT may exist: new segments are appended to it.")
+@click.option("--anew", is_flag=True, help="Start a new session whenever the link comes up (needs --rig).")
+@click.option("--paced", is_flag=True, help="The started board samples as fast as the line allows, not in real time.")
+@click.option("--duration", type=click.FloatRange(min=0), help="Stop after this time [s].  [default: at Ctrl-C]")
+@click.option("--samples", type=click.IntRange(min=1), help="Stop after this number of samples.")
 @click.option(
     "--tee",
     "tees",
     metavar="URL",
     multiple=True,
-    help="Also to udp://host:9870 (JSON: PlotJuggler) or teleplot://host:47269.",
+    help="Also send to udp://host:9870 (JSON: PlotJuggler) or teleplot://host:47269; repeatable.",
 )
 @click.option(
     "--allow-loss",
     default=0.001,
     show_default=True,
     type=click.FloatRange(0, 1),
-    help="Share of frames or samples that may be lost without exit code 1.",
+    help="Share of frames or samples (0 to 1) whose loss is accepted; above it the exit code is 1.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Nothing but the summary at the end.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only the summary at the end.")
 @click.option(
     "--web",
     metavar="[HOST:PORT]",
     is_flag=False,
     flag_value=LIVE_PAGE,
-    help=f"A live page with moving plots for a browser, behind PORT and OUT.  [default: {LIVE_PAGE}]",
+    help=f"Live page with moving plots for a browser; give this option after PORT and OUT.  [default: {LIVE_PAGE}]",
 )
 def log_command(
     port: str,
@@ -76,13 +76,13 @@ def log_command(
     quiet: bool,
     web: str | None,
 ) -> int:
-    """Records what a board sends on PORT into the log OUT, until Ctrl-C.
+    """Records all bytes that a board sends on PORT in the log OUT, until Ctrl-C.
 
-    PORT is a serial device, a URL of pyserial or the name of an emulator. A link that breaks off is taken up again
-    when the board is back, in a new segment of the same log. The file holds every byte that came, and opens even if
-    this program is killed. With a rig file a board that waits for its settings is started.
+    PORT is a serial device, a URL of pyserial or the name of an emulator. If the link fails, recording continues when
+    the board is back, in a new segment of the same log. The file contains every received byte and can be read even if
+    this program is killed. With a rig file, a board that waits for its settings is started.
 
-    On a terminal the estimates are shown as they come, elsewhere there is a line every ten seconds.
+    On a terminal the estimates are shown as they arrive; otherwise a status line is printed every 10 s.
     """
     emulated = port in (HOST_TARGET, *EMULATORS)
     rig = None if rig_path is None else load(rig_path)
@@ -116,7 +116,7 @@ def log_command(
             account = logger.run()
         except PvidError:
             if logger.stream.account.begun:
-                print_account(logger.stream.account, 1.0, logger.failures)  # what was recorded before it is in the log
+                print_account(logger.stream.account, 1.0, logger.failures)  # earlier data are in the log
             raise
     return print_account(account, allow_loss, logger.failures)
 
@@ -124,7 +124,7 @@ def log_command(
 def _view(title: str, l1: float | None, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
     if address and not is_local(address):
-        tell(f"whoever reaches this machine can look at {address}")
+        tell(f"every computer that can reach this machine can open {address}")
     console = Console()
     if sys.stdout.isatty() and not console.is_dumb_terminal:
         return LiveView(console, title, l1, address)
@@ -150,7 +150,7 @@ def _configurations(board: StreamRig, source: Source) -> Callable[[], Configurat
 def print_account(account: Account, allow_loss: float, failures: Sequence[str] = ()) -> int:
     """The summary of a recording, of at most 64 segments; returns the exit code.
 
-    `failures` of the views are named, and are no losses.
+    `failures` of the views are printed, and do not count as losses.
     """
     if earlier := account.begun - len(account.segments):
         samples = account.samples - sum(one.samples for one in account.segments)
@@ -174,7 +174,7 @@ def print_account(account: Account, allow_loss: float, failures: Sequence[str] =
 
 
 def _wrong(account: Account) -> list[str]:
-    """What of a recording cannot be relied on, beside losses that were counted; a sentence each."""
+    """Faults of a recording other than counted losses; one sentence each."""
     sentences = []
     if account.garbled:
         of_them = "not one frame" if not account.frames else f"not one frame in {account.garbled} of the segments"
@@ -188,7 +188,7 @@ def _wrong(account: Account) -> list[str]:
     return sentences
 
 
-_MOST_STRETCHES = 100  # that are named
+_MOST_STRETCHES = 100  # that are printed
 
 _LOG = click.argument("log", type=click.Path(path_type=Path))
 _RIG = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
@@ -197,17 +197,17 @@ _RIG = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="
 @click.command(name="verify")
 @_LOG
 @_RIG
-@click.option("--partial", is_flag=True, help="Exit code 0 also when a part is not verified.")
+@click.option("--partial", is_flag=True, help="Exit code 0 also if only a part is verified.")
 def verify_command(log: Path, rig_path: Path | None, partial: bool) -> int:
     """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
 
-    The first difference is named. A sample is verified when an equal hash covers it. What follows a lost sample cannot
-    be verified until the board begins another session; it is listed, and counted in the summary.
+    Prints the first difference. A sample is verified if an equal hash covers it. Samples after a lost sample cannot
+    be verified until the board begins another session; they are listed, and counted in the summary.
 
-    Exit code 0 when every sample is verified but for those behind the last hash, when no further one was due; 1 at a
-    difference, and, without --partial, when something else is not verified; 3 when nothing is.
+    Exit code 0: every sample is verified; those after the last hash may be unverified if no further hash was due.
+    1: there is a difference, or, without --partial, other samples are not verified. 3: no sample is verified.
     """
-    from pvid.logverify import Verdict, Verifier  # the twins, which other commands need not wait for
+    from pvid.logverify import Verdict, Verifier  # the twins, which other commands do not need
 
     rig = load(rig_path) if rig_path is not None else rig_of_log(log)
     reader = LogReader(log)
@@ -232,13 +232,13 @@ def verify_command(log: Path, rig_path: Path | None, partial: bool) -> int:
 @_LOG
 @_RIG
 @click.option("--to", "form", type=click.Choice(["csv", "parquet", "mcap", "npz"]), required=True, help="Format.")
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="Where, without ending.  [default: beside LOG]")
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Output without extension.  [default: beside LOG]")
 def export_command(log: Path, rig_path: Path | None, form: str, out: Path | None) -> int:
     """Writes samples, estimates, status and events of a LOG in SI units, for other programs.
 
-    csv and parquet make a file of each table; units are in LOG-metadata.json (CSV on the Web) or in the columns'
-    metadata. npz is one file, whose arrays t, phi and y are a run for `pvid identify` if nothing is missing; its units
-    stand in the array "units". mcap is one file of JSON messages for PlotJuggler and Foxglove.
+    csv and parquet write one file for each table; units are in LOG-metadata.json (CSV on the Web) or in the columns'
+    metadata. npz is one file; its arrays t, phi and y are a run for `pvid identify` if no sample is missing; the units
+    are in its array "units". mcap is one file of JSON messages for PlotJuggler and Foxglove.
     """
     from pvid.export import export_log
 
@@ -260,7 +260,7 @@ def plot_command(
 
     A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first.
     """
-    from pvid.report import recording_of, write_report  # matplotlib and scipy, which others need not wait for
+    from pvid.report import recording_of, write_report  # matplotlib and scipy, which other commands do not need
 
     recording = recording_of(log, rig_for(log, rig_path, settings), columns)
     print_notes(recording.run.notes)

@@ -1,8 +1,8 @@
-"""What linear rows lack at large angles, as an error of the estimate: the fixed-point core corrects nothing.
+"""Error of the estimate from linear rows at large angles: the fixed-point core has no correction for large angles.
 
-The rows' sines and cosines bias p by some (phi / 2)^2 / 2, in every window the same way, so that no scatter of the
-windows shows it. The run's own rows tell how much it is: the least squares over them as they are, less that over the
-same rows corrected for large angles.
+The rows replace sin phi and cos phi by their linear terms. This biases p by about (phi / 2)^2 / 2 (relative; phi in
+rad), with the same sign in every window, so the scatter of the windows does not show it. The run's own rows give the
+bias: the least squares over the rows without correction, minus that over the same rows corrected for large angles.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _CORRECTIONS = 3
 
 
 def linear_error(rig: RigFile, run: Run, p: Float) -> Float | None:
-    """Relative errors of w, d1, d2 that the linear rows of a run make [3], about an estimate p = (w, d1, d2) or with c.
+    """Relative errors of w, d1, d2 [3] from the linear rows of a run, at an estimate p = (w, d1, d2) or (w, d1, d2, c).
 
-    None where the run's angles are too large to be corrected.
+    None if the run's angles are too large for the correction.
     """
     try:
         rows = RunRows.of(rig, run, weak_design_of(rig, run.sample_rate)).thinned(_WINDOWS)

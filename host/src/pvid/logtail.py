@@ -1,4 +1,4 @@
-"""A log that grows, followed at a bounded distance from its end."""
+"""Follows a log that is being written, at a bounded distance from its end."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _CHUNK = 1 << 16
 class LogTail:
     """Reads a log behind its writer.
 
-    What comes while it is followed is left out (LogStream.skip) where it lies more than `most_behind` bytes ahead; what
-    is there before is read to its end.
+    Bytes that are in the file at the start are all read. After that, if the reader is more than `most_behind` bytes
+    behind the writer, it skips bytes (LogStream.skip).
     """
 
     def __init__(self, file: BinaryIO, stream: LogStream, most_behind: int = MOST_BEHIND) -> None:
@@ -25,7 +25,7 @@ class LogTail:
         self._there = os.fstat(file.fileno()).st_size
 
     def read(self, hurried: bool = False) -> bytes:
-        """The next bytes for the stream, b"" when there are none yet; hurried: of what is left, the last only."""
+        """The next bytes for the stream, b"" if there are none yet; hurried: skips to the last 64 kB of the file."""
         at, size = self._file.tell(), os.fstat(self._file.fileno()).st_size
         behind = size - at
         if behind > _CHUNK and (hurried or (at >= self._there and behind > self._most_behind)):

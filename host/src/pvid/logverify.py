@@ -1,13 +1,15 @@
-"""A log computed again: every estimate and every hash in it against the numpy twin, bit for bit.
+"""Computes a log again with the numpy twin and compares every estimate and every hash in it, bit for bit.
 
-What the bits depend on is all in the log: the samples from the session's first tick on, the configuration and, by the
-rig file, the settings and tables of the board's image. After a sample is lost the identifier's state is unknown, and
-what follows cannot be verified until another session begins. A link that broke without costing a sample breaks nothing.
+The log contains everything that the bits depend on: the samples from the session's first tick on, the configuration
+and the rig file, which gives the settings and tables of the board's image. After a lost sample the identifier's state
+is unknown, and later samples cannot be verified until another session begins. A link failure without a lost sample has
+no effect.
 
-A sample counts as verified when a later check covers it. A hash covers all samples before it, for it contains theirs.
-One of a board that does not hash its samples, and an estimate, covers what the identifier is done with: a sample is
-part of windows that are worked off up to Schedule.reach ticks later. What the recording holds behind the last check is
-left open. It is no fault as long as no check has been due there: it is told, and the log counts as verified.
+A check is an estimate or a hash. A sample counts as verified if a later check that covers it is equal. If the board
+hashes its samples, a hash covers all samples before it. An estimate, or a hash without the samples, covers only samples
+that the identifier has processed completely: a window is processed up to Schedule.reach ticks after its samples.
+Samples after the last check are not verified. If no further check was due there, this is no fault: it is reported, and
+the log counts as verified.
 """
 
 from __future__ import annotations
@@ -51,17 +53,17 @@ from pvid.twin.weak_q31 import WeakTwinQ31
 Check = Estimate | EstimateQ31 | Hash | Credit
 Twin = WeakTwin | StrongTwin | WeakTwinQ31 | StrongTwinQ31
 
-_CONFIGURATIONS = 8  # of the last sessions that are remembered
+_CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
 _UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
 
 
 @dataclass
 class Stretch:
-    """Consecutive ticks of one session and what came of them.
+    """Consecutive ticks of one session and the result of their verification.
 
-    `ticks` from `first` on; `checked` estimates and hashes were equal up to the `difference`, if there is one;
-    `verified` ticks are covered by checks that were equal; `open` says that no check of the others has been due yet;
-    `why_not` says why nothing could be verified.
+    `ticks`: their number, from `first` on. `checked`: estimates and hashes that were equal, up to the `difference` if
+    there is one. `verified`: ticks covered by equal checks. `open`: no check of the other ticks was due yet. `why_not`:
+    reason why nothing could be verified.
     """
 
     segment: int
@@ -76,7 +78,7 @@ class Stretch:
 
     @property
     def trailing(self) -> int:
-        """Ticks behind the last check."""
+        """Ticks after the last check."""
         return self.ticks - self.verified
 
     @property
@@ -96,11 +98,11 @@ class Stretch:
 
 @dataclass
 class Verdict:
-    """What became of all stretches."""
+    """Results of all stretches, added up."""
 
     samples: int = 0
     verified: int = 0
-    trailing: int = 0  # behind the last check of their stretch, where none has been due yet
+    trailing: int = 0  # after the last check of their stretch, if no further check was due
     checked: int = 0
     different: int = 0
     stretches: int = 0
@@ -108,7 +110,7 @@ class Verdict:
     bad: set[int] = field(default_factory=set)  # with a difference, or with nothing that could be verified
 
     def add(self, stretch: Stretch) -> None:
-        """The next one."""
+        """Adds the result of the next stretch."""
         self.stretches += 1
         self.samples += stretch.ticks
         self.checked += stretch.checked
@@ -124,7 +126,7 @@ class Verdict:
 
     @property
     def left(self) -> int:
-        """Samples that are not verified although a check of them was due, or cannot be."""
+        """Samples that cannot be verified, or are not although a check of them was due."""
         return self.samples - self.verified - self.trailing
 
     @property
@@ -148,9 +150,11 @@ class Verdict:
 
 @dataclass
 class _Open:
-    """A stretch that grows; `lacks` says what is missing before it, if it does not begin with its session.
+    """A stretch that is still growing.
 
-    `session` is 0 where the samples do not name it; `harmed` says that something was lost since the last check.
+    `lacks`: a sentence about the samples missing before it, if it does not begin with its session. `session`: 0 if the
+    samples do not contain it. `late`: the first samples of the session are missing. `harmed`: data were lost since the
+    last check.
     """
 
     stretch: Stretch
@@ -166,11 +170,11 @@ class _Open:
         return self.stretch.first + self.stretch.ticks
 
     def is_of(self, session: int) -> bool:
-        """Whether that can be its session."""
+        """Whether `session` can be the session of this stretch."""
         return 0 in (session, self.session) or session == self.session
 
     def begin_with(self, configuration: Configure | ConfigureQ31) -> None:
-        """Now that it is known where the session begins."""
+        """Sets `late` when the configuration shows at which tick the session begins."""
         if self.is_of(configuration.session) and self.stretch.first != configuration.first_tick:
             self.late = True
             self.parts.clear()
@@ -178,14 +182,14 @@ class _Open:
 
 
 class Verifier:
-    """Takes the records of a log in and hands out each stretch when it has come to its end.
+    """Reads the records of a log and yields each stretch when it is complete.
 
     Parameters
     ----------
     rig
-        Of the board; None: nothing can be verified.
+        The board's rig; None: nothing can be verified.
     progress
-        Called with the ticks computed so far.
+        Called with the number of ticks computed so far.
 
     Memory: the samples of the longest stretch.
     """
@@ -201,7 +205,7 @@ class Verifier:
         self._settings: dict[float, tuple[FloatConfig | FixedConfig, int]] = {}
 
     def stretches(self, records: Iterable[Record]) -> Iterator[Stretch]:
-        """Of all records, in order."""
+        """The stretches of all records, in order."""
         for record in records:
             yield from self._take(record)
         yield from self._close()
@@ -238,7 +242,7 @@ class Verifier:
                 opened.begin_with(configuration)
         self._before = record.segment, record.tick + raw.count
         opened.stretch.ticks += raw.count
-        if not opened.late:  # else it will not be computed
+        if not opened.late:  # a late stretch is not computed
             opened.parts.append(raw.values)
 
     def _take_check(self, tick: int, check: Check) -> None:
@@ -252,7 +256,7 @@ class Verifier:
             opened.harmed = False
 
     def _lacking(self, record: Record) -> str:
-        """What is missing before these samples, in a sentence."""
+        """A sentence about the samples missing before this record."""
         if self._before is None or self._before[0] != record.segment:
             return f"its session began before this segment did, and the samples before tick {record.tick} are not in it"
         first = self._before[1] if self._before[1] < record.tick else 0
@@ -290,7 +294,7 @@ class Verifier:
         for tick, check in opened.checks:
             if check.session == stretch.session:
                 checks.setdefault(tick, []).append(check)
-        with np.errstate(all="ignore"):  # a board may send any number, and say that it was configured with any
+        with np.errstate(all="ignore"):  # a board may send any number, in samples and in its configuration
             recomputation = _Recomputation(config, checks, stretch, self._count)
             recomputation.run(samples)
         stretch.verified = recomputation.covered
@@ -305,11 +309,11 @@ class Verifier:
             self._progress(self._done)
 
     def _config(self, configuration: Configuration) -> FloatConfig | FixedConfig:
-        """The identifier's settings: the rig file's, with what the configuration brings."""
+        """The identifier's settings: those of the rig file, with the values of the configuration."""
         if self.rig is None:
             raise PvidError("the log holds no rig file: name it with --rig")
         if self._hello is None:
-            raise PvidError("the board has not said who it is")
+            raise PvidError("the board has not sent its identity (a Hello frame)")
         rate = float(self._hello.sample_rate)
         if rate not in self._settings:
             board = stream_rig(self.rig, self.rig.sample_rate or rate)
@@ -349,7 +353,7 @@ class Verifier:
 
 def _law(number: int) -> Law:
     if number not in list(Law):
-        raise PvidError(f"the board was configured with law {number}, and there is none")
+        raise PvidError(f"the board was configured with law {number}, which does not exist")
     return Law(number)
 
 
@@ -359,7 +363,7 @@ def _pace(configuration: Configuration) -> int:
 
 
 def _reach(twin: Twin) -> int:
-    """Ticks from a sample to the end of what the identifier does with it."""
+    """Ticks from a sample until the identifier has processed it completely."""
     match twin:
         case WeakTwin() | WeakTwinQ31():
             return twin.schedule.reach
@@ -386,8 +390,8 @@ class _DifferentError(Exception):
 
 
 class _Recomputation:
-    """One run of the twin over a stretch: `covered` are the samples that the checks cover which were equal, `hashed`
-    says that they were hashed themselves."""
+    """One run of the twin over a stretch. `covered`: samples covered by equal checks. `hashed`: the board hashes its
+    samples."""
 
     def __init__(
         self,
@@ -409,7 +413,7 @@ class _Recomputation:
         self._verdict = int(Reason.WARMING_UP)
 
     def run(self, samples: npt.NDArray[Any]) -> None:
-        """Over samples [ticks, 2] from the session's first tick; the outcome is left in the stretch."""
+        """Runs over samples [ticks, 2] from the session's first tick; writes the result into the stretch."""
         self._sample_hashes = fnv.sample_hashes(samples)
         try:
             wide = samples.astype(np.int64) if self._fixed else samples
@@ -435,7 +439,7 @@ class _Recomputation:
             self.covered = max(self.covered, tick + 1 - (0 if hashed else self.reach))
 
     def _state(self, reason: int) -> bytes:
-        """What the hash covers, as in fnv.h."""
+        """The bytes that the hash covers, as in fnv.h."""
         estimator = self.twin.estimator
         word = reason.to_bytes(4, "little")
         if isinstance(estimator, EstimatorQ31):
@@ -445,7 +449,7 @@ class _Recomputation:
         return estimator.p[:, 0].astype("<f4").tobytes() + estimator.sums[:, 0].astype("<f4").tobytes() + word
 
     def _compared(self, check: Check, tick: int, reason: int) -> Iterator[tuple[str, int, int]]:
-        """Variable, the log's word, the twin's."""
+        """Yields variable, word of the log and word of the twin."""
         if isinstance(check, Hash | Credit) and check.sample_hash != 0:
             yield "hash of the samples", check.sample_hash, int(self._sample_hashes[tick])
         match check:
@@ -479,7 +483,7 @@ class _Recomputation:
 
 
 def _word(value: Any) -> int:
-    """The 32 bits of a number; one NaN is like another."""
+    """The 32 bits of a number; all NaNs are equal."""
     if isinstance(value, float | np.floating):
         word = np.float32(value)
         return 0x7FC00000 if np.isnan(word) else int(word.view(np.uint32))

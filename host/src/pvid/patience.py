@@ -1,4 +1,4 @@
-"""HTTP connections of the live page: a slow client's is ended, where uvicorn would wait for the rest of a request."""
+"""HTTP connections of the live page with time-outs: uvicorn alone would wait forever for the rest of a request."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import ClassVar
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-REQUEST_S = 8.0  # in which a request has to come; uvicorn ends a connection that is idle for 5 s by itself
-ANSWER_S = 30.0  # in which some of an answer has to be read
-MOST_WAITING = 24  # connections without a whole request: the oldest makes room for the next
+REQUEST_S = 8.0  # for a complete request; uvicorn itself closes a connection that is idle for 5 s
+ANSWER_S = 30.0  # in which the client must read some bytes of the answer
+MOST_WAITING = 24  # connections without a complete request: beyond this number the oldest is closed
 
 
 class Impatient(H11Protocol):
-    """A connection that is ended when its request does not come, or its answer is not taken, in time."""
+    """A connection that is closed if its request does not arrive, or its answer is not read, in time."""
 
     _waiting: ClassVar[dict[Impatient, None]] = {}  # in the order in which they began to wait
     _limit: asyncio.TimerHandle | None = None
@@ -30,7 +30,7 @@ class Impatient(H11Protocol):
         super().connection_lost(exc)
 
     def handle_events(self) -> None:
-        """Reads what has come; a request that is whole is given the time to be answered."""
+        """Reads received bytes; a complete request starts the time-out of the answer."""
         before = self.cycle
         super().handle_events()
         if self.cycle is not before:
@@ -38,12 +38,12 @@ class Impatient(H11Protocol):
             self._within(ANSWER_S)
 
     def on_response_complete(self) -> None:
-        """The answer has been handed to the system; the next request may come."""
+        """The answer has been passed to the operating system; waits for the next request."""
         self._await_request()
         super().on_response_complete()
 
     def resume_writing(self) -> None:
-        """Some of the answer has been read."""
+        """The client has read some of the answer."""
         super().resume_writing()
         if self not in self._waiting:
             self._within(ANSWER_S)

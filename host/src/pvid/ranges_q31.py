@@ -1,4 +1,4 @@
-"""Full scales of the fixed-point core: what the rig file says, else what a run needs, else defaults."""
+"""Full scales of the fixed-point core: from the rig file, else from what a run needs, else defaults."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ DEFAULT_PHI_RANGE = 0.5  # rad
 _Y_RANGE_OF_L1 = 0.1
 _ACCELERATION_OF_G = 4.0
 
-# Of the largest value in a run: the next run of the same rig may go a little further.
+# Factor on the largest value in a run: the next run of the same rig may be a little larger.
 _MARGIN = 1.25
-# One sample in a thousand may lie anywhere: what is further than this times the others is a fault of the sensor, which
-# the core is to leave out, not to make room for.
+# One sample in a thousand may have any value: beyond _FAULT times this quantile it is a fault of the sensor, which the
+# core rejects; the range need not include it.
 _ORDINARY = 0.999
 _ORDINARY_ACCELERATION = 0.99  # a jump of y by one fault is spread by the smoother
 _FAULT = 3.0
-_SMOOTHING_S = 0.05  # of the pivot's acceleration
-# A range of acceleration twice as wide costs nothing; ten times as wide the rounding of its products biases d2.
+_SMOOTHING_S = 0.05  # smoothing window for the pivot's acceleration
+# A range of acceleration that is twice too wide does no harm; ten times too wide, rounding of its products biases d2.
 _ACCELERATION_MARGIN = 2.0
 
 
 def with_default_ranges(rig: RigFile) -> Sensor:
-    """The sensors of a rig with a range each, those that the file leaves open by default."""
+    """The sensors of a rig with all ranges; those missing in the file have their default."""
     sensor = rig.sensor
     return replace(
         sensor,
@@ -43,11 +43,11 @@ def with_default_ranges(rig: RigFile) -> Sensor:
 
 
 def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
-    """The rig with a range each; where the file leaves one open, what the run needs and a margin: of phi and y no less
-    than the default."""
+    """The rig with all ranges. A range missing in the file is what the run needs plus a margin; for phi and y at least
+    the default."""
     default = with_default_ranges(rig)
     given = rig.sensor
-    rest = 0.0 if rig.identifier.form == "strong" else None  # what the strong form counts angles from
+    rest = 0.0 if rig.identifier.form == "strong" else None  # the strong form measures angles from 0
     ranges = {
         "phi_range": given.phi_range or max(default.phi_range, _MARGIN * reach(run.phi, rest)),
         "y_range": given.y_range or max(default.y_range, _MARGIN * reach(run.y)),
@@ -57,8 +57,8 @@ def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
 
 
 def _acceleration_range(rig: RigFile, run: Run, default: float) -> float:
-    """What the run needs [m/s^2]. Where that is beyond the default, faults are left out of it; in the strong form,
-    whose products keep their bits, it is no less than the default."""
+    """The range that the run needs [m/s^2]. If it is above the default, faults of the sensor are excluded. In the
+    strong form, whose products do not lose bits, it is at least the default."""
     if rig.identifier.form == "weak":
         largest = _ACCELERATION_MARGIN * _largest_acceleration(rig, run)
         if 0 < largest <= default:
@@ -67,7 +67,7 @@ def _acceleration_range(rig: RigFile, run: Run, default: float) -> float:
 
 
 def _largest_acceleration(rig: RigFile, run: Run) -> float:
-    """As the weak form's core sees it, noise and faults included [m/s^2]; 0 of a run that is too short."""
+    """Largest acceleration in the weak form's core, with noise and faults [m/s^2]; 0 if the run is too short."""
     design, finite = weak_design_of(rig, run.sample_rate), np.isfinite(run.y)
     if len(run.y) < design.taps or not finite.any():
         return 0.0
@@ -76,7 +76,7 @@ def _largest_acceleration(rig: RigFile, run: Run) -> float:
 
 
 def middle_of_travel(x: npt.ArrayLike) -> float:
-    """Half way between the ends of x [n], but for its faults; 0 of nothing."""
+    """Mean of the ends of x [n] without its faults; 0 if x is empty."""
     values = np.asarray(x, np.float64)
     values = values[np.isfinite(values)]
     if not len(values):
@@ -86,7 +86,7 @@ def middle_of_travel(x: npt.ArrayLike) -> float:
 
 
 def reach(x: Float, middle: float | None = None, ordinary: float = _ORDINARY) -> float:
-    """The furthest of x [n] from `middle`, None: that of its travel, but for its faults."""
+    """Largest distance of x [n] from `middle` (None: the middle of its travel), without its faults."""
     values = x[np.isfinite(x)]
     if not len(values):
         return 0.0
@@ -95,8 +95,8 @@ def reach(x: Float, middle: float | None = None, ordinary: float = _ORDINARY) ->
 
 
 def pivot_acceleration(run: Run) -> Float:
-    """y'' [n, m/s^2] behind a smoother of 50 ms, cubic."""
-    from scipy.signal import savgol_filter  # takes a quarter of a second that a float core need not wait for
+    """y'' [n, m/s^2] after a Savitzky-Golay smoother of 50 ms, degree 4."""
+    from scipy.signal import savgol_filter  # a quarter of a second, which a float core does not need
 
     points = max(7, round(_SMOOTHING_S * run.sample_rate)) | 1
     if len(run.y) < points:
@@ -110,8 +110,8 @@ def pivot_acceleration(run: Run) -> Float:
 
 @dataclass(frozen=True)
 class Beyond:
-    """Samples of a run that the core could not take in: `phi` and `y` beyond their ranges, `acceleration` with a
-    pivot that was thrown faster than its range or with a neighbour that was; of `samples` in all."""
+    """Counts of the samples of a run that the core rejected: `phi` and `y` beyond their ranges; `acceleration` for a
+    pivot acceleration beyond its range, at this sample or a neighbour. `samples`: all samples of the run."""
 
     phi: int
     y: int
@@ -120,11 +120,11 @@ class Beyond:
 
     @property
     def share(self) -> float:
-        """Of the samples, 0 to 1: the largest of the three."""
+        """The largest of the three counts as a share of all samples, 0 to 1."""
         return max(self.phi, self.y, self.acceleration) / max(self.samples, 1)
 
     def words(self, sensor: Sensor) -> str | None:
-        """Which samples are beyond what, a clause each; None if none are."""
+        """Share of samples beyond each range, one clause for each; None if there are none."""
         parts = [
             f"{_percent(count / max(self.samples, 1))} of the samples are beyond {name} = {value:.3g} {unit}"
             for count, name, value, unit in (
@@ -142,7 +142,7 @@ def _percent(share: float) -> str:
 
 
 def beyond_ranges(phi: Int64, y: Int64, phi_max: int, y_max: int, rejected: int) -> Beyond:
-    """Of counts about their offsets [n] and full scales [counts]; `rejected` by the core in all."""
+    """From sensor counts without offset [n] and full scales [counts]; `rejected`: samples that the core rejected."""
     outside_phi, outside_y = np.abs(phi) > phi_max, np.abs(y) > y_max
     thrown = max(0, rejected - int((outside_phi | outside_y).sum()))
     return Beyond(int(outside_phi.sum()), int(outside_y.sum()), thrown, len(phi))

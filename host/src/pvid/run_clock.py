@@ -1,4 +1,4 @@
-"""The uniform clock of a recorded run: found from its time stamps, and what is wrong with them bridged and told.
+"""The uniform clock of a recorded run: found from its time stamps; faults of these are corrected and reported.
 
 A run whose t departs from a uniform clock by at most a tenth of a period is left as it is, bit for bit. Else each row
 gets its tick, so that missing samples are seen, and one of two things holds:

@@ -1,4 +1,4 @@
-"""Missing ticks of a run: short gaps are interpolated, long ones stay empty, and both are told."""
+"""Missing ticks of a run: short gaps are interpolated, long ones stay empty, and both are reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Angles of an encoder that starts over after a turn, joined into one that does not."""
+"""Unwraps the angle of an encoder that wraps after one turn."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
-_FEWEST = 100  # samples; fewer do not show how large the steps between samples are
-_MOST_SHARE = 0.1  # of the steps: noise about the place where the encoder starts over repeats them
-# A joined step is at most so many times the largest of the others.
+_FEWEST = 100  # samples; with fewer the usual step between samples is not known
+_MOST_SHARE = 0.1  # largest share of steps that are wraps: noise at the wrap position repeats them
+# An unwrapped step is at most this many times the largest of the other steps.
 _SMOOTH = 3.0
 
 
 def joined(phi: FloatArray) -> tuple[FloatArray, int]:
-    """phi without the jumps of a whole turn, and how many there were.
+    """phi without jumps of a whole turn, and the number of jumps.
 
-    Where the jumps are not a turn to within what the angle moves between two samples, or too many, nothing is changed:
-    it is no encoder that starts over. What is joined rests within half a turn of 0.
+    phi is returned unchanged if there are too many jumps, or if a jump differs from a whole turn by more than the angle
+    moves between two samples: then the encoder does not wrap. The median of an unwrapped angle is within half a turn
+    of 0.
 
     Parameters
     ----------

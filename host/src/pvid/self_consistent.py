@@ -1,8 +1,8 @@
-"""What the linear rows of one window lack at large angles: found together with the ends of its motion.
+"""Terms that the linear rows of one window neglect at large angles, computed together with the ends of its motion.
 
-The lack follows from the motion inside the window, the motion from a and b at its ends, and these from the rows less
-the lack. Passes around this circle converge where the angles of both links are small; where the first link swings far
-they run away, and the two numbers a and b are solved for instead.
+The neglected terms (`lack`, `Remainder`) depend on the motion inside the window, the motion depends on its end values a
+and b, and these depend on the rows minus the neglected terms. A fixed-point iteration over these three steps converges
+if the angles of both links are small. If the first link swings far, it diverges, and a root search finds a and b.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pvid.weak_oracle import L2_MIN, Remainder, boundary, internal_motion, lack
 Float = npt.NDArray[np.float64]
 
 _PASSES = 3
-# Passes are enough where the last one changes the lack by less than this share of it.
+# The passes have converged if the last one changes the neglected terms by less than this share.
 _CONVERGED = 0.01
 _SOLVED = 1e-4  # of a and b, relative
 _EVALUATIONS = 40
@@ -25,11 +25,12 @@ _EVALUATIONS = 40
 def self_consistent(
     p: Float, damping: Float, columns: Float, phi: Float, u: Float, design: WeakDesign, full_angle: bool
 ) -> Remainder | None:
-    """Of the window with `columns` [11, K], angle phi and u [W], at p = (w, d1, d2, c), with friction `damping` [2].
+    """Neglected terms of the window with `columns` [11, K], angle phi [W, rad] and u [W, 1/s^2], at p = (w, d1, d2, c),
+    with friction `damping` [2].
 
-    None where no motion is consistent with its lack.
+    None if no motion is consistent with its neglected terms.
 
-    Cost: 3 evaluations of the motion where passes converge, else some 12.
+    Cost: 3 evaluations of the motion if the passes converge, else about 12.
     """
     none = Remainder(np.zeros(design.functions), np.zeros((2, design.functions)))
     if p[1] - p[2] - 1 <= L2_MIN:
@@ -56,7 +57,7 @@ def self_consistent(
             wanted = ends_with(lack_at(ends))
             return np.nan_to_num((wanted - ends) / unit, nan=1e6, posinf=1e6, neginf=-1e6)
 
-        from scipy.optimize import root  # takes half of what any command takes to start, and 40 MB of a logger
+        from scipy.optimize import root  # half the start time of a command, and 40 MB in a logger
 
         found = root(miss, first / unit, options={"xtol": _SOLVED, "maxfev": _EVALUATIONS})
         return lack_at(found.x * unit) if found.success else None

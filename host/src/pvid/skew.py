@@ -1,4 +1,4 @@
-"""Sensors that are not sampled at one instant: how much later y is than phi, found from the run, and put right."""
+"""Sensors that are not sampled at the same instant: estimates the delay of y after phi from the run, and shifts y."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from pvid.capture import Run
 from pvid.run_rows import Fit
 
-# y looks skewed where a shift of it leaves less than this share of the residuals' variance.
+# y counts as skewed if a shift reduces the variance of the residuals below this share.
 _SKEWED = 0.7
 _MOST = 3.0  # samples
 
 
 def aligned(run: Run, y_delay: float) -> Run:
-    """The run with y as it was when phi was sampled, where it was sampled y_delay [s] later; between its samples on
-    straight lines."""
+    """The run with y at the instants of phi, if y was sampled y_delay [s] later than phi; y is interpolated linearly
+    between its samples."""
     if y_delay == 0.0:
         return run
     clock = np.arange(len(run.y), dtype=np.float64)
@@ -26,10 +26,10 @@ def aligned(run: Run, y_delay: float) -> Run:
 
 
 def skew_of(run: Run, fitted: Callable[[Run], Fit]) -> tuple[float, Fit | None]:
-    """How much later y seems to be sampled than phi [s], to 3 samples, and the fit without it; (0, None) where a shift
-    explains nothing.
+    """Estimated delay of y after phi [s], at most 3 samples, and the fit of the run with this delay removed; (0, None)
+    if a shift does not reduce the residuals.
 
-    `fitted` gives the least squares of a run. chi^2 is a parabola of the shift: three of them show where it ends.
+    `fitted` returns the least squares of a run. chi^2 is a parabola of the shift: three values give its minimum.
     """
     sample = 1.0 / run.sample_rate
     now, earlier, later = (fitted(aligned(run, shift)).chi2 for shift in (0.0, -sample, sample))

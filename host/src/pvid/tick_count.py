@@ -1,4 +1,4 @@
-"""Ticks of a board in 64 bits, also of one that sends no more than their low 32."""
+"""Extends the ticks of a board to 64 bits, also if the board sends only the low 32 bits."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ _HALF = 1 << 31
 
 
 class TickCount:
-    """The ticks of one session after the other, as they stand in frames that come in order."""
+    """64-bit ticks from the ticks of frames in order of arrival, session after session."""
 
     def __init__(self) -> None:
-        self._session = 0  # 0: none was named
+        self._session = 0  # 0: unknown
         self._latest: int | None = None
 
     def begin(self) -> None:
-        """The board has begun anew."""
+        """The board has started a new session."""
         self._session, self._latest = 0, None
 
     def of(self, tick: int, session: int) -> int:
-        """The tick of a frame: a count that falls by more than 2^31 within a session has passed 2^32.
+        """The 64-bit tick of a frame: if the tick falls by more than 2^31 within a session, its 32 bits have wrapped.
 
         Parameters
         ----------
         tick
-            Of the frame, with the upper bits that it has.
+            Tick of the frame, with the upper bits that the frame contains.
         session
-            That it names; 0: none.
+            Session number in the frame; 0: the frame has none.
         """
         if session not in (0, self._session):
             if self._session != 0:

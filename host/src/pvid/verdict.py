@@ -1,10 +1,10 @@
-"""A published estimate held against the whole run: do all parts of it agree, and how much does it leave unexplained?
+"""Compares a published estimate with the whole run: do all windows agree with it, and how much motion is unexplained?
 
-A real rig never fits its equations to its encoder's noise, and an alarm for that alone would sound for every rig. What
-counts is whether the estimate is what all windows want. The scores of the windows, C^T N e, sum to 0 at the least
-squares; their scatter gives standard errors that need no model of the noise (clustered by window), and a sum that is
-far from 0 shows that the estimate belongs to a part of the run only. The larger of these and of the core's is
-published. The share of the motion that no pendulum explains is reported beside it.
+No real rig fits its equations to within the encoder's noise, so an alarm for this alone would be raised for every rig.
+The test is whether all windows agree with the estimate. The scores of the windows, C^T N e, sum to 0 at the least
+squares solution. Their scatter gives standard errors that need no model of the noise (clustered by window). A sum far
+from 0 shows that the estimate fits only a part of the run. The larger of these standard errors and the core's is
+published, together with the share of the motion that the equations do not explain.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from pvid.weak_oracle import VALID_ANGLE
 
 Float = npt.NDArray[np.float64]
 
-# Windows that are looked at, evenly spread over a longer run.
+# Most windows that are evaluated; in a longer run they are evenly spread.
 _WINDOWS = 300
 _WINDOWS_OF_SKEW = 100
-# Parts of the run disagree when the windows' own standard error, or what they want of p, is so many times the core's.
+# Parts of the run disagree if the windows' standard error, or their distance from p, exceeds this many of the core's.
 DISAGREES = 3.0
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Of an estimate p = (w, d1, d2, c), with friction (w, d1, d2, c, c1, c2).
+    """Result for an estimate p = (w, d1, d2, c), with friction (w, d1, d2, c, c1, c2).
 
     Attributes
     ----------
-    se : standard errors of p [n_p] from the scatter of the windows, their distance from p, and what a skew of the
-        sensors does; 0 where there are too few windows
-    unexplained : rms of the rows' residuals beyond the encoder's noise, over that of the rows (0 to about 1)
-    skew : how much later y seems to be sampled than phi [s]; 0 where that explains nothing
+    se : standard errors of p [n_p] from the scatter of the windows, their distance from p and the effect of a skew of
+        the sensors; 0 if there are too few windows
+    unexplained : rms of the rows' residuals beyond the encoder's noise, relative to the rms of the rows (0 to 1)
+    skew : estimated delay of y after phi [s]; 0 if a delay does not reduce the residuals
     """
 
     se: Float
@@ -50,7 +50,7 @@ class Verdict:
 
 
 def verdict(rig: RigFile, run: Run, p: Float) -> Verdict:
-    """What the run's windows say of p, which the core published; large angles are corrected."""
+    """Evaluates the windows of the run at p, which the core published; large angles are corrected."""
     at = p if len(p) > 3 else np.append(p, 0.0)
     nothing = Verdict(np.zeros(len(at)), 0.0)
     try:
@@ -67,13 +67,13 @@ def verdict(rig: RigFile, run: Run, p: Float) -> Verdict:
         return nothing
     beyond = float(plain.energy.sum()) - len(plain.energy) * (rows.design.functions - 2) * rows.row_sd**2
     unexplained = math.sqrt(max(beyond, 0.0) / max(float(plain.signal.sum()), 1e-300))
-    share = rows.part  # of the windows: the whole run knows p better
+    share = rows.part  # share of the windows that is used: the whole run has smaller errors
     se = np.sqrt(fit.clustered_se**2 * share + wanted**2 + by_skew**2)
     return Verdict(se, min(unexplained, 1.0), skew)
 
 
 def _rows(rig: RigFile, run: Run, at: Float, most: int) -> RunRows:
-    """Of the windows that can be judged, so many at most, corrected at p."""
+    """Rows of the valid windows, at most `most` of them, corrected at p."""
     rows = RunRows.of(rig, run, weak_design_of(rig, run.sample_rate)).thinned(most)
     rows = rows.within(at[3], VALID_ANGLE, FEWEST)
     if rig.identifier.full_angle or rig.identifier.damping:
