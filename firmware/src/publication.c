@@ -20,7 +20,7 @@ static inline void store(word *place, uint32_t value)
     __atomic_store_n(place, value, __ATOMIC_RELAXED);
 }
 
-/* All that was written before is seen by whoever sees what is written after. */
+/* A reader that sees a later write also sees all writes before this fence. */
 static inline void written(void)
 {
     __atomic_thread_fence(__ATOMIC_RELEASE);

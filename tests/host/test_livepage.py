@@ -151,7 +151,7 @@ def test_the_state_is_that_of_the_log_and_bounded(sent: list[bytes], tmp_path: P
     state = state_of(log, "a title")
     assert state["title"] == "a title" and state["up"] and state["lost"] == ""
     assert f"{TICKS} samples" in state["received"] and "weak form, core f32" in state["board"]
-    assert state["reason"] == "updated" and state["kappa"].endswith("good: parameters told apart")
+    assert state["reason"] == "updated" and state["kappa"].endswith("good: parameters identifiable")
     assert [row["symbol"] for row in state["parameters"]] == ["g*", "l2", "rho2", "w", "d1", "d2", "c"]
     estimates = state["estimates"]
     assert len(estimates["t"]) == TICKS // 100

@@ -124,10 +124,10 @@ def test_every_reason_has_words() -> None:
 
 def test_kappa_in_words_and_as_a_bar() -> None:
     assert [kappa_words(one) for one in (0.0, 1e-4, 2e-3, 0.01)] == [
-        "parameters cannot be told apart",
-        "weak: parameters barely told apart",
-        "fair: parameters told apart",
-        "good: parameters told apart",
+        "parameters not identifiable",
+        "weak: parameters barely identifiable",
+        "fair: parameters identifiable",
+        "good: parameters identifiable",
     ]
     assert [kappa_share(one) for one in (0.0, 1e-7, 1e-3, 1.0, 7.0, float("nan"))] == [0, 0, 0.5, 1, 1, 0]
 

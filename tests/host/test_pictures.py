@@ -83,7 +83,7 @@ def test_the_terminal_view_fits_80_by_24_whatever_it_has_to_say(
         lines = console.export_text(clear=False).splitlines()
         assert len(lines) <= 24 and max(map(len, lines)) <= 80
         assert not worst or "friction, large angles" in " ".join(lines)
-        assert "parameters told apart" in "".join(lines) or worst
+        assert "parameters identifiable" in "".join(lines) or worst
         (tmp_path / "terminal.svg").write_text(console.export_svg(title="pvid log"))
         with chromium(tmp_path / f"chromium{worst}", 1000, 620) as browser:
             browser.get((tmp_path / "terminal.svg").as_uri())

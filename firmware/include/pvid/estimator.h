@@ -117,7 +117,7 @@ typedef struct {
     float kappa_min;
     float noise_margin;
     float dead_zone;              /* squared */
-    float noise[PVID_NOISE_TRACES]; /* what the model's `noise` is told; written by whoever makes the rows */
+    float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; written by the module that makes the rows */
     float energy;                 /* sum of e^2 of the rows since the last group's end, at the p they met */
     float taken;                  /* their weight; these two only for models without functions of their own */
     float expected;               /* mean over the rows in the sums of the variance that the sensors' noise gives them

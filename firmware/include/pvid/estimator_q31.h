@@ -107,7 +107,7 @@ typedef struct {
     int32_t kappa_min;
     uint32_t noise_margin;
     uint32_t dead_zone;
-    pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by whoever makes the rows */
+    pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by the module that makes the rows */
     int64_t energy; /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
     int64_t taken;  /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them [units

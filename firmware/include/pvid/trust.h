@@ -1,16 +1,16 @@
-/* pvid/trust.h - which estimate may be shown to others.
+/* pvid/trust.h - which estimates are published.
  *
- * The estimator always has a p; this decides whether it is worth anything. After every group of rows the
- * present estimate is judged, and either becomes the published one or not, for a reason that is told:
+ * The estimator always has a p; this module decides whether it is accurate enough. After every group of rows it
+ * checks the present estimate, publishes it or not, and returns the reason:
  *
  *   PVID_UPDATED            it is published
  *   PVID_MISFIT             it is published, but the residuals are larger than the sensors' noise explains
- *   PVID_HELD_NOT_EXCITED   the data do not say enough of p[0], or no more than noise would
+ *   PVID_HELD_NOT_EXCITED   the data contain too little information on p[0], or no more than noise would
  *   PVID_HELD_PIVOT         the system could not be solved
- *   PVID_HELD_UNCERTAIN     the standard errors are too wide, or p is still on its way
+ *   PVID_HELD_UNCERTAIN     the standard errors are too large, or p has not converged yet
  *
- * Until the first one is trusted, the published estimate is the start with the start's standard deviations.
- * An estimate that was trusted stays until a better one is.
+ * Until the first estimate is trusted, the published one is the start with the start's standard deviations.
+ * A trusted estimate is held until a later one is trusted.
  *
  * The alarm compares residuals with what the sensors' noise explains, from the first judgement on: the variance of all
  * rows in the sums at the present p, and the windows lately, at the p that they met.
@@ -42,8 +42,8 @@ typedef struct {
                             PVID_TRUST_LONG groups and more; half as much again on the mean over the last
                             PVID_TRUST_SHORT ones. At least 1; 0: no alarm */
     uint16_t groups_min; /* groups before the first publication */
-    uint16_t shut_max;   /* groups in a row that say too little for a step, after which p goes back to the
-                            published one, lest it stay where noise led it; 0: never */
+    uint16_t shut_max;   /* consecutive groups with too little information for a step, after which p is reset to the
+                            published one, so that it does not stay where noise moved it; 0: never */
     float renewal;       /* the past is renewed once p has settled so far from where its rows came in, in one of its
                             positive parameters and relative to it, while the residuals of all rows are beyond the
                             alarm's limit; 0.01..1e3; 0: never */

@@ -2,9 +2,8 @@
 
 A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order and among others; `Columns` maps other names
 and units. Jumps of a whole turn are joined (`run_turns`), its clock is made uniform (`run_clock`) and short gaps are
-interpolated (`run_gaps`); what was done is in `Run.notes`, and a run that needs nothing keeps every bit. Whatever is
-wrong with a file is told in one sentence, as a `PvidError`, that names the file and, where there is one, the line and
-the column.
+interpolated (`run_gaps`). `Run.notes` lists the corrections; a run that needs none keeps every bit. A fault of a file
+raises a `PvidError` of one sentence with the file and, if known, the line and the column.
 """
 
 from __future__ import annotations

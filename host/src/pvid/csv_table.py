@@ -2,8 +2,8 @@
 
 Separators are commas, semicolons, tabs or spaces; with any but commas the decimal point may be a comma. A byte order
 mark, CRLF, quotes, blank lines and lines that begin with #, % or // are taken; the names may stand in such a line, as
-numpy.savetxt writes them. A table without names has columns 1, 2, 3, ... A file that ends within a line was cut off:
-that line is left out. Whatever else is wrong is told with its line.
+numpy.savetxt writes them. A table without names has columns 1, 2, 3, ... If a file ends within a line, it was cut off,
+and that line is ignored. Every other fault is reported with its line number.
 """
 
 from __future__ import annotations

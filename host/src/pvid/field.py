@@ -1,11 +1,11 @@
-"""Field mode: a board samples by itself, and the PC collects what it says.
+"""Field mode: a board samples by itself, and the PC collects its frames.
 
     target = open_target("mps2-an386", rig)
     record = collect(target, 5000, begin=rig)          # starts the board over; without begin: joins in
     phi, y = record.samples(0, 5000)                   # exactly what the identifier got
 
-What the frames mean is written in link.py. Whoever has the image's settings, the configuration and every sample from
-the session's first tick on can compute every bit again.
+link.py describes the frames. The image's settings, the configuration and every sample from the session's first tick on
+are enough to compute every bit again.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""Frames of the serial link (DESIGN.md, "Files and links"), without any input or output of its own.
+"""Frames of the serial link, without any input or output of its own.
 
     COBS(header || payload || CRC-32) || 0x00
     header: version u8, type u8, schema u32, sequence u16, tick u32; little-endian
 
-The header holds the low 32 bits of the tick. What a board sends about its ticks has the next 16 as `tick_high`, so that
-it counts on for 8900 years at 1 kHz; `Frame.tick` and `encode` have them together. The ticks of a board begin anew with
-every session: the session number, which stands in the same frames, tells a restart from a counter that has wrapped.
+The header contains the low 32 bits of the tick. Frames of a board also contain the next 16 bits as `tick_high`: 48 bits
+last 8900 years at 1 kHz. `Frame.tick` and `encode` combine them. The ticks of a board restart with every session; the
+session number in the same frames distinguishes a restart from a wrapped counter.
 
-The classes below with a `TYPE` are the one definition of what stands in a payload: the schema text that a board
-sends, its hash in every header and firmware/link/schema.h are made from them (`pvid link-schema`).
+The classes below with a `TYPE` are the only definition of the payloads: the schema text that a board sends, its hash in
+every header and firmware/link/schema.h are generated from them (`pvid link-schema`).
 
     decoder = Decoder()
     for item in decoder.feed(port.read(...)):
@@ -244,9 +244,9 @@ class Schema(Message):
 class Configuration(Message):
     """What both cores are configured with.
 
-    PC to board: starts over with these settings; the others are in the image, with its tables. Board to PC, while it
-    samples by itself: the configuration in force, bit by bit as it came, beside every Hello. Whoever has it, the
-    image's settings (Hello.settings names them) and every sample from `first_tick` on has all that the bits depend on.
+    PC to board: start a new session with these settings; the image contains the others and its tables. Board to PC, in
+    field mode: the active configuration, bit by bit as received, with every Hello. The bits depend only on it, on the
+    image's settings (`Hello.settings` is their number) and on every sample from `first_tick` on.
     """
 
     session: int = wire("u32")  # any number but 0; comes back in every answer

@@ -1,7 +1,7 @@
-"""`pvid log --web`: the live page, served by a process of its own that follows the log as any reader may.
+"""`pvid log --web`: the live page, served by a separate process that follows the log like any other reader.
 
-The page asks for the state when it has drawn the last one: whoever is slow sees less of it, and nothing piles up. The
-recording neither waits for that process nor shares its memory, and gets the processor first.
+The page requests the next state when it has drawn the last one: a slow browser skips states, and no queue grows. The
+recording neither waits for this process nor shares its memory, and it has the higher priority.
 
     python -m pvid.livepage FD LOG TITLE        serves on the listening socket FD until its standard input ends
 """

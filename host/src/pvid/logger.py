@@ -1,9 +1,9 @@
-"""`pvid log`: the bytes of a port to disk first, then their records to whoever looks on.
+"""`pvid log`: writes the bytes of a port to disk first, then passes their records to the observers.
 
-One thread does nothing but read the port and append to the log (pvid.logfile). The caller's thread follows the file,
-like any other reader of it might, so that a slow screen or a slow consumer costs no byte; its memory is a chunk and
-the account. A board that sends faster than frames can be decoded does not hold it up: what it leaves out is on the
-disk, and counted (Account.unread). An observer that fails is left out from there on; the recording goes on.
+One thread only reads the port and appends to the log (pvid.logfile). The caller's thread follows the file like any
+other reader, so that a slow screen or a slow consumer loses no byte; its memory is one chunk and the account. If a
+board sends faster than frames can be decoded, the caller's thread skips bytes: they are on the disk, and counted
+(Account.unread). An observer that fails is removed; the recording continues.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@
             case Loss() | Gap() | Restart(): ...          (what is missing)
     reader.account                                stream.account
 
-The account is up to date with the record that was handed out last. An `Observer` is whoever wants each record as it
-comes: the status line, the tee, a live view.
+The account includes the last record that was returned. An `Observer` receives each record as it arrives: the status
+line, the tee, a live view.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ class Account:
 
 
 class Observer(Protocol):
-    """Whoever wants each record as it comes."""
+    """Receives each record as it arrives."""
 
     def take(self, record: Record, account: Account) -> None:
         """The next record."""

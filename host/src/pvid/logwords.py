@@ -1,4 +1,4 @@
-"""What a person is told of a recording: names of the parameters, reasons, kappa and residual in words."""
+"""A recording in words for the user: names of the parameters, reasons, kappa and residual in words."""
 
 from __future__ import annotations
 
@@ -94,12 +94,12 @@ def reason_words(reason: str) -> str:
 
 
 def kappa_words(kappa: float) -> str:
-    """How well the data tell w from d1 and d2."""
+    """Identifiability of w, d1 and d2 from the data, in words."""
     if not kappa >= KAPPA_MIN:
-        return "parameters cannot be told apart"
+        return "parameters not identifiable"
     if kappa < KAPPA_WEAK:
-        return "weak: parameters barely told apart"
-    return ("fair" if kappa < KAPPA_GOOD else "good") + ": parameters told apart"
+        return "weak: parameters barely identifiable"
+    return ("fair" if kappa < KAPPA_GOOD else "good") + ": parameters identifiable"
 
 
 def kappa_share(kappa: float) -> float:

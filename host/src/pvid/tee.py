@@ -1,4 +1,4 @@
-"""Numbers by UDP while they come: JSON for PlotJuggler and whoever else listens, or Teleplot's own lines.
+"""Sends numbers by UDP as they arrive: JSON for PlotJuggler and other receivers, or Teleplot's own lines.
 
 JSON as PlotJuggler's "UDP Server" takes it (plotjuggler_plugins/DataStreamUDP and the JSON parser of its repository,
 github.com/facontidavide/PlotJuggler): an object a datagram of less than 2048 bytes; objects within it become paths

@@ -72,7 +72,7 @@ async function drawPlots({ estimates, motion }) {
     await drawParameter(`parameter${i}`, t, one);
   }
   await draw("residualPlot", estimates.residualLabel, [curve(t, estimates.residual, ORANGE)], within(estimates.residualLimits));
-  await draw("kappaPlot", "kappa: are the parameters told apart?", [
+  await draw("kappaPlot", "kappa: are the parameters identifiable?", [
     curve(t, estimates.kappa, GREEN, { name: "kappa", showlegend: true }),
     curve(t, t.map(() => 3e-5), RED, { name: "nothing is published below", showlegend: true, line: { color: RED, dash: "dash" } }),
   ], { type: "log", dtick: 1 }, 0.5);
