@@ -26,7 +26,7 @@ static inline void written(void)
     __atomic_thread_fence(__ATOMIC_RELEASE);
 }
 
-/* All that is read after is as new as what was read before. */
+/* Reads after this fence return values at least as new as those before it. */
 static inline void read_so_far(void)
 {
     __atomic_thread_fence(__ATOMIC_ACQUIRE);
