@@ -18,7 +18,7 @@
  * Rows that came in at a poor start may weigh far too much, and float32 sums with which p has come a long way have lost
  * digits. Once p has settled, such a past is renewed: it fades before each of the next groups.
  *
- * Total; O(n_p^2).
+ * Defined for every input; O(n_p^2).
  */
 #ifndef PVID_TRUST_H
 #define PVID_TRUST_H

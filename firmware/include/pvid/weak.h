@@ -1,8 +1,8 @@
 /* pvid/weak.h - the weak form of the identifier: samples of a real encoder in, parameters out.
  *
- * The strong form differentiates the angle four times and drowns in an encoder's noise. Here the
- * equation of motion is multiplied by K test functions over a window of about a second and
- * integrated by parts (MATH.md 5): no derivative of the angle is left, only y_A'' of the pivot, and
+ * The strong form differentiates the angle four times, which amplifies an encoder's noise too much. The weak form
+ * multiplies the equation of motion by K test functions over a window of about a second and
+ * integrates by parts (MATH.md 5): no derivative of the angle is left, only y_A'' of the pivot, and
  * each window gives K rows (Y, N) to the same estimator.
  *
  *   static pvid_weak_f32 identifier;
@@ -15,17 +15,17 @@
  *   there:     estimate = pvid_weak_estimate_f32(&identifier);
  *   elsewhere: if (pvid_weak_read_f32(&identifier, &copy, &number) && (number > 0)) ...
  *
- * What happens when. Samples are smoothed over `taps` and decimated by D; two windows of W decimated
- * samples, half a window apart, gather sums; every H = (W - 1) / 2 decimated samples one of them is
- * complete. Of D ticks the first half smooths, a slice of the taps each; the second half adds the result
- * to the windows, a slice of the functions each. In the first half, too, a complete window is turned
- * into rows and Gauss-Newton steps, one small stage a tick, while the others fill; then the estimate is judged,
- * and published or not. No tick is long: the longest costs some three times the mean one up to K = 12, four
- * times at K = 16, as long as a hop has a free tick for every stage. (Where it has fewer, a tick takes `together` stages
- * of the state, and the longest tick is about so many times as long.) What a tick does depends on its place in this
- * schedule, not on the data: only a window that is dropped, for want of drive or for its angle, leaves its stages out.
+ * Schedule. Samples are smoothed over `taps` and decimated by D; two windows of W decimated
+ * samples, half a window apart, add sums; every H = (W - 1) / 2 decimated samples one of them is
+ * complete. Of D ticks the first half smooths, a slice of the taps in each; the second half adds the result
+ * to the windows, a slice of the functions in each. The first half also turns a complete window
+ * into rows and Gauss-Newton steps, one small stage in each tick, while the other window fills; then the estimate is
+ * checked, and published or not. The longest tick costs about three times the mean tick up to K = 12, four
+ * times at K = 16, if a hop (H decimated samples) has a free tick for every stage. (If it has fewer, a tick runs
+ * `together` stages of the state, and the longest tick is longer by about this factor.) The work of a tick depends on
+ * its place in this schedule, not on the data; only a window dropped for too little drive or for its angle skips it.
  *
- * The first window that is taken in sets c to the mean of phi over it: an encoder's zero may be far from 0.
+ * The first window that is used sets c to the mean of phi over it: an encoder's offset may be far from 0.
  *
  * Never allocates. Defined for every input: a sample that is not finite is rejected and restarts the windows (its
  * neighbours are no longer equidistant); the sums are kept. Call all functions of an object from one context; only
@@ -276,13 +276,13 @@ const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
  * with *estimate undefined, iff an estimate was published during each of PVID_READ_ATTEMPTS tries, or before init. */
 bool pvid_weak_read_f32(const pvid_weak_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number);
 
-/* Tells the identifier that samples are missing: the windows start again, nothing else is lost. */
+/* Call this if samples are missing: the windows start again, all other state is kept. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self);
 
-/* Freezes the identifier, or lets it go on. While it is frozen every window that is completed is dropped with
- * PVID_HELD_FROZEN: p and the sums stay, and nothing is forgotten. One that is being worked off is finished, in less
- * than half a window. Samples are gathered all the while, so that it goes on without a bump: the first window after is
- * at most half a window away, and may have begun before. */
+/* Freezes the identifier (true) or resumes it (false). While it is frozen every complete window is dropped with
+ * PVID_HELD_FROZEN: p and the sums are kept, without forgetting. A window that is being processed is finished, in less
+ * than half a window. Samples are still added to windows, so that it resumes bumplessly: the next window is complete
+ * after at most half a window, and may have begun before the resumption. */
 void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen);
 
 #ifdef __cplusplus

@@ -271,8 +271,8 @@ def simulate_command(**options: Any) -> int:
 
 def _form_options(function: Callable[..., int]) -> Callable[..., int]:
     for option in (
-        click.option("--form", type=click.Choice(["weak", "strong"]), help="Overrides the rig file."),
-        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Overrides the rig file."),
+        click.option("--form", type=click.Choice(["weak", "strong"]), help="Form; overrides the rig file."),
+        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Law; overrides the rig file."),
         columns_option,
         rig_options,
     ):
