@@ -17,8 +17,8 @@
  * Total and bounded: whatever the rows, p stays finite and inside its bounds. A row or a step that
  * cannot be used is counted and leaves the state as it was. Not thread-safe.
  *
- * The dead zone (off by default) keeps p still while the data do not ask for more than noise explains: no step is taken
- * while p is within `dead_zone` standard errors of where all data together want it,
+ * The dead zone (off by default) holds p while the data require no more change than noise explains: no step is taken
+ * while p is within `dead_zone` standard errors of the solution of all data,
  *
  *   F^T (S + H0)^-1 F <= dead_zone^2 correlation s^2,   s^2 the lesser of the residual variance and row_sd^2.
  *
@@ -73,7 +73,7 @@ typedef struct {
                                    less of p[0] than the start does, 0..1; 0: always step */
     float noise_margin;         /* no step while the data say less than so many times what noise of row_sd
                                    alone would (for models that know it), 0..1e6; 0: do not ask */
-    float dead_zone;            /* no step while p is within so many standard errors of where the data want it,
+    float dead_zone;            /* no step while p is within so many standard errors of the data's solution,
                                    0..100; 0: no dead zone */
     pvid_law law;
     uint16_t divider;           /* groups of rows a solve, 1.. */

@@ -111,7 +111,7 @@ typedef struct {
     int64_t energy; /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
     int64_t taken;  /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them [units
-                                 of Y's integer squared]: no residual variance is taken for smaller. 0: nobody has said */
+                                 of Y's integer squared]: residual variances are at least this. 0: not set */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
     pvid_counters counters;

@@ -289,10 +289,8 @@ def _with(rig: RigFile, **overrides: str | None) -> RigFile:
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
 @_form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
-@click.option(
-    "--on", "target", metavar="TARGET", help="Also compute on an emulator, stream-host or a serial port."
-)
-@click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
+@click.option("--on", "target", metavar="TARGET", help="Also compute on an emulator, stream-host or a serial port.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 def identify_command(
     run_path: Path,
