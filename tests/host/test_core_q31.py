@@ -26,7 +26,10 @@ from pvid.setup_q31 import counts_of, weak_config_q31
 from pvid.weak_design_q31 import weak_tables_q31
 
 FIRMWARE = ROOT / "firmware"
-SHARED = [FIRMWARE / "src" / name for name in ("crc32.c", "fnv.c", "snapshot.c")]  # what both cores need
+# What both cores need.
+SHARED = [
+    FIRMWARE / "src" / name for name in ("crc32.c", "fnv.c", "publication.c", "snapshot.c")
+]
 SOURCES = sorted([*(FIRMWARE / "src").glob("*_q31.c"), *SHARED])
 COMPILERS = {
     "arm-none-eabi": ["-mcpu=cortex-m0plus", "-mthumb"],

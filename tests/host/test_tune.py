@@ -252,7 +252,7 @@ def pvid(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_command_writes_a_rig_file_that_identifies(tmp_path: Path) -> None:
-    write_run(tmp_path / "run.csv", short_run())
+    write_run(tmp_path / "run.csv", simulate(sensors=standard_sensors(13), truth="full", duration=SHORT_S, seed=4).run)
     (tmp_path / "run.toml").write_text("l1 = 0.3\n", encoding="utf-8")
     done = pvid("tune", "run.csv", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
