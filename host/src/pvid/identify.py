@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -128,6 +128,8 @@ class Identification:
         share of the motion that the equations leave unexplained, rms; None in the strong form
     skew
         how much later y seems to be sampled than phi [s]; 0 where that explains nothing
+    judged
+        whether the run had enough windows to compare the estimate with; True where no verdict is asked for
     linear_error
         what the fixed-point core's linear rows put into the standard errors, the largest of w, d1, d2, relative; 0 in
         other cores
@@ -177,6 +179,7 @@ class Identification:
     parts_disagree: bool = False
     skew: float = 0.0
     linear_error: float = 0.0
+    judged: bool = True
     parts: dict[str, ErrorParts] = field(default_factory=dict)
     friction: tuple[float, ...] = ()
     first_publication_s: float | None = None
@@ -222,6 +225,8 @@ class Identification:
                 "the windows of the run disagree with the estimate or with one another: friction, large angles or a "
                 "mechanism that has changed; the standard errors cover the disagreement"
             )
+        if not self.judged:
+            words.append("too few windows of the run can be compared with the estimate: a short run, or large angles")
         if self.is_old and (self.parts_disagree or self._share_published < _RARELY):
             words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
         if words and self.unexplained is not None and self.unexplained >= _UNEXPLAINED_TOLD:
@@ -660,16 +665,20 @@ def _identification(
     """`linear`: relative errors of w, d1, d2 [3] that linear rows make, which the covariance contains."""
     names = (*LINEAR, ZERO)[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
-    unexplained, parts_disagree, skew = None, False, 0.0
+    unexplained, parts_disagree, skew, judged = None, False, 0.0, True
     if rig.identifier.form == "weak" and trusted_s is not None:
         unbiased = np.append(p, friction)
         if linear is not None:  # the verdict's rows are corrected
             unbiased[:3] /= 1 + linear
         over_run = verdict(rig, run, unbiased)
-        wider = np.maximum(over_run.se[: len(p)] / np.sqrt(np.diag(covariance)), 1.0)
+        own = np.sqrt(np.diag(covariance))
+        wider = np.maximum(over_run.se[: len(p)] / own, 1.0)
         covariance = covariance * np.outer(wider, wider)
         unexplained, parts_disagree = over_run.unexplained, bool(wider[:3].max() > DISAGREES)
-        skew = over_run.skew
+        skew, judged = over_run.skew, over_run.judged
+        if publications is not None:  # windows that scatter by more than the core expects did so from the first one on
+            scatter = np.maximum(over_run.scatter[:3] / own[:3], 1.0)
+            publications = replace(publications, se=publications.se * scatter)
     noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     physical = oracle.physical(p[:3], rig.l1)
     if np.isfinite(physical).all():
@@ -697,6 +706,7 @@ def _identification(
         unexplained=unexplained,
         parts_disagree=parts_disagree,
         skew=skew,
+        judged=judged,
         linear_error=0.0 if linear is None else float(np.abs(linear).max()),
         status=status,
         reasons=reasons,

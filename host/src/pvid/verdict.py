@@ -40,19 +40,23 @@ class Verdict:
     ----------
     se : standard errors of p [n_p] from the scatter of the windows, their distance from p and the effect of a skew of
         the sensors; 0 if there are too few windows
+    scatter : the part of them that the scatter of the windows makes [n_p]
     unexplained : rms of the rows' residuals beyond the encoder's noise, relative to the rms of the rows (0 to 1)
     skew : estimated delay of y after phi [s]; 0 if a delay does not reduce the residuals
+    judged : whether the run has enough windows that can be corrected at p
     """
 
     se: Float
+    scatter: Float
     unexplained: float
     skew: float = 0.0
+    judged: bool = True
 
 
 def verdict(rig: RigFile, run: Run, p: Float) -> Verdict:
     """Evaluates the windows of the run at p, which the core published; large angles are corrected."""
     at = p if len(p) > 3 else np.append(p, 0.0)
-    nothing = Verdict(np.zeros(len(at)), 0.0)
+    nothing = Verdict(np.zeros(len(at)), np.zeros(len(at)), 0.0, judged=False)
     try:
         rows = _rows(rig, run, at, _WINDOWS)
         fit = rows.judged(at)
@@ -68,8 +72,9 @@ def verdict(rig: RigFile, run: Run, p: Float) -> Verdict:
     beyond = float(plain.energy.sum()) - len(plain.energy) * (rows.design.functions - 2) * rows.row_sd**2
     unexplained = math.sqrt(max(beyond, 0.0) / max(float(plain.signal.sum()), 1e-300))
     share = rows.part  # share of the windows that is used: the whole run has smaller errors
-    se = np.sqrt(fit.clustered_se**2 * share + wanted**2 + by_skew**2)
-    return Verdict(se, min(unexplained, 1.0), skew)
+    scatter = fit.clustered_se * math.sqrt(share)
+    se = np.sqrt(scatter**2 + wanted**2 + by_skew**2)
+    return Verdict(se, scatter, min(unexplained, 1.0), skew)
 
 
 def _rows(rig: RigFile, run: Run, at: Float, most: int) -> RunRows:
