@@ -17,10 +17,12 @@ from pvid.capture import Run, write_run
 from pvid.cli import commands
 from pvid.identify import identify
 from pvid.native import Native
+from pvid.native_q31 import WeakConfigQ31
 from pvid.ranges_q31 import DEFAULT_PHI_RANGE, beyond_ranges, pivot_acceleration, with_ranges_of
 from pvid.rig import Pendulum, Tone, simulate, standard_sensors
 from pvid.rigfile import RigFile, Sensor
 from pvid.setup_q31 import config_for_run
+from pvid.survey import fitted
 
 STANDARD = RigFile.standard()
 RIG = replace(STANDARD, identifier=replace(STANDARD.identifier, core="q31"))
@@ -168,3 +170,13 @@ def test_windows_that_never_fill_name_what_was_rejected(native: Native) -> None:
     result = identify(replace(run, phi=phi), STANDARD, native, start=[30.0, 9.0, 5.5])
     assert not result.identified
     assert result.status == "rejected not finite"
+
+
+def test_a_coarse_encoder_at_a_low_rate_is_taken_in(native: Native) -> None:
+    """81 counts and the shortest filters: the smoothing weights had 35 bits after the point, and the core takes 31."""
+    rig = simulate_rig(native, shipped(), 2, 154)
+    record, _ = identify_rig(native, rig, "q31")
+    assert "refused" not in str(record["reason"])
+    q31 = replace(rig.file, identifier=replace(rig.file.identifier, core="q31"))
+    config = config_for_run(fitted(q31, rig.run), rig.run)
+    assert isinstance(config, WeakConfigQ31) and config.design.smooth_bits == 31

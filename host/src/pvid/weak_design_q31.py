@@ -27,6 +27,7 @@ Int32 = npt.NDArray[np.int32]
 CHI_BITS = 11
 TERM_BITS = 21
 U_BITS = 18
+SMOOTH_BITS = 31  # after the point, of the smoothing weights
 HIGH_BITS = 13
 # A column of a window: full scale, and the size expected of it.
 COLUMN_BITS = 31
@@ -130,10 +131,11 @@ def _shift_to(largest: float, bits: int) -> int:
     return max(0, -bits_for(largest, bits))
 
 
-def _integer_weights(weights: Float, reach: int, factor: float) -> tuple[Int32, int]:
+def _integer_weights(weights: Float, reach: int, factor: float, most_bits: int = 62) -> tuple[Int32, int]:
     """weights * factor as integers of the finest format in which weight times `reach` fits 31 bits, and the format."""
     scaled = weights * factor
-    bits = min(bits_for(float(np.abs(scaled).max()) * reach, 32), bits_for(float(np.abs(scaled).max()), 31))
+    largest = float(np.abs(scaled).max())
+    bits = min(bits_for(largest * reach, 32), bits_for(largest, 31), most_bits)
     return np.rint(scaled * 2.0**bits).astype(np.int32), bits
 
 
@@ -166,7 +168,7 @@ def weak_tables_q31(
     window, functions = design.window, design.functions
     steps = np.arange(window - 1)
     # front end: exact sums of counts
-    smooth, smooth_bits = _integer_weights(design.smooth, 4 * phi_max, 1.0)
+    smooth, smooth_bits = _integer_weights(design.smooth, 4 * phi_max, 1.0, SMOOTH_BITS)
     second, second_bits = _integer_weights(design.second, 4 * y_max, y_lsb / design.l1 * design.sample_rate**2 * dt**2)
     f_sum = phi_max * (2.0**smooth_bits + 4 * float(np.abs(smooth).sum()))
     u_sum = 4.0 * y_max * float(np.abs(second).sum())
