@@ -130,6 +130,50 @@ static void init_refuses_null(void **state)
     assert_int_equal(pvid_gate_init_q31(NULL, &strong_unit.gate, 1u, (pvid_scaled_q31){0, 0}), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_f32(NULL, &config.trust, &weak.estimator), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_q31(NULL, &weak_unit.trust, &weak_q31.estimator), PVID_BAD_POINTER);
+    static pvid_differentiator_q31 bank;
+    static pvid_gate_f32 gate;
+    static pvid_gate_q31 gate_q31;
+    assert_int_equal(pvid_estimator_init_f32(&strong.estimator, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_estimator_init_q31(&strong_q31.estimator, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_differentiator_init_f32(&strong.phi, NULL, 1.0f), PVID_BAD_POINTER);
+    assert_int_equal(pvid_differentiator_init_q31(&bank, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_gate_init_f32(&gate, NULL, 1.0f, 1.0f, 1.0f), PVID_BAD_POINTER);
+    assert_int_equal(pvid_gate_init_q31(&gate_q31, NULL, 1u, (pvid_scaled_q31){0, 0}), PVID_BAD_POINTER);
+    assert_int_equal(pvid_trust_init_f32(&weak.trust, NULL, &weak.estimator), PVID_BAD_POINTER);
+    assert_int_equal(pvid_trust_init_f32(&weak.trust, &config.trust, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_trust_init_q31(&weak_q31.trust, NULL, &weak_q31.estimator), PVID_BAD_POINTER);
+    assert_int_equal(pvid_trust_init_q31(&weak_q31.trust, &weak_unit.trust, NULL), PVID_BAD_POINTER);
+}
+
+static void an_estimate_is_read_from_what_is_ready_alone(void **state)
+{
+    (void)state;
+    const pvid_weak_config_f32 config = weak_config();
+    pvid_estimate_f32 estimate;
+    pvid_estimate_q31 estimate_q31;
+    memset(&weak, 0, sizeof weak);
+    memset(&weak_q31, 0, sizeof weak_q31);
+    assert_false(pvid_weak_read_f32(NULL, &estimate, NULL));
+    assert_false(pvid_weak_read_q31(NULL, &estimate_q31, NULL));
+    assert_false(pvid_weak_read_f32(&weak, &estimate, NULL));
+    assert_false(pvid_weak_read_q31(&weak_q31, &estimate_q31, NULL));
+    assert_int_equal(pvid_weak_init_f32(&weak, &config), PVID_OK);
+    assert_int_equal(pvid_weak_init_q31(&weak_q31, &weak_unit), PVID_OK);
+    assert_false(pvid_weak_read_f32(&weak, NULL, NULL));
+    assert_false(pvid_weak_read_q31(&weak_q31, NULL, NULL));
+    assert_true(pvid_weak_read_f32(&weak, &estimate, NULL));
+    assert_true(pvid_weak_read_q31(&weak_q31, &estimate_q31, NULL));
+    assert_int_equal(pvid_snapshot_save_weak_f32(&weak, NULL, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_f32(&weak, &config, 1, NULL, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_q31(&weak_q31, NULL, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_q31(&weak_q31, &weak_unit, 1, NULL, sizeof image), 0);
+    const pvid_strong_config_f32 other = strong_config();
+    assert_int_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
+    assert_int_equal(pvid_strong_init_q31(&strong_q31, &strong_unit), PVID_OK);
+    assert_int_equal(pvid_snapshot_save_strong_f32(&strong, NULL, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_strong_f32(&strong, &other, 1, NULL, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_strong_q31(&strong_q31, NULL, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_strong_q31(&strong_q31, &strong_unit, 1, NULL, sizeof image), 0);
 }
 
 /* Whatever stood in the memory, and whatever the object was before. */
@@ -212,6 +256,7 @@ int main(void)
         cmocka_unit_test(static_objects_before_init_do_nothing),
         cmocka_unit_test(null_is_an_answer),
         cmocka_unit_test(init_refuses_null),
+        cmocka_unit_test(an_estimate_is_read_from_what_is_ready_alone),
         cmocka_unit_test(a_refused_init_leaves_an_object_that_does_nothing),
         cmocka_unit_test(estimators_and_differentiators_do_nothing_either),
     };
