@@ -27,9 +27,7 @@ from pvid.weak_design_q31 import weak_tables_q31
 
 FIRMWARE = ROOT / "firmware"
 # What both cores need.
-SHARED = [
-    FIRMWARE / "src" / name for name in ("crc32.c", "fnv.c", "publication.c", "snapshot.c")
-]
+SHARED = [FIRMWARE / "src" / name for name in ("crc32.c", "fnv.c", "publication.c", "snapshot.c")]
 SOURCES = sorted([*(FIRMWARE / "src").glob("*_q31.c"), *SHARED])
 COMPILERS = {
     "arm-none-eabi": ["-mcpu=cortex-m0plus", "-mthumb"],

@@ -9,8 +9,9 @@ import field_board
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 
-from pvid import link
+from pvid import link, report
 from pvid.capture import Run, write_run
 from pvid.cli import commands
 from pvid.errors import PvidError
@@ -305,3 +306,14 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(log: Path, native: Native
     writer.close()
     with pytest.raises(PvidError, match="no rig file"):
         recording_of(tmp_path / "bare.pvlog", None)
+
+
+def test_the_phase_plot_takes_a_run_that_ends_with_missing_samples() -> None:
+    """A board that sends no numbers at the end of a log took the report down."""
+    run = simulate(sensors=standard_sensors(14), truth="linear", duration=6.0, seed=2).run
+    phi = run.phi.copy()
+    phi[:3] = phi[-5:] = np.nan
+    axis = Figure().add_subplot()
+    report._phase(replace(run, phi=phi), axis)
+    whole, _ = axis.lines
+    assert np.isfinite(np.asarray(whole.get_ydata())).mean() > 0.9

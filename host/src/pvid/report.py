@@ -396,8 +396,8 @@ def _amplitude(axis: Axes, frequency: Float, x: Float, color: str, label: str) -
 
 def _phase(run: Run, axis: Axes) -> None:
     points = max(7, round(_SMOOTHING_S * run.sample_rate)) | 1
-    angle = savgol_filter(run.phi, points, 4)
-    rate = savgol_filter(run.phi, points, 4, deriv=1, delta=1 / run.sample_rate)
+    angle = savgol_filter(run.phi, points, 4, mode="nearest")  # a fit at the ends would refuse a missing sample
+    rate = savgol_filter(run.phi, points, 4, deriv=1, delta=1 / run.sample_rate, mode="nearest")
     every = max(1, len(angle) // _MOST_DOTS)
     last = run.t > run.t[-1] - _LAST_S
     axis.plot(angle[::every], rate[::every], color="C0", linewidth=0.6, alpha=0.3, label="whole run")
