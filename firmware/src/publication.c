@@ -5,7 +5,7 @@
 
 /* How words are shared. Atomic where the compiler has such accesses and the processor such instructions; elsewhere
  * there is one core, whose interrupts see volatile accesses in the order of the source. An estimate's floats are copied
- * as words, of which gcc and clang are told. */
+ * as words, which gcc and clang allow by an attribute. */
 #if defined(__GNUC__) && defined(__GCC_HAVE_SYNC_COMPARE_AND_SWAP_4) && !defined(__FRAMAC__)
 
 typedef uint32_t __attribute__((may_alias)) word;

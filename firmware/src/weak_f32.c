@@ -96,8 +96,8 @@ static void restart_window(pvid_weak_window_f32 *window, uint16_t index)
     }
 }
 
-/* The first window begins with the next decimated sample. The second stands in its middle then: what
- * it gathers until its own beginning, half a window later, is thrown away. */
+/* The first window begins with the next decimated sample. The second is then in its middle: what
+ * it sums until its own start, half a window later, is discarded. */
 static void restart(pvid_weak_f32 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);

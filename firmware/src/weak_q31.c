@@ -142,8 +142,8 @@ static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
     window->bends = 0;
 }
 
-/* The first window begins with the next decimated sample. The second stands in its middle then: what it gathers until
- * its own beginning, half a window later, is thrown away, but must not come on top of what it had. */
+/* The first window begins with the next decimated sample. The second is then in its middle: what it sums until
+ * its own start, half a window later, is discarded, but must not be added to its earlier sums. */
 static void restart(pvid_weak_q31 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);

@@ -140,7 +140,7 @@ def test_publications_of_a_run_end_in_its_answer(native: Native) -> None:
         assert publications.t[-1] == result.trusted_s
         for at, name in enumerate(NAMES):
             assert publications.p[-1, at] == result.value[name]
-            # what the whole run says of the answer (pvid.verdict) only widens it
+            # the verdict over the whole run (pvid.verdict) can only widen the standard errors
             assert publications.se[-1, at] <= result.se[name] * (1 + 1e-5)
 
 

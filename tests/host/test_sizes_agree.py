@@ -30,7 +30,7 @@ OTHER = {
 
 LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
 
-# What applications of each kind call first; the last one stands for files that have no init.
+# The first call of each kind of application; the last one represents files without an init.
 FUNCTIONS = (
     "pvid_weak_init_f32",
     "pvid_strong_init_f32",

@@ -299,6 +299,7 @@ def identify(
         if isinstance(config, StrongConfig):
             return _in_float64(run, rig, config, every)
         return _weak_in_float64(run, rig, config)
+    rig = with_ranges_of(rig, run)
     return _in_q31(run, rig, config_for_run(rig, run, start), every, native)
 
 
@@ -530,7 +531,7 @@ def _in_q31(
         first_publication_s=float(run.t[trusted[0]]) if told else None,
         reasons=_counted(record.reason),
         beyond=beyond,
-        beyond_words=beyond.words(with_ranges_of(rig, run).sensor),
+        beyond_words=beyond.words(rig.sensor),
         chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifierQ31) else None,
         alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=status,

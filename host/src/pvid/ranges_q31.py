@@ -68,10 +68,9 @@ def _acceleration_range(rig: RigFile, run: Run, default: float) -> float:
 
 def _largest_acceleration(rig: RigFile, run: Run) -> float:
     """Largest acceleration in the weak form's core, with noise and faults [m/s^2]; 0 if the run is too short."""
-    design, finite = weak_design_of(rig, run.sample_rate), np.isfinite(run.y)
-    if len(run.y) < design.taps or not finite.any():
+    design, height = weak_design_of(rig, run.sample_rate), _height(run)
+    if len(height) < design.taps:
         return 0.0
-    height = np.interp(np.arange(len(run.y)), np.flatnonzero(finite), run.y[finite] - middle_of_travel(run.y))
     return rig.l1 * float(np.abs(front_end(height, height, design)[1]).max())
 
 
@@ -99,13 +98,18 @@ def pivot_acceleration(run: Run) -> Float:
     from scipy.signal import savgol_filter  # a quarter of a second, which a float core does not need
 
     points = max(7, round(_SMOOTHING_S * run.sample_rate)) | 1
-    if len(run.y) < points:
+    height = _height(run)
+    if len(height) < points:
         return np.zeros(0)
+    return np.asarray(savgol_filter(height, points, 4, deriv=2, delta=1.0 / run.sample_rate))
+
+
+def _height(run: Run) -> Float:
+    """y from the middle of its travel [n, m], interpolated where samples are missing; empty if there are none."""
     finite, clock = np.isfinite(run.y), np.arange(len(run.y))
     if not finite.any():
         return np.zeros(0)
-    height = np.interp(clock, clock[finite], run.y[finite] - middle_of_travel(run.y))
-    return np.asarray(savgol_filter(height, points, 4, deriv=2, delta=1.0 / run.sample_rate))
+    return np.interp(clock, clock[finite], run.y[finite] - middle_of_travel(run.y))
 
 
 @dataclass(frozen=True)

@@ -43,13 +43,13 @@ def self_consistent(
         return lack(p, internal_motion(p, ends, phi, u, design), phi, u, design, full_angle)
 
     with np.errstate(over="ignore", invalid="ignore"):
-        first = ends_with(none)
         out, moved = none, np.inf
         for _ in range(_PASSES):
             before, out = out, lack_at(ends_with(out))
             moved = float(np.linalg.norm(out.y - before.y)) / max(float(np.linalg.norm(out.y)), 1e-300)
         if not full_angle or moved <= _CONVERGED:
             return out if np.isfinite(out.y).all() and np.isfinite(out.k).all() else None
+        first = ends_with(none)
         unit = np.maximum(np.abs(first), 1e-9)
 
         def miss(scaled: Float) -> Float:

@@ -77,7 +77,7 @@ def _begin_of_file(descriptor: int) -> int | None:
 def watch() -> None:
     """Puts watched streams in place of the process's own; streams that a caller has replaced stay."""
     if sys.stdout is sys.__stdout__:
-        # A closed one fails as GNU's tools do it: a descriptor that can only be read stands in its place.
+        # A closed stream becomes a read-only descriptor, so that writing fails, as with the GNU tools.
         descriptor = os.open(os.devnull, os.O_RDONLY) if sys.stdout is None else sys.stdout.fileno()
         sys.stdout = _text(_Output(descriptor), sys.stdout)
     if sys.stderr is sys.__stderr__:

@@ -1,7 +1,7 @@
 """Mutated rig files, runs and command lines against the command line, in this process: what breaks it.
 
 Whatever a user gives, a command ends with one of its exit codes; a refusal is a sentence that begins with "pvid: "; no
-exception escapes, no library warns, no number that is none stands in an answer, and nothing takes long or much memory.
+exception escapes, no library warns, no answer contains nan or inf, and nothing takes long or much memory.
 All is drawn from a seed.
 """
 

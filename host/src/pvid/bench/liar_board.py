@@ -190,7 +190,7 @@ class LyingBoard:
         return b"".join([self.raw(Schema.TYPE, text, 0, number), *(self.raw(*one, 0, number) for one in frames)])
 
     def introduction(self, hello: Hello | None = None, configure: Configure | None = None) -> Iterator[bytes]:
-        """What stands in front of the samples."""
+        """The frames before the samples."""
         yield self.say(hello or self.hello())
         yield self.say(message(Schema, text=SCHEMA_TEXT.encode()))
         yield self.say(configure or self.configure())
