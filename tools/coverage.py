@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import playback  # noqa: E402 - of tests
 
-from pvid.core.native import SIZES  # noqa: E402
+from pvid.settings.bounds import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "coverage"
 PAGE = ROOT / "tests" / "COVERAGE.md"

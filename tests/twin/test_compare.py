@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from pvid.core.native import SIZES
+from pvid.settings.bounds import SIZES
 
 MUTANTS = {
     "estimator_f32.c": (
