@@ -23,8 +23,8 @@ uint32_t pvid_arithmetic_faults_f32(void)
         faults |= 2u;
     }
     const volatile float one = 1.0f;
-    const volatile float tie_to_even = 5.9604645e-8f;  /* 2^-24: half an ulp of 1 */
-    const volatile float above_tie = 5.9604652e-8f;    /* next float above */
+    const volatile float tie_to_even = 5.9604645e-8f; /* 2^-24: half an ulp of 1 */
+    const volatile float above_tie = 5.9604652e-8f;   /* next float above */
     const volatile float sum_even = one + tie_to_even;
     const volatile float sum_odd = a + tie_to_even;
     const volatile float sum_up = one + above_tie;

@@ -10,11 +10,11 @@
 #include "fir_window.h"
 
 const float pvid_five_points_f32[PVID_ORDERS * 2] = {
-    0.0f,         0.0f,          /* order 0: the centre itself */
-    8.0f / 12.0f, -1.0f / 12.0f, /* order 1 */
+    0.0f,          0.0f,          /* order 0: the centre itself */
+    8.0f / 12.0f,  -1.0f / 12.0f, /* order 1 */
     16.0f / 12.0f, -1.0f / 12.0f, /* order 2 */
-    -1.0f,        0.5f,          /* order 3 */
-    -4.0f,        1.0f,          /* order 4 */
+    -1.0f,         0.5f,          /* order 3 */
+    -4.0f,         1.0f,          /* order 4 */
 };
 
 static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
@@ -34,8 +34,7 @@ static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
     return PVID_OK;
 }
 
-static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
-                                         float sample_rate_hz)
+static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank, float sample_rate_hz)
 {
     const pvid_status status = bank_is_valid(bank);
     if (status != PVID_OK) {

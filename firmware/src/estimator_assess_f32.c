@@ -75,7 +75,7 @@ bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float 
         }
     }
     pvid_cholesky_f32 factor;
-    return pvid_cholesky_factor_f32(&factor, n, (const float(*)[PVID_MAX_P])rest);
+    return pvid_cholesky_factor_f32(&factor, n, (const float (*)[PVID_MAX_P])rest);
 }
 
 void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],
@@ -106,11 +106,11 @@ bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PV
     for (size_t a = 0; a < n_p; a++) {
         s[a][a] += wide / (self->start_sd[a] * self->start_sd[a]);
     }
-    return pvid_cholesky_factor_f32(factor, n_p, (const float(*)[PVID_MAX_P])s);
+    return pvid_cholesky_factor_f32(factor, n_p, (const float (*)[PVID_MAX_P])s);
 }
 
-bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
-                                   const float force[], float variance)
+bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor, const float force[],
+                                   float variance)
 {
     float x[PVID_MAX_P];
     float square = 0.0f;
@@ -173,7 +173,7 @@ static void assess_at_once(const pvid_estimator_f32 *self, pvid_estimate_f32 *es
     const float variance = pvid_estimator_variance_f32(self, sums, energy);
     const float wide = variance * self->correlation;
     estimate->residual_sd = sqrtf(variance);
-    pvid_estimator_find_kappa_f32(self, (const float(*)[PVID_MAX_P])s, estimate);
+    pvid_estimator_find_kappa_f32(self, (const float (*)[PVID_MAX_P])s, estimate);
     pvid_cholesky_f32 factor;
     const bool known = pvid_estimator_factor_wide_f32(self, s, wide, &factor);
     if (known) {

@@ -48,7 +48,8 @@ void pvid_estimator_expect_q31(pvid_estimator_q31 *self, pvid_scaled_q31 varianc
     if ((self->taken <= 0) || (weight < self->taken)) {
         return;
     }
-    const pvid_scaled_q31 share = pvid_scaled_over_q31(pvid_scaled_of_q31(self->taken, 0), pvid_scaled_of_q31(weight, 0));
+    const pvid_scaled_q31 share =
+        pvid_scaled_over_q31(pvid_scaled_of_q31(self->taken, 0), pvid_scaled_of_q31(weight, 0));
     const pvid_scaled_q31 change = pvid_scaled_times_q31(share, pvid_scaled_minus_q31(variance, self->expected));
     const pvid_scaled_q31 mean = pvid_scaled_plus_q31(self->expected, change);
     self->expected.m = (mean.m > 0) ? mean.m : 0;

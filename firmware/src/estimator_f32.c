@@ -243,8 +243,7 @@ static inline pvid_reason add_relative_row(pvid_estimator_f32 *self, const float
 }
 
 /* What comes before a row of a model with functions of its own is added to the sums. */
-static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y, float e,
-                                    const float gradient[])
+static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y, float e, const float gradient[])
 {
     const pvid_reason reason = admit(self, n, y);
     if (reason != PVID_ACCUMULATED) {
@@ -318,7 +317,7 @@ static pvid_reason step_of_any(pvid_estimator_f32 *self, float gain, float s[][P
     for (size_t a = 0; a < n_p; a++) {
         complete_system(self, a, gain, s, rhs);
     }
-    if (!pvid_cholesky_factor_f32(&factor, n_p, (const float(*)[PVID_MAX_P])s)) {
+    if (!pvid_cholesky_factor_f32(&factor, n_p, (const float (*)[PVID_MAX_P])s)) {
         return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
     if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
@@ -367,7 +366,7 @@ static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[]
     complete_system(self, 0, gain, s, rhs);
     complete_system(self, 1, gain, s, rhs);
     complete_system(self, 2, gain, s, rhs);
-    if (!pvid_cholesky_factor_three_f32(&factor, (const float(*)[PVID_MAX_P])s)) {
+    if (!pvid_cholesky_factor_three_f32(&factor, (const float (*)[PVID_MAX_P])s)) {
         return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
     if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {

@@ -121,8 +121,8 @@ bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float 
 
 /* Whether p is within the dead zone of estimator.h: force is F [n_p], factor that of S + H0, variance that of the
  * residuals. False for what is no number. Cost: a solve. */
-bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
-                                   const float force[], float variance);
+bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor, const float force[],
+                                   float variance);
 
 /* Where p is absurd a residual sum overflows or is no number; so far up no standard error made of it does. */
 #define PVID_RESIDUAL_MAX 1.0e30f

@@ -24,9 +24,9 @@ static bool format_is_valid(int8_t bits)
 static bool model_is_valid(const pvid_model_q31 *model)
 {
     return !((model == NULL) || (model->theta == NULL) || (model->jacobian == NULL) || (model->formats == NULL) ||
-        (model->c_row == NULL) || (model->c_column == NULL) || (model->n_theta < 1u) ||
-        (model->n_theta > PVID_MAX_THETA_Q31) || (model->n_p < 1u) || (model->n_p > PVID_MAX_P) ||
-        (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31));
+             (model->c_row == NULL) || (model->c_column == NULL) || (model->n_theta < 1u) ||
+             (model->n_theta > PVID_MAX_THETA_Q31) || (model->n_p < 1u) || (model->n_p > PVID_MAX_P) ||
+             (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31));
 }
 
 static bool formats_are_valid(const pvid_estimator_config_q31 *config)

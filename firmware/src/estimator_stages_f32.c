@@ -76,14 +76,14 @@ static void inform_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f3
     const bool judging = solve->estimate != NULL;
     solve->variance = judging ? pvid_estimator_variance_f32(self, solve->sums, 0.0f) : self->row_variance;
     solve->informed =
-        pvid_estimator_is_informed_f32(self, (const float(*)[PVID_MAX_P])solve->s, solve->variance, weight);
+        pvid_estimator_is_informed_f32(self, (const float (*)[PVID_MAX_P])solve->s, solve->variance, weight);
 }
 
 static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
     const uint8_t gated = pvid_gated_f32(model);
-    const float(*s)[PVID_MAX_P] = (const float(*)[PVID_MAX_P])solve->s;
+    const float (*s)[PVID_MAX_P] = (const float (*)[PVID_MAX_P])solve->s;
     for (size_t a = 0; a < model->n_p; a++) {
         solve->s[a][a] += self->prior[a];
     }
@@ -248,7 +248,7 @@ static void kappa_stage(const pvid_estimator_f32 *self, const pvid_estimator_sol
     estimate->weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
     estimate->residual_sd = sqrtf(solve->variance);
     estimate->misfit = pvid_estimator_misfit_f32(self, solve->sums);
-    pvid_estimator_find_kappa_f32(self, (const float(*)[PVID_MAX_P])solve->s, estimate);
+    pvid_estimator_find_kappa_f32(self, (const float (*)[PVID_MAX_P])solve->s, estimate);
 }
 
 /* The stages that a solve and an assessment share; returns whether the stage is to be repeated. */

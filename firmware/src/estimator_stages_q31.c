@@ -90,7 +90,7 @@ static void eliminate_part(pvid_estimator_solve_q31 *solve, size_t n_p, size_t p
     const size_t first = (part - 1u) * PIVOTS_A_STAGE;
     const size_t end = ((n_p - first) > PIVOTS_A_STAGE) ? (first + PIVOTS_A_STAGE) : n_p;
     for (size_t turn = first; turn < end; turn++) {
-        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q, (n_p - 1u) - turn);
+        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q, (n_p - 1u) - turn);
     }
 }
 
@@ -109,7 +109,7 @@ static void inform_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q3
     if (part == 0u) {
         int64_t rest[PVID_MAX_P][PVID_MAX_P];
         pvid_system_without_noise_q31(self, solve, rest);
-        begin_factor(solve, n_p, (const int64_t(*)[PVID_MAX_P])rest);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])rest);
         return;
     }
     eliminate_part(solve, n_p, part);
@@ -141,7 +141,7 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
         add_prior(self, solve);
-        begin_factor(solve, n_p, (const int64_t(*)[PVID_MAX_P])solve->s);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
         return;
     }
     eliminate_part(solve, n_p, part);
@@ -519,15 +519,14 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
 static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
 {
     if (part == 0u) {
-        begin_factor(solve, (uint8_t)n_p, (const int64_t(*)[PVID_MAX_P])solve->s);
+        begin_factor(solve, (uint8_t)n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
         return;
     }
     if (part < factor_parts(n_p)) {
         eliminate_part(solve, n_p, part);
     } else if (solve->factor.positive) {
         estimate->kappa = solve->factor.first_pivot;
-        estimate->least_pivot =
-            pvid_cholesky_least_pivot_q31(&solve->factor, (const int32_t(*)[PVID_MAX_P])solve->q);
+        estimate->least_pivot = pvid_cholesky_least_pivot_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q);
     }
 }
 
@@ -536,7 +535,7 @@ static void widen_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
         pvid_estimator_widen_q31(self, solve);
-        begin_factor(solve, n_p, (const int64_t(*)[PVID_MAX_P])solve->s);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
     } else {
         eliminate_part(solve, n_p, part);
     }

@@ -55,8 +55,8 @@ static uint32_t design_of(uint32_t hash, const pvid_weak_design_q31 *design)
     const size_t half = (design->taps - 1u) / 2u;
     const size_t functions = design->functions;
     const int32_t limits[] = {design->phi_max, design->y_max, design->u_max};
-    const uint8_t single[] = {design->lag,      design->smooth_bits, design->phi_shift, design->u_shift, design->uf_shift,
-                              design->sum_shift};
+    const uint8_t single[] = {design->lag,     design->smooth_bits, design->phi_shift,
+                              design->u_shift, design->uf_shift,    design->sum_shift};
     uint32_t running = pvid_fnv_word(hash, design->taps);
     running = pvid_fnv_word(running, design->decimation);
     running = pvid_fnv_word(running, design->window);

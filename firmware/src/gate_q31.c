@@ -52,7 +52,8 @@ static pvid_scaled_q31 held(pvid_scaled_q31 scale, pvid_scaled_q31 floor)
     return ((scale.e > (scale_max.e + 1)) || pvid_scaled_exceeds_q31(scale, scale_max)) ? scale_max : scale;
 }
 
-/* Whether a square is at most limit times scale, whose mantissas' product is 2^58 at least: the exponents decide of most. */
+/* Whether a square is at most limit times scale, whose mantissas' product is 2^58 at least: the exponents decide of
+ * most. */
 static bool is_usual(const pvid_gate_q31 *self, pvid_scaled_q31 square)
 {
     return ((square.e + 30) <= ((self->limit.e + self->scale.e) + 58)) ||

@@ -1,7 +1,7 @@
 #include "integer_q31.h"
 
-/* No sum of parts leaves its type: |high low| <= 2^31 - 2^15, and what is carried into it is below 2^16 where the product
- * is positive. */
+/* No sum of parts leaves its type: |high low| <= 2^31 - 2^15, and what is carried into it is below 2^16 where the
+ * product is positive. */
 int64_t pvid_product_in_halves_q31(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
@@ -54,8 +54,8 @@ uint32_t pvid_bit_length_q31(uint64_t x)
     return length + length_of[rest];
 }
 
-/* Digit by digit, in base 4: `rest` is what is left of x, `root` the digits found, moved along with them. The first half
- * of the digits depends on the upper half of x alone. */
+/* Digit by digit, in base 4: `rest` is what is left of x, `root` the digits found, moved along with them. The first
+ * half of the digits depends on the upper half of x alone. */
 uint32_t pvid_square_root_q31(uint64_t x)
 {
     uint32_t upper_rest = (uint32_t)(x >> 32);
@@ -85,8 +85,7 @@ pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x)
 {
     const uint32_t k = 31u - pvid_bit_length_q31(x);
     const uint64_t quotient = ((uint64_t)1 << 61) / ((uint64_t)x << k);
-    const pvid_reciprocal_q31 result = {(int32_t)((quotient > INT32_MAX) ? (uint64_t)INT32_MAX : quotient),
-                                        (uint8_t)k};
+    const pvid_reciprocal_q31 result = {(int32_t)((quotient > INT32_MAX) ? (uint64_t)INT32_MAX : quotient), (uint8_t)k};
     return result;
 }
 
@@ -96,8 +95,7 @@ pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent)
     if (((exponent - up) & 1) != 0) {
         up--;
     }
-    const pvid_root_q31 root = {(int32_t)pvid_square_root_q31((uint64_t)pvid_scale_q31(m, -up)),
-                                (exponent - up) / 2};
+    const pvid_root_q31 root = {(int32_t)pvid_square_root_q31((uint64_t)pvid_scale_q31(m, -up)), (exponent - up) / 2};
     return root;
 }
 

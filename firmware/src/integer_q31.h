@@ -31,7 +31,8 @@ static inline int32_t pvid_floor_shift_32_q31(int32_t x, uint32_t s)
     return x >> s;
 }
 
-/* a b by four multiplications of 16 by 16 bits: half of what a core without a long multiplication takes for 64 by 64. */
+/* a b by four multiplications of 16 by 16 bits: half of what a core without a long multiplication takes for 64 by 64.
+ */
 int64_t pvid_product_in_halves_q31(int32_t a, int32_t b);
 
 /* a b. */

@@ -41,8 +41,8 @@ bool pvid_kapitza_physical_f32(const pvid_estimate_f32 *estimate, float l1, pvid
     const float root = sqrtf(big_l2);
     pvid_kapitza_f32 v;
     v.g = w * l1;
-    v.l2 = (l1 * big_l2) / d2;   /* l1/L1, L1 = d2/L2 */
-    v.rho2 = (l1 * root) / d2;   /* l2/sqrt(L2) */
+    v.l2 = (l1 * big_l2) / d2; /* l1/L1, L1 = d2/L2 */
+    v.rho2 = (l1 * root) / d2; /* l2/sqrt(L2) */
     /* gradients over (d1, d2), with dL2 = dd1 - dd2 */
     const float l2_d1 = l1 / d2;
     const float l2_d2 = -(l1 + v.l2) / d2;

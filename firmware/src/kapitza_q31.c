@@ -16,7 +16,8 @@ static bool scale_is_valid(const pvid_kapitza_scale_q31 *scale)
 /* a b / c, rounded down; 0 <= a < 2^62, 0 <= b < 2^31, c > 0. Saturates at half of PVID_WIDE, so that two add up. */
 static int64_t times_over(int64_t a, int32_t b, int64_t c)
 {
-    const int32_t up = (int32_t)pvid_bit_length_q31((uint64_t)PVID_WIDE) - 1 - (int32_t)pvid_bit_length_q31((uint64_t)a);
+    const int32_t up =
+        (int32_t)pvid_bit_length_q31((uint64_t)PVID_WIDE) - 1 - (int32_t)pvid_bit_length_q31((uint64_t)a);
     const int64_t quotient = pvid_scale_q31(a, -up) / c; /* a 2^up / c */
     const int32_t down = (int32_t)pvid_bit_length_q31((uint64_t)quotient) - 31;
     const int64_t mantissa = pvid_clamp_q31(pvid_scale_q31(quotient, down), (int64_t)1 << 31); /* 31 bits, rounded */

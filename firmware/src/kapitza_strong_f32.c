@@ -32,7 +32,7 @@ enum {
     PHI2_PHI0 = 28, /* 8 */
     PHI0_PHI0 = 36, /* 9 */
     MOMENTS = 45,
-    B = 45,         /* 11: N Y */
+    B = 45, /* 11: N Y */
     YY = 56,
     WEIGHT = 57
 };

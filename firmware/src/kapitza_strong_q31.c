@@ -36,8 +36,7 @@ static bool take_powers(int32_t x, int32_t u, const uint8_t shift[], size_t coun
 }
 
 bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *shifts, const int32_t phi[PVID_ORDERS],
-                                 const int32_t u[PVID_Y_ORDERS_Q31], int32_t *y,
-                                 int32_t n[PVID_KAPITZA_STRONG_THETA])
+                                 const int32_t u[PVID_Y_ORDERS_Q31], int32_t *y, int32_t n[PVID_KAPITZA_STRONG_THETA])
 {
     /* Y = 2 u' (u' phi'') - u (u'' phi'' + 2 u' phi''' - u phi''''), and N_1 is that bracket less u phi'''' */
     const int64_t u0_phi4 = pvid_product_q31(u[0], phi[4]);
@@ -159,37 +158,37 @@ static void formats_of(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bi
     const int16_t d2 = (int16_t)(p_bits[D2] + UP);
     const int16_t d2_w = (int16_t)((p_bits[D2] + p_bits[W]) - DOWN);
     const int16_t theta[PVID_KAPITZA_STRONG_THETA] = {
-        w1,                          /* w */
-        w2,                          /* w^2 */
-        d1,                          /* d1 */
-        d1_w,                        /* 3 d1 w */
-        (int16_t)(d1_w + down),      /* 3 d1 w^2 */
-        (int16_t)(d1_w + (2 * down)), /* d1 w^3 */
-        d2,                          /* d2 */
-        (int16_t)(d2_w - 2),         /* 4 d2 w */
-        (int16_t)((d2_w + down) - 1), /* 2 3 d2 w^2 */
+        w1,                                 /* w */
+        w2,                                 /* w^2 */
+        d1,                                 /* d1 */
+        d1_w,                               /* 3 d1 w */
+        (int16_t)(d1_w + down),             /* 3 d1 w^2 */
+        (int16_t)(d1_w + (2 * down)),       /* d1 w^3 */
+        d2,                                 /* d2 */
+        (int16_t)(d2_w - 2),                /* 4 d2 w */
+        (int16_t)((d2_w + down) - 1),       /* 2 3 d2 w^2 */
         (int16_t)((d2_w + (2 * down)) - 2), /* 4 d2 w^3 */
-        (int16_t)(d2_w + (3 * down)), /* d2 w^4 */
+        (int16_t)(d2_w + (3 * down)),       /* d2 w^4 */
     };
     const int16_t c[18] = {
-        ONE_BITS,                    /* 1 */
-        (int16_t)(w1 - 1),           /* 2 w */
-        d1,                          /* 3 d1 */
-        (int16_t)(d1_w - 1),         /* 2 3 d1 w */
-        (int16_t)(d1_w + down),      /* 3 d1 w^2 */
-        (int16_t)(d2 - 2),           /* 4 d2 */
-        (int16_t)(d2_w - 2),         /* 4 3 d2 w */
-        (int16_t)((d2_w + down) - 2), /* 4 3 d2 w^2 */
+        ONE_BITS,                           /* 1 */
+        (int16_t)(w1 - 1),                  /* 2 w */
+        d1,                                 /* 3 d1 */
+        (int16_t)(d1_w - 1),                /* 2 3 d1 w */
+        (int16_t)(d1_w + down),             /* 3 d1 w^2 */
+        (int16_t)(d2 - 2),                  /* 4 d2 */
+        (int16_t)(d2_w - 2),                /* 4 3 d2 w */
+        (int16_t)((d2_w + down) - 2),       /* 4 3 d2 w^2 */
         (int16_t)((d2_w + (2 * down)) - 2), /* 4 d2 w^3 */
-        ONE_BITS,                    /* 1 */
-        w1,                          /* 3 w */
-        w2,                          /* 3 w^2 */
-        (int16_t)(w2 + down),        /* w^3 */
-        ONE_BITS,                    /* 1 */
-        (int16_t)(w1 - 2),           /* 4 w */
-        (int16_t)(w2 - 1),           /* 2 3 w^2 */
-        (int16_t)((w2 + down) - 2),  /* 4 w^3 */
-        (int16_t)(w2 + (2 * down)),  /* w^4 */
+        ONE_BITS,                           /* 1 */
+        w1,                                 /* 3 w */
+        w2,                                 /* 3 w^2 */
+        (int16_t)(w2 + down),               /* w^3 */
+        ONE_BITS,                           /* 1 */
+        (int16_t)(w1 - 2),                  /* 4 w */
+        (int16_t)(w2 - 1),                  /* 2 3 w^2 */
+        (int16_t)((w2 + down) - 2),         /* 4 w^3 */
+        (int16_t)(w2 + (2 * down)),         /* w^4 */
     };
     for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
         theta_bits[i] = theta[i];

@@ -6,9 +6,9 @@
 #include "pvid/config.h"
 #include "scaled_q31.h"
 
-#define BLOCK_S 4u        /* PVID_MISFIT_BLOCK_S */
-#define ROWS_MAX 65535u   /* of a block */
-#define TOLD_DOWN 3u      /* so that what is told of a row, within 2^31, has a square like that of a residual */
+#define BLOCK_S 4u      /* PVID_MISFIT_BLOCK_S */
+#define ROWS_MAX 65535u /* of a block */
+#define TOLD_DOWN 3u    /* so that what is told of a row, within 2^31, has a square like that of a residual */
 #define TOLD_LIMIT ((int32_t)1 << 28)
 
 /* Of q: PVID_MISFIT_MOST, PVID_MISFIT_LEAST; and PVID_MISFIT_TIMES. */
@@ -56,8 +56,7 @@ bool pvid_misfit_take_q31(pvid_misfit_q31 *self, int64_t square, int64_t told)
     self->left--;
     if ((self->left % PVID_MISFIT_FEW) == 0u) {
         self->energy = pvid_scaled_plus_q31(self->energy, pvid_scaled_of_q31(self->few_energy, 0));
-        self->signal =
-            pvid_scaled_plus_q31(self->signal, pvid_scaled_of_q31(self->few_signal, 2 * (int32_t)TOLD_DOWN));
+        self->signal = pvid_scaled_plus_q31(self->signal, pvid_scaled_of_q31(self->few_signal, 2 * (int32_t)TOLD_DOWN));
         self->few_energy = 0;
         self->few_signal = 0;
     }

@@ -8,21 +8,13 @@
 #include "pvid/pvid.h"
 
 #define MAGIC 0x53535650u /* "PVSS" */
-#define VERSION                                                                                                       \
+#define VERSION                                                                                                        \
     (((uint32_t)PVID_VERSION_MAJOR << 24) | ((uint32_t)PVID_VERSION_MINOR << 16) | (uint32_t)PVID_VERSION_PATCH)
 #define CRC_BYTES 4u
 #define BYTE_ORDER 0x01020304u
 
 /* Places of the header. */
-enum {
-    AT_MAGIC = 0,
-    AT_LENGTH = 4,
-    AT_VERSION = 8,
-    AT_KIND = 12,
-    AT_LAYOUT = 16,
-    AT_CONFIG = 20,
-    AT_GENERATION = 24
-};
+enum { AT_MAGIC = 0, AT_LENGTH = 4, AT_VERSION = 8, AT_KIND = 12, AT_LAYOUT = 16, AT_CONFIG = 20, AT_GENERATION = 24 };
 
 /* Whole and undamaged, whatever it is of. */
 static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
@@ -39,7 +31,7 @@ static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
     }
     const size_t sealed = (size_t)said - CRC_BYTES;
     return (pvid_crc32(0u, image, sealed) == pvid_get_u32(&image[sealed])) ? PVID_SNAPSHOT_RESTORED
-                                                                          : PVID_SNAPSHOT_DAMAGED;
+                                                                           : PVID_SNAPSHOT_DAMAGED;
 }
 
 /* Whether image[] holds an undamaged snapshot of this identity. */
@@ -120,9 +112,8 @@ size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_iden
     return seal(image, identity, generation);
 }
 
-pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length,
-                                           const pvid_snapshot_identity *identity, uint8_t object[],
-                                           const pvid_snapshot_shape *shape, void *behind)
+pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity,
+                                           uint8_t object[], const pvid_snapshot_shape *shape, void *behind)
 {
     const pvid_snapshot_status status = inspect(image, length, identity);
     if (status == PVID_SNAPSHOT_RESTORED) {

@@ -36,9 +36,8 @@ size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_iden
                           const void *object, const pvid_snapshot_shape *shape, const void *behind);
 
 /* Restores both if image[] holds an undamaged snapshot of this identity; pointers stay what they are. */
-pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length,
-                                           const pvid_snapshot_identity *identity, uint8_t object[],
-                                           const pvid_snapshot_shape *shape, void *behind);
+pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity,
+                                           uint8_t object[], const pvid_snapshot_shape *shape, void *behind);
 
 /* Whether the pointer at `place` of the object was one when the snapshot was taken, or NULL. */
 bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place);

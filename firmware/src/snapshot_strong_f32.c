@@ -9,15 +9,24 @@
 #define PLACE(field) ((uint32_t)offsetof(pvid_strong_f32, field))
 
 static const uint32_t layout[] = {
-    sizeof(pvid_strong_f32), sizeof(void *),
-    PLACE(phi.rate_power),   PLACE(phi.history),
-    PLACE(y),                PLACE(drive),
-    PLACE(misfit),           PLACE(misfit.block),
-    PLACE(estimator),        PLACE(estimator.information.low),
-    PLACE(estimator.p),      PLACE(estimator.innovation),
-    PLACE(estimator.gain),   PLACE(estimator.counters),
-    PVID_MAX_WINDOW,         PVID_MAX_P,
-    PVID_MAX_THETA,          PVID_MAX_MOMENTS,
+    sizeof(pvid_strong_f32),
+    sizeof(void *),
+    PLACE(phi.rate_power),
+    PLACE(phi.history),
+    PLACE(y),
+    PLACE(drive),
+    PLACE(misfit),
+    PLACE(misfit.block),
+    PLACE(estimator),
+    PLACE(estimator.information.low),
+    PLACE(estimator.p),
+    PLACE(estimator.innovation),
+    PLACE(estimator.gain),
+    PLACE(estimator.counters),
+    PVID_MAX_WINDOW,
+    PVID_MAX_P,
+    PVID_MAX_THETA,
+    PVID_MAX_MOMENTS,
 };
 
 static const uint32_t pointers[] = {PLACE(phi.bank.weights), PLACE(y.bank.weights), PLACE(estimator.model)};

@@ -187,8 +187,8 @@ static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *esti
     return moved;
 }
 
-/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had come
- * in there; and a p that noise may have moved so far has not arrived anywhere. */
+/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
+ * come in there; and a p that noise may have moved so far has not arrived anywhere. */
 static void settle(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool known, bool agrees)
 {
     const bool stale = known && !agrees && has_moved(self, estimator);

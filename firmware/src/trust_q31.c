@@ -12,8 +12,8 @@
 #define ARRIVED 19661 /* 0.3, Q16 */
 #define SMALL_STEP (((int64_t)1 << PVID_SIZE_BITS) / 10000)
 
-/* p has settled when its last step is smaller than 2 %, and is near where it goes when it has with standard errors below
- * a tenth. */
+/* p has settled when its last step is smaller than 2 %, and is near where it goes when it has with standard errors
+ * below a tenth. */
 #define SETTLED_STEP (((int64_t)1 << PVID_SIZE_BITS) / 50)
 #define NEAR (((int64_t)1 << ERROR_BITS) / 10)
 
@@ -170,8 +170,8 @@ static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *esti
     return moved;
 }
 
-/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had come
- * in there; and a p that noise may have moved so far has not arrived anywhere. */
+/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
+ * come in there; and a p that noise may have moved so far has not arrived anywhere. */
 static void settle(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool agrees)
 {
     if (!agrees && has_moved(self, estimator)) {

@@ -56,7 +56,8 @@ static bool angle_is_valid(const pvid_weak_config_f32 *config)
         return true;
     }
     const bool room = !config->friction || (config->zero_unknown && PVID_KAPITZA_HAS_FRICTION);
-    return room && pvid_weak_angle_is_asked_f32(config->angle) && (config->passes >= 1u) && (config->passes <= PVID_MAX_PASSES);
+    return room && pvid_weak_angle_is_asked_f32(config->angle) && (config->passes >= 1u) &&
+           (config->passes <= PVID_MAX_PASSES);
 }
 
 static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
@@ -68,7 +69,8 @@ static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f3
 #if PVID_KAPITZA_HAS_FRICTION
     estimator.model = config->friction ? &pvid_kapitza_friction_f32 : estimator.model;
 #endif
-    estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)pvid_weak_hop(design->window));
+    estimator.update_rate_hz =
+        config->sample_rate_hz / ((float)design->decimation * (float)pvid_weak_hop(design->window));
     estimator.row_weight = (functions - 2.0f) / functions;
     estimator.correlation = design->overlap;
     return pvid_estimator_init_f32(&self->estimator, &estimator);
@@ -145,7 +147,8 @@ static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *conf
     if (status != PVID_OK) {
         return status;
     }
-    const float windows_hz = config->sample_rate_hz / ((float)design->decimation * (float)pvid_weak_hop(design->window));
+    const float windows_hz =
+        config->sample_rate_hz / ((float)design->decimation * (float)pvid_weak_hop(design->window));
     status = pvid_gate_init_f32(&self->finish.gate, &config->gate, windows_hz, GATE_MEMORY, 1.0f);
     if (status != PVID_OK) {
         return status;
@@ -310,7 +313,7 @@ static inline void add_slice(pvid_weak_f32 *self)
         pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, &self->bend,
                                    self->term[self->turn][window->index % 2u]);
     }
-    pvid_weak_window_add_f32(window, design, (const float(*)[PVID_WEAK_SAMPLE_TERMS])self->term[self->turn], first,
+    pvid_weak_window_add_f32(window, design, (const float (*)[PVID_WEAK_SAMPLE_TERMS])self->term[self->turn], first,
                              last, self->sums[window->buffer]);
     self->function = (uint8_t)last;
     if (last == design->functions) {

@@ -225,7 +225,7 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
                                pvid_reason *reason)
 {
     const size_t functions = design->functions;
-    const float(*fixed)[PVID_WEAK_TERMS] = (const float(*)[PVID_WEAK_TERMS])sums;
+    const float (*fixed)[PVID_WEAK_TERMS] = (const float (*)[PVID_WEAK_TERMS])sums;
     const size_t row = self->index;
     const size_t few = ((row + FUNCTIONS_A_STAGE) < functions) ? (row + FUNCTIONS_A_STAGE) : functions;
     size_t done = row + 1u; /* functions, after this stage */

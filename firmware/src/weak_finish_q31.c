@@ -27,11 +27,11 @@ enum {
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
-    STAGE_FIT,   /* likewise: what the rows leave unexplained, for the gate */
-    STAGE_NOISE, /* are the rows to be taken in? and what noise there is in them */
-    STAGE_FADE,  /* in two parts: the past, while it is to be aged */
-    STAGE_ADD,   /* K times: a row to the estimator */
-    STAGE_SOLVE, /* `iterations` solves of several stages each */
+    STAGE_FIT,    /* likewise: what the rows leave unexplained, for the gate */
+    STAGE_NOISE,  /* are the rows to be taken in? and what noise there is in them */
+    STAGE_FADE,   /* in two parts: the past, while it is to be aged */
+    STAGE_ADD,    /* K times: a row to the estimator */
+    STAGE_SOLVE,  /* `iterations` solves of several stages each */
     STAGE_ASSESS, /* several stages */
     STAGE_JUDGE,  /* is the estimate to be published? */
     STAGE_IDLE
@@ -54,10 +54,10 @@ enum {
 #define COMBINATION_BITS 29 /* six of them times a Gram table of 30 bits fit an int64 */
 #define DIRECTION_BITS 27   /* squares of 64 of them likewise */
 
-/* The noise in the rows is asked for to a few per cent: tables of 14 bits and rows of 13 do, whose products add up in 32
- * bits. */
-#define GRAM_22 3u          /* the first of the three Gram tables that speak of chi'' and chi alone: 22, 20 + 02, 00 */
-#define GRAM_DOWN 16u       /* from a table's 30 bits to 14 */
+/* The noise in the rows is asked for to a few per cent: tables of 14 bits and rows of 13 do, whose products add up in
+ * 32 bits. */
+#define GRAM_22 3u    /* the first of the three Gram tables that speak of chi'' and chi alone: 22, 20 + 02, 00 */
+#define GRAM_DOWN 16u /* from a table's 30 bits to 14 */
 #define INVERSE_BITS 15
 #define INVERSE_LIMIT ((int32_t)1 << 26) /* 64 of them times an entry of L fit an int64 */
 #define ROW_BITS 12
@@ -205,7 +205,8 @@ static size_t parts_of_triangle(size_t functions, size_t parts)
 }
 
 /* Entries first..last-1 of a row of L with L L^T = R0, in place. Rows of L have a length below 1, and so no sum of
- * theirs comes near PVID_WIDE, unless R0 cannot be factored: then the row's diagonal will tell, whatever its entries. */
+ * theirs comes near PVID_WIDE, unless R0 cannot be factored: then the row's diagonal will tell, whatever its entries.
+ */
 static void factor_entries(pvid_weak_finish_q31 *self, size_t row, size_t first, size_t last)
 {
     int32_t *l = &self->factor[row_start(row)];
@@ -409,8 +410,8 @@ static void remove_components(pvid_weak_finish_q31 *self, size_t first, size_t l
     }
 }
 
-/* What a window's rows leave unexplained, a few functions at a time; a row that does not fit as large as can be. Only the gate
- * asks for it. */
+/* What a window's rows leave unexplained, a few functions at a time; a row that does not fit as large as can be. Only
+ * the gate asks for it. */
 static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *estimator, size_t first, size_t last,
                           int32_t sums[][PVID_WEAK_TERMS_Q31])
 {

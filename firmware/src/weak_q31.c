@@ -268,8 +268,8 @@ void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen)
 }
 
 /* A window that has come round hands its sums over and goes on in the buffer that is free. Its last sample, which has
- * no weight, is the first one of the next. Returns why the window is dropped, if it is, or PVID_ACCUMULATED: its sums are
- * cleared where they are. */
+ * no weight, is the first one of the next. Returns why the window is dropped, if it is, or PVID_ACCUMULATED: its sums
+ * are cleared where they are. */
 static pvid_reason turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 {
     self->warm = true;

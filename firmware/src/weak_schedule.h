@@ -15,7 +15,8 @@
 #include "pvid/weak_job.h"
 
 /* Most stages of a complete window that a tick may take. One is the rule; more only where a hop has fewer free ticks
- * than a window has stages: short windows, low decimation, the correction's sweeps. The longest tick grows with them. */
+ * than a window has stages: short windows, low decimation, the correction's sweeps. The longest tick grows with them.
+ */
 #define PVID_STAGES_TOGETHER 32u
 
 static inline bool pvid_is_odd_within(uint16_t n, uint16_t low, uint16_t high)

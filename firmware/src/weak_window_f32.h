@@ -9,14 +9,14 @@
 /* What the samples add, by the factor of the table: places among the sums of a function. The first eight are also
  * the places of a sample's terms; the others repeat these with another factor. */
 enum {
-    PVID_TERM_UF = 0,   /* chi'' (-u phi) */
-    PVID_TERM_F = 1,    /* chi'' (-phi) */
-    PVID_TERM_UIUF = 2, /* chi'' (-u I2(u phi)) */
-    PVID_TERM_UIF = 3,  /* chi'' (-u I2(phi)) */
-    PVID_TERM_UIU = 4,  /* chi'' u I2(u) */
-    PVID_TERM_UI1 = 5,  /* chi'' u I2(1) */
-    PVID_TERM_U = 6,    /* chi'' u */
-    PVID_TERM_UT = 7,   /* chi'' u t */
+    PVID_TERM_UF = 0,     /* chi'' (-u phi) */
+    PVID_TERM_F = 1,      /* chi'' (-phi) */
+    PVID_TERM_UIUF = 2,   /* chi'' (-u I2(u phi)) */
+    PVID_TERM_UIF = 3,    /* chi'' (-u I2(phi)) */
+    PVID_TERM_UIU = 4,    /* chi'' u I2(u) */
+    PVID_TERM_UI1 = 5,    /* chi'' u I2(1) */
+    PVID_TERM_U = 6,      /* chi'' u */
+    PVID_TERM_UT = 7,     /* chi'' u t */
     PVID_TERM_CHI_UF = 8, /* chi (-u phi) */
     PVID_TERM_CHI_F = 9,  /* chi (-phi) */
     PVID_TERM_CHI_U = 10, /* chi u */

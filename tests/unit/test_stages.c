@@ -123,8 +123,7 @@ static void the_fixed_point_window_takes_the_stages_that_init_counts_with(void *
                                           &fixed.estimator, &fixed.trust, &reason);
             }
         }
-        assert_int_equal(stages,
-                         pvid_weak_finish_stages_q31(fixed.design->functions, iterations, &fixed.estimator));
+        assert_int_equal(stages, pvid_weak_finish_stages_q31(fixed.design->functions, iterations, &fixed.estimator));
     }
 }
 

@@ -3,9 +3,9 @@
  * schema.h; what they mean: host/src/pvid/link.py.
  *
  * No sample from the PC is lost: samples are numbered, the board accepts only the next one, and each credit contains
- * its number and how many samples may be in transit. Lost or damaged samples are sent again; repeated ones are counted and
- * ignored. Every answer contains the session number of the configuration, so that the PC detects a restarted board, and
- * 48 bits of the tick: the 32 bits of the header wrap after 50 days at 1 kHz.
+ * its number and how many samples may be in transit. Lost or damaged samples are sent again; repeated ones are counted
+ * and ignored. Every answer contains the session number of the configuration, so that the PC detects a restarted board,
+ * and 48 bits of the tick: the 32 bits of the header wrap after 50 days at 1 kHz.
  *
  * In field mode the board sends each sample exactly as the identifier gets it, before the hash or the estimate that
  * includes it. In real time (PVID_SOURCE_SENSOR) nothing waits for the line: a frame that does not fit is dropped, and
@@ -171,10 +171,7 @@ static void answer_raw(void)
         const bool wrapped = stream.ticks < field.count; /* since the first of these samples */
         pvid_put_u32(&field.frame[IDENTIFIER_RAW_SESSION], stream.session);
         pvid_put_u16(&field.frame[IDENTIFIER_RAW_TICK_HIGH], (uint16_t)(stream.tick_high - (wrapped ? 1u : 0u)));
-        answers_put(&stream.out,
-                    IDENTIFIER_RAW,
-                    stream.ticks - field.count,
-                    field.frame,
+        answers_put(&stream.out, IDENTIFIER_RAW, stream.ticks - field.count, field.frame,
                     IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * field.count));
         field.count = 0;
     }

@@ -2,8 +2,8 @@
  *
  * A row is made of derivatives in one time unit: all orders of phi in one format, u, u', u'' in another, so that
  * products whose orders add up to the same stand in the same format. Each entry of the row is shifted to a format of
- * its own, chosen by the design tool for the size expected of it; a row of which an entry does not fit is refused, never
- * bent.
+ * its own, chosen by the design tool for the size expected of it; a row of which an entry does not fit is refused,
+ * never bent.
  */
 #ifndef PVID_KAPITZA_STRONG_Q31_H
 #define PVID_KAPITZA_STRONG_Q31_H
@@ -36,11 +36,10 @@ typedef struct {
 
 /* One row from phi[k] = d^k phi/dt^k and u = y_A''/l1, u', u'', all within +-PVID_DERIVATIVE_LIMIT_Q31. Writes Y and
  * N[11] in the order of pvid_kapitza_strong_row_f32, with the binomial coefficients in theta as there. Returns false,
- * and leaves them in disorder, iff an entry or a part of Y is beyond +-PVID_ROW_LIMIT_Q31. Cost: 13 products of 32 by 32
- * bits. */
+ * and leaves them in disorder, iff an entry or a part of Y is beyond +-PVID_ROW_LIMIT_Q31. Cost: 13 products of 32 by
+ * 32 bits. */
 bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *shifts, const int32_t phi[PVID_ORDERS],
-                                 const int32_t u[PVID_Y_ORDERS_Q31], int32_t *y,
-                                 int32_t n[PVID_KAPITZA_STRONG_THETA]);
+                                 const int32_t u[PVID_Y_ORDERS_Q31], int32_t *y, int32_t n[PVID_KAPITZA_STRONG_THETA]);
 
 /* w times the gradient in w of N^T theta, from term[i] = N_i theta_i: each as often as w is a factor of theta_i. */
 int64_t pvid_kapitza_strong_told_q31(const int64_t term[PVID_KAPITZA_STRONG_THETA]);
