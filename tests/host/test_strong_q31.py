@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
-from test_core_q31 import FIRMWARE, SOURCES, tool
+from test_core_q31 import SOURCES, tool
 
 from pvid import oracle
 from pvid.capture import write_run
 from pvid.cli import commands
+from pvid.core.sources import INCLUDES
 from pvid.errors import PvidError
 from pvid.native import Native, Reason
 from pvid.native_q31 import RowEstimatorQ31, StrongConfigQ31, StrongIdentifierQ31, strong_rows_q31
@@ -219,7 +220,7 @@ def test_the_header_is_the_configuration_and_nothing_overflows(
     (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
     sanitizers = ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
     sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
-    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src", f"-I{tmp_path}"]
+    includes = [*INCLUDES, f"-I{tmp_path}"]
     flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", *sanitizers, *includes]
     tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", tmp_path / "program")
     run = simulate(sensors=standard_sensors(20), truth="linear", duration=3.0, seed=2).run

@@ -3,7 +3,7 @@
  * counts within full scale. */
 #include "prove.h"
 
-#include "integer_q31.h"
+#include "number/integer_q31.h"
 #include "pvid/differentiator_q31.h"
 
 #define WINDOW 41u

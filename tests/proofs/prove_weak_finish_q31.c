@@ -7,7 +7,7 @@
 #include "estimator_contracts.h"
 #include "weak_design.h"
 
-#include "weak_finish_q31.c" /* its stages, by name */
+#include "weak/finish_q31.c" /* its stages, by name */
 
 static pvid_weak_finish_q31 finish;
 static pvid_estimator_q31 estimator;

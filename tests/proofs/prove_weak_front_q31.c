@@ -4,7 +4,7 @@
 #include "prove.h"
 
 #include "weak_design.h"
-#include "weak_front_q31.h"
+#include "weak/front_q31.h"
 
 static const struct {
     uint16_t taps;

@@ -4,7 +4,7 @@
 
 #include "contracts.h"
 #include "weak_design.h"
-#include "weak_window_q31.h"
+#include "weak/window_q31.h"
 
 static pvid_weak_window_q31 window;
 static int32_t term[PVID_WEAK_TERMS_Q31];

@@ -2,7 +2,7 @@
 #ifndef PROOF_WEAK_DESIGN_H
 #define PROOF_WEAK_DESIGN_H
 
-#include "integer_q31.h"
+#include "number/integer_q31.h"
 #include "weak_table_q31.h"
 
 /* Largest |F|. */

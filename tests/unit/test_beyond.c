@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "estimator_q31.h"
+#include "solve/estimator_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 #include "strong_table_q31.h"

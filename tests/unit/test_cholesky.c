@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "cholesky_f32.h"
+#include "solve/cholesky_f32.h"
 
 static uint32_t generator = 7u;
 

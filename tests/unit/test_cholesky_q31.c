@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "cholesky_q31.h"
+#include "solve/cholesky_q31.h"
 
 #define ONE 1073741824.0 /* 2^30 */
 

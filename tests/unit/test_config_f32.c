@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "bounds.h"
-#include "fingerprint_f32.h"
+#include "keep/fingerprint_f32.h"
 #include "pvid/pvid.h"
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "bounds.h"
-#include "fingerprint_q31.h"
+#include "keep/fingerprint_q31.h"
 #include "pvid/pvid.h"
 #include "weak_table_q31.h"
 

@@ -11,11 +11,11 @@
 
 #include <cmocka.h>
 
-#include "count.h"
-#include "estimator_q31.h"
+#include "number/count.h"
+#include "solve/estimator_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 #include "strong_table_q31.h"
 
 /* ---- y = N^T p with as many entries as there may be parameters ---- */

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "information_q31.h"
+#include "solve/information_q31.h"
 
 #define N 3
 #define SUMS (6 + 3 + 2)

@@ -6,8 +6,8 @@
 
 #include <cmocka.h>
 
-#include "cholesky_q31.h"
-#include "integer_q31.h"
+#include "solve/cholesky_q31.h"
+#include "number/integer_q31.h"
 
 /* A generator of its own: the same numbers on every machine. */
 static uint64_t next_random(uint64_t *state)

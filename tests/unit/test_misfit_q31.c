@@ -3,9 +3,9 @@
 #include <stdint.h>
 
 #include "misfit_cases.h"
-#include "misfit_q31.h"
+#include "judge/misfit_q31.h"
 #include "pvid/pvid.h"
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 
 #define UNIT 1000000 /* of e and of what is told */
 

@@ -9,16 +9,16 @@
 
 #include <cmocka.h>
 
-#include "estimator_f32.h"
+#include "solve/estimator_f32.h"
 #include "plant.h"
 #include "pvid/pvid.h"
-#include "weak_angle_f32.h"
-#include "weak_finish_f32.h"
-#include "weak_finish_q31.h"
+#include "full_angle_f32.h"
+#include "weak/finish_f32.h"
+#include "weak/finish_q31.h"
 #include "weak_table.h"
 #include "weak_table_q31.h"
-#include "weak_window_f32.h"
-#include "weak_window_q31.h"
+#include "weak/window_f32.h"
+#include "weak/window_q31.h"
 
 static pvid_weak_f32 identifier;
 static pvid_weak_angle_f32 angle;

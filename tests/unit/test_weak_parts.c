@@ -7,13 +7,13 @@
 
 #include <cmocka.h>
 
-#include "pattern_f32.h"
+#include "solve/pattern_f32.h"
 #include "pvid/pvid.h"
-#include "weak_finish_f32.h"
-#include "weak_front_f32.h"
-#include "weak_schedule.h"
+#include "weak/finish_f32.h"
+#include "weak/front_f32.h"
+#include "weak/schedule.h"
 #include "weak_table.h"
-#include "weak_window_f32.h"
+#include "weak/window_f32.h"
 
 static void assert_close(double value, double expected, double tolerance)
 {

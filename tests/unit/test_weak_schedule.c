@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #include "pvid/config.h"
-#include "weak_schedule.h"
+#include "weak/schedule.h"
 
 /* A block has ticks enough: two windows of slices and the stages' own. */
 static void every_block_has_room(void **state)
