@@ -142,7 +142,8 @@ def page_of(files: list[File]) -> str:
 
 {taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
 are taken by the CMocka programs and by what `tests/host/playback.py` plays, as gcov counts them at -O0: every
-operand of a `&&` or `||` has two. The slower tests were not asked. PVID_ASSERT, which ends the program, was compiled out. Missed:
+operand of a `&&` or `||` has two. The slower tests were not asked. PVID_ASSERT, which ends the program,
+was compiled out. Missed:
 
 | where | line | branches | why |
 |---|---|---:|---|

@@ -568,8 +568,9 @@ def page_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
 {told.mutants} mutants of the {files} files of `firmware/src` and `firmware/models`, drawn with seed {seed}, by each
 file's number of them: one operator, sign or constant changed. {told.killed} were killed:
 {100 * told.killed / told.mutants:.1f} % of all, and {100 * told.rate:.1f} % of the {could} that are not
-equivalent. {told.by_bits} of them by the bits of a few seconds of data (`tests/host/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over
-40 000 ticks, oracles, accuracy) were not asked.
+equivalent. {told.by_bits} of them by the bits of a few seconds of data
+(`tests/host/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over 40 000
+ticks, oracles, accuracy) were not asked.
 
 ## Survivors that a test could kill
 

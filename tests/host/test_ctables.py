@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from pvid.capture import write_run
 from pvid.cli import commands
-from pvid.core.sources import INCLUDES, source
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, source
 from pvid.ctables import bank_header, float_array, float_literal
 from pvid.differentiation import finite_difference, savitzky_golay
 from pvid.errors import PvidError
