@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from pathlib import Path
+from typing import Any
 
 from conftest import ROOT
 
@@ -16,49 +16,66 @@ LIMIT = 20
 HOME = "host/src/pvid/cases.py"
 
 NAMES = {"weak", "strong", "f32", "q31", "f64"}
-MEMBERS = {(owner, name) for owner, names in (("Form", ("WEAK", "STRONG")), ("Core", ("F32", "Q31"))) for name in names}
-# Types of which there is one for each form or core, by the names that they have and that they had.
-OWN = re.compile(
-    r"(?:(?:Weak|Strong|Fixed|Float)(?:Config|Twin|Identifier|Settings|Arithmetic|Tables)?"
-    r"|ConfigQ31|Configure|Estimate|Estimator|\w+)Q31|(?:Weak|Strong|Fixed|Float)(?:Config|Twin|Identifier)"
-)
+MEMBERS = {("Form", "WEAK"), ("Form", "STRONG"), ("Core", "F32"), ("Core", "Q31")}
+# Types of which there is one for each form or core.
+OWN = re.compile(r"(?:Weak|Strong|Fixed|Float)(?:Config|Twin|Identifier)(?:Q31)?|ConfigQ31|EstimatorQ31")
+PAIRS = (("Configure", "ConfigureQ31"), ("Estimate", "EstimateQ31"), ("Sample", "Count"), ("Raw", "RawCount"))
 MACROS = re.compile(r"^\s*#\s*(?:el)?if.*\b(?:STREAM|REPLAY)_(?:FORM|CORE|Q31|WEAK)\b|\bif\(.*PVID_STREAM_CORE")
 
 
-def _is_name(node: ast.expr) -> bool:
+def _is_name(node: ast.AST) -> bool:
     """Whether it is a form or core: "weak", Form.WEAK, or a tuple or list of them."""
-    if isinstance(node, ast.Constant):
-        return node.value in NAMES
-    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-        return (node.value.id, node.attr) in MEMBERS
-    return isinstance(node, ast.Tuple | ast.List | ast.Set) and any(map(_is_name, node.elts))
+    match node:
+        case ast.Constant():
+            return node.value in NAMES
+        case ast.Attribute(value=ast.Name(id=owner), attr=name):
+            return (owner, name) in MEMBERS
+        case ast.Tuple() | ast.List() | ast.Set():
+            return any(map(_is_name, node.elts))
+    return False
 
 
-def _types(node: ast.expr) -> Iterator[str]:
-    for part in ast.walk(node):
-        if isinstance(part, ast.Name):
-            yield part.id
-        elif isinstance(part, ast.Attribute):
-            yield part.attr
+def _types(node: ast.AST) -> set[str]:
+    """Names of the types in an expression."""
+    names = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+    return names | {part.attr for part in ast.walk(node) if isinstance(part, ast.Attribute)}
+
+
+def _siblings(name: str) -> Iterator[str]:
+    """The types of the other core and of the other form."""
+    for pair in PAIRS:
+        if name in pair:
+            yield pair[1 - pair.index(name)]
+            return
+    if OWN.fullmatch(name):
+        yield name.removesuffix("Q31") if name.endswith("Q31") else f"{name}Q31"
+        yield name.replace("Weak", "Strong") if "Weak" in name else name.replace("Strong", "Weak")
+
+
+def _tells_apart(names: set[str]) -> bool:
+    return any(sibling not in names for name in names for sibling in _siblings(name))
 
 
 def _is_condition(node: ast.AST) -> bool:
     match node:
         case ast.Compare():
             sides = [node.left, *node.comparators]
-            fixed = any(isinstance(side, ast.Attribute) and side.attr == "fixed" for side in sides)
-            return any(map(_is_name, sides)) or fixed
+            return any(_is_name(side) or (isinstance(side, ast.Attribute) and side.attr == "fixed") for side in sides)
         case ast.Call(func=ast.Name(id="isinstance"), args=[_, kinds]):
-            return any(OWN.fullmatch(name) for name in _types(kinds))
+            return _tells_apart(_types(kinds))
         case ast.match_case():
-            kinds = [part.cls for part in ast.walk(node.pattern) if isinstance(part, ast.MatchClass)]
+            classes = [part.cls for part in ast.walk(node.pattern) if isinstance(part, ast.MatchClass)]
             values = [part.value for part in ast.walk(node.pattern) if isinstance(part, ast.MatchValue)]
-            return any(OWN.fullmatch(name) for kind in kinds for name in _types(kind)) or any(map(_is_name, values))
+            return _tells_apart(set[str]().union(*map(_types, classes))) or any(map(_is_name, values))
         case ast.Dict():
             return sum(key is not None and _is_name(key) for key in node.keys) >= 2
         case ast.IfExp() | ast.If():
             return isinstance(node.test, ast.Attribute) and node.test.attr.lstrip("_") == "fixed"
     return False
+
+
+def _line(node: Any) -> int:
+    return int(node.pattern.lineno if isinstance(node, ast.match_case) else node.lineno)
 
 
 def conditions() -> list[str]:
@@ -67,19 +84,14 @@ def conditions() -> list[str]:
     for path in sorted((ROOT / "host" / "src" / "pvid").rglob("*.py")):
         place = path.relative_to(ROOT).as_posix()
         if place != HOME:
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            lines = [getattr(node, "lineno", 0) or node.pattern.lineno for node in ast.walk(tree) if _is_condition(node)]  # type: ignore[attr-defined]
-            found += [f"{place}:{line}" for line in sorted(lines)]
+            nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            found += [f"{place}:{line}" for line in sorted(_line(node) for node in nodes if _is_condition(node))]
     for suffix in ("*.c", "*.h", "*.txt", "*.cmake"):
         for path in sorted((ROOT / "firmware").rglob(suffix)):
-            found += _lines_of(path)
+            lines = path.read_text(encoding="utf-8").splitlines()
+            place = path.relative_to(ROOT).as_posix()
+            found += [f"{place}:{number}" for number, line in enumerate(lines, 1) if MACROS.search(line)]
     return found
-
-
-def _lines_of(path: Path) -> list[str]:
-    lines = path.read_text(encoding="utf-8").splitlines()
-    place = path.relative_to(ROOT).as_posix()
-    return [f"{place}:{number}" for number, line in enumerate(lines, 1) if MACROS.search(line)]
 
 
 def test_few_conditions_on_form_or_core_are_left_outside_the_cases() -> None:
@@ -95,7 +107,9 @@ def test_a_condition_is_found_in_each_of_its_shapes() -> None:
         'table = {"weak": 1, "strong": 2}',
         "if core is Core.Q31: pass",
         "match twin:\n    case StrongTwin(): pass",
+        "fixed = isinstance(item, EstimateQ31)",
     )
     for shape in shapes:
         assert any(map(_is_condition, ast.walk(ast.parse(shape)))), shape
-    assert not any(map(_is_condition, ast.walk(ast.parse('print(case.form, "weak")'))))
+    for shape in ('print(case.form, "weak")', "isinstance(item, Estimate | EstimateQ31)"):
+        assert not any(map(_is_condition, ast.walk(ast.parse(shape)))), shape

@@ -24,6 +24,7 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import ROOT
 from pvid.core.headers import Headers, default_library
 from pvid.core.native import Identifier, Native
+from pvid.core.sources import PUBLIC_FOLDERS
 from pvid.rig.file import RigFile
 from pvid.settings.bounds import SIZES
 from pvid.settings.enums import Reason
@@ -307,13 +308,13 @@ def build_library(folder: Path) -> ctypes.CDLL:
 
     What they take of the core comes from the library that is measured.
     """
-    include, here, cost = (ROOT / name for name in ("firmware/include", "tests/longevity", "tests/cost"))
+    here, cost = (ROOT / name for name in ("tests/longevity", "tests/cost"))
     sources = [*sorted(here.glob("*.c")), cost / "rls_f32.c"]
     library, core = folder / LIBRARY, default_library().resolve()
     folder.mkdir(parents=True, exist_ok=True)
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=default"]
     command += SIZES
-    command += [f"-I{path}" for path in (include, here, cost)]
+    command += [f"-I{path}" for path in (*PUBLIC_FOLDERS, here, cost)]
     linked = [str(core), f"-Wl,-rpath,{core.parent}", "-lm"]
     try:
         done = subprocess.run(

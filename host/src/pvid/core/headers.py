@@ -119,7 +119,7 @@ class Headers:
             case "pointer":
                 return np.dtype(np.uintp)
             case "enum":
-                return np.dtype(np.int32)
+                return np.dtype(f"u{size}")
         if ctype.cname in ("float", "double"):
             return np.dtype(f"f{size}")
         return np.dtype(np.bool_ if ctype.cname == "_Bool" else f"{'u' if ctype.cname[0] == 'u' else 'i'}{size}")
