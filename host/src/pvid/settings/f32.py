@@ -104,7 +104,7 @@ class TrustConfig:
     se_max: float = 0.05
     misfit_max: float = 4.0
     groups_min: int = 3
-    shut_max: int = 16
+    revert_after: int = 16
     renewal: float = 0.2
 
 

@@ -45,7 +45,7 @@ class TrustConfigQ31:
     se_max: int = 838861
     misfit_max: int = 262144
     groups_min: int = 3
-    shut_max: int = 16
+    revert_after: int = 16
     renewal: int = 13107
 
 
