@@ -328,7 +328,7 @@ def identify_command(
     bits at every tick that it reported and at the end.
     """
     rig = _with(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
-    run = read_input(run_path, rig, columns, whole=rig.identifier.core == "f64")
+    run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)
     given, rig = rig, resolved(rig, run)
     notes = resolution_note(given, rig)
     print_notes(notes)
@@ -398,9 +398,8 @@ def compare_command(
     run = read_input(run_path, rig, columns)
     rig = fitted(rig, run)
     native = Native()
-    own = "q31" if rig.identifier.core == "q31" else "f32"
     outcomes: list[Outcome] = []
-    for arithmetic in ["f32", "q31"] if core == "all" else [core or own]:
+    for arithmetic in ["f32", "q31"] if core == "all" else [core or rig.identifier.core_traits.in_c]:
         for one in [law] if law else ["stationary", "pseudovelocity"]:
             chosen = replace(rig, identifier=replace(rig.identifier, law=one, core=arithmetic))  # type: ignore[arg-type]
             with progress_bar(f"{one} law, {arithmetic}", len(run.t)) as advance:
