@@ -42,13 +42,15 @@ def pytest_configure(config: pytest.Config) -> None:
 def ticks(request: pytest.FixtureRequest) -> int:
     """The length of a run [ticks], of the test's mark of that name."""
     mark = request.node.get_closest_marker("ticks")
-    return int(mark.kwargs["long" if request.config.getoption("--long") else "short"])
+    length = int(mark.kwargs["long" if request.config.getoption("--long") else "short"])
+    request.node.user_properties.append(("ticks", length))
+    return length
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Puts the longest files first; within a file, and among the others, nothing moves."""
     if not config.getoption("--long"):
-        config.hook.pytest_deselected([item for item in items if item.get_closest_marker("long")])
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
         items[:] = [item for item in items if not item.get_closest_marker("long")]
     places = {f"test_{name}.py": place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path.name, len(places)))
