@@ -615,7 +615,7 @@ def _print_header(header: str, check: Path | None) -> int:
 
 @commands.group()
 def bench() -> None:
-    """Measures what the README and host/README.md claim and prints it as tables."""
+    """Measures what the README and the benchmark pages claim and prints it as tables."""
 
 
 def _update_readme(readme: Path | None, marker: str, text: str) -> None:
