@@ -226,6 +226,8 @@ install_requirements() { # install_requirements PROFILE
     # From inside host/: a path is read as a URL, which spaces break.
     logged pip-pvid env -C "$root/host" "${pip[@]}" --no-index --no-deps --no-build-isolation --editable . ||
         die "$failed"
+    # tools/bench, behind the installed packages, so that no module of tools/ hides one of theirs.
+    printf '%s\n' "$root/tools" >"$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/pvid-tools.pth"
     write_stamp "$venv/installed-$1" "$(requirements)"
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Branch coverage of the C core and the link by the quick tests: the CMocka programs, and what tests/host/playback.py
+"""Branch coverage of the C core and the link by the quick tests: the CMocka programs, and what tests/playback.py
 plays through the shared library.
 
     build/venv/bin/python tools/coverage.py            measures, prints a table by file and what was missed
@@ -25,11 +25,11 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "host"))
+sys.path.insert(0, str(ROOT / "tests"))
 
-import playback  # noqa: E402 - of tests/host
+import playback  # noqa: E402 - of tests
 
-from pvid.native import SIZES  # noqa: E402
+from pvid.core.native import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "coverage"
 PAGE = ROOT / "tests" / "COVERAGE.md"
@@ -40,7 +40,9 @@ INCLUDES = [f"-I{FIRMWARE / name}" for name in ("include", "src", "link")]
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
-PLAY = "import playback; from pvid.native import Native; [playback.digest(Native(), v) for v in playback.variants()]"
+PLAY = (
+    "import playback; from pvid.core.native import Native; [playback.digest(Native(), v) for v in playback.variants()]"
+)
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def page_of(files: list[File]) -> str:
 # Branch coverage
 
 {taken} of the {branches} branches of `firmware/src` and `firmware/link` ({share(files):.1f} %) are taken by the CMocka
-programs and by what `tests/host/playback.py` plays, as gcov counts them at -O0: every operand of a `&&` or `||` has
+programs and by what `tests/playback.py` plays, as gcov counts them at -O0: every operand of a `&&` or `||` has
 two. The slower tests were not asked. PVID_ASSERT, which ends the program, was compiled out. Missed:
 
 | where | line | branches | why |
@@ -154,7 +156,7 @@ def main() -> int:
         raise SystemExit("missing: gcovr (Debian's name); ./tools/test installs it")
     for program in build():
         run(program)
-    path = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests/host"))
+    path = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
     run(sys.executable, "-c", PLAY, PYTHONPATH=path, PVID_NATIVE_LIBRARY=str(BUILD / "libnative.so"))
     files = measured()
     print("| file | branches taken | of |\n|---|---:|---:|")

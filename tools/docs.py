@@ -19,8 +19,8 @@ from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
 
-from pvid import link
-from pvid.rigfile import Identifier, Nominal, RigFile, Sensor
+from pvid.link import frames
+from pvid.rig.file import Identifier, Nominal, RigFile, Sensor
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -80,7 +80,7 @@ def rig_file_tables() -> str:
 
 def schema_block() -> str:
     """The schema of link-and-log.md."""
-    return f"```\n{link.SCHEMA_TEXT}\n```"
+    return f"```\n{frames.SCHEMA_TEXT}\n```"
 
 
 # page, marker, text

@@ -4,7 +4,7 @@
     build/venv/bin/python tools/mutate.py                  240 mutants; writes tests/MUTANTS.md; a quarter of an hour
     build/venv/bin/python tools/mutate.py --count 10       ten of them; writes nothing
 
-The quick tests are two: what tests/host/playback.py plays through the shared library, under every setting of every form
+The quick tests are two: what tests/playback.py plays through the shared library, under every setting of every form
 and core, whose bits the suite compares with the numpy twin; and the CMocka programs of tests/unit, as they are, then
 those that take less than a second under clang's address and undefined-behaviour sanitizers. A crash and a loop without
 an end are noticed, too. A change that leaves the object code as it was is no mutant.
@@ -34,11 +34,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "host"))
+sys.path.insert(0, str(ROOT / "tests"))
 
-import playback  # noqa: E402 - of tests/host
+import playback  # noqa: E402 - of tests
 
-from pvid.native import SIZES, Native  # noqa: E402
+from pvid.core.native import SIZES, Native  # noqa: E402
 
 BUILD = ROOT / "build" / "mutate"
 MEMORY = ROOT / "build" / "mutants.json"
@@ -549,7 +549,7 @@ def page_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
 {told.mutants} mutants of the {files} files of `firmware/src`, drawn with seed {seed}, by each file's number of them:
 one operator, sign or constant changed. {told.killed} were killed: {100 * told.killed / told.mutants:.1f} % of all, and
 {100 * told.rate:.1f} % of the {could} that are not equivalent. {told.by_bits} of them by the bits of a few seconds of
-data (`tests/host/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over
+data (`tests/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over
 40 000 ticks, oracles, accuracy) were not asked.
 
 ## Survivors that a test could kill

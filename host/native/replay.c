@@ -1,4 +1,4 @@
-/* The C side of pvid.native: replays a run through the shipped core and records every tick.
+/* The C side of pvid.core.native: replays a run through the shipped core and records every tick.
  *
  * Host only. The core is compiled from the same sources with the same flags as on a device; this
  * file adds loops that Python would be slow at, and a table of sizes that Python checks at load.

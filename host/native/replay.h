@@ -1,4 +1,4 @@
-/* What pvid.native calls besides the core itself. */
+/* What pvid.core.native calls besides the core itself. */
 #ifndef PVID_REPLAY_H
 #define PVID_REPLAY_H
 

@@ -1,4 +1,4 @@
-/* The C side of pvid.native_q31: replays a run through the shipped fixed-point core and records every tick. */
+/* The C side of pvid.core.native_q31: replays a run through the shipped fixed-point core and records every tick. */
 #include "replay_q31.h"
 
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-/* What pvid.native_q31 calls besides the core itself: the fixed-point counterpart of replay.h. */
+/* What pvid.core.native_q31 calls besides the core itself: the fixed-point counterpart of replay.h. */
 #ifndef PVID_REPLAY_Q31_H
 #define PVID_REPLAY_Q31_H
 

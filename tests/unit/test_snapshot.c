@@ -1,5 +1,5 @@
 /* Saving and restoring an identifier: it continues bit for bit, refuses what is not its own, and power may fail at
- * any byte of a save. The fixed-point core and the whole runs are in tests/host/test_snapshot.py. */
+ * any byte of a save. The fixed-point core and the whole runs are in tests/core/test_snapshot.py. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

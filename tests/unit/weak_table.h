@@ -1,5 +1,5 @@
 /* A small weak-form design made at run time, in double: five taps, polynomials (1 - x^2)^6 x^k, made
- * orthonormal at a nominal p. For tests of the core; real designs come from pvid.weak_design. */
+ * orthonormal at a nominal p. For tests of the core; real designs come from pvid.design.weak. */
 #ifndef WEAK_TABLE_H
 #define WEAK_TABLE_H
 

@@ -32,7 +32,7 @@ extern "C" {
 #define PVID_MAX_MOMENTS_Q31 ((PVID_MAX_THETA_Q31 * (PVID_MAX_THETA_Q31 + 1)) / 2)
 #define PVID_MAX_SUMS_Q31 (PVID_MAX_MOMENTS_Q31 + PVID_MAX_THETA_Q31 + 2)
 
-/* Settings; pvid.setup_q31 derives them from a rig file. */
+/* Settings; pvid.setup.q31 derives them from a rig file. */
 typedef struct {
     const pvid_model_q31 *model;
     int32_t start[PVID_MAX_P];    /* where p starts, within the bounds; p[i] in format p_bits[i] */

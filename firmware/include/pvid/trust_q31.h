@@ -17,7 +17,7 @@ extern "C" {
 
 #define PVID_SURPLUS_BITS 24
 
-/* Settings; pvid.setup_q31 derives them from those of trust.h. */
+/* Settings; pvid.setup.q31 derives them from those of trust.h. */
 typedef struct {
     int32_t kappa_min;   /* least kappa and least pivot, Q30, 0..0.999 */
     int32_t se_max;      /* largest standard error of the positive parameters, relative to them, Q24, > 0 */

@@ -182,7 +182,7 @@ typedef struct {
  * Of the tables it checks, in one walk, what it costs no analysis to know: a weight of `smooth` or `second` times four
  * full scales fits 32 bits; F and U F fit 21 bits for every count within full scale; an entry of chi times a term of 21
  * bits fits 32 bits with its rounding; no entry of gram is beyond 2^30 (gram_bits may be any). The rest is the design
- * tool's word, which proves it by interval analysis before it writes a table (host/src/pvid/weak_design_q31.py) and
+ * tool's word, which proves it by interval analysis before it writes a table (host/src/pvid/design/weak_q31.py) and
  * tells the bits left free, `margins`: for every sample with |U| <= u_max the double integrals fit 63 bits, each shifted
  * one 32, each term 21, the sum of a window's products 32, and a column of terms 31. Tables of your own need that
  * proof: with others, sums wrap. */

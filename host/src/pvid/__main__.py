@@ -1,6 +1,6 @@
 """python -m pvid: the command line."""
 
-from pvid.cli import main
+from pvid.cli.main import main
 
 if __name__ == "__main__":
     main()

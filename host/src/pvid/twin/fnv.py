@@ -68,7 +68,7 @@ def _running(rows: Bytes, start: int) -> npt.NDArray[np.uint32]:
 
 
 def sample_hashes(samples: npt.NDArray[np.float32] | npt.NDArray[np.int32]) -> npt.NDArray[np.uint32]:
-    """Hash after every sample, of [ticks, 2] from a session's first tick on (Hash.sample_hash in pvid.link)."""
+    """Hash after every sample, of [ticks, 2] from a session's first tick on (Hash.sample_hash in pvid.link.frames)."""
     return _running(np.ascontiguousarray(samples, samples.dtype.newbyteorder("<")).view(np.uint8), START)
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.ctables import float_literal
-from pvid.rig import STANDARD_DRIVE, STANDARD_PENDULUM, STANDARD_RELEASE
+from pvid.design.c_tables import float_literal
+from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, STANDARD_RELEASE
 
 # Steps a second at least: the leapfrog's error in the fastest motion, 25 rad/s, is 3e-5 of its frequency.
 _STEPS_A_SECOND = 1000.0

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.native import EstimatorConfig, Reason, StrongConfig
-from pvid.twin import kapitza_strong as model
-from pvid.twin.differentiator import derivatives
-from pvid.twin.estimator import Estimator
-from pvid.twin.gate import Gate
-from pvid.twin.misfit import Misfit
+from pvid.core.native import EstimatorConfig, Reason, StrongConfig
+from pvid.twin.f32.differentiator import derivatives
+from pvid.twin.f32.estimator import Estimator
+from pvid.twin.f32.gate import Gate
+from pvid.twin.f32.misfit import Misfit
+from pvid.twin.kapitza import strong as model
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]

@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.errors import PvidError
-from pvid.native import Reason
-from pvid.native_q31 import EstimatorConfigQ31, StrongConfigQ31
-from pvid.twin import kapitza_strong_q31 as model
-from pvid.twin.differentiator_q31 import derivatives
-from pvid.twin.estimator_q31 import EstimatorQ31
-from pvid.twin.gate_q31 import GateQ31
-from pvid.twin.integer_q31 import Int, clamp, integers, times_q31
-from pvid.twin.misfit_q31 import MisfitQ31
-from pvid.twin.scaled_q31 import scaled
+from pvid.base.errors import PvidError
+from pvid.core.native import Reason
+from pvid.core.native_q31 import EstimatorConfigQ31, StrongConfigQ31
+from pvid.twin.kapitza import strong_q31 as model
+from pvid.twin.q31.differentiator import derivatives
+from pvid.twin.q31.estimator import EstimatorQ31
+from pvid.twin.q31.gate import GateQ31
+from pvid.twin.q31.integer import Int, clamp, integers, times_q31
+from pvid.twin.q31.misfit import MisfitQ31
+from pvid.twin.q31.scaled import scaled
 from pvid.twin.weak_q31 import TwinRecordQ31
 
 Mask = npt.NDArray[np.bool_]

@@ -8,17 +8,18 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.errors import PvidError
-from pvid.native import EstimatorConfig, Reason, WeakConfig
-from pvid.twin import kapitza_weak, weak_finish, weak_front, weak_window
-from pvid.twin.differentiator import segments
-from pvid.twin.estimator import RelativeEstimator
-from pvid.twin.gate import Gate
+from pvid.base.errors import PvidError
+from pvid.core.native import EstimatorConfig, Reason, WeakConfig
+from pvid.twin.f32 import weak_finish, weak_front, weak_window
+from pvid.twin.f32.differentiator import segments
+from pvid.twin.f32.estimator import RelativeEstimator
+from pvid.twin.f32.gate import Gate
+from pvid.twin.f32.trust import Trust
+from pvid.twin.f32.weak_window import Window
+from pvid.twin.kapitza import weak as kapitza_weak
+from pvid.twin.kapitza.full_angle import Angle
 from pvid.twin.strong import TwinRecord
-from pvid.twin.trust import Trust
-from pvid.twin.weak_angle import Angle
 from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
-from pvid.twin.weak_window import Window
 
 Float32 = npt.NDArray[np.float32]
 

@@ -8,17 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.native import Reason
-from pvid.native_q31 import EstimatorConfigQ31, WeakConfigQ31
-from pvid.twin import kapitza_weak_q31, weak_finish_q31, weak_front_q31, weak_window_q31
-from pvid.twin.differentiator import segments
-from pvid.twin.estimator_q31 import EstimatorQ31
-from pvid.twin.gate_q31 import GateQ31
-from pvid.twin.integer_q31 import Int, integers, scale
-from pvid.twin.scaled_q31 import Scaled, scaled
-from pvid.twin.trust_q31 import TrustQ31
+from pvid.core.native import Reason
+from pvid.core.native_q31 import EstimatorConfigQ31, WeakConfigQ31
+from pvid.twin.f32.differentiator import segments
+from pvid.twin.kapitza import weak_q31 as kapitza_weak_q31
+from pvid.twin.q31 import weak_finish as weak_finish_q31
+from pvid.twin.q31 import weak_front as weak_front_q31
+from pvid.twin.q31 import weak_window as weak_window_q31
+from pvid.twin.q31.estimator import EstimatorQ31
+from pvid.twin.q31.gate import GateQ31
+from pvid.twin.q31.integer import Int, integers, scale
+from pvid.twin.q31.scaled import Scaled, scaled
+from pvid.twin.q31.trust import TrustQ31
+from pvid.twin.q31.weak_window import Window
 from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
-from pvid.twin.weak_window_q31 import Window
 
 
 @dataclass

@@ -1,0 +1,1 @@
+"""What every room needs: errors, the console, files written whole, text for sentences."""

@@ -1,0 +1,36 @@
+"""TOML from strangers: rig files, populations, settings."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+from pvid.base.errors import PvidError
+
+# Longer ones are slips. A key of many parts takes tomllib time and memory that grow with their square: half a minute
+# and 4 GB for 60 kB.
+MOST_BYTES = 64_000
+TOO_LONG = f"is no TOML for pvid: it is longer than {MOST_BYTES // 1000} kB"
+_LONGEST_LINE = 4000
+
+
+def toml_document(text: str) -> dict[str, Any]:
+    """The tables in a text.
+
+    Raises
+    ------
+    PvidError
+        When it is not TOML, or too long or too deep for a file that a person wrote.
+    """
+    if len(text) > MOST_BYTES:
+        raise PvidError(TOO_LONG)
+    if max(map(len, text.split("\n"))) > _LONGEST_LINE:
+        raise PvidError(f"is no TOML for pvid: it has a line of more than {_LONGEST_LINE} characters")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise PvidError(f"is not TOML: {error}") from error
+    except ValueError as error:  # an integer of more digits than Python reads
+        raise PvidError("is no TOML for pvid: a number in it has thousands of digits") from error
+    except RecursionError as error:
+        raise PvidError("is no TOML for pvid: its tables are nested too deeply") from error

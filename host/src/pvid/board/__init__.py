@@ -1,0 +1,1 @@
+"""Boards and emulators: images, streaming, sizes."""

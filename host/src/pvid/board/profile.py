@@ -1,0 +1,150 @@
+"""Where the instructions of a tick go: every executed one counted in the emulator, by function of the source."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from pvid.base.errors import PvidError
+from pvid.board.boards import BUILD, ROOT, Board, one_at_a_time, prepare_emulator
+from pvid.board.replay_image import build_image, parse_report, standard_run
+
+TICKS = 5000
+TIMEOUT_S = 300.0
+PLUGIN = BUILD / "qemu_profile.so"
+LEAST_SHARE = 0.01  # of a tick: functions below it stand in one line together
+
+HEADER = ("form", "function", "file", "instructions", "%")
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Instructions a tick, mean over the run, of each function, by (name, source file); and the mean that the image
+    itself measured, which has the call in it."""
+
+    functions: dict[tuple[str, str], float]
+    measured: float
+
+    @property
+    def total(self) -> float:
+        """Of all functions."""
+        return sum(self.functions.values())
+
+
+@dataclass(frozen=True)
+class _Symbol:
+    start: int
+    size: int
+    name: str
+    file: str
+
+
+def _symbols(board: Board, image: Path) -> list[_Symbol]:
+    """Functions of an image by address."""
+    command = [f"{board.tool_prefix}nm", "--line-numbers", "--print-size", "--defined-only", str(image)]
+    listing = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    entry = re.compile(r"^([0-9a-f]+) ([0-9a-f]+) [tTwW] (\S+)(?:\t(\S+):\d+)?$", re.MULTILINE)
+    sizes = re.compile(r"_window\d+_theta\d+_p\d+_\w+_enum\d+")  # what the linker's names hold of pvid/config.h
+    return sorted(
+        (
+            _Symbol(int(start, 16), int(size, 16), sizes.sub("", name), Path(file or "compiler").name)
+            for start, size, name, file in entry.findall(listing)
+        ),
+        key=lambda symbol: symbol.start,
+    )
+
+
+def _build_plugin() -> None:
+    source = ROOT / "host" / "native" / "qemu_profile.c"
+    with one_at_a_time(PLUGIN):
+        if PLUGIN.exists() and PLUGIN.stat().st_mtime >= source.stat().st_mtime:
+            return
+        fresh = PLUGIN.with_suffix(".new")
+        command = ["gcc", "-std=gnu99", "-O2", "-Wall", "-Wextra", "-fPIC", "-shared", str(source), "-o", str(fresh)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise PvidError(f"the profiling plugin did not build: {done.stderr.strip()[:200]}")
+        fresh.replace(PLUGIN)
+
+
+def _named(symbols: list[_Symbol], name: str) -> _Symbol:
+    for symbol in symbols:
+        if symbol.name == name:
+            return symbol
+    raise PvidError(f"the image has no function {name}")
+
+
+def profile(board: Board, form: str, core: str = "f32", ticks: int = TICKS) -> Profile:
+    """Plays the replay image of the standard run and counts.
+
+    Raises
+    ------
+    PvidError
+        When the board's emulator is not QEMU or takes no plugins, something does not build, or the image fails.
+    """
+    if board.toolchain == "avr":
+        raise PvidError(f"{board.name}: only QEMU counts by function")
+    prepare_emulator(board)
+    _build_plugin()
+    run = standard_run(form, ticks, core)
+    image, _ = build_image(board, run)
+    symbols = _symbols(board, image)
+    main = _named(symbols, "main")
+    base = symbols[0].start
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "counts"
+        settings = {
+            "entry": _named(symbols, f"pvid_{form}_step_{core}").start,
+            "skip": run.measure_from,
+            "caller": main.start,
+            "caller_end": main.start + main.size,
+            "base": base,
+            "bytes": symbols[-1].start + symbols[-1].size - base,
+            "out": out,
+        }
+        plugin = ",".join([str(PLUGIN), *(f"{name}={value}" for name, value in settings.items())])
+        command = [*board.command(image), "-plugin", plugin]
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, capture_output=True, timeout=TIMEOUT_S, check=False
+            )
+        except subprocess.TimeoutExpired as error:
+            raise PvidError(f"{board.name}: no end after {TIMEOUT_S:g} s") from error
+        if not out.exists():
+            said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            raise PvidError(f"{board.emulator} did not count: {said[-1] if said else 'it takes no plugins'}")
+        counts = out.read_text(encoding="ascii")
+    report = parse_report(done.stdout.decode("ascii", "replace").replace("\r", ""))
+    return Profile(_by_function(counts, symbols), report.instructions_mean)
+
+
+def _by_function(counts: str, symbols: list[_Symbol]) -> dict[tuple[str, str], float]:
+    first, *lines = counts.splitlines()
+    calls = int(first.removeprefix("calls "))
+    total: Counter[tuple[str, str]] = Counter()
+    remaining = iter(symbols)
+    symbol = next(remaining)
+    for line in lines:  # by address, as the symbols are
+        address, count = int(line.split()[0], 16), int(line.split()[1])
+        while address >= symbol.start + symbol.size:
+            symbol = next(remaining)
+        total[symbol.name, symbol.file] += count
+    return {function: count / calls for function, count in total.most_common()}
+
+
+def table_rows(profiles: dict[str, Profile]) -> list[tuple[str, ...]]:
+    """Cells of the table, as in HEADER, from profiles by form; each form's last line is what was measured."""
+    rows: list[tuple[str, ...]] = []
+    for form, one in profiles.items():
+        shown = {function: n for function, n in one.functions.items() if n >= LEAST_SHARE * one.measured}
+        lines = [(f"`{name}`", f"`{file}`", n) for (name, file), n in shown.items()]
+        if len(shown) < len(one.functions):
+            lines.append((f"{len(one.functions) - len(shown)} others", "", one.total - sum(shown.values())))
+        lines.append(("the call", "`main.c`", one.measured - one.total))
+        lines.append(("**all**", "", one.measured))
+        rows += [(form, name, file, f"{n:.0f}", f"{100 * n / one.measured:.0f}") for name, file, n in lines]
+    return rows

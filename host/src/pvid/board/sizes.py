@@ -1,0 +1,182 @@
+"""What the core costs on every board: flash, RAM, stack and instructions a tick, measured on the replay image."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.errors import PvidError
+from pvid.board.boards import BOARDS, Board
+from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
+from pvid.board.stack_bound import stack_bound
+
+TICKS = 5000
+TIMEOUT_S = 300.0
+ALLOWANCE = 1.02
+
+HEADER = (
+    "target",
+    "form",
+    "text",
+    "arithmetic",
+    "tables",
+    "data",
+    "bss",
+    "stack bound",
+    "stack seen",
+    "mean",
+    "longest",
+)
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A board, the arithmetic and the form of the identifier."""
+
+    board: Board
+    form: str
+    core: str = "f32"
+
+    @property
+    def name(self) -> str:
+        """Key of the budget."""
+        return f"{self.board.name} {self.form} {self.core}"
+
+
+ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
+
+# An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
+ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}
+
+CONFIGURATIONS = tuple(
+    Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)
+)
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """Bytes, and instructions a tick (an AVR: clock cycles).
+
+    text: the core's code and constants; arithmetic: what the compiler adds for it (soft float, division, memcpy);
+    tables: the design's; data, bss: the core's variables, of which bss is the identifier's state; stack_bound and
+    stack_seen: proven from the code and found by painting, for the whole image.
+    """
+
+    text: int
+    arithmetic: int
+    tables: int
+    data: int
+    bss: int
+    stack_bound: int
+    stack_seen: int
+    mean: int
+    longest: int
+
+
+def sections(map_text: str) -> Iterator[tuple[str, int, str]]:
+    """(input section, bytes, object it comes from) of everything that the linker kept, from its map."""
+    kept = map_text.partition("Linker script and memory map")[2]
+    entry = re.compile(r"^ (\.[^\s*]+|COMMON)\s+0x[0-9a-f]+\s+0x([0-9a-f]+)\s+(\S.*)$", re.MULTILINE)
+    for name, size, source in entry.findall(kept):
+        if int(size, 16):
+            yield name, int(size, 16), source
+
+
+def _bytes_of(map_text: str, name: str, source: str) -> int:
+    wanted, origin = re.compile(name), re.compile(source)
+    return sum(size for section, size, file in sections(map_text) if wanted.match(section) and origin.search(file))
+
+
+_CORE = r"libpvid\.a\("
+_ARITHMETIC = r"libgcc\.a\(|libm\.a\(|libc\.a\(|freestanding/"
+_CODE = r"\.text|\.s?rodata"
+
+
+def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
+    """Builds and runs the replay image of a configuration.
+
+    Raises
+    ------
+    PvidError
+        When a compiler or emulator is missing, or the image fails.
+    """
+    board = configuration.board
+    image, tree = build_image(board, standard_run(configuration.form, TICKS, configuration.core))
+    map_text = image.with_suffix(".map").read_text(encoding="utf-8")
+    report = play(board, image, TIMEOUT_S)
+    footprint = Footprint(
+        text=_bytes_of(map_text, _CODE, _CORE),
+        arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),
+        tables=_bytes_of(
+            map_text,
+            r"\.(s?rodata|progmem\.data)\.replay_(config_)?(smooth|second|chi|gram|multiplier|weights)$",
+            "replay",
+        ),
+        data=_bytes_of(map_text, r"\.s?data", _CORE),
+        bss=_bytes_of(map_text, r"\.s?bss|COMMON", _CORE) + report.state_bytes,
+        stack_bound=stack_bound(board.tool_prefix, image, tree, board.entry),
+        stack_seen=report.stack_used,
+        mean=round(report.instructions_mean),
+        longest=round(report.instructions_longest),
+    )
+    return footprint, report
+
+
+def table_rows(footprints: dict[Configuration, Footprint]) -> list[tuple[str, ...]]:
+    """Cells of the table in host/docs/benchmarks/cost.md, as in HEADER."""
+    return [
+        (
+            f"{configuration.board.core} ({configuration.board.name})",
+            f"{configuration.form}, {configuration.core}",
+            *(str(getattr(footprint, name)) for name in Footprint.__dataclass_fields__),
+        )
+        for configuration, footprint in footprints.items()
+    ]
+
+
+# ---- the budget
+
+OPENING, CLOSING = "# <sizes>", "# </sizes>"
+
+
+def budget_text(footprints: dict[Configuration, Footprint]) -> str:
+    """The budget's lines: one table a configuration."""
+    lines = []
+    for configuration, footprint in footprints.items():
+        figures = ", ".join(f"{name} = {getattr(footprint, name)}" for name in Footprint.__dataclass_fields__)
+        lines.append(f'"{configuration.name}" = {{ {figures} }}')
+    return "\n".join(["[targets]", *lines])
+
+
+def write_budget(path: Path, footprints: dict[Configuration, Footprint]) -> None:
+    """Replaces the budget between its marks in `path`.
+
+    Raises
+    ------
+    PvidError
+        When the file has no place for it.
+    """
+    old = path.read_text(encoding="utf-8")
+    if OPENING not in old or CLOSING not in old:
+        raise PvidError(f"{path} has no place for the budget: the lines {OPENING} and {CLOSING}")
+    head, rest = old.split(OPENING, 1)
+    write_whole(path, f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}")
+
+
+def over_budget(path: Path, footprints: dict[Configuration, Footprint]) -> list[str]:
+    """A sentence for every figure that exceeds its budget in `path` by more than 2 %, or has none."""
+    allowed = tomllib.loads(path.read_text(encoding="utf-8")).get("targets", {})
+    found = []
+    for configuration, footprint in footprints.items():
+        limits = allowed.get(configuration.name, {})
+        for name in Footprint.__dataclass_fields__:
+            figure, limit = getattr(footprint, name), limits.get(name)
+            if limit is None:
+                found.append(f"{configuration.name}: {name} has no budget")
+            elif figure > ALLOWANCE * limit:
+                found.append(f"{configuration.name}: {name} is {figure}, its budget {limit}")
+    return found

@@ -1,0 +1,107 @@
+"""What commands share that read a run: options for the rig and the columns, and what was done to the run."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pvid.base.console import tell
+from pvid.base.errors import PvidError
+from pvid.base.figure_file import format_of
+from pvid.log.rig import LOG_SUFFIX, run_of_log
+from pvid.rig.columns import Columns
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run, read_run
+
+Command = Callable[..., Any]
+
+
+def rig_options(command: Command) -> Command:
+    """Adds --rig and --set: parameters rig_path and settings."""
+    rig = click.option(
+        "--rig",
+        "rig_path",
+        type=click.Path(path_type=Path),
+        help="The rig file (TOML).  [default: a log's own, or RUN.toml beside RUN.csv]",
+    )
+    settings = click.option(
+        "--set",
+        "settings",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="Value of a key of the rig file; overrides the file: l1=0.25 [m] or sensor.phi_lsb=0.0015 [rad]. "
+        "Only l1 is needed. Repeatable.",
+    )
+    return rig(settings(command))
+
+
+def columns_option(command: Command) -> Command:
+    """Adds --columns: parameter columns."""
+    return click.option(
+        "--columns",
+        metavar="MAP",
+        type=ColumnsType(),
+        help="Columns of RUN for t, phi and y, and their units: t=time_ms:ms,phi=angle_deg:deg,y=h:mm. A number "
+        "is the position of the column, from 1; units are s ms us ns min, rad mrad deg rev turn, m cm mm um in, a "
+        "number of SI units, or one of these divided (rev/4096) or with opposite sign (-mm).",
+    )(command)
+
+
+class ColumnsType(click.ParamType[Columns]):
+    """Text of --columns."""
+
+    name = "columns"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Columns:
+        """See click."""
+        return value if isinstance(value, Columns) else Columns.parse(value)
+
+
+class FigurePath(click.Path):
+    """Path of a figure to write; its format is checked before any computation."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """See click."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        format_of(path)
+        return path
+
+
+def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whole: bool = False) -> Run:
+    """The run in a file or a log; prints what was done to it.
+
+    Parameters
+    ----------
+    whole
+        Only the longest stretch without a missing tick.
+
+    Raises
+    ------
+    PvidError
+        When it cannot be read.
+    """
+    from pvid.run.skew import aligned  # SciPy, whose 40 MB a logger does without
+
+    if path.suffix == LOG_SUFFIX:
+        if columns is not None:
+            raise PvidError(f"{path} is a log, whose columns are known: leave --columns out")
+        return aligned(run_of_log(path), rig.sensor.y_delay)
+    run = aligned(read_run(path, rig.sample_rate, columns), rig.sensor.y_delay)
+    run.refuse_damaged()
+    if whole:
+        run = run.whole()
+    print_notes(run.notes)
+    return run
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """What was done to a run, on standard error."""
+    for note in notes:
+        tell(f"pvid: input: {note}")

@@ -1,0 +1,38 @@
+"""Tables that a command prints, or writes into the place for them on a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.console import tell
+from pvid.base.errors import PvidError
+
+
+def put_table(page: Path | None, marker: str, text: str) -> None:
+    """Replaces what stands between <!-- marker --> and <!-- /marker -->, or prints it when no file is given."""
+    if page is None:
+        click.echo(text)
+        return
+    old = page.read_text(encoding="utf-8")
+    opening, closing = f"<!-- {marker} -->", f"<!-- /{marker} -->"
+    if opening not in old or closing not in old:
+        raise PvidError(f"{page} has no place for this table: the lines {opening} and {closing}")
+    head, rest = old.split(opening, 1)
+    tail = rest.split(closing, 1)[1]
+    write_whole(page, f"{head}{opening}\n{text}\n{closing}{tail}")
+    tell(f"{page}: table {marker} written")
+
+
+UPDATE = click.option(
+    "--update",
+    type=click.Path(path_type=Path, exists=True),
+    help="Write the table into this file's place for it.",
+)
+
+
+def markdown(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])

@@ -1,0 +1,1 @@
+"""The shipped C core, loaded from its shared library."""

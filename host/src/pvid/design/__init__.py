@@ -1,0 +1,1 @@
+"""Filters and tables of both forms, and what they cost."""

@@ -1,0 +1,1 @@
+"""Recorded logs: recorder, reader, values, verification, export."""

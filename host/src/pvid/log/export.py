@@ -1,0 +1,258 @@
+"""Logs for other programs: CSV, Parquet, NPZ, MCAP, with units in the metadata.
+
+Memory is constant but for NPZ, which holds its arrays while it is written. A file appears whole or not at all.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid import __version__
+from pvid.base.atomic_write import appearing
+from pvid.base.errors import PvidError
+from pvid.log.reader import LogReader
+from pvid.log.rig import hello_of_log
+from pvid.log.values import TABLES, Column, Rows, Values
+
+_BATCH = 1 << 15  # rows
+
+
+class Writer(Protocol):
+    """Takes rows in, one after the other."""
+
+    def __init__(self, base: Path, files: Mapping[str, Path]) -> None: ...
+
+    @staticmethod
+    def suffixes() -> list[str]: ...
+
+    def write(self, rows: Rows) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class CsvWriter:
+    """A file of each table; numbers as Python writes them, which read back exactly."""
+
+    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
+        self._stack = ExitStack()
+        self._writers = {}
+        for table, columns in TABLES.items():
+            file = self._stack.enter_context(files[f"-{table}.csv"].open("w", newline="", encoding="utf-8"))
+            self._writers[table] = csv.writer(file)
+            self._writers[table].writerow(columns)
+        files["-metadata.json"].write_text(json.dumps(self._metadata(base), indent=1), encoding="utf-8")
+
+    @staticmethod
+    def suffixes() -> list[str]:
+        """Endings of what is written."""
+        return [*(f"-{table}.csv" for table in TABLES), "-metadata.json"]
+
+    def _metadata(self, base: Path) -> dict[str, Any]:
+        kinds = {"f8": "double", "i8": "long"}
+
+        def described(name: str, column: Column) -> dict[str, Any]:
+            kind = kinds.get(column.kind, "string")
+            return {"name": name, "datatype": kind, "dc:description": column.what, "unit": column.unit}
+
+        tables = [
+            {
+                "url": f"{base.name}-{table}.csv",
+                "tableSchema": {"columns": [described(name, column) for name, column in columns.items()]},
+            }
+            for table, columns in TABLES.items()
+        ]
+        return {"@context": "http://www.w3.org/ns/csvw", "dc:creator": f"pvid {__version__}", "tables": tables}
+
+    def write(self, rows: Rows) -> None:
+        """See Writer."""
+        columns = [rows.columns[name].tolist() for name in TABLES[rows.table]]
+        self._writers[rows.table].writerows(zip(*columns, strict=True))
+
+    def close(self) -> None:
+        """See Writer."""
+        self._stack.close()
+
+
+class _Gathered:
+    """Rows of each table, until there are enough of them."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, list[Rows]] = {table: [] for table in TABLES}
+        self._count = dict.fromkeys(TABLES, 0)
+
+    def add(self, rows: Rows) -> bool:
+        """Whether a batch of this table is full."""
+        self._parts[rows.table].append(rows)
+        self._count[rows.table] += len(rows.columns["t"])
+        return self._count[rows.table] >= _BATCH
+
+    def take(self, table: str) -> dict[str, npt.NDArray[Any]]:
+        """What was gathered, by column; arrays of length 0 when nothing was."""
+        parts, self._parts[table], self._count[table] = self._parts[table], [], 0
+        return {
+            name: np.concatenate([np.empty(0, column.kind), *(one.columns[name] for one in parts)])
+            for name, column in TABLES[table].items()
+        }
+
+
+class ParquetWriter:
+    """A file of each table; unit and description are metadata of the columns."""
+
+    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
+        import pyarrow  # 40 ms that other formats need not wait for
+        import pyarrow.parquet
+
+        self._arrow, self._parquet = pyarrow, pyarrow.parquet
+        self._gathered = _Gathered()
+        self._schemas = {table: self._schema(columns) for table, columns in TABLES.items()}
+        self._writers = {
+            table: self._parquet.ParquetWriter(files[f"-{table}.parquet"], schema)
+            for table, schema in self._schemas.items()
+        }
+
+    @staticmethod
+    def suffixes() -> list[str]:
+        """Endings of what is written."""
+        return [f"-{table}.parquet" for table in TABLES]
+
+    def _schema(self, columns: Mapping[str, Column]) -> Any:
+        arrow = self._arrow
+        kinds = {"f8": arrow.float64(), "i8": arrow.int64()}
+        fields = [
+            arrow.field(
+                name,
+                kinds.get(column.kind, arrow.string()),
+                metadata={"unit": column.unit, "description": column.what},
+            )
+            for name, column in columns.items()
+        ]
+        return arrow.schema(fields, metadata={"creator": f"pvid {__version__}"})
+
+    def _flush(self, table: str) -> None:
+        columns = self._gathered.take(table)
+        self._writers[table].write_table(self._arrow.table(columns, schema=self._schemas[table]))
+
+    def write(self, rows: Rows) -> None:
+        """See Writer."""
+        if self._gathered.add(rows):
+            self._flush(rows.table)
+
+    def close(self) -> None:
+        """See Writer."""
+        for table, writer in self._writers.items():
+            self._flush(table)
+            writer.close()
+
+
+class NpzWriter:
+    """One file: the samples' columns by their names, the others' as `estimates.w`; "units" is a JSON object."""
+
+    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
+        self._path = files[".npz"]
+        self._gathered = _Gathered()
+
+    @staticmethod
+    def suffixes() -> list[str]:
+        """Endings of what is written."""
+        return [".npz"]
+
+    def write(self, rows: Rows) -> None:
+        """See Writer."""
+        self._gathered.add(rows)
+
+    def close(self) -> None:
+        """See Writer."""
+        arrays: dict[str, npt.NDArray[Any]] = {}
+        units = {}
+        for table, columns in TABLES.items():
+            front = "" if table == "samples" else f"{table}."
+            arrays.update({front + name: array for name, array in self._gathered.take(table).items()})
+            units.update({front + name: column.unit for name, column in columns.items()})
+        with self._path.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays, units=np.array(json.dumps(units)))
+
+
+class McapWriter:
+    """One file: a channel of JSON messages for each table, with a JSON schema that tells the units."""
+
+    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
+        from mcap.writer import Writer as Mcap
+
+        self._file = files[".mcap"].open("wb")
+        self._mcap = Mcap(self._file)
+        self._mcap.start(profile="", library=f"pvid {__version__}")
+        self._channels = {}
+        self._sequence = 0
+        for table, columns in TABLES.items():
+            schema = self._mcap.register_schema(
+                f"pvid.{table}", "jsonschema", json.dumps(self._schema(table, columns)).encode()
+            )
+            units = {name: column.unit for name, column in columns.items() if column.unit not in ("", "1")}
+            self._channels[table] = self._mcap.register_channel(f"/{table}", "json", schema, metadata=units)
+
+    @staticmethod
+    def suffixes() -> list[str]:
+        """Endings of what is written."""
+        return [".mcap"]
+
+    def _schema(self, table: str, columns: Mapping[str, Column]) -> dict[str, Any]:
+        kinds = {"f8": "number", "i8": "integer"}
+        properties = {
+            name: {"type": kinds.get(column.kind, "string"), "description": column.what, "unit": column.unit}
+            for name, column in columns.items()
+            if name != "log_time"
+        }
+        return {"title": f"pvid.{table}", "type": "object", "properties": properties}
+
+    def write(self, rows: Rows) -> None:
+        """See Writer. A number that is none is left out of its message: JSON has no NaN."""
+        names = [name for name in TABLES[rows.table] if name != "log_time"]
+        channel = self._channels[rows.table]
+        times = rows.columns["log_time"].tolist()
+        for log_time, *row in zip(times, *(rows.columns[name].tolist() for name in names), strict=True):
+            message = {name: value for name, value in zip(names, row, strict=True) if value == value}
+            self._mcap.add_message(
+                channel, log_time, json.dumps(message).encode(), publish_time=log_time, sequence=self._sequence
+            )
+            self._sequence = (self._sequence + 1) & 0xFFFFFFFF
+
+    def close(self) -> None:
+        """See Writer."""
+        self._mcap.finish()  # type: ignore[no-untyped-call]
+        self._file.close()
+
+
+FORMATS: dict[str, type[Writer]] = {"csv": CsvWriter, "parquet": ParquetWriter, "mcap": McapWriter, "npz": NpzWriter}
+
+
+def export_log(log: Path, form: str, base: Path, l1: float | None) -> list[Path]:
+    """Writes a log as one of FORMATS under the name `base` with the format's endings; returns what was written.
+
+    `l1` [m] of the rig: without it there are no g, l2 and rho2.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read or a file cannot be written.
+    """
+    kind = FORMATS[form]
+    values = Values(l1, hello_of_log(log))
+    try:
+        with ExitStack() as stack:
+            files = {one: stack.enter_context(appearing(base.with_name(base.name + one))) for one in kind.suffixes()}
+            writer = kind(base, files)
+            for record in LogReader(log):
+                for rows in values.rows(record):
+                    writer.write(rows)
+            writer.close()
+    except OSError as error:
+        raise PvidError(f"cannot write {base}: {error.strerror}") from error
+    return [base.with_name(base.name + suffix) for suffix in kind.suffixes()]

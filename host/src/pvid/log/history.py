@@ -1,0 +1,248 @@
+"""What a view of a recording remembers, in bounded memory however long it lasts.
+
+Of the estimates the whole history, thinned evenly; of the samples the last seconds. Times are seconds since the
+first record, by the PC's clock when a segment began and the board's from there on.
+
+A record is only put aside when it comes. What it means in numbers is computed when somebody looks, and only of what is
+then to be seen: a board that sends ten thousand frames a second costs the view no more than one that sends ten.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Raw, RawCount
+from pvid.log.file import Segment
+from pvid.log.reader import Account, Record, Restart
+from pvid.log.values import TABLES, Rows, Values
+
+Float = npt.NDArray[np.float64]
+
+NUMBERS = tuple(name for name, column in TABLES["estimates"].items() if column.kind == "f8" and name != "t")
+_MOST_SAMPLES = 200_000
+_MOST_ASIDE = 5_000  # records that are put aside while nobody looks
+_MOST_PARTS = 1_000  # in which the samples are kept
+
+T = TypeVar("T")
+
+
+class Rates:
+    """Samples and bytes a second, over the last seconds."""
+
+    def __init__(self, over_s: float = 2.0) -> None:
+        self._over_s = over_s
+        self._counts: deque[tuple[float, int, int]] = deque()  # when, samples, bytes
+
+    def now(self, account: Account, when: float) -> tuple[float, float]:
+        """At the time `when` (of time.monotonic), which may be asked often."""
+        counts = self._counts
+        counts.append((when, account.samples, account.bytes))
+        while len(counts) > 2 and when - counts[1][0] > self._over_s:
+            counts.popleft()
+        passed = max(when - counts[0][0], 1e-9)
+        return (account.samples - counts[0][1]) / passed, (account.bytes - counts[0][2]) / passed
+
+
+class Thinned(Generic[T]):
+    """Rows of which at most 2 `points` are kept, evenly spaced but for the newest, which always is."""
+
+    def __init__(self, points: int) -> None:
+        self.points = points
+        self.rows: list[T] = []
+        self._stride = 1
+        self._seen = 0
+
+    def append(self, row: T) -> None:
+        """The next row."""
+        if self._seen > 0 and (self._seen - 1) % self._stride != 0:
+            self.rows.pop()
+        self._seen += 1
+        self.rows.append(row)
+        if len(self.rows) >= 2 * self.points and (self._seen - 1) % self._stride == 0:
+            newest = self.rows[-1]
+            self.rows = self.rows[::2]
+            self._stride *= 2
+            if (self._seen - 1) % self._stride != 0:
+                self.rows.append(newest)
+
+
+@dataclass(eq=False)
+class _Point:
+    """An estimate; `row` are its time [s] and NUMBERS once they have been computed."""
+
+    record: Record
+    row: tuple[float, ...] = ()
+
+
+class History:
+    """Feeds on every record of a log, in order.
+
+    Parameters
+    ----------
+    l1
+        Length of rod 1 [m]; None: g, l2 and rho2 stay unknown.
+    points
+        Half of the most estimates that are kept.
+    window_s
+        How much of the samples is kept [s], as far as they are no more than 200 000.
+    """
+
+    def __init__(self, l1: float | None = None, points: int = 400, window_s: float = 10.0) -> None:
+        self.window_s = window_s
+        self.hello: Hello | None = None
+        self._values = Values(l1)
+        self._aside: list[Record | _Point] = []
+        self._aside_samples = 0
+        self._estimates: Thinned[_Point] = Thinned(points)
+        self._newest: dict[str, float] = {}
+        self._reason = ""
+        self._samples: deque[Float] = deque()  # t, phi, y: [3, n] each
+        self._count = 0
+        self._began: int | None = None
+
+    def know(self, l1: float) -> None:
+        """The length of rod 1 [m], once it is known."""
+        self._values.l1 = l1
+
+    @property
+    def has_physical(self) -> bool:
+        """Whether g, l2 and rho2 can be computed."""
+        return self._values.l1 is not None
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether the newest estimate lies in the physical region; so it is called where that cannot be known."""
+        return not self.has_physical or math.isfinite(self.newest.get("l2", 0.0))
+
+    @property
+    def newest(self) -> dict[str, float]:
+        """The newest estimate: NUMBERS by name; empty before the first."""
+        self._work_off()
+        return self._newest
+
+    @property
+    def reason(self) -> str:
+        """That of the newest estimate (Reason.text); empty before the first."""
+        self._work_off()
+        return self._reason
+
+    def take(self, record: Record) -> None:
+        """The next record; it costs the same whatever it holds."""
+        match record.item:
+            case Estimate() | EstimateQ31():
+                point = _Point(record)
+                self._estimates.append(point)
+                self._aside.append(point)
+            case Raw() | RawCount() as raw:
+                self._aside.append(record)
+                self._aside_samples += raw.count
+            case Hello() as hello:
+                self.hello = hello
+                self._aside.append(record)
+            case Configuration() | Segment() | Restart():
+                self._aside.append(record)
+            case _:
+                return
+        if len(self._aside) > _MOST_ASIDE or self._aside_samples > _MOST_SAMPLES:
+            self._work_off()
+
+    def estimates(self, name: str) -> Float:
+        """A column of the estimates' history: "t" [s] or one of NUMBERS, [n]."""
+        self._work_off()
+        at = 0 if name == "t" else 1 + NUMBERS.index(name)
+        return np.array([point.row[at] for point in self._estimates.rows], np.float64)
+
+    def samples(self) -> Float:
+        """The last `window_s` of t [s], phi [rad], y [m]: [3, n]."""
+        self._work_off()
+        if not self._samples:
+            return np.zeros((3, 0))
+        joined = np.concatenate(self._samples, axis=1)
+        return np.asarray(joined[:, joined[0] > joined[0, -1] - self.window_s])
+
+    def _work_off(self) -> None:
+        """Computes what was put aside: the estimates that are kept, the samples in as few pieces as can be."""
+        if not self._aside:
+            return
+        aside, self._aside, self._aside_samples = self._aside, [], 0
+        kept = set(self._estimates.rows)
+        wanted = (one for one in aside if not isinstance(one, _Point) or one in kept)
+        for one in _joined(wanted):
+            record = one.record if isinstance(one, _Point) else one
+            for rows in self._values.rows(record):
+                if rows.table == "samples":
+                    self._take_samples(rows)
+                elif isinstance(one, _Point):
+                    self._take_estimate(one, rows)
+
+    def _since_began(self, log_time: npt.NDArray[Any]) -> Float:
+        if self._began is None:
+            self._began = int(log_time[0])
+        return np.asarray((log_time - self._began) / 1e9)
+
+    def _take_samples(self, rows: Rows) -> None:
+        columns = {name: rows.columns[name][-_MOST_SAMPLES:] for name in ("log_time", "phi", "y")}
+        if not len(columns["phi"]):
+            return
+        part = np.stack([self._since_began(columns["log_time"]), columns["phi"], columns["y"]])
+        self._samples.append(part)
+        self._count += part.shape[1]
+        oldest = part[0, -1] - self.window_s
+        while self._samples[0][0, -1] < oldest or self._count > _MOST_SAMPLES:
+            self._count -= self._samples.popleft().shape[1]
+        if len(self._samples) > _MOST_PARTS:
+            self._samples = deque([np.concatenate(self._samples, axis=1)])
+
+    def _take_estimate(self, point: _Point, rows: Rows) -> None:
+        t = float(self._since_began(rows.columns["log_time"])[0])
+        self._newest = {name: float(rows.columns[name][0]) for name in NUMBERS}
+        self._reason = str(rows.columns["reason"][0])
+        point.row = (t, *self._newest.values())
+
+
+def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:
+    """The same, with consecutive frames of samples made one."""
+    first: Record | None = None
+    parts: list[bytes] = []
+    following = 0
+    for one in aside:
+        raw = None if isinstance(one, _Point) else one.item
+        if not isinstance(one, _Point) and isinstance(raw, Raw | RawCount):
+            if first is not None and (type(first.item), first.segment, following) != (type(raw), one.segment, one.tick):
+                yield _of_parts(first, parts)
+                first = None
+            if first is None:
+                first, parts = one, []
+            parts.append(raw.phi_y[: 8 * raw.count])
+            following = one.tick + raw.count
+            continue
+        if first is not None:
+            yield _of_parts(first, parts)
+            first = None
+        yield one
+    if first is not None:
+        yield _of_parts(first, parts)
+
+
+def _of_parts(first: Record, parts: list[bytes]) -> Record:
+    assert isinstance(first.item, Raw | RawCount)
+    return replace(first, item=replace(first.item, phi_y=b"".join(parts)))
+
+
+def envelope(t: Float, x: Float, bins: int) -> tuple[Float, Float]:
+    """At most 2 `bins` points of x over t, both [n]: where n is more, each bin's least and largest, where they are."""
+    width = len(x) // bins
+    if width <= 2:
+        return t, x
+    first = len(x) - width * bins
+    cut = x[first:].reshape(bins, width)
+    at = np.sort(np.stack([cut.argmin(axis=1), cut.argmax(axis=1)], axis=1), axis=1)
+    chosen = (first + width * np.arange(bins)[:, np.newaxis] + at).ravel()
+    return t[chosen], x[chosen]

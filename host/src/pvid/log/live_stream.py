@@ -1,0 +1,115 @@
+"""Sends numbers by UDP as they arrive: JSON for PlotJuggler and other receivers, or Teleplot's own lines.
+
+JSON as PlotJuggler's "UDP Server" takes it (plotjuggler_plugins/DataStreamUDP and the JSON parser of its repository,
+github.com/facontidavide/PlotJuggler): an object a datagram of less than 2048 bytes; objects within it become paths
+(`/estimates/w`); its time is a number of seconds in a field at the top, which the user names there: "timestamp".
+
+Teleplot as its page has it (github.com/nesnes/teleplot, "Telemetry Format"): lines `name:time:value§unit`, time in
+milliseconds, more `time:value` of the same name behind a `;`, lines apart by newlines, a datagram up to 1432 bytes; no
+`:` and `|` in a name, none of `,;:|.` in a unit.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+from pvid.base.errors import PvidError
+from pvid.base.hosts import addresses
+from pvid.link.frames import Loss
+from pvid.log.reader import Account, Record
+from pvid.log.values import TABLES, Rows, Values
+
+_TABLES = ("samples", "estimates")
+_LEFT_OUT = ("segment", "run", "log_time", "tick")
+_TELEPLOT_ROWS = 8  # a row of samples is at most 3 points of 46 bytes
+
+
+class Tee:
+    """An observer that sends samples and estimates to `udp://host:port` or `teleplot://host:port`.
+
+    udp: `{"timestamp": 1.7e9, "tick": 5, "estimates": {"w": 31.6, ...}}`, one for each row.
+    teleplot: `estimates.w:1700000000000:31.6§1/s^2`, up to eight rows of a table together. Nobody need listen;
+    what does not get through is lost, as UDP is.
+
+    Parameters
+    ----------
+    l1
+        Length of rod 1 [m]; None: g, l2 and rho2 are not sent.
+
+    Raises
+    ------
+    PvidError
+        When the address is none.
+    """
+
+    def __init__(self, address: str, l1: float | None = None) -> None:
+        try:
+            parts = urlsplit(address)
+            scheme, host, port = parts.scheme, parts.hostname, parts.port
+        except ValueError:
+            scheme, host, port = "", None, None
+        if scheme not in ("udp", "teleplot") or not host or not port:
+            raise PvidError(f"{address!r} is no address to send to: udp://host:port or teleplot://host:port")
+        found = addresses(host, port, socket.SOCK_DGRAM, f"cannot send to {address}")[0]
+        self._datagrams = _teleplot if scheme == "teleplot" else _json
+        self._values = Values(l1)
+        self._socket = socket.socket(found[0], socket.SOCK_DGRAM)
+        self._to = found[1]
+
+    def take(self, record: Record, account: Account) -> None:
+        """See logreader.Observer."""
+        if isinstance(record.item, Loss):
+            return  # of which a line in trouble has many
+        for rows in self._values.rows(record):
+            if rows.table in _TABLES:
+                for datagram in self._datagrams(rows):
+                    with contextlib.suppress(OSError):  # nobody there: the log has it all
+                        self._socket.sendto(datagram, self._to)
+
+    def idle(self, account: Account) -> None:
+        """See logreader.Observer."""
+
+    def close(self, account: Account) -> None:
+        """See logreader.Observer."""
+        self._socket.close()
+
+
+def _numbers(rows: Rows, index: int) -> dict[str, float]:
+    """Of one row; what is no number is left out."""
+    values = {name: column[index].item() for name, column in rows.columns.items() if name not in _LEFT_OUT}
+    return {name: value for name, value in values.items() if not isinstance(value, str) and value == value}
+
+
+def _json(rows: Rows) -> Iterator[bytes]:
+    for index in range(len(rows.columns["t"])):
+        when = rows.columns["log_time"][index] / 1e9
+        content = {"timestamp": when, "tick": int(rows.columns["tick"][index]), rows.table: _numbers(rows, index)}
+        yield (json.dumps(content) + "\n").encode()
+
+
+def _teleplot(rows: Rows) -> Iterator[bytes]:
+    count = len(rows.columns["t"])
+    for first in range(0, count, _TELEPLOT_ROWS):
+        points: dict[str, list[str]] = {}
+        for index in range(first, min(first + _TELEPLOT_ROWS, count)):
+            when = _milliseconds(int(rows.columns["log_time"][index]))
+            for name, value in _numbers(rows, index).items():
+                points.setdefault(name, []).append(f"{when}:{value!r}")
+        yield "\n".join(
+            f"{rows.table}.{name}:{';'.join(told)}{_unit(rows.table, name)}" for name, told in points.items()
+        ).encode()
+
+
+def _milliseconds(ns: int) -> str:
+    """All of its digits: at more than 1000 samples a second whole milliseconds would not tell them apart."""
+    whole, rest = divmod(ns, 1_000_000)
+    return f"{whole}.{rest:06d}".rstrip("0") if rest else str(whole)
+
+
+def _unit(table: str, name: str) -> str:
+    unit = TABLES[table][name].unit
+    return f"§{unit}" if unit != "1" else ""

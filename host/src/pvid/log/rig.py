@@ -1,0 +1,104 @@
+"""What a log tells of the rig it was recorded on, and the run in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.link.frames import Hello
+from pvid.log.reader import LogReader, LogStream
+from pvid.log.values import Values, is_rate
+from pvid.rig.file import RigFile
+from pvid.rig.run import MIN_ROWS, Run
+
+LOG_SUFFIX = ".pvlog"
+_LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
+
+
+def rig_of_log(path: Path) -> RigFile | None:
+    """The rig file in a log; None when the logger was given none.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, or the rig file in it is none.
+    """
+    reader = LogReader(path)
+    for _ in reader:
+        if reader.rig is not None:
+            return RigFile.parse(reader.rig)
+        if reader.account.frames:
+            break  # it stands in front of all that the board said
+    return None
+
+
+def refuse_to_append(path: Path, rig: RigFile | None) -> None:
+    """A log has one rig file: verify, identify and export take it for all of its segments.
+
+    Raises
+    ------
+    PvidError
+        When `path` is there and is no log, or one with another rig file.
+    """
+    stream = LogStream()
+    try:
+        with path.open("rb") as file:
+            while stream.rig is None and not stream.account.frames and (data := file.read(1 << 16)):
+                for _ in stream.feed(data):
+                    pass
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise PvidError(f"cannot read {path}: {error.strerror}") from error
+    if stream.account.bytes and not stream.is_log and not stream.account.frames:
+        raise PvidError(f"{path} is no log of pvid, and nothing is added to it")
+    if rig is not None and stream.rig is not None and RigFile.parse(stream.rig) != rig:
+        raise PvidError(f"{path} was recorded with another rig file: a log has one, and what is new needs a new log")
+
+
+def hello_of_log(path: Path) -> Hello | None:
+    """Who the board is, by its first word on it; None when it never said."""
+    for record in LogReader(path):
+        if isinstance(record.item, Hello):
+            return record.item
+    return None
+
+
+def run_of_log(path: Path) -> Run:
+    """The longest stretch of samples in a log without a gap; NaN where one is no number, or no rig's.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, the board has not told its sample rate, or there are too few samples.
+    """
+    hello = hello_of_log(path)
+    if hello is None:
+        raise PvidError(f"{path}: the board never said who it is, and its sample rate is not known")
+    if not is_rate(hello.sample_rate):
+        raise PvidError(f"{path}: the board's sample rate is {hello.sample_rate:g} Hz, as it says, and that is none")
+    values = Values(hello=hello)
+    best: list[npt.NDArray[np.float64]] = []
+    parts: list[npt.NDArray[np.float64]] = []
+    longest = length = 0
+    expected = None
+    for record in LogReader(path):
+        for rows in values.rows(record):
+            if rows.table != "samples":
+                continue
+            columns = np.stack([rows.columns[name] for name in ("t", "phi", "y")])
+            columns[1:, ~(np.abs(columns[1:]) <= _LARGEST).all(axis=0)] = np.nan
+            if record.tick != expected:
+                parts, length = [], 0
+            parts.append(columns)
+            length += columns.shape[1]
+            expected = record.tick + columns.shape[1]
+            if length > longest:
+                best, longest = parts, length
+    t, phi, y = np.concatenate([np.empty((3, 0)), *best], axis=1)
+    if (there := int(np.isfinite(phi).sum())) < MIN_ROWS:
+        raise PvidError(f"{path} holds {there} samples in a row; a run needs at least {MIN_ROWS}")
+    return Run(t=t, phi=phi, y=y, sample_rate=float(hello.sample_rate))

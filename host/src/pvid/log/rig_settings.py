@@ -1,0 +1,84 @@
+"""Where a command takes the rig from: --rig, a log, RUN.toml beside RUN.csv, and --set KEY=VALUE over any of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pvid.base.errors import PvidError
+from pvid.base.toml_text import toml_document
+from pvid.base.wording import shown
+from pvid.log.rig import rig_of_log
+from pvid.rig.file import RigFile, check_setting, load
+from pvid.rig.run import is_run
+
+
+def rig_path_of(run_path: Path) -> Path:
+    """RUN.toml, beside RUN.csv or RUN.csv.gz."""
+    name = run_path.name.removesuffix(".gz")
+    return run_path.with_name(Path(name).stem + ".toml")
+
+
+def rig_for(run_path: Path | None, rig_path: Path | None, settings: Iterable[str] = ()) -> RigFile:
+    """The rig that a run or a log comes from.
+
+    Parameters
+    ----------
+    run_path
+        A log has its own rig file; a run may have one beside it. None: no run.
+    rig_path
+        A rig file that comes before both.
+    settings
+        `KEY=VALUE`, which come before what the file holds; all there is where there is no file.
+
+    Raises
+    ------
+    PvidError
+        When there is neither a rig file nor a setting of l1, or a key or a value is wrong.
+    """
+    given = parse_settings(settings)
+    if rig_path is not None:
+        return load(rig_path, given)
+    if run_path is not None and not is_run(run_path):
+        rig = rig_of_log(run_path)
+        if rig is not None:
+            return RigFile.parse(rig.text(), given) if given else rig
+    elif run_path is not None and (beside := rig_path_of(run_path)).is_file():
+        return load(beside, given)
+    if run_path is not None and not run_path.exists():
+        raise PvidError(f"{run_path} does not exist")
+    if "l1" not in given:
+        raise PvidError("no rig file, and l1, the length of rod 1 [m], is all that is needed: use --set l1=0.25")
+    return RigFile.parse("", given)
+
+
+def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
+    """`l1=0.25` and `sensor.phi_lsb=0.0015` as the tables of a rig file.
+
+    A value is written as in TOML; the quotes of a word may be left out.
+
+    Raises
+    ------
+    PvidError
+        Naming the key that is unknown, given twice, of the wrong type or out of range.
+    """
+    document: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, text = (part.strip() for part in setting.partition("="))
+        if not equals or not key or not text:
+            raise PvidError(f"--set {shown(setting)} is not KEY=VALUE, as in --set l1=0.25")
+        try:
+            value = toml_document(f"value = {text}")["value"]
+        except PvidError:
+            value = text
+        table, dot, name = key.rpartition(".")
+        try:
+            value = check_setting(table, name, value)
+        except PvidError as error:
+            raise PvidError(f"--set {error}") from error
+        place = document.setdefault(table, {}) if dot else document
+        if name in place:
+            raise PvidError(f"--set {key} is given twice")
+        place[name] = value
+    return document

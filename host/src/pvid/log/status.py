@@ -1,0 +1,63 @@
+"""How a recording goes, in one line: rewritten on a terminal, a new one every ten seconds elsewhere."""
+
+from __future__ import annotations
+
+import time
+from typing import TextIO
+
+from pvid.core.native import Reason
+from pvid.link.frames import Estimate, EstimateQ31, Hello
+from pvid.log.reader import Account, Record
+from pvid.log.values import in_si
+
+_ON_TERMINAL_S = 0.25
+_ELSEWHERE_S = 10.0
+
+
+class StatusLine:
+    """An observer that writes to a stream, standard error in general."""
+
+    def __init__(self, to: TextIO) -> None:
+        self._to = to
+        self._terminal = to.isatty()
+        self._period = _ON_TERMINAL_S if self._terminal else _ELSEWHERE_S
+        self._written = self._rated = time.monotonic()
+        self._samples = 0
+        self._estimate: Estimate | EstimateQ31 | None = None
+        self._tick = 0
+
+    def take(self, record: Record, account: Account) -> None:
+        """See logreader.Observer."""
+        if isinstance(record.item, Estimate | EstimateQ31):
+            self._estimate, self._tick = record.item, record.tick
+
+    def idle(self, account: Account) -> None:
+        """See logreader.Observer."""
+        now = time.monotonic()
+        if now - self._written >= self._period:
+            self._written = now
+            line = self.line(account, now)
+            self._to.write(f"\r\x1b[2K{line}" if self._terminal else f"{line}\n")
+            self._to.flush()
+
+    def close(self, account: Account) -> None:
+        """See logreader.Observer."""
+        if self._terminal:
+            self._to.write("\r\x1b[2K")
+            self._to.flush()
+
+    def line(self, account: Account, now: float) -> str:
+        """Rate since the last line, losses, the last estimate; before the link is up that it is not."""
+        if not account.segments:
+            return "the link is not up yet"
+        rate = (account.samples - self._samples) / max(now - self._rated, 1e-9)
+        self._rated, self._samples = now, account.samples
+        text = f"{account.samples} samples, {rate:.0f}/s, lost {account.missing_samples}, damaged {account.damaged}"
+        if account.segments[-1].why is not None:
+            text += f"; waiting for the link ({account.obstacle or account.segments[-1].why})"
+        hello, estimate = account.lasting.get(Hello), self._estimate
+        if isinstance(hello, Hello) and estimate is not None:
+            w, d1, d2 = in_si(estimate, hello)[0][:3]
+            reason = Reason(estimate.reason).text if estimate.reason in list(Reason) else str(estimate.reason)
+            text += f"; tick {self._tick}: w {w:.5g} 1/s^2, d1 {d1:.5g}, d2 {d2:.5g}, {reason}"
+        return text

@@ -1,0 +1,263 @@
+"""Records of a log (pvid.log.reader) as rows of numbers in SI, for files, screens and the wire.
+
+    values = Values(l1)
+    for record in reader:
+        for rows in values.rows(record):
+            rows.table, rows.columns["t"], ...
+
+Each of TABLES has the columns written there, with their units; a number that a record does not have is NaN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.native import Reason
+from pvid.link.frames import (
+    MAX_P,
+    Code,
+    Configure,
+    ConfigureQ31,
+    Estimate,
+    EstimateQ31,
+    Hello,
+    Loss,
+    Message,
+    Raw,
+    RawCount,
+    Status,
+)
+from pvid.log.file import Close, Segment
+from pvid.log.reader import Gap, Record, Restart
+from pvid.oracle import strong as oracle
+
+_SLOWEST, _FASTEST = 1e-3, 1e9  # [Hz]
+_LONGEST_S = 3e9  # between the PC's clock and a tick: a century, which a time in ns has room for
+_MOST = (1 << 63) - 1
+
+PARAMETERS = {"w": "1/s^2", "d1": "1", "d2": "1", "c": "rad"}
+PHYSICAL = {"g": "m/s^2", "l2": "m", "rho2": "m"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """Unit (1 for a pure number, none for text), numpy's kind, and what it is."""
+
+    unit: str
+    kind: str
+    what: str
+
+
+def _errors(names: Mapping[str, str]) -> dict[str, Column]:
+    return {f"{name}_se": Column(unit, "f8", f"standard error of {name}") for name, unit in names.items()}
+
+
+_WHERE = {
+    "t": Column("s", "f8", "time on the board since its tick 0"),
+    "tick": Column("1", "i8", "tick on the board"),
+    "segment": Column("1", "i8", "segment of the log"),
+    "run": Column("1", "i8", "how often the board had begun to count ticks anew"),
+    "log_time": Column("ns", "i8", "the PC's clock at the beginning, then the board's; never backwards"),
+}
+
+TABLES: dict[str, dict[str, Column]] = {
+    "samples": {
+        **_WHERE,
+        "phi": Column("rad", "f8", "measured relative angle"),
+        "y": Column("m", "f8", "measured height of the pivot"),
+    },
+    "estimates": {
+        **_WHERE,
+        "updates": Column("1", "i8", "solves so far"),
+        **{name: Column(unit, "f8", "estimate") for name, unit in {**PARAMETERS, **PHYSICAL}.items()},
+        **_errors({**PARAMETERS, **PHYSICAL}),
+        "kappa": Column("1", "f8", "how far apart the data tell the parameters, 0 to 1"),
+        "residual": Column("1", "f8", "standard deviation of a row's residual over the one it was configured with"),
+        "reason": Column("", "U24", "what became of the last group of rows"),
+    },
+    "status": {
+        **_WHERE,
+        "state": Column("", "U24", "what the board does"),
+        "updates": Column("1", "i8", "solves so far"),
+        "rejected": Column("1", "i8", "samples that were not finite or absurd"),
+    },
+    "events": {
+        **_WHERE,
+        "event": Column("", "U16", "what happened to the log"),
+        "count": Column("1", "i8", "frames or samples lost, bytes spoilt"),
+        "text": Column("", "U200", "more of it"),
+    },
+}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of one table, all of its columns with an entry a row."""
+
+    table: str
+    columns: dict[str, npt.NDArray[Any]]
+
+
+class Values:
+    """Turns records into rows; it has to see every record, in order.
+
+    Parameters
+    ----------
+    l1
+        Length of rod 1 [m], of the rig file; None: g, l2 and rho2 are not computed.
+    hello
+        Who the board is, where that is known before its records; without it times are NaN until it has said so.
+    """
+
+    def __init__(self, l1: float | None = None, hello: Hello | None = None) -> None:
+        self.l1 = l1
+        self._hello = hello
+        self._row_sd = math.nan
+        self._offset = 0.0  # of the angle in fixed point [rad]
+        self._anchor: tuple[int, int] | None = None  # tick and log time
+        self._latest = 0
+        self._runs = 0
+        self._segment = -1
+        self._session: int | None = None  # None: not named in this segment
+
+    @property
+    def sample_rate(self) -> float:
+        """[Hz], as the board told; NaN before it did, and where it told a number that is no rate."""
+        rate = math.nan if self._hello is None else self._hello.sample_rate
+        return rate if is_rate(rate) else math.nan
+
+    def rows(self, record: Record) -> Iterator[Rows]:
+        """Those of one record: none or one table's."""
+        item = record.item
+        if record.segment != self._segment or isinstance(item, Restart):
+            self._segment, self._session, self._anchor = record.segment, None, None
+        if isinstance(item, Hello | Status) and item.session != self._session:
+            if self._session is not None:  # it was configured: its ticks count from elsewhere
+                self._anchor = None
+            self._session = item.session
+        match item:
+            case Hello():
+                self._hello = item
+            case Configure() | ConfigureQ31():
+                self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
+                offset = item.phi_offset if isinstance(item, ConfigureQ31) else 0
+                self._offset = offset * (self._hello.phi_lsb if self._hello else 0.0)
+            case Raw() | RawCount():
+                yield self._samples(record, item)
+            case Estimate() | EstimateQ31():
+                yield self._estimate(record, item)
+            case Status():
+                state = Code(item.code).name if item.code in list(Code) else str(item.code)
+                yield self._one(
+                    "status",
+                    record,
+                    state=state.lower().replace("_", " "),
+                    updates=item.updates,
+                    rejected=item.rejected,
+                )
+            case Restart():
+                self._runs += 1
+                yield self._one("events", record, event="restart", count=0, text="the board began anew")
+            case Gap():
+                text = f"samples of ticks {item.first} to {item.first + item.samples - 1} are missing"
+                yield self._one("events", record, event="gap", count=item.samples, text=text)
+            case Loss():
+                text = f"{item.pieces} pieces" if item.pieces > 1 else ""
+                yield self._one("events", record, event=item.why, count=item.frames or item.bytes, text=text)
+            case Segment():
+                yield self._one("events", record, event="segment", count=item.number, text=item.port)
+            case Close():
+                yield self._one("events", record, event="close", count=min(item.received, _MOST), text=item.words)
+            case _:
+                pass
+
+    def _where(self, record: Record, ticks: npt.NDArray[np.int64]) -> dict[str, npt.NDArray[Any]]:
+        rate = self.sample_rate
+        log_time = self._log_time(record, ticks)
+        return {
+            "t": ticks / rate,
+            "tick": ticks,
+            "segment": np.full(len(ticks), record.segment),
+            "run": np.full(len(ticks), self._runs),
+            "log_time": log_time,
+        }
+
+    def _log_time(self, record: Record, ticks: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """By the board's clock, which starts at the PC's when the segment or the board's run begins."""
+        if not isinstance(record.item, Message) or isinstance(record.item, Segment | Close) or not len(ticks):
+            return np.full(len(ticks), max(self._latest, record.unix_ns))
+        if self._anchor is None:
+            self._anchor = (int(ticks[0]), max(record.unix_ns, self._latest))
+        first, began = self._anchor
+        rate = self.sample_rate
+        passed = np.zeros(len(ticks)) if math.isnan(rate) else np.clip((ticks - first) / rate, -_LONGEST_S, _LONGEST_S)
+        log_time = np.maximum(began + np.rint(1e9 * passed).astype(np.int64), self._latest)
+        self._latest = int(log_time[-1])
+        return log_time
+
+    def _one(self, table: str, record: Record, **values: float | int | str) -> Rows:
+        columns = self._where(record, np.array([record.tick], np.int64))
+        for name, column in TABLES[table].items():
+            if name not in columns:
+                columns[name] = np.array([values[name]], column.kind)
+        return Rows(table, columns)
+
+    @np.errstate(all="ignore")  # a board may send any number
+    def _samples(self, record: Record, item: Raw | RawCount) -> Rows:
+        phi_y = item.values.astype(np.float64)
+        if isinstance(item, RawCount):
+            hello = self._hello
+            phi_y *= np.array([np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb])
+        columns = self._where(record, record.tick + np.arange(len(phi_y), dtype=np.int64))
+        return Rows("samples", {**columns, "phi": phi_y[:, 0], "y": phi_y[:, 1]})
+
+    @np.errstate(all="ignore")
+    def _estimate(self, record: Record, item: Estimate | EstimateQ31) -> Rows:
+        n_p = min(MAX_P if self._hello is None else self._hello.n_p, len(PARAMETERS))
+        p, covariance = in_si(item, self._hello, self._offset)
+        numbers: dict[str, Any] = dict.fromkeys(TABLES["estimates"], np.nan)
+        errors = np.sqrt(np.diag(covariance))
+        for i, name in enumerate(list(PARAMETERS)[:n_p]):
+            numbers[name], numbers[f"{name}_se"] = p[i], errors[i]
+        if self.l1 is not None:
+            physical = oracle.physical(p[:3], self.l1)
+            of_physical = oracle.physical_errors(p[:3], covariance[:3, :3], self.l1)
+            for i, name in enumerate(PHYSICAL):
+                if np.isfinite(physical).all():
+                    numbers[name], numbers[f"{name}_se"] = physical[i], of_physical[i]
+        fixed = isinstance(item, EstimateQ31)
+        numbers["kappa"] = item.kappa / 2**30 if fixed else item.kappa
+        numbers["residual"] = item.residual_sd / self._row_sd
+        reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)
+        return self._one("estimates", record, **{**numbers, "updates": item.updates, "reason": reason})
+
+
+def is_rate(sample_rate: float) -> bool:
+    """Whether a board can have this sample rate [Hz]."""
+    return _SLOWEST <= sample_rate <= _FASTEST
+
+
+def in_si(
+    item: Estimate | EstimateQ31, hello: Hello | None, phi_offset: float = 0.0
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """p [MAX_P] and its covariance [MAX_P, MAX_P] in SI; zero where the model has no parameter.
+
+    Of the fixed-point core: NaN before the board has told its units; `phi_offset` [rad] is added to its c.
+    """
+    upper = np.triu_indices(MAX_P)
+    matrix = np.zeros((MAX_P, MAX_P))
+    if isinstance(item, Estimate):
+        matrix[upper] = item.covariance
+        return np.array(item.p), matrix + np.triu(matrix, 1).T
+    unit = np.full(MAX_P, np.nan) if hello is None else np.array(hello.p_unit)
+    matrix[upper] = np.array(item.correlation) / 2**30
+    se = np.array(item.se) * unit
+    p = np.array(item.p) * unit
+    p[3] += phi_offset
+    return p, (matrix + np.triu(matrix, 1).T) * np.outer(se, se)

@@ -1,0 +1,490 @@
+"""Computes a log again with the numpy twin and compares every estimate and every hash in it, bit for bit.
+
+The log contains everything that the bits depend on: the samples from the session's first tick on, the configuration
+and the rig file, which gives the settings and tables of the board's image. After a lost sample the identifier's state
+is unknown, and later samples cannot be verified until another session begins. A link failure without a lost sample has
+no effect.
+
+A check is an estimate or a hash. A sample counts as verified if a later check that covers it is equal. If the board
+hashes its samples, a hash covers all samples before it. An estimate, or a hash without the samples, covers only samples
+that the identifier has processed completely: a window is processed up to Schedule.reach ticks after its samples.
+Samples after the last check are not verified. If no further check was due there, this is no fault: it is reported, and
+the log counts as verified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.board.stream_image import settings_number
+from pvid.board.stream_rig import FixedConfig, FloatConfig, stream_rig
+from pvid.core.native import Law, Reason, StrongConfig, WeakConfig
+from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.link.frames import (
+    MAX_P,
+    Configuration,
+    Configure,
+    ConfigureQ31,
+    Credit,
+    Estimate,
+    EstimateQ31,
+    Hash,
+    Hello,
+    Loss,
+    Raw,
+    RawCount,
+)
+from pvid.log.reader import Gap, Record, Restart
+from pvid.rig.file import RigFile
+from pvid.run.compare import P_NAMES, Difference
+from pvid.twin import fnv
+from pvid.twin.q31.estimator import EstimatorQ31
+from pvid.twin.strong import StrongTwin
+from pvid.twin.strong_q31 import StrongTwinQ31
+from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
+
+Check = Estimate | EstimateQ31 | Hash | Credit
+Twin = WeakTwin | StrongTwin | WeakTwinQ31 | StrongTwinQ31
+
+_CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
+_UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
+
+
+@dataclass
+class Stretch:
+    """Consecutive ticks of one session and the result of their verification.
+
+    `ticks`: their number, from `first` on. `checked`: estimates and hashes that were equal, up to the `difference` if
+    there is one. `verified`: ticks covered by equal checks. `open`: no check of the other ticks was due yet. `why_not`:
+    reason why nothing could be verified.
+    """
+
+    segment: int
+    first: int
+    ticks: int
+    session: int | None = None
+    checked: int = 0
+    difference: Difference | None = None
+    why_not: str | None = None
+    verified: int = 0
+    open: bool = False
+
+    @property
+    def trailing(self) -> int:
+        """Ticks after the last check."""
+        return self.ticks - self.verified
+
+    @property
+    def text(self) -> str:
+        """In one sentence."""
+        where = f"segment {self.segment}, ticks {self.first} to {self.first + self.ticks - 1}"
+        if self.difference is not None:
+            return f"{where}: DIFFERENT at {self.difference}"
+        if self.why_not is not None:
+            return f"{where}: not verified, {self.why_not}"
+        found = f"{where}: {self.checked} estimates and hashes equal in every bit"
+        if self.trailing:
+            why = "no check of them was due yet" if self.open else "the check of them was lost"
+            found += f"; the last {self.trailing} samples are not verified, {why}"
+        return found
+
+
+@dataclass
+class Verdict:
+    """Results of all stretches, added up."""
+
+    samples: int = 0
+    verified: int = 0
+    trailing: int = 0  # after the last check of their stretch, if no further check was due
+    checked: int = 0
+    different: int = 0
+    stretches: int = 0
+    good: set[int] = field(default_factory=set)  # segments with a verified stretch that has no difference
+    bad: set[int] = field(default_factory=set)  # with a difference, or with nothing that could be verified
+
+    def add(self, stretch: Stretch) -> None:
+        """Adds the result of the next stretch."""
+        self.stretches += 1
+        self.samples += stretch.ticks
+        self.checked += stretch.checked
+        different = stretch.difference is not None
+        self.different += different
+        if not different:
+            self.verified += stretch.verified
+            self.trailing += stretch.trailing if stretch.open else 0
+        if different or not stretch.verified:
+            self.bad.add(stretch.segment)
+        else:
+            self.good.add(stretch.segment)
+
+    @property
+    def left(self) -> int:
+        """Samples that cannot be verified, or are not although a check of them was due."""
+        return self.samples - self.verified - self.trailing
+
+    @property
+    def text(self) -> str:
+        """In one sentence."""
+        if not self.stretches:
+            return "nothing to verify: the log holds no samples"
+        parts = [f"{self.checked} estimates and hashes equal in every bit, {self.verified} samples verified"]
+        if self.trailing:
+            parts.append(f"{self.trailing} behind the last check")
+        if self.different:
+            parts.append(f"{self.different} of {self.stretches} stretches DIFFERENT")
+        if self.left:
+            parts.append(f"{self.left} samples not verified")
+        if lacking := sorted(self.bad - self.good):
+            parts.append(
+                f"nothing verified of segment{'' if len(lacking) == 1 else 's'} {', '.join(map(str, lacking))}"
+            )
+        return "in all: " + "; ".join(parts)
+
+
+@dataclass
+class _Open:
+    """A stretch that is still growing.
+
+    `lacks`: a sentence about the samples missing before it, if it does not begin with its session. `session`: 0 if the
+    samples do not contain it. `late`: the first samples of the session are missing. `harmed`: data were lost since the
+    last check.
+    """
+
+    stretch: Stretch
+    lacks: str
+    session: int
+    late: bool = False
+    harmed: bool = False
+    parts: list[npt.NDArray[Any]] = field(default_factory=list)
+    checks: list[tuple[int, Check]] = field(default_factory=list)
+
+    @property
+    def next(self) -> int:
+        return self.stretch.first + self.stretch.ticks
+
+    def is_of(self, session: int) -> bool:
+        """Whether `session` can be the session of this stretch."""
+        return 0 in (session, self.session) or session == self.session
+
+    def begin_with(self, configuration: Configure | ConfigureQ31) -> None:
+        """Sets `late` when the configuration shows at which tick the session begins."""
+        if self.is_of(configuration.session) and self.stretch.first != configuration.first_tick:
+            self.late = True
+            self.parts.clear()
+            self.checks.clear()
+
+
+class Verifier:
+    """Reads the records of a log and yields each stretch when it is complete.
+
+    Parameters
+    ----------
+    rig
+        The board's rig; None: nothing can be verified.
+    progress
+        Called with the number of ticks computed so far.
+
+    Memory: the samples of the longest stretch.
+    """
+
+    def __init__(self, rig: RigFile | None, progress: Callable[[int], None] | None = None) -> None:
+        self.rig = rig
+        self._progress = progress
+        self._done = 0
+        self._hello: Hello | None = None
+        self._configurations: dict[int, Configure | ConfigureQ31] = {}
+        self._open: _Open | None = None
+        self._before: tuple[int, int] | None = None  # segment and tick where the last samples ended
+        self._settings: dict[float, tuple[FloatConfig | FixedConfig, int]] = {}
+
+    def stretches(self, records: Iterable[Record]) -> Iterator[Stretch]:
+        """The stretches of all records, in order."""
+        for record in records:
+            yield from self._take(record)
+        yield from self._close()
+
+    def _take(self, record: Record) -> Iterator[Stretch]:
+        match record.item:
+            case Hello() as hello:
+                self._hello = hello
+            case Configure() | ConfigureQ31() as configuration:
+                self._configurations.pop(configuration.session, None)
+                self._configurations[configuration.session] = configuration
+                if len(self._configurations) > _CONFIGURATIONS:
+                    del self._configurations[next(iter(self._configurations))]
+                if self._open is not None:
+                    self._open.begin_with(configuration)
+            case Raw() | RawCount() as raw:
+                yield from self._take_samples(record, raw)
+            case Estimate() | EstimateQ31() | Hash() | Credit() as check:
+                self._take_check(record.tick, check)
+            case Restart():
+                yield from self._close()
+            case Gap() | Loss():
+                if self._open is not None and not (isinstance(record.item, Loss) and record.item.why == "cut"):
+                    self._open.harmed = True
+            case _:
+                pass
+
+    def _take_samples(self, record: Record, raw: Raw | RawCount) -> Iterator[Stretch]:
+        opened = self._open
+        if opened is None or record.tick != opened.next or not opened.is_of(raw.session):
+            yield from self._close()
+            opened = self._open = _Open(Stretch(record.segment, record.tick, 0), self._lacking(record), raw.session)
+            if (configuration := self._configurations.get(raw.session)) is not None:
+                opened.begin_with(configuration)
+        self._before = record.segment, record.tick + raw.count
+        opened.stretch.ticks += raw.count
+        if not opened.late:  # a late stretch is not computed
+            opened.parts.append(raw.values)
+
+    def _take_check(self, tick: int, check: Check) -> None:
+        opened = self._open
+        if opened is None or opened.late or check.session == 0 or not opened.is_of(check.session):
+            return
+        if tick > opened.next:  # of samples that were lost
+            opened.harmed = True
+        elif tick > opened.stretch.first:
+            opened.checks.append((tick, check))
+            opened.harmed = False
+
+    def _lacking(self, record: Record) -> str:
+        """A sentence about the samples missing before this record."""
+        if self._before is None or self._before[0] != record.segment:
+            return f"its session began before this segment did, and the samples before tick {record.tick} are not in it"
+        first = self._before[1] if self._before[1] < record.tick else 0
+        return f"the samples of ticks {first} to {record.tick - 1} were lost, and every bit after them depends on them"
+
+    def _close(self) -> Iterator[Stretch]:
+        opened, self._open = self._open, None
+        if opened is None:
+            return
+        try:
+            self._verify(opened)
+        except PvidError as error:
+            opened.stretch.why_not = str(error)
+        yield opened.stretch
+
+    def _verify(self, opened: _Open) -> None:
+        stretch = opened.stretch
+        if not opened.late and opened.checks:
+            stretch.session = opened.checks[-1][1].session
+        else:
+            stretch.session = opened.session or None
+        configuration = self._configurations.get(stretch.session or 0)
+        if opened.late or (configuration is None and stretch.first != 0):
+            raise PvidError(opened.lacks)
+        if not opened.checks:
+            stretch.open = configuration is not None and not opened.harmed and stretch.ticks <= _pace(configuration)
+            raise PvidError(
+                "no check of them was due yet" if stretch.open else "no estimate and no hash came with them"
+            )
+        if configuration is None:
+            raise PvidError("the board's configuration did not come with them")
+        config = self._config(configuration)
+        samples = np.concatenate(opened.parts)
+        checks: dict[int, list[Check]] = {}
+        for tick, check in opened.checks:
+            if check.session == stretch.session:
+                checks.setdefault(tick, []).append(check)
+        with np.errstate(all="ignore"):  # a board may send any number, in samples and in its configuration
+            recomputation = _Recomputation(config, checks, stretch, self._count)
+            recomputation.run(samples)
+        stretch.verified = recomputation.covered
+        allowed = _pace(configuration) + recomputation.reach
+        if recomputation.hashed and configuration.hash_every:
+            allowed = configuration.hash_every
+        stretch.open = not opened.harmed and stretch.trailing <= allowed
+
+    def _count(self) -> None:
+        self._done += 1
+        if self._progress is not None and self._done % 512 == 0:
+            self._progress(self._done)
+
+    def _config(self, configuration: Configuration) -> FloatConfig | FixedConfig:
+        """The identifier's settings: those of the rig file, with the values of the configuration."""
+        if self.rig is None:
+            raise PvidError("the log holds no rig file: name it with --rig")
+        if self._hello is None:
+            raise PvidError("the board has not sent its identity (a Hello frame)")
+        rate = float(self._hello.sample_rate)
+        if rate not in self._settings:
+            board = stream_rig(self.rig, self.rig.sample_rate or rate)
+            self._settings[rate] = (board.config, settings_number(board))
+        config, number = self._settings[rate]
+        if configuration.settings != number:
+            raise PvidError("the board's image was made for other settings than the rig file's")
+        n_p = len(config.estimator.start)
+        names = ("start", "start_sd", "lower", "upper")
+        match config, configuration:
+            case WeakConfigQ31() | StrongConfigQ31(), ConfigureQ31() as given:
+                integers: dict[str, Any] = {name: tuple(getattr(given, name)[:n_p]) for name in names}
+                estimator = replace(
+                    config.estimator,
+                    **integers,
+                    row_sd=given.row_sd,
+                    forgetting_groups=given.forgetting_groups,
+                    gain=given.gain,
+                    divider=given.divider,
+                )
+                return replace(config, estimator=estimator, phi_offset=given.phi_offset, y_offset=given.y_offset)
+            case WeakConfig() | StrongConfig(), Configure() as given:
+                floats: dict[str, Any] = {name: np.array(getattr(given, name)[:n_p], np.float32) for name in names}
+                settings = replace(
+                    config.estimator,
+                    **floats,
+                    row_sd=given.row_sd,
+                    forgetting_s=given.forgetting_s,
+                    feedback_hz=given.feedback_hz,
+                    law=_law(given.law),
+                    divider=given.divider,
+                )
+                return replace(config, estimator=settings)
+            case _:
+                raise PvidError("the board's image holds another core than the rig file asks for")
+
+
+def _law(number: int) -> Law:
+    if number not in list(Law):
+        raise PvidError(f"the board was configured with law {number}, which does not exist")
+    return Law(number)
+
+
+def _pace(configuration: Configuration) -> int:
+    """Ticks from an estimate or a hash to the next."""
+    return min((every for every in (configuration.hash_every, configuration.estimate_every) if every), default=0)
+
+
+def _reach(twin: Twin) -> int:
+    """Ticks from a sample until the identifier has processed it completely."""
+    match twin:
+        case WeakTwin() | WeakTwinQ31():
+            return twin.schedule.reach
+        case StrongTwin():
+            return twin.config.window
+        case StrongTwinQ31():
+            return twin.config.design.bank.window
+
+
+def _twin_of(config: FloatConfig | FixedConfig) -> Twin:
+    match config:
+        case WeakConfig():
+            return WeakTwin(config)
+        case StrongConfig():
+            return StrongTwin(config)
+        case WeakConfigQ31():
+            return WeakTwinQ31(config)
+        case StrongConfigQ31():
+            return StrongTwinQ31(config)
+
+
+class _DifferentError(Exception):
+    """Ends a recomputation."""
+
+
+class _Recomputation:
+    """One run of the twin over a stretch. `covered`: samples covered by equal checks. `hashed`: the board hashes its
+    samples."""
+
+    def __init__(
+        self,
+        config: FloatConfig | FixedConfig,
+        checks: dict[int, list[Check]],
+        stretch: Stretch,
+        count: Callable[[], None],
+    ) -> None:
+        self.twin = _twin_of(config)
+        self.reach = _reach(self.twin)
+        self.covered = 0
+        self.hashed = False
+        self._fixed = isinstance(config, FixedConfig)
+        self._checks = checks
+        self._stretch = stretch
+        self._count = count
+        self._hash = fnv.START
+        self._sample_hashes = np.empty(0, np.uint32)
+        self._verdict = int(Reason.WARMING_UP)
+
+    def run(self, samples: npt.NDArray[Any]) -> None:
+        """Runs over samples [ticks, 2] from the session's first tick; writes the result into the stretch."""
+        self._sample_hashes = fnv.sample_hashes(samples)
+        try:
+            wide = samples.astype(np.int64) if self._fixed else samples
+            self.twin.follow(wide[:, 0], wide[:, 1], self._after)
+        except _DifferentError:
+            pass
+
+    def _after(self, tick: int, reasons: npt.NDArray[np.uint8]) -> None:
+        reason = int(reasons[0])
+        self._hash = fnv.fold_bytes(self._hash, self._state(reason))
+        if reason != Reason.ACCUMULATED:
+            self._verdict = reason
+        self._count()
+        done = self._stretch.first + tick + 1
+        for check in self._checks.get(done, ()):
+            for variable, logged, own in self._compared(check, tick, reason):
+                if logged != own:
+                    self._stretch.difference = Difference(done, variable, logged, own, "log")
+                    raise _DifferentError
+            self._stretch.checked += 1
+            hashed = isinstance(check, Hash | Credit) and check.sample_hash != 0
+            self.hashed = self.hashed or hashed
+            self.covered = max(self.covered, tick + 1 - (0 if hashed else self.reach))
+
+    def _state(self, reason: int) -> bytes:
+        """The bytes that the hash covers, as in fnv.h."""
+        estimator = self.twin.estimator
+        word = reason.to_bytes(4, "little")
+        if isinstance(estimator, EstimatorQ31):
+            exponent = int(estimator.exponent[0]).to_bytes(4, "little")
+            p, sums = estimator.p[:, 0].astype("<i4"), estimator.sums[:, 0].astype("<i8")
+            return p.tobytes() + sums.tobytes() + exponent + word
+        return estimator.p[:, 0].astype("<f4").tobytes() + estimator.sums[:, 0].astype("<f4").tobytes() + word
+
+    def _compared(self, check: Check, tick: int, reason: int) -> Iterator[tuple[str, int, int]]:
+        """Yields variable, word of the log and word of the twin."""
+        if isinstance(check, Hash | Credit) and check.sample_hash != 0:
+            yield "hash of the samples", check.sample_hash, int(self._sample_hashes[tick])
+        match check:
+            case Hash():
+                yield "hash", check.hash, self._hash
+            case Credit():
+                yield "hash", check.hash, self._hash
+                yield "status", check.reason, reason
+            case Estimate() | EstimateQ31():
+                yield from self._compared_estimate(check)
+
+    def _compared_estimate(self, check: Estimate | EstimateQ31) -> Iterator[tuple[str, int, int]]:
+        if isinstance(check, EstimateQ31) != self._fixed:
+            raise PvidError("the estimates are of another core than the rig file asks for")
+        own = self.twin.estimator.assess()[0]
+        n_p = len(self.twin.estimator.p)
+        upper = tuple((a, b) for a, b in _UPPER if b < n_p)
+        for i in range(n_p):
+            yield P_NAMES[i], _word(check.p[i]), _word(own["p"][i])
+        matrix = "correlation" if isinstance(check, EstimateQ31) else "covariance"
+        logged = dict(zip(_UPPER, getattr(check, matrix), strict=True))
+        if isinstance(check, EstimateQ31):
+            for i in range(n_p):
+                yield f"standard error of {P_NAMES[i]}", _word(check.se[i]), _word(own["se"][i])
+        for a, b in upper:
+            yield f"{matrix} of {P_NAMES[a]} and {P_NAMES[b]}", _word(logged[a, b]), _word(own[matrix][a, b])
+        for name in ("kappa", "residual_sd", "weight"):
+            yield name.replace("_", " "), _word(getattr(check, name)), _word(own[name])
+        yield "updates", check.updates, int(self.twin.estimator.counters["updates"][0])
+        yield "status", check.reason, self._verdict
+
+
+def _word(value: Any) -> int:
+    """The 32 bits of a number; all NaNs are equal."""
+    if isinstance(value, float | np.floating):
+        word = np.float32(value)
+        return 0x7FC00000 if np.isnan(word) else int(word.view(np.uint32))
+    return int(value) & 0xFFFFFFFF

@@ -1,0 +1,116 @@
+"""A recording in words for the user: names of the parameters, reasons, kappa and residual in words."""
+
+from __future__ import annotations
+
+import math
+
+from pvid.core.native import Reason
+from pvid.link.frames import Code, Core, Form, Hello, Status
+from pvid.log.reader import Account
+
+# Values.TABLES["estimates"] has the same names.
+PARAMETERS = {
+    "g": ("g*", "gravity in the plane", "m/s²"),
+    "l2": ("l2", "joint to centre of mass", "m"),
+    "rho2": ("rho2", "radius of gyration", "m"),
+    "w": ("w", "g*/l1", "1/s²"),
+    "d1": ("d1", "1 + L2 (1 + L1)", ""),
+    "d2": ("d2", "L1 L2", ""),
+    "c": ("c", "the encoder's zero", "rad"),
+}
+
+_REASONS = {
+    Reason.UPDATED: "the estimate took a step",
+    Reason.WARMING_UP: "the first window of samples is not full yet",
+    Reason.ACCUMULATED: "samples taken in, the next step comes with the next window",
+    Reason.HELD_NOT_EXCITED: "drive or motion say too little of the parameters; the last estimate stays",
+    Reason.HELD_PIVOT: "the equations could not be solved; the last estimate stays",
+    Reason.REJECTED_NOT_FINITE: "a sample was not a number and was left out",
+    Reason.REJECTED_OUTLIER: "a sample lay far from all others and was left out",
+    Reason.REJECTED_SATURATED: "a sample was absurdly large and was left out",
+    Reason.HELD_UNCERTAIN: "standard errors too wide, or still on the way; the last trusted estimate stays",
+    Reason.HELD_OUT_OF_RANGE: "the angle went beyond what the equations are good for; that window was dropped",
+    Reason.HELD_FROZEN: "frozen: nothing is taken in",
+    Reason.NOT_READY: "the identifier has no configuration yet, or refused the one that it was given",
+    Reason.MISFIT: "the estimate took a step, but residuals exceed the sensors' noise: friction, large angles or "
+    "another mechanism",
+}
+
+# What the core publishes (trust.h), and what a good drive reaches (MATH.md 4).
+KAPPA_MIN, KAPPA_WEAK, KAPPA_GOOD = 3e-5, 1e-3, 5e-3
+_KAPPA_SHOWN = (1e-6, 1.0)
+
+
+def board_words(hello: Hello | None, account: Account) -> str:
+    """Who the board is, and what it does if it does not simply run."""
+    if hello is None:
+        return "has not said yet who it is"
+    form, core = (
+        kinds(number).name.lower() if number in list(kinds) else str(number)
+        for kinds, number in ((Form, hello.form), (Core, hello.core))
+    )
+    text = f"{hello.board}: {form} form, core {core}, {hello.sample_rate:g} samples per second"
+    status = account.lasting.get(Status)
+    if isinstance(status, Status) and status.code != Code.RUNNING and status.code in list(Code):
+        text += f"; {Code(status.code).name.lower().replace('_', ' ')}"
+    return text
+
+
+def link_words(account: Account) -> tuple[bool, str]:
+    """Whether the link is up, and how it is."""
+    if not account.segments:
+        return False, "opening"
+    last = account.segments[-1]
+    if last.why is None:
+        return True, f"up, segment {last.number}"
+    return False, f"down: {account.obstacle or last.why}"
+
+
+def received_words(account: Account, samples: float, received: float) -> str:
+    """What came, and `samples` and `received` bytes a second."""
+    return (
+        f"{account.samples} samples ({samples:.0f} per second), {account.bytes / 1e6:.2f} MB "
+        f"({received / 1e3:.1f} kB/s)"
+    )
+
+
+def loss_words(account: Account) -> str:
+    """What was lost; empty when nothing was."""
+    parts = [
+        (account.missing_samples, "samples"),
+        (account.missing, "frames"),
+        (account.damaged, "damaged pieces"),
+        (account.foreign, "foreign frames"),
+    ]
+    told = ", ".join(f"{count} {what}" for count, what in parts if count)
+    lost = f"{told} ({100 * account.lost_share:.2g} %)" if told else ""
+    unread = f"{account.unread / 1e6:.1f} MB recorded, but too fast to be decoded" if account.unread else ""
+    return "; ".join(filter(None, (lost, unread)))
+
+
+def reason_words(reason: str) -> str:
+    """What a reason (Reason.text) means, in a sentence; empty for one of another version."""
+    return next((words for one, words in _REASONS.items() if one.text == reason), "")
+
+
+def kappa_words(kappa: float) -> str:
+    """Identifiability of w, d1 and d2 from the data, in words."""
+    if not kappa >= KAPPA_MIN:
+        return "parameters not identifiable"
+    if kappa < KAPPA_WEAK:
+        return "weak: parameters barely identifiable"
+    return ("fair" if kappa < KAPPA_GOOD else "good") + ": parameters identifiable"
+
+
+def kappa_share(kappa: float) -> float:
+    """Length of kappa's bar, 0 to 1, over the decades from 1e-6 to 1."""
+    low, high = (math.log10(one) for one in _KAPPA_SHOWN)
+    if not kappa > 0:
+        return 0.0
+    return min(1.0, max(0.0, (math.log10(kappa) - low) / (high - low)))
+
+
+def residual_words(hello: Hello | None) -> str:
+    """What the residuals are so many times of."""
+    weak = hello is not None and hello.form == Form.WEAK
+    return "times the encoder's noise" if weak else "times the row_sd that was configured"

@@ -1,0 +1,1 @@
+"""The method in float64, written apart from the C core and its twin."""

@@ -1,0 +1,1 @@
+"""Rig files and recorded runs: reading, checking, clock, gaps, columns."""

@@ -1,0 +1,452 @@
+"""The uniform clock of a recorded run: found from its time stamps; faults of these are corrected and reported.
+
+A run whose t departs from a uniform clock by at most a tenth of a period is left as it is, bit for bit. Else each row
+gets its tick, so that missing samples are seen, and one of two things holds:
+
+* t is only rounded, or samples are missing: the samples stay as they are, each at its tick.
+* t jitters. Whether the samples were taken at irregular times or only stamped late cannot be seen from t. But it can
+  often be seen from phi and y: a motion is smoother at its true times. Where it is clearly smoother at uniform times,
+  the samples stay as they are; else phi and y are interpolated at uniform times from the recorded ones, by cubic
+  polynomials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.rig.table import Table
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.integer]
+
+# Largest departure of t from a uniform clock that is left as it is [periods]. On the standard rig at 1 kHz (phi' up to
+# 1 rad/s) it is 1e-4 rad, half the encoder's noise, and it leaves room for time stamps with few decimals.
+_JITTER_PERIODS = 0.1
+# A step of t longer than this many periods is a gap: a sample is missing.
+_GAP_PERIODS = 1.5
+# Between jittering stamps a longer step is empty; in a shorter one, of a late sample or a missing one, the cubic
+# through the samples around it lets 0.8 times their noise through.
+_EMPTY_PERIODS = 2.5
+# Half of what t is rounded to, and a little more.
+_ROUNDING = 0.55
+# w is proportional to the square of the sample rate: 1e-4 changes it by 0.02 %, a good run's standard error. So much
+# the rig file's sample rate may differ from t without a word.
+_RATE_TOLERANCE = 1e-4
+# A quartz is off by 1e-4, a ceramic resonator by 5e-3, the RC oscillator of a microcontroller by 3e-2; beyond that t
+# has another unit, or the rig file is another one's.
+_RATE_LIMIT = 0.05
+_RATE_RANGE_HZ = (1e-3, 1e9)
+_USUAL_RATES = (20.0, 20_000.0)  # Hz
+_LONGEST_S = 1e20  # nanoseconds taken for seconds, since 1970, are 2e18
+# Rows on either side of a gap that their mean tells the number of missing ticks from: jitter averages out.
+_ROWS_BESIDE_GAP = 20
+# So few gaps in exact stamps are no rounding.
+_CERTAIN_GAPS = 2
+_REPEATED_SHARE = 0.01
+# Stamps that come in bursts (a PC's, of what a serial port hands over) are late by up to this [s].
+_LATE_S = 0.05
+_BURST_SHARE = 0.1
+# Ticks that may be missing, of all: what is left is less than a recording.
+_MISSING_SHARE = 0.5
+# A polynomial of this degree follows a motion of 20 rad/s for so long, to 1e-4 of it.
+_FOLLOWED_S, _DEGREE = 0.128, 5
+_LEAST_ROWS = 32
+_BLOCKS, _LEAST_BLOCKS = 400, 8
+_CLEARLY = 4.0  # standard errors
+_CHUNK = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class Uniform:
+    """Samples on a uniform clock.
+
+    Attributes
+    ----------
+    t, phi, y : ndarray, shape (n,)
+        [s], [rad], [m]; phi and y are NaN at ticks without a sample.
+    sample_rate : float
+        [Hz].
+    notes : what was found and done, a sentence each
+    """
+
+    t: FloatArray
+    phi: FloatArray
+    y: FloatArray
+    sample_rate: float
+    notes: tuple[str, ...]
+
+
+def uniform(table: Table, promised: float | None) -> Uniform:
+    """Samples of a table on a uniform clock.
+
+    Parameters
+    ----------
+    table
+        At least 3 rows; t is finite.
+    promised
+        The rig file's sample rate [Hz].
+
+    Raises
+    ------
+    PvidError
+        When time runs backwards, more is missing than there, or t and the promise contradict each other.
+    """
+    t = table.t
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # times near the end of float64's range
+        period = float(t[-1] - t[0]) / (t.size - 1)
+        if not abs(period) < _LONGEST_S / t.size:
+            raise table.error(t.size - 1, "t", f"{t[-1]!s} s is too far from the first time, {t[0]!s} s")
+        if period > 0 and _largest_departure(t, period) <= _JITTER_PERIODS:
+            rate, note = _rate(table, 1 / period, _end_error(t, period), promised)
+            return Uniform(t, table.phi, table.y, rate, (*table.notes, *note))
+        return _from_stamps(table, promised)
+
+
+def _from_stamps(table: Table, promised: float | None) -> Uniform:
+    steps = np.diff(table.t)
+    if (steps < 0).any():
+        row = int(np.argmax(steps < 0)) + 1
+        before = f"the time before it, {table.t[row - 1]!s} s (two recordings in one file?)"
+        raise table.error(row, "t", f"{table.t[row]!s} s runs back from {before}")
+    if table.t[-1] == table.t[0]:
+        raise table.error(1, "t", f"{table.t[1]!s} s repeats the time before it, as all times do")
+    table, steps = _without_repeated_rows(table, steps)
+    quantum = _quantum(table.t)
+    fit = _chosen(_fits(table, steps, quantum), quantum)
+    repeats = steps == 0
+    del steps  # 8 bytes a row, in front of what takes more
+    rate, note = _rate(table, 1 / fit.period, fit.error, promised)
+    note = (*table.notes, *note)
+    if fit.keeps_time(quantum):
+        if fit.largest > _JITTER_PERIODS:
+            note += (f"t is rounded to {quantum:g} s: the samples are taken as uniform at {rate:g} Hz",)
+        placed = _placed(table, fit.ticks, rate, note)
+    else:
+        placed = _with_jitter(table, repeats, fit, rate, promised, note)
+    return placed
+
+
+def _without_repeated_rows(table: Table, steps: FloatArray) -> tuple[Table, FloatArray]:
+    """Rows that a logger wrote twice are left out; not where t is rounded so coarsely that it repeats anyway."""
+    again = np.flatnonzero(steps == 0) + 1
+    if not 0 < again.size < _REPEATED_SHARE * table.t.size:
+        return table, steps
+    if any((signal[again] != signal[again - 1]).any() for signal in (table.phi, table.y)):
+        return table, steps
+    kept = np.delete(np.arange(table.t.size), again)
+    note = f"rows that repeat the one before them, left out: {again.size} (first: {table.place(int(again[0]))})"
+    less = replace(
+        table,
+        t=table.t[kept],
+        phi=table.phi[kept],
+        y=table.y[kept],
+        place=lambda row: table.place(int(kept[row])),
+        notes=(*table.notes, note),
+    )
+    return less, np.diff(less.t)
+
+
+def _with_jitter(
+    table: Table,
+    repeats: npt.NDArray[np.bool_],
+    fit: _Fit,
+    rate: float,
+    promised: float | None,
+    note: tuple[str, ...],
+) -> Uniform:
+    size = f"by up to {fit.largest:.2g} periods ({fit.largest * fit.period:.2g} s, {table.place(fit.worst)})"
+    stamped_late = fit.largest * fit.period <= _LATE_S
+    if repeats.any():
+        if not stamped_late or np.count_nonzero(repeats) < _BURST_SHARE * repeats.size:
+            row = int(np.argmax(repeats)) + 1
+            raise table.error(row, "t", f"{table.t[row]!s} s repeats the time before it")
+        note += (
+            f"t comes in bursts, it departs from a uniform clock {size}: the samples are taken as uniform at "
+            f"{rate:g} Hz, and a missing one would not be seen",
+        )
+        return _placed(table, None, rate, note)
+    if stamped_late and _smoother_when_uniform(table, fit):
+        note += (
+            f"t departs from a uniform clock {size}, but phi and y are smoother without that: the samples are taken as "
+            f"uniform at {rate:g} Hz",
+        )
+        return _placed(table, fit.ticks, rate, note)
+    # the recorded times are believed: any rate near theirs will do
+    rate = promised if promised is not None else _shortest_decimal(1 / fit.period, 1e-3)
+    t, phi, y = _interpolated(table, rate, fit.period)
+    told = f"t jitters {size}: phi and y are interpolated at {rate:g} Hz from the recorded times"
+    long = int(np.count_nonzero(np.diff(table.t) > _GAP_PERIODS * fit.period))
+    if long:
+        told += f"; steps longer than {_GAP_PERIODS:g} periods, of late samples or missing ones: {long}"
+    return Uniform(t, phi, y, rate, (*table.notes, told))
+
+
+def _placed(table: Table, ticks: IntArray | None, rate: float, notes: tuple[str, ...]) -> Uniform:
+    """Each sample at its tick, NaN elsewhere; a sample a tick where none are given."""
+    count = table.t.size if ticks is None else int(ticks[-1]) + 1
+    t = _times(table.t[0], count, rate)
+    if ticks is None or count == ticks.size:
+        return Uniform(t, table.phi, table.y, rate, notes)
+    phi, y = np.full(t.size, np.nan), np.full(t.size, np.nan)
+    phi[ticks], y[ticks] = table.phi, table.y
+    return Uniform(t, phi, y, rate, notes)
+
+
+def _times(first: float, count: int, rate: float) -> FloatArray:
+    t = np.arange(count, dtype=np.float64)
+    t /= rate
+    t += first
+    return t
+
+
+# --- departure from a uniform clock ------------------------------------------------------------------------------
+
+
+def _largest_departure(t: FloatArray, period: float) -> float:
+    """Of t from a clock through its ends [periods]; inf when t is not finite. In pieces, to save memory."""
+    largest = 0.0
+    for first in range(0, t.size, _CHUNK):
+        piece = t[first : first + _CHUNK]
+        departure = float(np.abs((piece - t[0]) / period - np.arange(first, first + piece.size)).max())
+        largest = max(largest, departure) if departure == departure else np.inf
+    return largest
+
+
+def _end_error(t: FloatArray, period: float) -> float:
+    """Relative error of a rate found from both ends of t, by the rounding of float64."""
+    largest = max(abs(float(t[0])), abs(float(t[-1])))
+    return 4 * float(np.spacing(largest)) / (period * (t.size - 1))
+
+
+def _quantum(t: FloatArray) -> float:
+    """The decimal that t is rounded to at the run's begin or at its end, the larger one [s]; 0: none.
+
+    A logger that prints six digits rounds ever more as t grows.
+    """
+    found = 0.0
+    for piece in (t[:500], t[-500:]):
+        for digits in range(10):
+            scaled = piece * 10.0**digits
+            slack = 1e-3 + 4 * float(np.spacing(np.abs(scaled).max()))
+            if np.abs(scaled - np.rint(scaled)).max() <= slack:
+                found = max(found, 10.0**-digits)
+                break
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A uniform clock through the stamps: tick of each row [n], None where each row is one; period [s], its relative
+    standard error, the largest departure of a stamp [periods] and its row; the number of gaps."""
+
+    ticks: IntArray | None
+    period: float
+    error: float
+    largest: float
+    worst: int
+    gaps: int
+
+    def keeps_time(self, quantum: float) -> bool:
+        """Whether no stamp departs by more than what is usual, and what t is rounded to [s]."""
+        return self.largest <= _JITTER_PERIODS + _ROUNDING * quantum / self.period
+
+
+def _fit(t: FloatArray, ticks: IntArray | None = None, gaps: int = 0) -> _Fit:
+    """By least squares; each row is a tick where none are given. In pieces, to save memory."""
+
+    def pieces() -> Iterator[tuple[int, FloatArray, FloatArray]]:
+        for first in range(0, t.size, _CHUNK):
+            part = slice(first, first + _CHUNK)
+            own = np.arange(first, min(first + _CHUNK, t.size)) if ticks is None else ticks[part]
+            yield first, own.astype(np.float64) - middle, t[part] - mean
+
+    mean = float(t.mean())
+    middle = (t.size - 1) / 2 if ticks is None else float(ticks.mean())
+    energy = product = squares = largest = 0.0
+    for _, centred, times in pieces():
+        energy += float(centred @ centred)
+        product += float(centred @ times)
+    period = product / energy
+    worst = 0
+    for first, centred, times in pieces():
+        departure = times / period - centred
+        squares += float(departure @ departure)
+        row = int(np.argmax(np.abs(departure)))
+        if abs(departure[row]) > largest:
+            largest, worst = float(abs(departure[row])), first + row
+    return _Fit(ticks, period, float(np.sqrt(squares / t.size / energy)), largest, worst, gaps)
+
+
+def _fits(table: Table, steps: FloatArray, quantum: float) -> list[_Fit]:
+    """Clocks that leave ticks out where t steps far, the one without gaps first.
+
+    There are two with gaps: where t is rounded as coarsely as its period, a long step may be rounding or a missing
+    sample.
+    """
+    fits = [_fit(table.t)]
+    some = steps[:: -(-steps.size // _CHUNK)]
+    usual = float(np.median(some[some > 0])) if (some > 0).any() else fits[0].period
+    for longest in [_GAP_PERIODS * usual + quantum, _GAP_PERIODS * usual][0 if quantum > 0.1 * usual else 1 :]:
+        period = float(steps.mean(where=steps <= longest))
+        gaps = np.flatnonzero(steps > max(longest, _GAP_PERIODS * period))
+        if not gaps.size:
+            continue
+        lengths = steps[gaps] / period
+        if float(lengths.sum()) > _MISSING_SHARE / (1 - _MISSING_SHARE) * table.t.size + gaps.size:
+            if any(one.keeps_time(quantum) for one in fits) or fits[0].largest * fits[0].period <= _LATE_S:
+                continue
+            worst = int(gaps[np.argmax(lengths)])
+            raise table.error(
+                worst + 1,
+                "t",
+                f"a gap of {steps[worst]:.6g} s, {lengths.max():.4g} periods, comes before it, and more of the run is "
+                f"missing than there (several recordings in one file?)",
+            )
+        ticks = np.ones(table.t.size, np.int32)  # half the memory; 2^31 of them would be 25 days at 1 kHz
+        ticks[0] = 0
+        ticks[gaps + 1] = _ticks_across(table.t, gaps, period)
+        fits.append(_fit(table.t, np.cumsum(ticks, out=ticks), gaps.size))
+    return fits
+
+
+def _chosen(fits: list[_Fit], quantum: float) -> _Fit:
+    """Of those that keep time the one with the fewest gaps, else the one that departs least.
+
+    One or two long steps in stamps that are exact else are missing samples rather than rounding, which would make many.
+    """
+    exact = [one for one in fits if one.largest <= _JITTER_PERIODS and one.gaps <= _CERTAIN_GAPS]
+    keeping = [one for one in fits if one.keeps_time(quantum)]
+    if exact or keeping:
+        return (exact or keeping)[0]
+    return min(fits, key=lambda one: one.largest * one.period)
+
+
+def _ticks_across(t: FloatArray, gaps: IntArray, period: float) -> IntArray:
+    """Ticks between the rows on either side of each gap, from the mean times of some rows there."""
+    edges = np.concatenate([[-1], gaps, [t.size - 1]])
+    ticks = np.empty(gaps.size, np.int64)
+    for k, gap in enumerate(gaps):
+        before = t[max(edges[k], gap - _ROWS_BESIDE_GAP) + 1 : gap + 1]
+        after = t[gap + 1 : min(edges[k + 2], gap + _ROWS_BESIDE_GAP) + 1]
+        between = float(after.mean() - before.mean()) / period - (before.size + after.size - 2) / 2
+        ticks[k] = max(1, round(between))
+    return ticks
+
+
+# --- rate --------------------------------------------------------------------------------------------------------
+
+
+def _rate(table: Table, measured: float, error: float, promised: float | None) -> tuple[float, tuple[str, ...]]:
+    """The run's sample rate [Hz], and a note where it is not the promised one."""
+    name = table.columns["t"].name
+    if promised is None:
+        low, high = _RATE_RANGE_HZ
+        if not low <= measured <= high:
+            told = f"a sample rate of {measured:.6g} Hz is out of range"
+            raise PvidError(f"{table.path}, column {name}: {told}{_unit(name, measured)}.")
+        return _shortest_decimal(measured, 1e-9 + 3 * error), ()
+    off = measured / promised - 1
+    # t is trusted only to within the jitter at each end
+    if abs(off) <= _RATE_TOLERANCE + 3 * error + 2 * _JITTER_PERIODS / (table.t.size - 1):
+        return float(promised), ()
+    if abs(off) > _RATE_LIMIT:
+        raise PvidError(
+            f"{table.path}, column {name}: the samples come at {measured:.6g} Hz, but the rig's sample rate is "
+            f"{promised:.6g} Hz{_cause(name, measured / promised, measured)}."
+        )
+    rate = _shortest_decimal(measured, max(1e-9, 0.01 * abs(off)))
+    return rate, (f"t runs at {rate:g} Hz, {100 * off:+.2g} % off the rig's sample rate: t is believed",)
+
+
+def _cause(name: str, ratio: float, measured: float) -> str:
+    """Why t may run at another rate than the rig file promises."""
+    for unit, per_second in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+        if abs(ratio * per_second - 1) < 2 * _RATE_LIMIT:
+            return f": t looks like {unit}: use --columns t={name}:{unit}"
+    return f": if t is right, use --set sample_rate={_shortest_decimal(measured, 1e-3):g}"
+
+
+def _unit(name: str, rate: float) -> str:
+    """What unit t is in, likely, where its rate in seconds [Hz] is impossible."""
+    for unit, per_second in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+        if _USUAL_RATES[0] <= rate * per_second <= _USUAL_RATES[1]:
+            return f": t looks like {unit}: use --columns t={name}:{unit}"
+    return " (is t in seconds?)"
+
+
+def _shortest_decimal(value: float, tolerance: float) -> float:
+    """The shortest number within a relative ``tolerance``: 1000 rather than 1000.0000000000001."""
+    for digits in range(1, 17):
+        candidate = float(f"{value:.{digits}g}")
+        if abs(candidate - value) <= tolerance * value:
+            return candidate
+    return value
+
+
+# --- jitter ------------------------------------------------------------------------------------------------------
+
+
+def _smoother_when_uniform(table: Table, fit: _Fit) -> bool:
+    """Whether phi and y are clearly smoother at uniform times than at the recorded ones.
+
+    Blocks of rows all over the run are compared with a polynomial, by least squares, at either times.
+    """
+    length = max(_LEAST_ROWS, int(_FOLLOWED_S / fit.period))
+    blocks = table.t.size // length
+    chosen = np.unique(np.linspace(0, blocks - 1, min(blocks, _BLOCKS)).astype(int)) if blocks else np.zeros(0, int)
+    rows = (chosen * length)[:, None] + np.arange(length)
+    ticks = rows.astype(np.float64) if fit.ticks is None else fit.ticks[rows].astype(np.float64)
+    stamps = table.t[rows] / fit.period
+    scores = np.zeros(len(rows))
+    for signal in (table.phi[rows], table.y[rows]):
+        scores += np.log(_unexplained(signal, ticks) / _unexplained(signal, stamps))
+    scores = scores[np.isfinite(scores)]
+    if scores.size < _LEAST_BLOCKS:
+        return False
+    return bool(scores.mean() < -_CLEARLY * scores.std() / np.sqrt(scores.size))
+
+
+def _unexplained(x: FloatArray, t: FloatArray) -> FloatArray:
+    """Energy of each row of x [blocks, n] that a polynomial in its times t [blocks, n] does not explain."""
+    begin, end = t[:, :1], t[:, -1:]
+    powers = ((2 * t - begin - end) / (end - begin))[:, :, None] ** np.arange(_DEGREE + 1)
+    explained = np.linalg.qr(powers)[0]
+    coefficients = explained.transpose(0, 2, 1) @ x[:, :, None]
+    energy: FloatArray = np.sum((x - (explained @ coefficients)[:, :, 0]) ** 2, axis=1)
+    return energy
+
+
+def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """t, phi and y at uniform times from the cubics through the four samples around them; NaN within gaps."""
+    there = np.isfinite(table.phi) & np.isfinite(table.y)
+    times, phi, y = table.t, table.phi, table.y
+    if not there.all():
+        times, phi, y = times[there], phi[there], y[there]
+    first, last = float(times[0]), float(times[-1])
+    t = _times(first, int(np.floor((last - first) * rate * (1 + 1e-12))) + 1, rate)
+    out = np.empty((2, t.size))
+    for begin in range(0, t.size, _CHUNK):
+        at = t[begin : begin + _CHUNK]
+        right = np.clip(np.searchsorted(times, at, side="right"), 1, times.size - 1)
+        start = np.clip(right - 2, 0, times.size - 4)
+        gaps = [times[start + k] - at for k in range(4)]
+        piece = out[:, begin : begin + _CHUNK]
+        piece[:] = 0.0
+        for i in range(4):
+            weight = np.ones(at.size)
+            for j in range(4):
+                if j != i:
+                    weight *= gaps[j] / (gaps[j] - gaps[i])
+            piece[0] += weight * phi[start + i]
+            piece[1] += weight * y[start + i]
+        # a sample within half a period is as good as one at the tick
+        nearest = np.minimum(np.abs(times[right] - at), np.abs(at - times[right - 1]))
+        within = (times[right] - times[right - 1] > _EMPTY_PERIODS * period) & (nearest > period / 2)
+        piece[:, within] = np.nan
+    end = t.size - int(np.argmax(np.isfinite(out[0, ::-1])))
+    return t[:end], out[0, :end], out[1, :end]

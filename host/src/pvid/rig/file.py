@@ -1,0 +1,425 @@
+"""The rig file: what a user knows of a rig and wants of the identifier, in TOML.
+
+    l1 = 0.30                 # m; the only key without a default
+    sample_rate = 1000        # Hz
+    [sensor]
+    phi_lsb = 3.835e-4        # rad
+    [nominal]
+    l2 = 0.1                  # m
+    [identifier]
+    law = "stationary"
+
+Every key is a field of the dataclasses below, which hold its unit, range and default. A wrong key or value
+becomes a PvidError that names it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal, TypeVar, get_args
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.errors import PvidError
+from pvid.base.toml_text import MOST_BYTES, TOO_LONG, toml_document
+
+_Parsed = TypeVar("_Parsed")
+
+Form = Literal["weak", "strong"]
+Law = Literal["stationary", "pseudovelocity"]
+Core = Literal["f32", "q31", "f64"]
+Differentiator = Literal["savitzky-golay", "finite-difference"]
+
+# The strong form is least wrong with degree 12 and 20 bits on a window this long.
+_STRONG_WINDOW_S = 0.241
+
+# What the gate keeps out where the file does not say [times the usual]: windows are alike, rows follow the motion.
+_GATE: dict[Form, float] = {"weak": 4.0, "strong": 6.0}
+
+# Until it believes in a change [time constants of forgetting]: windows of a changed mechanism pass no sooner; of its
+# rows enough do wherever their residuals cross zero.
+_PATIENCE: dict[Form, float] = {"weak": 3.0, "strong": 6.0}
+
+
+# What is no zero but smaller is a slip, and what is divided by it overflows.
+_LEAST = 1e-12
+
+
+class Unset(float):
+    """A number that stands where the rig file does not say."""
+
+
+def _number(default: Any, unit: str, low: float, high: float) -> Any:
+    """A field that holds a number from low to high; an int where the default is one."""
+    metadata = {"unit": unit, "low": low, "high": high}
+    return field(default=default, metadata=metadata)
+
+
+def _choice(default: str, choices: Any) -> Any:
+    return field(default=default, metadata={"choices": get_args(choices)})
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Resolutions, for the scaling of fixed-point cores and for predicted errors; 0: exact.
+
+    Attributes
+    ----------
+    phi_lsb : angle sensor [rad]; default 14 bits a turn
+    y_lsb : pivot sensor [m]
+    phi_zero : what the encoder reads at rest, roughly [rad]: needed where that is beyond 1 rad, a half turn say
+    y_delay : how much later than phi the pivot is sampled [s]; the host moves y by it, a board does not
+    y_gain_sd : standard deviation of the gain of y, relative: enters the standard errors, since no run shows it
+    phi_range : largest angle from rest that the fixed-point core takes in [rad]; 0: 0.5, or more where the run at hand
+        needs it
+    y_range : largest height of the pivot about the middle of its travel likewise [m]; 0: a tenth of l1, or more
+        likewise
+    acceleration_range : largest acceleration of the pivot likewise [m/s^2]; 0: twice the run's, without a run four
+        times the nominal g. Ten times the run's would cost accuracy: products of u are rounded
+    """
+
+    phi_lsb: float = _number(Unset(2.0 * math.pi / 2**14), "rad", 0.0, 1.0)
+    y_lsb: float = _number(5e-6, "m", 0.0, 1.0)
+    phi_zero: float = _number(0.0, "rad", -1e3, 1e3)
+    y_delay: float = _number(0.0, "s", -1.0, 1.0)
+    y_gain_sd: float = _number(0.003, "relative", 0.0, 1.0)
+    phi_range: float = _number(0.0, "rad", 0.0, 10.0)
+    y_range: float = _number(0.0, "m", 0.0, 1e6)
+    acceleration_range: float = _number(0.0, "m/s^2", 0.0, 1e9)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[sensor] ")
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A rough guess of the unknowns: start of the estimate, centre of its bounds, whitening.
+
+    Attributes
+    ----------
+    g : the part of gravity that lies in the plane of motion [m/s^2]
+    l2 : joint to the centre of mass of body 2 [m]; l1/3 when the file does not say
+    rho2 : radius of gyration of body 2 [m]; l1/3 when the file does not say
+    """
+
+    l2: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
+    rho2: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
+    g: float = _number(9.8, "m/s^2", 1e-3, 1e3)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[nominal] ")
+
+
+@dataclass(frozen=True)
+class Identifier:
+    """How to identify.
+
+    Attributes
+    ----------
+    form : "weak" (integrals, for real encoders) or "strong" (the paper's derivatives, for 20 bits and more)
+    law : "stationary" (with feedback, converges) or "pseudovelocity" (the paper's equation (5), literally)
+    core : "f32", "q31" (fixed point) or "f64" (the oracle)
+    window_s : window of the weak form or of the differentiator [s]; 0: 1.3 slow periods of the nominal pendulum (weak
+        form), 0.241 s (strong form)
+    differentiator : of the strong form
+    degree : of its Savitzky-Golay polynomial
+    stride : samples between the differentiator's points
+    test_functions : of the weak form, per window; 0: up to 1.5 times the nominal fast mode, 8 to 16
+    decimation : of the weak form, samples in per sample used; 0: what leaves about 200 a window
+    smoothing_s : of the weak form, length of the filters before decimation [s]; 0: the shortest that serve
+    pass_hz : of the weak form, up to which frequency these filters leave the motion as it is [Hz]; 0: 7 times the
+        nominal fast mode
+    forgetting_s : time constant of forgetting [s]; 0: nothing is forgotten
+    feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at
+        every solve
+    divider : ticks (strong form) or windows (weak form) a solve
+    disturbance : of the joints' angular accelerations, white [rad/s^2/sqrt(Hz)]: rows are weighted by it beside the
+        encoder's noise; a survey finds it from the residuals
+    survey : search a recorded run for start and design before the core identifies it, instead of taking the nominal's
+    full_angle : correct the weak form for sines and cosines; float32 only
+    damping : two regressors more, for viscous friction
+    zero : the encoder's zero is unknown, a fourth parameter of the weak form
+    kappa_min : hold the estimate while less than this part of w's information is its own
+    outlier_gate : keep out rows or windows whose residuals are larger than so many times the usual; 0: none; where the
+        file does not say, see `gate`
+    outlier_patience_s : until the gate believes that the mechanism has changed [s]; 0: never; where the file does not
+        say, 3 times forgetting_s in the weak form, 6 times in the strong one
+    dead_zone : keep p while it is within so many standard errors of where the data want it; 0: always follow them
+    """
+
+    form: Form = _choice("weak", Form)
+    law: Law = _choice("stationary", Law)
+    core: Core = _choice("f32", Core)
+    window_s: float = _number(0.0, "s", 0.0, 1e6)
+    differentiator: Differentiator = _choice("savitzky-golay", Differentiator)
+    degree: int = _number(12, "", 4, 12)
+    stride: int = _number(1, "samples", 1, 65535)
+    test_functions: int = _number(0, "", 0, 16)
+    decimation: int = _number(0, "samples", 0, 64)
+    smoothing_s: float = _number(0.0, "s", 0.0, 1e6)
+    pass_hz: float = _number(0.0, "Hz", 0.0, 1e6)
+    forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
+    feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)
+    divider: int = _number(1, "", 1, 65535)
+    disturbance: float = _number(0.0, "rad/s^2/sqrt(Hz)", 0.0, 1e9)
+    survey: bool = True
+    full_angle: bool = True
+    damping: bool = False
+    zero: bool = True
+    kappa_min: float = _number(1e-5, "", 0.0, 0.999)
+    outlier_gate: float | None = _number(None, "", 0.0, 1e3)
+    outlier_patience_s: float | None = _number(None, "s", 0.0, 1e12)
+    dead_zone: float = _number(0.0, "", 0.0, 100.0)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[identifier] ")
+
+    @property
+    def strong_window_s(self) -> float:
+        """Length of the differentiator's window [s]."""
+        return self.window_s if self.window_s > 0.0 else _STRONG_WINDOW_S
+
+    @property
+    def gate(self) -> float:
+        """What the gate keeps out [times the usual]: outlier_gate, or 4 (weak form) and 6 (strong form) where the file
+        does not say; none then with equation (5), which is to stay as the paper has it."""
+        if self.outlier_gate is not None:
+            return self.outlier_gate
+        return _GATE[self.form] if self.law == "stationary" else 0.0
+
+    @property
+    def patience_s(self) -> float:
+        """Until the gate believes in a change [s], 0: never."""
+        if self.outlier_patience_s is not None:
+            return self.outlier_patience_s
+        return min(_PATIENCE[self.form] * self.forgetting_s, 1e12) if self.gate > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class RigFile:
+    """A rig and the way to identify it.
+
+    Attributes
+    ----------
+    l1 : length of rod 1 [m]
+    nominal, sensor, identifier : the file's tables
+    sample_rate : [Hz]; None: whatever the run says
+    l1_sd : standard deviation of l1, relative: enters the standard errors, since no run shows it
+    """
+
+    l1: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
+    nominal: Nominal
+    sensor: Sensor = field(default_factory=Sensor)
+    identifier: Identifier = field(default_factory=Identifier)
+    sample_rate: float | None = _number(None, "Hz", 1e-3, 1e6)
+    l1_sd: float = _number(0.001, "relative", 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "")
+
+    @classmethod
+    def standard(cls) -> RigFile:
+        """The standard rig of MATH.md 6, as a user who knows only l1 and the sensors would write it, and both exactly:
+        a simulation has no error of l1 or of the gain of y."""
+        sensor = Sensor(y_gain_sd=0.0)
+        return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sensor=sensor, sample_rate=1000.0, l1_sd=0.0)
+
+    @classmethod
+    def parse(cls, text: str, settings: Mapping[str, Any] | None = None) -> RigFile:
+        """From TOML text; PvidError names the key that is unknown, missing, of wrong type or out of range.
+
+        Parameters
+        ----------
+        settings
+            Keys and tables that come before those of the text.
+        """
+        top = _known(cls, _merged(toml_document(text), settings or {}), "")
+        if "l1" not in top:
+            raise PvidError("l1 is missing: the length of rod 1 [m]")
+        tables = {name: _table(top.pop(name, {}), name) for name in _TABLES}
+        top = _without_integers(cls, top)
+        _check_value(_field(cls, "l1"), top["l1"], "")
+        third = top["l1"] / 3.0
+        guess = {"l2": third, "rho2": third, **tables["nominal"]}
+        return cls(
+            nominal=Nominal(**guess),
+            sensor=Sensor(**tables["sensor"]),
+            identifier=Identifier(**tables["identifier"]),
+            **top,
+        )
+
+    def text(self) -> str:
+        """TOML text with every key and its unit; `parse` gives the same rig back."""
+        lines = _lines(self)
+        for name in ("sensor", "nominal", "identifier"):
+            lines += ["", f"[{name}]", *_lines(getattr(self, name))]
+        return "\n".join(lines) + "\n"
+
+    def write(self, path: str | Path) -> None:
+        """Writes `text` to a file."""
+        try:
+            write_whole(Path(path), self.text())
+        except OSError as error:
+            raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile:
+    """Reads a rig file; PvidError names the file and the key. `settings` come before what it holds."""
+    return parsed_file(path, lambda text: RigFile.parse(text, settings))
+
+
+def parsed_file(path: str | Path, parse: Callable[[str], _Parsed]) -> _Parsed:
+    """What `parse` makes of a file's text; PvidError names the file, and what `parse` names."""
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise PvidError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(data) > MOST_BYTES:
+        raise PvidError(f"{path}: {TOO_LONG}")
+    try:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except ValueError as error:
+        raise PvidError(f"{path}: is not UTF-8 text") from error
+    try:
+        return parse(text)
+    except PvidError as error:
+        raise PvidError(f"{path}: {error}") from error
+
+
+def check_setting(table: str, key: str, value: Any) -> Any:
+    """One value as a rig file holds it; PvidError names a key that is unknown, or has the wrong type or range.
+
+    Parameters
+    ----------
+    table
+        Name of the table; "" for the keys above them.
+    """
+    name = f"{table}.{key}" if table else key
+    if table and table not in _TABLES:
+        raise PvidError(f"{name!a}: a rig file has no table {table!a}; it has {', '.join(_TABLES)}")
+    owner = _TABLES[table] if table else RigFile
+    keys = [one.name for one in fields(owner) if one.name not in _TABLES]
+    if key not in keys:
+        within = [f"{other}.{key}" for other, one in _TABLES.items() if key in (f.name for f in fields(one))]
+        hint = f"it is {within[0]}" if within and not table else f"known are {', '.join(keys)}"
+        raise PvidError(f"{name!a} is not a key of a rig file; {hint}")
+    value = _without_integers(owner, {key: value})[key]
+    field_of = _field(owner, key)
+    _check_value(field_of, value, f"{table}." if table else "")
+    return value
+
+
+_TABLES: dict[str, type] = {"sensor": Sensor, "nominal": Nominal, "identifier": Identifier}
+
+
+def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The document with the settings in place of its own; a table takes them key by key."""
+    merged = dict(document)
+    for key, value in settings.items():
+        held = merged.get(key, {})
+        if key not in _TABLES:
+            merged[key] = value
+        elif isinstance(held, dict):  # else it is refused as what it is
+            merged[key] = {**held, **value}
+    return merged
+
+
+def _field(owner: type, name: str) -> Field[Any]:
+    return next(f for f in fields(owner) if f.name == name)
+
+
+def _known(owner: type, given: Mapping[str, Any], place: str) -> dict[str, Any]:
+    """The keys of a table, refused when the dataclass has no such field."""
+    names = [f.name for f in fields(owner)]
+    for key in given:
+        if key not in names:
+            raise PvidError(f"{place}{key!a} is not a key of a rig file; here are known {', '.join(names)}")
+    return dict(given)
+
+
+def _table(given: Any, name: str) -> dict[str, Any]:
+    if not isinstance(given, dict):
+        raise PvidError(f"{name} must be a table, [{name}], not {_shown(given)}")
+    return _without_integers(_TABLES[name], _known(_TABLES[name], given, f"[{name}] "))
+
+
+def _without_integers(owner: type, given: dict[str, Any]) -> dict[str, Any]:
+    """1000 stands for 1000.0 where a float is wanted."""
+
+    def converted(name: str, value: Any) -> Any:
+        key = _field(owner, name)
+        wants_float = "low" in key.metadata and not _wants_integer(key)
+        return float(value) if type(value) is int and wants_float and abs(value) < 2**53 else value
+
+    return {name: converted(name, value) for name, value in given.items()}
+
+
+def _wants_integer(key: Field[Any]) -> bool:
+    return key.default is not MISSING and type(key.default) is int
+
+
+def _check_fields(owner: Any, place: str) -> None:
+    for key in fields(owner):
+        if key.metadata or key.type == "bool":
+            _check_value(key, getattr(owner, key.name), place)
+
+
+def _check_value(key: Field[Any], value: Any, place: str) -> None:
+    """Refuses a value of the wrong type or out of the range in the field's metadata."""
+    name = f"{place}{key.name}"
+    if "choices" in key.metadata:
+        if value not in key.metadata["choices"]:
+            known = " or ".join(f'"{choice}"' for choice in key.metadata["choices"])
+            raise PvidError(f"{name} must be {known}, not {_shown(value)}")
+        return
+    if key.type == "bool":
+        if type(value) is not bool:
+            raise PvidError(f"{name} must be true or false, not {_shown(value)}")
+        return
+    if value is None and key.default is None:
+        return
+    wanted = int if _wants_integer(key) else float
+    if type(value) is not wanted and not (wanted is float and type(value) in (int, Unset)):
+        kind = "a whole number" if wanted is int else "a number"
+        raise PvidError(f"{name} must be {kind}, not {_shown(value)}")
+    low, high, unit = key.metadata["low"], key.metadata["high"], key.metadata["unit"]
+    if not low <= value <= high or (low == 0 and 0 < value < _LEAST):
+        wide = f"0 or from {_LEAST:g}" if low <= value <= high else f"from {low:g}"
+        wide = f"{wide} to {high:g} {unit}".rstrip()
+        raise PvidError(f"{name} must be {wide}, not {_shown(value)}")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    try:
+        text = ascii(value)
+    except (ValueError, RecursionError):  # thousands of digits, or of tables in one another
+        return "that"
+    return text if len(text) <= 40 else text[:40] + "..."
+
+
+# Fields that say nothing by default, and the property that holds what follows from the others.
+_DERIVED = {"outlier_gate": "gate", "outlier_patience_s": "patience_s"}
+
+
+def _lines(owner: Any) -> list[str]:
+    """`key = value  # unit` for each field that holds a value; in a comment what follows where it holds none."""
+    lines = []
+    for key in fields(owner):
+        value = getattr(owner, key.name)
+        if key.name in _TABLES:
+            continue
+        if value is None:
+            if key.name in _DERIVED:
+                lines.append(f"# {key.name} = {getattr(owner, _DERIVED[key.name])!r}")
+            continue
+        shown = (
+            f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)
+        )
+        unit = key.metadata.get("unit", "")
+        lines.append(f"{key.name} = {shown}" + (f"  # {unit}" if unit else ""))
+    return lines

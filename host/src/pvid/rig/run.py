@@ -1,0 +1,260 @@
+"""Recorded runs on disk: text tables, NPZ and Parquet, with every check a stranger's file needs.
+
+A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order and among others; `Columns` maps other names
+and units. Jumps of a whole turn are joined (`run_turns`), its clock is made uniform (`run_clock`) and short gaps are
+interpolated (`run_gaps`). `Run.notes` lists the corrections; a run that needs none keeps every bit. A fault of a file
+raises a `PvidError` of one sentence with the file and, if known, the line and the column.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.errors import PvidError
+from pvid.base.wording import reason
+from pvid.rig.array_table import read_npz, read_parquet, write_npz, write_parquet
+from pvid.rig.clock import Uniform, uniform
+from pvid.rig.columns import SIGNALS, Columns
+from pvid.rig.csv_table import read_csv, write_csv, write_csv_gz
+from pvid.rig.gaps import bridge, stretches
+from pvid.rig.table import Table, row_place
+from pvid.rig.turns import joined
+
+FloatArray = npt.NDArray[np.float64]
+Function = TypeVar("Function")
+
+# The shortest finite difference of order 4 takes 5 samples: fewer feed no form of the identifier.
+MIN_ROWS = 5
+
+_LARGEST = 1e12  # [rad] or [m]: counts of 40 bits
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One recorded run: three signals on a common, uniform clock.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Time [s].
+    phi : ndarray, shape (n,)
+        Measured relative angle [rad]; NaN at a tick without a sample.
+    y : ndarray, shape (n,)
+        Measured height of the pivot [m]; NaN likewise.
+    sample_rate : float
+        [Hz].
+    notes : tuple of str
+        What was done to the recording, a sentence each; empty when it is as recorded.
+    """
+
+    t: FloatArray
+    phi: FloatArray
+    y: FloatArray
+    sample_rate: float
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in SIGNALS:
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
+        for name in SIGNALS:
+            data = getattr(self, name)
+            if data.ndim != 1 or data.size != self.t.size:
+                raise PvidError(f"A run's column {name} must hold one number a sample ({self.t.size}).")
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    def refuse_damaged(self) -> None:
+        """Refuses numbers that no unit explains, and that overflow what is computed with them.
+
+        Raises
+        ------
+        PvidError
+            Naming the first.
+        """
+        for name in ("phi", "y"):
+            beyond = np.abs(getattr(self, name)) > _LARGEST
+            if beyond.any():
+                at = int(np.argmax(beyond))
+                raise PvidError(
+                    f"{name} is {getattr(self, name)[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: "
+                    "is the file damaged?"
+                )
+
+    def whole(self) -> Run:
+        """The longest stretch without a missing tick, for what cannot leave ticks out; this run when none is missing.
+
+        Raises
+        ------
+        PvidError
+            When no stretch has `MIN_ROWS` samples.
+        """
+        there = np.isfinite(self.phi) & np.isfinite(self.y)
+        if there.all():
+            return self
+        firsts, ends = stretches(there)
+        longest = int(np.argmax(ends - firsts)) if firsts.size else 0
+        if not firsts.size or ends[longest] - firsts[longest] < MIN_ROWS:
+            raise PvidError(f"the run has no {MIN_ROWS} samples in a row")
+        part = slice(int(firsts[longest]), int(ends[longest]))
+        t = self.t[part]
+        note = f"used is the longest stretch without a gap: {t[0]:.6g} s to {t[-1]:.6g} s"
+        return replace(self, t=t, phi=self.phi[part], y=self.y[part], notes=(*self.notes, note))
+
+
+def read_run(path: str | os.PathLike[str], rate: float | None = None, columns: Columns | None = None) -> Run:
+    """Read a run from a text table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, also ``.gz``), ``.npz`` or ``.parquet``.
+
+    Parameters
+    ----------
+    path : path
+    rate : float, optional
+        The sample rate the rig file promises [Hz].
+    columns : Columns, optional
+        Which columns are t, phi and y, and their units; those names, in SI, by default.
+
+    Raises
+    ------
+    PvidError
+        For anything that is wrong with the file and cannot be bridged.
+    """
+    if rate is not None and not 0 < rate < float("inf"):
+        raise PvidError(f"The sample rate must be a positive number of Hz, not {rate:g}.")
+    path = Path(path)
+    read = _format(path, _READERS)
+    try:
+        if path.is_dir():
+            raise PvidError(f"{path} is a directory, not a recorded run.")
+        if not path.exists():
+            raise PvidError(f"{path} does not exist.")
+        if not path.is_file():
+            raise PvidError(f"{path} is not a regular file.")
+        table = read(path, columns or Columns())
+    except (OSError, ValueError) as error:
+        raise PvidError(f"{path} cannot be read: {reason(error)}.") from error
+    except MemoryError as error:
+        raise PvidError(f"{path} does not fit into memory.") from error
+    return _run(_checked(table), rate)
+
+
+def write_run(path: str | os.PathLike[str], run: Run) -> None:
+    """Write a run; the suffix gives the format, and `read_run` gives every float64 back exactly.
+
+    The file appears whole or not at all (temporary file, then rename), and the same run gives the same bytes.
+
+    Raises
+    ------
+    PvidError
+        When the run is one that `read_run` would not give back, or the file cannot be written.
+    """
+    path = Path(path)
+    write = _format(path, _WRITERS)
+    for name in SIGNALS:
+        data = getattr(run, name)
+        if not np.isfinite(data).all():
+            row = int(np.argmin(np.isfinite(data)))
+            raise PvidError(f"{path} is not written: {row_place(row)}, column {name}: {data[row]} is no number.")
+    table = Table(path, run.t, run.phi, run.y, Columns(), row_place)
+    again = _run(_checked(table), run.sample_rate)
+    if again.notes:
+        raise PvidError(f"{path} is not written: {again.notes[0]}.")
+    content = write(path, {name: getattr(run, name) for name in SIGNALS})
+    try:
+        write_whole(path, content)
+    except OSError as error:
+        raise PvidError(f"{path} cannot be written: {reason(error)}.") from error
+
+
+def is_run(path: Path) -> bool:
+    """Whether a file's name is that of a recorded run."""
+    return path.name.lower().endswith(tuple(_READERS))
+
+
+def _checked(table: Table) -> Table:
+    """The rows between the first and the last sample; refused when there are too few, or a number is infinite."""
+    for signal in SIGNALS:
+        data = getattr(table, signal)
+        if np.isinf(data).any():
+            row = int(np.argmax(np.isinf(data)))
+            raise table.error(row, signal, f"{data[row]} is not a finite number")
+    there = np.isfinite(table.phi) & np.isfinite(table.y)
+    rows = int(np.count_nonzero(there))
+    if rows < MIN_ROWS:
+        raise PvidError(f"{table.path} has {rows} rows of data; a run needs at least {MIN_ROWS}.")
+    first, last = int(np.argmax(there)), there.size - 1 - int(np.argmax(there[::-1]))
+    if not np.isfinite(table.t[first : last + 1]).all():
+        row = first + int(np.argmin(np.isfinite(table.t[first : last + 1])))
+        raise table.error(row, "t", "the cell is empty or nan, and only phi and y may be missing")
+    if (first, last) == (0, there.size - 1):
+        return table
+    part = slice(first, last + 1)
+    note = f"rows without numbers at the ends, left out: {there.size - (last + 1 - first)}"
+    return replace(
+        table,
+        t=table.t[part],
+        phi=table.phi[part],
+        y=table.y[part],
+        place=lambda row: table.place(row + first),
+        notes=(*table.notes, note),
+    )
+
+
+def _run(table: Table, rate: float | None) -> Run:
+    phi, jumps = joined(table.phi)
+    if jumps:
+        name = table.columns["phi"].name
+        note = f"{name} jumps by a turn, {jumps} times: joined (the encoder starts over there)"
+        table = replace(table, phi=phi, notes=(*table.notes, note))
+    clocked = uniform(table, rate)
+    firsts, ends = bridge(clocked.phi, clocked.y, clocked.sample_rate)
+    notes = (*clocked.notes, *_gap_notes(clocked, firsts, ends))
+    return Run(clocked.t, clocked.phi, clocked.y, clocked.sample_rate, notes)
+
+
+def _gap_notes(clocked: Uniform, firsts: npt.NDArray[np.int64], ends: npt.NDArray[np.int64]) -> tuple[str, ...]:
+    lengths = ends - firsts
+    rate = clocked.sample_rate
+    filled = np.isfinite(clocked.phi[firsts])
+    notes = []
+    for chosen, done in (
+        (filled, "interpolated"),
+        (~filled, "which cannot be interpolated: the identifier starts its windows again behind each"),
+    ):
+        if chosen.any():
+            count = int(np.count_nonzero(chosen))
+            samples = int(lengths[chosen].sum())
+            at = float(clocked.t[firsts[chosen][0]])
+            longest = float(lengths[chosen].max()) / rate
+            notes.append(
+                f"missing samples: {samples} of {clocked.t.size}, in {count} gap{'s' if count > 1 else ''} (first at "
+                f"{at:.6g} s, longest {longest:.3g} s), {done}"
+            )
+    return tuple(notes)
+
+
+_READERS: dict[str, Callable[[Path, Columns], Table]] = {
+    **{f"{suffix}{zipped}": read_csv for suffix in (".csv", ".tsv", ".txt", ".dat") for zipped in ("", ".gz")},
+    ".npz": read_npz,
+    ".parquet": read_parquet,
+}
+_WRITERS: dict[str, Callable[[Path, dict[str, FloatArray]], bytes]] = {
+    ".csv": write_csv,
+    ".csv.gz": write_csv_gz,
+    ".npz": write_npz,
+    ".parquet": write_parquet,
+}
+
+
+def _format(path: Path, formats: Mapping[str, Function]) -> Function:
+    for suffix, function in formats.items():
+        if path.name.lower().endswith(suffix):
+            return function
+    raise PvidError(f"{path} has no name of a run: it must end in {', '.join(formats)}.")

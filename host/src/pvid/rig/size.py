@@ -1,0 +1,36 @@
+"""How long a recorded run may be: what this machine's memory holds of it while it is identified."""
+
+from __future__ import annotations
+
+import os
+import resource
+from pathlib import Path
+
+from pvid.base.errors import PvidError
+
+MOST_ROWS = 50_000_000  # 14 hours at 1 kHz
+BYTES_A_ROW = 160  # of memory while a run is read and identified, measured: 140 (bench reading has the reader's part)
+_SHARE = 0.8  # of the memory
+
+
+def most_rows() -> int:
+    """Of a run that is read on this machine."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if soft != resource.RLIM_INFINITY:
+        memory = min(memory, soft)
+    return min(MOST_ROWS, int(_SHARE * memory) // BYTES_A_ROW)
+
+
+def refuse_beyond(path: Path, rows: int) -> None:
+    """Refuses a file of more rows.
+
+    Raises
+    ------
+    PvidError
+        Naming the limit.
+    """
+    most = most_rows()
+    if rows > most:
+        why = "no run is that long" if most == MOST_ROWS else "this machine has memory for no more"
+        raise PvidError(f"{path} has more than {most} rows of data, and {why}: divide it, or record at a lower rate")

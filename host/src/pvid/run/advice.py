@@ -1,0 +1,558 @@
+"""What is likely to be wrong with a run that gives no answer, or a doubtful one, and what to type about it.
+
+Mistakes of units are seen in magnitudes; the others in trials: the run is identified again with the suspected mistake
+put right, which takes some hundredths of a second, and the trial that answers, or leaves much less unexplained,
+is believed. What is found is put right before the search goes on, so that two mistakes give two sentences, and one
+mistake one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.core.native import Native, Reason
+from pvid.models.kapitza.modes import modes_hz
+from pvid.oracle.weak import VALID_ANGLE
+from pvid.rig.file import RigFile, Unset
+from pvid.rig.run import Run
+from pvid.rig.sensor_steps import resolution_of
+from pvid.rig.turns import joined
+from pvid.run.excitation import excitation_of
+from pvid.run.identify import Identification, identify
+from pvid.run.survey import fitted
+from pvid.setup.f32 import nominal_start
+from pvid.setup.ranges_q31 import pivot_acceleration, reach
+
+GRAVITY = 9.81  # m/s^2
+_MOST_GRAVITY = 1.02 * 9.83  # nowhere on Earth is more
+_TILTED = 0.5  # of gravity, and of the rig file's: a plane that is tilted by 60 degrees is rare
+
+_LOWEST_RATE = 25.0  # Hz
+_LIKELY_RATES = (50.0, 20_000.0)
+_LONGEST_ROD = 3.0  # m
+_LIKELY_RODS = (0.03, 2.0)  # m
+_MOST_ACCELERATION = 3.0  # of the pivot [gravity], rms
+_LIKELY_ACCELERATION = (0.005, 2.0)
+_WIDE_SWING = 1.0  # rad: a swing of a few degrees looks like it when it is read as radians
+_SMALL_ANGLE = 0.05  # rad: below, what sines leave is within a 14-bit encoder's noise
+_USUAL_SWING = 0.75 * VALID_ANGLE  # small angles do not show the counts of a turn: it is taken for one of these
+_FULL_TURN = 2 * math.pi
+_FAR_REST = 1.5  # rad
+_LSB_OFF = 0.3
+_MANY_STEPS = 30.0
+_WHOLE_BITS = 0.01  # a turn of 2 pi is off by 0.16
+
+_FADING = 2.5  # rms of the swing in the first fifth of a run, over that in the last
+
+_LINEAR_TOLD = 0.005  # error of fixed point's linear rows, relative
+
+_MOST_SAMPLES = 200_000  # of a run, for trials
+_BETTER = 0.5  # chi^2 of a trial that is believed, over that without it
+_EXPLAINED = 3.0  # chi^2 at which nothing in the equations is looked for
+_MOST_ROUNDS = 4
+_CLOCK_OFF = 0.3  # less does not keep a run from being answered
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run and its rig, as given or with mistakes put right."""
+
+    run: Run
+    rig: RigFile
+
+
+@dataclass(frozen=True)
+class Cure:
+    """A mistake, in a sentence with what to type, and the case without it."""
+
+    sentence: str
+    case: Case
+
+
+def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tuple[str, ...]:
+    """Sentences on what is likely to be wrong; () for a run that has been answered without a warning and whose sensors
+    and scales are plausible.
+
+    Parameters
+    ----------
+    run, rig
+        As given to `identify`.
+    result
+        What it returned.
+    native
+        The C core, for trials.
+    """
+    case = Case(_shortened(run), rig)
+    if result.beyond_words is not None and not result.identified:
+        return (_wider_ranges(result),)
+    if result.parts_disagree and result.skew != 0.0:
+        delay = rig.sensor.y_delay + result.skew
+        return (f"phi and y are not sampled at one instant: do so, or use --set sensor.y_delay={delay:.3g}",)
+    if _is_good(result):
+        if result.linear_error > _LINEAR_TOLD:
+            return (
+                f"{_not_corrected(result)}; its standard errors contain {100 * result.linear_error:.2g} % for that",
+            )
+        degrees = _angle_in_degrees(case, native)
+        if degrees:
+            return (degrees[0].sentence,)
+        # the answer's own start and design serve the trials
+        found, case, now = _put_right(Case(case.run, _settled(case)), native, units=False)
+    else:
+        found, case, now = _put_right(case, native)
+    if not found:
+        found = list(_remaining(case, result, now))
+    elif not _is_good(result) and not _answers(now):  # there is more to it
+        found += _remaining(case, now or result, now)
+    answer = now if now is not None and _answers(now) else result
+    if answer.identified:
+        found += _clock_of(answer, rig)
+    return tuple(found)
+
+
+def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]:
+    """Sentences on a run whose rig file's settings were refused."""
+    return tuple(_put_right(Case(_shortened(run), rig), native)[0])
+
+
+def behind(advices: tuple[str, ...], error: PvidError) -> PvidError:
+    """A refusal behind the mistakes that it follows from."""
+    return PvidError(f"{'; '.join(advices)} (as it is: {error})" if advices else str(error))
+
+
+def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str], Case, Identification | None]:
+    """What is found, the case without it, and what this gives; without `units` only sensors and equations are looked
+    at."""
+    found: list[str] = []
+    for _ in range(_MOST_ROUNDS if units else 0):
+        cure = _unit_mistake(case, native)
+        if cure is None or cure.sentence in found:
+            break
+        found.append(cure.sentence)
+        case = cure.case
+    now = _trial(case, native)
+    for search in (_exchanged, _step_of, _equation_mistake):
+        for _ in range(_MOST_ROUNDS):
+            cure = None if search is _equation_mistake and _is_explained(now) else search(case, now, native)
+            if cure is None or cure.sentence in found:
+                break
+            found.append(cure.sentence)
+            case, now = cure.case, _trial(cure.case, native)
+    return found, case, now
+
+
+# ---- trials
+
+
+def _shortened(run: Run) -> Run:
+    if len(run.t) <= _MOST_SAMPLES:
+        return run
+    first = slice(_MOST_SAMPLES)
+    return replace(run, t=run.t[first], phi=run.phi[first], y=run.y[first])
+
+
+def _trial(case: Case, native: Native) -> Identification | None:
+    """The case in the weak form and float32, its residuals held against the sensors' noise alone; None where the
+    settings are refused."""
+    identifier = case.rig.identifier
+    float32 = replace(identifier, core="f32", form="weak", law="stationary", window_s=_weak_window(case.rig))
+    try:
+        return identify(case.run, _settled(Case(case.run, replace(case.rig, identifier=float32))), native, points=1)
+    except PvidError:
+        return None
+
+
+def _settled(case: Case) -> RigFile:
+    """The rig with what the run's survey finds, but for the disturbance that explains the rest."""
+    rig = fitted(case.rig, case.run)
+    return replace(rig, identifier=replace(rig.identifier, disturbance=case.rig.identifier.disturbance))
+
+
+def _weak_window(rig: RigFile) -> float:
+    return rig.identifier.window_s if rig.identifier.form == "weak" else 0.0
+
+
+def _is_good(result: Identification | None) -> bool:
+    return result is not None and result.identified and result.warning is None
+
+
+def _is_explained(result: Identification | None) -> bool:
+    return _is_good(result) and result is not None and (result.chi2 is None or result.chi2 < _EXPLAINED)
+
+
+def _answers(trial: Identification | None) -> bool:
+    """With parameters that some pendulum has."""
+    return trial is not None and trial.identified and "g" in trial.value
+
+
+def _is_better(trial: Identification | None, now: Identification | None) -> bool:
+    """Whether a trial answers where there was no answer, or leaves much less unexplained."""
+    if trial is None or not _answers(trial):
+        return False
+    if now is None or not now.identified:
+        return True
+    if trial.chi2 is None or now.chi2 is None:
+        return trial.warning is None and now.warning is not None
+    return trial.chi2 < _BETTER * now.chi2
+
+
+# ---- units
+
+
+def _unit_mistake(case: Case, native: Native) -> Cure | None:
+    """The first mistake of a unit that magnitudes show; of several units the one that answers."""
+    for cures in (
+        _time_unit(case),
+        _angle_in_counts(case),
+        _angle_in_degrees(case, native),
+        _far_rest(case),
+        _rod_units(case),
+        _height_units(case),
+    ):
+        if len(cures) > 1:
+            return next((cure for cure in cures if _answers(_trial(cure.case, native))), cures[0])
+        if cures:
+            return cures[0]
+    return None
+
+
+def _time_unit(case: Case) -> list[Cure]:
+    run = case.run
+    if run.sample_rate >= _LOWEST_RATE:
+        return []
+    for unit, words, factor in (("ms", "milliseconds", 1e3), ("us", "microseconds", 1e6), ("ns", "nanoseconds", 1e9)):
+        rate = run.sample_rate * factor
+        if _LIKELY_RATES[0] <= rate <= _LIKELY_RATES[1]:
+            right = replace(run, t=run.t / factor, sample_rate=rate)
+            return [
+                Cure(
+                    f"t looks like {words} (in seconds the sample rate is {run.sample_rate:.3g} Hz): "
+                    f"use --columns t=t:{unit}",
+                    Case(right, case.rig),
+                )
+            ]
+    return []
+
+
+def _swing(run: Run) -> tuple[float, float]:
+    """Where phi rests, about, and how far it goes from there [rad]."""
+    phi = run.phi[np.isfinite(run.phi)]
+    rest = float(np.median(phi)) if len(phi) else 0.0
+    return rest, float(np.abs(phi - rest).max(initial=0.0))
+
+
+def _angle_in_counts(case: Case) -> list[Cure]:
+    phi = case.run.phi[np.isfinite(case.run.phi)]
+    _, swing = _swing(case.run)
+    if swing < _MANY_STEPS or (phi != np.rint(phi)).any():
+        return []
+    counts = next((n for n in (2**bits for bits in range(9, 21)) if _FULL_TURN * swing / n < _USUAL_SWING), 2**20)
+    right = replace(case.run, phi=joined(case.run.phi * _FULL_TURN / counts)[0])
+    lsb = replace(case.rig.sensor, phi_lsb=_FULL_TURN / counts)
+    return [
+        Cure(
+            f"phi looks like counts of the encoder (whole numbers, {2 * swing:.0f} of them): use --columns "
+            f"phi=phi:rev/N with N the counts of a turn, 4096 for 12 bits",
+            Case(right, replace(case.rig, sensor=lsb)),
+        )
+    ]
+
+
+def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
+    """By its swing, where that is a whole turn or a trial in degrees is answered better; or by the encoder's step."""
+    run = case.run
+    _, swing = _swing(run)
+    step = resolution_of(run.phi)
+    by_step = step is not None and _is_step_in_degrees(step, case.rig.sensor.phi_lsb)
+    if swing < _WIDE_SWING and not by_step:
+        return []
+    in_degrees = Case(replace(run, phi=joined(np.radians(run.phi))[0]), case.rig)
+    if swing < _FULL_TURN and not by_step and not _is_better(_trial(in_degrees, native), _trial(case, native)):
+        return []
+    return [
+        Cure(
+            f"phi looks like degrees (it swings by {swing:.3g} to a side): use --columns phi=phi:deg",
+            in_degrees,
+        )
+    ]
+
+
+def _is_step_in_degrees(step: float, lsb: float) -> bool:
+    """Whether an encoder's step is what the rig file gives, in degrees; or, where it does not give it, a turn of 360
+    over a power of two."""
+    if not isinstance(lsb, Unset):
+        return lsb > 0 and abs(math.degrees(lsb) / step - 1) < 0.1
+    bits = math.log2(360.0 / step)
+    return bits > 6 and abs(bits - round(bits)) < _WHOLE_BITS
+
+
+def _far_rest(case: Case) -> list[Cure]:
+    rest, swing = _swing(case.run)
+    if abs(rest - case.rig.sensor.phi_zero) < max(_FAR_REST, 2 * swing):
+        return []
+    turned = abs(math.remainder(rest, _FULL_TURN)) > math.pi / 2
+    half = " (a half turn: is it counted from where link 2 points the other way?)" if turned else ""
+    sensor = replace(case.rig.sensor, phi_zero=float(f"{rest:.3g}"))
+    return [
+        Cure(
+            f"phi rests at {rest:.4g} rad{half}: use --set sensor.phi_zero={rest:.3g}",
+            Case(case.run, replace(case.rig, sensor=sensor)),
+        )
+    ]
+
+
+def _rod_units(case: Case) -> list[Cure]:
+    rig = case.rig
+    if rig.l1 <= _LONGEST_ROD:
+        return []
+    cures = []
+    for words, factor in (("centimetres", 0.01), ("millimetres", 0.001)):
+        l1 = rig.l1 * factor
+        if _LIKELY_RODS[0] <= l1 <= _LIKELY_RODS[1]:
+            guess = replace(rig.nominal, l2=rig.nominal.l2 * factor, rho2=rig.nominal.rho2 * factor)
+            cures.append(
+                Cure(
+                    f"l1 = {rig.l1:g} m looks like {words}: use --set l1={l1:g}",
+                    Case(case.run, replace(rig, l1=l1, nominal=guess)),
+                )
+            )
+    return cures
+
+
+def _height_units(case: Case) -> list[Cure]:
+    run = case.run
+    acceleration = np.sort(np.abs(pivot_acceleration(run)))[: int(0.999 * len(run.y))]
+    rms = float(np.sqrt(np.mean(acceleration**2))) / GRAVITY if len(acceleration) else 0.0
+    largest = reach(run.y)
+    if rms < _MOST_ACCELERATION or largest < case.rig.l1:
+        return []
+    cures = []
+    for unit, words, factor in (("mm", "millimetres", 1e-3), ("cm", "centimetres", 1e-2), ("um", "micrometres", 1e-6)):
+        if _LIKELY_ACCELERATION[0] <= rms * factor <= _LIKELY_ACCELERATION[1]:
+            cures.append(
+                Cure(
+                    f"y looks like {words} (largest |y| is {largest:.3g}, l1 is {case.rig.l1:g} m): "
+                    f"use --columns y=y:{unit}",
+                    Case(replace(run, y=run.y * factor), case.rig),
+                )
+            )
+    return cures
+
+
+# ---- sensors
+
+
+def _exchanged(case: Case, now: Identification | None, native: Native) -> Cure | None:
+    """phi and y in one another's place, where the run is answered only with both in their own."""
+    if now is not None and now.identified:
+        return None
+    sensor = case.rig.sensor
+    steps = [resolution_of(values) for values in (case.run.y, case.run.phi)]
+    try:
+        lsb = replace(sensor, phi_lsb=steps[0] or sensor.phi_lsb, y_lsb=steps[1] or sensor.y_lsb)
+        right = Case(replace(case.run, phi=case.run.y, y=case.run.phi), replace(case.rig, sensor=lsb))
+    except PvidError:
+        return None
+    trial = _trial(right, native)
+    if not (_is_good(trial) and _answers(trial)):
+        return None
+    return Cure(
+        "phi and y are exchanged, it seems (the other way round the run is explained): use --columns phi=y,y=phi",
+        right,
+    )
+
+
+def _step_of(case: Case, now: Identification | None, native: Native) -> Cure | None:
+    return next(iter(_steps(case)), None)
+
+
+def _steps(case: Case) -> list[Cure]:
+    """Resolutions that the rig file gives otherwise than the run shows them."""
+    sensor, cures = case.rig.sensor, []
+    for name, values, given, unit in (
+        ("phi_lsb", case.run.phi, sensor.phi_lsb, "rad"),
+        ("y_lsb", case.run.y, sensor.y_lsb, "m"),
+    ):
+        step = None if isinstance(given, Unset) else resolution_of(values)
+        if step is None or abs(math.log(max(given, 1e-12) / step)) <= math.log(1 + _LSB_OFF):
+            continue
+        right = replace(sensor, **{name: float(f"{step:.4g}")})
+        cures.append(
+            Cure(
+                f"{name[:-4]} moves in steps of {step:.4g} {unit}, and {name} is {given:.4g}: "
+                f"use --set sensor.{name}={step:.4g}",
+                Case(case.run, replace(case.rig, sensor=right)),
+            )
+        )
+    return cures
+
+
+# ---- equations
+
+
+def _equation_mistake(case: Case, now: Identification | None, native: Native) -> Cure | None:
+    """The one that a trial confirms best."""
+    best: tuple[Cure, Identification] | None = None
+    for cure in _suspected(case, now):
+        trial = _trial(cure.case, native)
+        if trial is not None and _is_better(trial, now) and (best is None or _is_better(trial, best[1])):
+            best = cure, trial
+    return best[0] if best is not None else _first_answered(case, now, native)
+
+
+def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
+    run, rig = case.run, case.rig
+
+    def with_identifier(**changed: bool) -> Case:
+        return Case(run, replace(rig, identifier=replace(rig.identifier, **changed)))  # type: ignore[arg-type]
+
+    if now is None or not now.identified:
+        yield Cure(
+            "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
+            Case(replace(run, y=-run.y), rig),
+        )
+    largest = now.largest_angle if now is not None else _swing(run)[1]
+    if not rig.identifier.full_angle:
+        yield Cure(
+            f"angles go to {largest:.2g} rad, and sin phi is not phi there: use --set identifier.full_angle=true"
+            + (" with --core f32" if rig.identifier.core == "q31" else ""),
+            with_identifier(full_angle=True),
+        )
+    elif rig.identifier.form == "weak" and rig.identifier.core != "q31":
+        yield Cure(
+            "the run follows the equations of small angles, as a simulation of them does: use "
+            "--set identifier.full_angle=false",
+            with_identifier(full_angle=False),
+        )
+    if not rig.identifier.damping and rig.identifier.zero:
+        yield Cure(
+            "there is friction in the joints: use --set identifier.damping=true"
+            + (" with --core f32" if rig.identifier.core == "q31" else ""),
+            with_identifier(damping=True),
+        )
+
+
+def _first_answered(case: Case, now: Identification | None, native: Native) -> Cure | None:
+    """Another clock with which a run is answered that was not."""
+    return None if now is not None and now.identified else _clock(case, native)
+
+
+def _at_rate(case: Case, factor: float) -> Case:
+    run = replace(case.run, t=case.run.t / factor, sample_rate=case.run.sample_rate * factor)
+    return Case(run, replace(case.rig, sample_rate=None))
+
+
+def _clock(case: Case, native: Native) -> Cure | None:
+    """A clock that runs too slow or too fast. Any explains a run, with another gravity: one is tried that brings what
+    phi does most to the nominal slow mode, and gravity tells which is right."""
+    slow = (modes_hz(nominal_start(case.rig)) or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
+    tried = slow / _dominant_hz(case.run)
+    if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
+        return None
+    trial = _trial(_at_rate(case, tried), native)
+    if trial is None or not _answers(trial):
+        return None
+    factor = tried * math.sqrt(GRAVITY / trial.value["g"])
+    right = _at_rate(case, factor)
+    if abs(math.log(factor)) < math.log(1 + _CLOCK_OFF) or not _answers(_trial(right, native)):
+        return None
+    rate = case.run.sample_rate
+    return Cure(
+        f"t seems {_size(factor)} (gravity is 9.8 m/s^2 with {rate * factor:.3g} samples a second, not {rate:.4g}): "
+        f"if so, use --columns t=t:{1 / factor:.3g}",
+        right,
+    )
+
+
+def _dominant_hz(run: Run) -> float:
+    """Where phi's spectrum is largest [Hz]; at least two periods a run."""
+    phi = np.where(np.isfinite(run.phi), run.phi, np.nanmedian(run.phi))
+    power = np.abs(np.fft.rfft((phi - phi.mean()) * np.hanning(len(phi)))) ** 2
+    return float(max(2, int(np.argmax(power[2:])) + 2)) * run.sample_rate / len(phi)
+
+
+def _size(ratio: float) -> str:
+    """Of what is `ratio` times what it should be."""
+    return f"{ratio:.3g} times too large" if ratio > 1 else f"{1 / ratio:.3g} times too small"
+
+
+def _clock_of(result: Identification, rig: RigFile) -> tuple[str, ...]:
+    """Of an answer whose gravity is more than the Earth's, or much less than that and the rig file's."""
+    g, error = result.value.get("g", GRAVITY), 3 * result.se.get("g", 0.0)
+    if g - error > _MOST_GRAVITY:
+        unless = ""
+    elif g + error < _TILTED * min(GRAVITY, rig.nominal.g):
+        unless = f"unless the plane is tilted by {math.degrees(math.acos(min(g / GRAVITY, 1.0))):.0f} degrees, "
+    else:
+        return ()
+    ratio = g / GRAVITY
+    return (
+        f"g* = {g:.3g} m/s^2 is {ratio:.3g} times gravity: {unless}t is {_size(1 / math.sqrt(ratio))} (if so, use "
+        f"--columns t=t:{math.sqrt(ratio):.3g}), or y is {_size(ratio)} (--columns y=y:{1 / ratio:.3g})",
+    )
+
+
+# ---- what remains
+
+
+def _wider_ranges(result: Identification) -> str:
+    assert result.beyond is not None
+    names = [name for name in ("phi", "y", "acceleration") if getattr(result.beyond, name)]
+    return (
+        f"{result.beyond_words}: raise {' and '.join(f'{name}_range' for name in names)} in the rig file, "
+        f"or leave out the key, and the run sets it"
+    )
+
+
+def _remaining(case: Case, result: Identification, now: Identification | None) -> Iterator[str]:
+    """Of a run in which no mistake was found; `now` is what the weak form in float32 makes of it."""
+    if _is_good(result):
+        return
+    if result.form == "strong" and _is_good(now):
+        yield "the strong form needs an encoder of 20 bits and more: use --form weak, which explains this run"
+        return
+    if result.law != "stationary" and _is_good(now):
+        yield "equation (5) does not arrive from this guess: use --law stationary, which explains this run"
+        return
+    if result.core == "q31" and _answers(now):
+        if result.largest_angle > _SMALL_ANGLE:
+            yield _not_corrected(result)
+        else:
+            yield "fixed point does not resolve this run: use --core f32, which answers it"
+        return
+    excitation = excitation_of(case.run, case.rig)
+    if excitation.weak is not None:
+        yield excitation.weak
+    elif result.largest_angle > VALID_ANGLE:
+        yield (
+            f"angles go to {result.largest_angle:.2g} rad, and the equations are corrected up to {VALID_ANGLE:g} rad: "
+            f"release the pendulum from a smaller angle, or drive it less near its modes"
+        )
+    elif result.identified:
+        return
+    elif excitation.fading > _FADING:
+        yield (
+            f"the swing dies away (to {100 / excitation.fading:.0f} % of what it was at first): friction in the joints "
+            f"leaves too little motion: reduce it, or drive the pivot harder"
+            + ("" if case.rig.identifier.damping else ", and use --set identifier.damping=true")
+        )
+    elif result.status == Reason.HELD_UNCERTAIN.text:
+        yield "the standard errors are still too wide: record longer, drive the pivot harder, or use a finer encoder"
+    else:
+        yield (
+            "the run does not follow the equations of a pendulum on a moving pivot, with any unit, sign or clock "
+            "that was tried: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
+            "sampled at the same time, and does nothing rub or hit?"
+        )
+
+
+def _not_corrected(result: Identification) -> str:
+    return (
+        f"angles go to {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
+        f"--core f32, or smaller angles"
+    )

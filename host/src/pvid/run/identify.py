@@ -1,0 +1,745 @@
+"""One run through one core: the answer that `pvid identify` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.core.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
+from pvid.core.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.models.kapitza.modes import modes_hz
+from pvid.oracle import strong as oracle
+from pvid.oracle.scale_errors import added_covariance, scale_errors
+from pvid.oracle.weak import WeakSettings, identify_weak
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.run.excitation import excitation_of
+from pvid.run.linear_rows import linear_error
+from pvid.run.survey import fitted
+from pvid.run.verdict import DISAGREES, verdict
+from pvid.setup.f32 import bank_of, config_of, weak_design_of
+from pvid.setup.q31 import beyond_range, config_for_run, counts_of, covariance_of, p_of, se_of
+from pvid.setup.ranges_q31 import Beyond, with_ranges_of
+
+Float = npt.NDArray[np.float64]
+
+LINEAR = ("w", "d1", "d2")
+NAMED = 4  # parameters that are published; what friction the weak form estimates beside them only absorbs
+ZERO = "c"
+
+# With w known no better than this, relative, nothing is identified.
+WORST_SE = 0.1
+# The fixed-point core's linear rows err by more at angles at which nothing is identified; as the core's own se_max.
+WORST_LINEAR = 0.05
+
+# What the strong form says of an estimate that is one.
+_GOOD = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
+
+_FADING = 4  # windows after the correction's switch (weak_oracle)
+
+# Windows that the float64 core's alarm wants to have seen.
+MISFIT_WINDOWS = 16
+
+# Status of a run that gave nothing because samples lay beyond the fixed-point core's ranges.
+SATURATED = "saturated"
+# Of a run that is driven and moves, and in which the core sees no drive: its equations do not explain it.
+UNEXPLAINED = "held not explained"
+
+PHYSICAL = ("g", "l2", "rho2")
+UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", "rho2": "m"}
+
+
+# Samples beyond the fixed-point core's ranges: of an answer, from this share on they are worth a warning.
+_BEYOND_WARNED = 0.01
+# Each of them costs a window: with so many, one or two a second at 1 kHz, nothing else needs to be wrong.
+_BEYOND_FATAL = 1e-3
+
+
+# An answer that fewer windows published than this share, and the last ones not, is doubtful.
+_RARELY = 0.1
+
+
+# Share of the motion from which on a warning tells what is left unexplained.
+_UNEXPLAINED_TOLD = 1e-3
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Estimates over time, for a figure: t [n] in s, p and se [n, 3]; physical and its errors [n, 3], NaN outside
+    the physical region; kappa [n]. Standard errors contain those of the scales, as Identification.se does."""
+
+    t: Float
+    p: Float
+    se: Float
+    physical: Float
+    physical_se: Float
+    kappa: Float
+
+
+@dataclass(frozen=True)
+class Publications:
+    """Every estimate that was published during a run: t [n] in s, p = (w, d1, d2) and its standard errors [n, 3], and
+    whether the alarm stood beside it [n]."""
+
+    t: Float
+    p: Float
+    se: Float
+    alarm: npt.NDArray[np.bool_]
+
+    @classmethod
+    def none(cls) -> Publications:
+        """Of a run in which nothing was published, or of a form that publishes nothing."""
+        return cls(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.bool_))
+
+
+@dataclass(frozen=True)
+class ErrorParts:
+    """What a standard error is made of, in the parameter's unit: the larger of the core's own and of the scatter of the
+    run's windows; the gain of y; l1."""
+
+    noise: float
+    y_gain: float
+    l1: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a run gave.
+
+    value, se
+        w, d1, d2 [1/s^2, -, -], c [rad] where it is estimated and, inside the physical region, g, l2, rho2
+        [m/s^2, m, m], with their standard errors. Where `identified` is false they are the start, not an estimate.
+    parts
+        of the standard errors, where something is identified
+    friction
+        c1, c2 [m^2/s] of pivot and joint, where they are estimated; else ()
+    kappa
+        part of w's information that d1 and d2 cannot imitate
+    trusted_s, first_publication_s
+        when the core published last and first [s]; None: never. In the strong form, which publishes whatever it has,
+        trusted_s is None
+    chi2
+        variance of the residuals over what the sensors' noise explains; None: not judged yet, or the strong form
+    unexplained
+        share of the motion that the equations leave unexplained, rms; None in the strong form
+    skew
+        how much later y seems to be sampled than phi [s]; 0 where that explains nothing
+    judged
+        whether the run had enough windows to compare the estimate with; True where no verdict is asked for
+    linear_error
+        what the fixed-point core's linear rows put into the standard errors, the largest of w, d1, d2, relative; 0 in
+        other cores
+    parts_disagree
+        the run's windows, corrected for large angles, want another estimate than the one published, or scatter, by
+        much more than the core's standard errors say
+    alarm
+        whether chi2 is too much. The strong form's is its own (pvid/misfit.h); float64 has none
+    status
+        the last tick's reason in words; of a run that the fixed-point core could not take in, that
+    ticks, updates, lost
+        samples; steps of the estimate; samples that were rejected
+    reasons
+        how often each reason came, in ticks (core f64: in windows or rows)
+    largest_angle
+        of phi from its rest [rad]
+    beyond
+        samples beyond the ranges of the fixed-point core, and `beyond_words`, a clause on them; None in other cores
+    notes
+        on how the run was read
+    advice
+        sentences on what is likely to be wrong, and its cure (pvid.run.advice)
+    publications
+        of the weak form's C cores; their standard errors contain those of the scales, too
+    hash
+        None where the core has none (f64)
+    """
+
+    value: dict[str, float]
+    se: dict[str, float]
+    kappa: float
+    trusted_s: float | None
+    chi2: float | None
+    alarm: bool
+    status: str
+    ticks: int
+    updates: int
+    lost: int
+    hash: int | None
+    core: str
+    form: str
+    law: str
+    on: str
+    trajectory: Trajectory
+    publications: Publications
+    unexplained: float | None = None
+    parts_disagree: bool = False
+    skew: float = 0.0
+    linear_error: float = 0.0
+    judged: bool = True
+    parts: dict[str, ErrorParts] = field(default_factory=dict)
+    friction: tuple[float, ...] = ()
+    first_publication_s: float | None = None
+    reasons: Mapping[str, int] = field(default_factory=dict)
+    largest_angle: float = 0.0
+    beyond: Beyond | None = None
+    beyond_words: str | None = None
+    notes: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ()
+
+    @property
+    def identified(self) -> bool:
+        """Whether this is an answer: one that was trusted; in the strong form, whose last word is no refusal and whose
+        w is known."""
+        return _is_answer(self.form, self.trusted_s, self.updates, self.status, self.se["w"], self.value["w"])
+
+    @property
+    def modes_hz(self) -> tuple[float, ...]:
+        """The slow and the fast mode of the estimate [Hz]; () where nothing is identified."""
+        return modes_hz(np.array([self.value[name] for name in LINEAR])) if self.identified else ()
+
+    @property
+    def warning(self) -> str | None:
+        """What makes the answer doubtful, in words; None if nothing does."""
+        words = []
+        if self.alarm and self.chi2 is not None:
+            words.append(
+                f"the residuals have {self.chi2:.1f} times the variance that the sensors' noise explains: large "
+                f"angles, friction, or a wrong phi_lsb; the errors are larger than the standard errors say"
+            )
+        elif self.alarm:
+            words.append(
+                "the rows leave more unexplained than they should: too coarse an encoder for the strong form, a jolt "
+                "in sums that do not forget it, or a mechanism that has changed; the estimate is not to be believed"
+            )
+        if self.parts_disagree and self.skew != 0.0:
+            when = "later" if self.skew > 0 else "earlier"
+            words.append(
+                f"y seems to be sampled {1e3 * abs(self.skew):.2g} ms {when} than phi; the standard errors cover it"
+            )
+        elif self.parts_disagree:
+            words.append(
+                "the windows of the run disagree with the estimate or with one another: friction, large angles or a "
+                "mechanism that has changed; the standard errors cover the disagreement"
+            )
+        if not self.judged:
+            words.append("too few windows of the run can be compared with the estimate: a short run, or large angles")
+        if self.is_old and (self.parts_disagree or self._share_published < _RARELY):
+            words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
+        if words and self.unexplained is not None and self.unexplained >= _UNEXPLAINED_TOLD:
+            words.append(f"the equations leave {100 * self.unexplained:.2g} % of the motion unexplained")
+        if self.identified and self.beyond is not None and self.beyond.share >= _BEYOND_WARNED:
+            words.append(f"{self.beyond_words}: those samples were left out")
+        return "; ".join(words) or None
+
+    @property
+    def is_old(self) -> bool:
+        """Whether the run's last windows published nothing: the estimate is that of trusted_s."""
+        new = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
+        return self.trusted_s is not None and self.status not in new
+
+    @property
+    def _share_published(self) -> float:
+        """Of the windows of a moving pivot, those that published."""
+        published = sum(self.reasons.get(one.text, 0) for one in (Reason.UPDATED, Reason.MISFIT))
+        doubted = sum(self.reasons.get(one.text, 0) for one in (Reason.HELD_UNCERTAIN, Reason.HELD_OUT_OF_RANGE))
+        return published / max(published + doubted, 1)
+
+    @property
+    def verdict(self) -> str:
+        """Why nothing was identified, in words."""
+        if self.form == "strong" and self.updates and self.status in _GOOD:
+            return f"the standard error of w is {100 * self.se['w'] / abs(self.value['w']):.0f} % of it"
+        return f"{self.status}: {self.beyond_words}" if self.status == SATURATED else self.status
+
+
+def _is_answer(form: str, trusted_s: float | None, updates: int, status: str, se_w: float, w: float) -> bool:
+    if form == "weak":
+        return trusted_s is not None
+    return updates > 0 and status in _GOOD and se_w <= WORST_SE * abs(w)
+
+
+def identify(
+    run: Run, rig: RigFile, native: Native, *, start: npt.ArrayLike | None = None, points: int = 400
+) -> Identification:
+    """Identifies a run with the core, form and law of the rig file.
+
+    Parameters
+    ----------
+    run, rig
+        The samples and the rig they come from.
+    native
+        The C core, used by cores "f32" and "q31".
+    start
+        p = (w, d1, d2) to start from; by default what the run's survey finds (pvid.run.survey).
+    points
+        Number of points of the trajectory.
+
+    Raises
+    ------
+    PvidError
+        When the run is shorter than the window, or the settings do not fit the core.
+    """
+    if start is None:
+        rig = fitted(rig, run)
+    config = config_of(rig, run.sample_rate, start)
+    needed = _ticks_needed(config)
+    if len(run.t) < needed:
+        raise PvidError(
+            f"the run has {len(run.t)} samples and the {rig.identifier.form} form needs {needed} for its first answer: "
+            f"nothing can be identified; record longer or shorten window_s"
+        )
+    every = max(1, len(run.t) // points)
+    if rig.identifier.core == "f32":
+        return _in_float32(run, rig, config, every, native)
+    if rig.identifier.core == "f64":
+        if isinstance(config, StrongConfig):
+            return _in_float64(run, rig, config, every)
+        return _weak_in_float64(run, rig, config)
+    rig = with_ranges_of(rig, run)
+    return _in_q31(run, rig, config_for_run(rig, run, start), every, native)
+
+
+def _ticks_needed(config: StrongConfig | WeakConfig) -> int:
+    if isinstance(config, WeakConfig):
+        # one window, and as much again as its rows and steps may take
+        return config.design.taps + config.design.decimation * (config.design.window + config.hop)
+    return 2 * config.delay + 1
+
+
+def _in_float32(
+    run: Run, rig: RigFile, config: StrongConfig | WeakConfig, every: int, native: Native
+) -> Identification:
+    identifier = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
+    record = identifier.run(run.phi, run.y, sums=False, estimate_every=every)
+    counters = identifier.counters
+    last = identifier.estimate if isinstance(identifier, WeakIdentifier) else identifier.assess()
+    trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
+    told = len(trusted) > 0
+    publishes = isinstance(identifier, WeakIdentifier)
+    estimates = record.estimate
+    trajectory = _trajectory(
+        run.t[::every],
+        estimates["p"][:, :3].astype(np.float64),
+        estimates["covariance"][:, :3, :3].astype(np.float64),
+        rig,
+        estimates["kappa"].astype(np.float64),
+    )
+    n_p = min(record.p.shape[1], NAMED)
+    publications = Publications.none()
+    if publishes:
+        publications = Publications(
+            t=run.t[trusted],
+            p=record.published[trusted, :3].astype(np.float64),
+            se=record.published_se[trusted, :3].astype(np.float64),
+            alarm=record.reason[trusted] == Reason.MISFIT,
+        )
+    return _identification(
+        rig,
+        run,
+        p=last["p"][:n_p].astype(np.float64),
+        friction=tuple(map(float, last["p"][NAMED : record.p.shape[1]])),
+        covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
+        kappa=float(last["kappa"]),
+        trusted_s=float(run.t[trusted[-1]]) if told and publishes else None,
+        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        reasons=_counted(record.reason),
+        chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifier) else None,
+        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        status=_final_status(record.reason),
+        ticks=len(run.t),
+        updates=counters["updates"],
+        lost=counters["rejected_not_finite"] + counters["rejected_saturated"],
+        running_hash=identifier.running_hash,
+        trajectory=trajectory,
+        publications=publications,
+    )
+
+
+def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Identification:
+    bank = bank_of(rig, run.sample_rate)
+    d_phi = bank.apply(run.phi, run.sample_rate).T
+    d_y = bank.apply(run.y, run.sample_rate).T
+    u = d_y[:, 2:5] / rig.l1
+    driven = oracle.driven(u[:, 0], run.sample_rate, config.drive_min)
+    if not driven.any():
+        return _start_held(run, rig, config)
+    n, y = oracle.strong_rows(d_phi[driven], u[driven])
+    settings = config.estimator
+    result = oracle.identify_strong(
+        n,
+        y,
+        oracle.Settings(
+            start=settings.start.astype(np.float64),
+            start_sd=settings.start_sd.astype(np.float64),
+            lower=settings.lower.astype(np.float64),
+            upper=settings.upper.astype(np.float64),
+            row_sd=settings.row_sd,
+            rate=run.sample_rate,
+            law=rig.identifier.law,
+            feedback_hz=settings.feedback_hz,
+            forgetting_s=settings.forgetting_s,
+            correlation=settings.correlation,
+            step_limit=settings.step_limit,
+            kappa_min=settings.kappa_min,
+            divider=settings.divider,
+        ),
+        estimate_every=every,
+    )
+    times = run.t[2 * config.delay :][driven][[tick for tick, _ in result.estimates]]
+    moved_at_end = bool(driven[-1] and result.updated[-settings.divider :].any())
+    return _identification(
+        rig,
+        run,
+        p=result.last.p,
+        covariance=result.last.covariance,
+        kappa=result.last.kappa,
+        trusted_s=None,
+        chi2=None,
+        alarm=False,
+        status=(Reason.UPDATED if moved_at_end else Reason.HELD_NOT_EXCITED).text,
+        reasons=_windows_counted(result.updated, result.updated),
+        ticks=len(run.t),
+        updates=int(result.updated.sum()),
+        lost=0,
+        running_hash=None,
+        trajectory=_trajectory(
+            times,
+            np.array([estimate.p for _, estimate in result.estimates]),
+            np.array([estimate.covariance for _, estimate in result.estimates]),
+            rig,
+            np.array([estimate.kappa for _, estimate in result.estimates]),
+        ),
+    )
+
+
+def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identification:
+    """The trajectory has one point a window."""
+    if config.estimator.law is not Law.STATIONARY or config.estimator.divider != 1:
+        raise PvidError("core f64 has the weak form's stationary law with a solve at every window only: use f32")
+    settings = config.estimator
+    n_p = min(len(settings.start), NAMED)
+    result = identify_weak(
+        run.phi,
+        run.y,
+        weak_design_of(rig, run.sample_rate),
+        WeakSettings(
+            start=settings.start[:n_p].astype(np.float64),
+            row_sd=settings.row_sd,
+            start_sd=settings.start_sd[:n_p].astype(np.float64),
+            forgetting_s=settings.forgetting_s,
+            iterations=config.iterations,
+            step_limit=settings.step_limit,
+            kappa_min=settings.kappa_min,
+            drive_min=config.drive_min,
+            full_angle=rig.identifier.full_angle,
+            damping=rig.identifier.damping,
+            pivot_noise=config.pivot_noise,
+            misfit_max=config.trust.misfit_max,
+            renewal=config.trust.renewal,
+        ),
+    )
+    # the gate and the alarm of pvid/trust.h, without the question how much of the information noise makes
+    trust = config.trust
+    relative = (result.se[:, :3] / result.p[:, :3]).max(axis=1)
+    arrived = np.arange(len(result.t)) + 1 >= trust.groups_min
+    good = result.updated & arrived & (result.kappa >= trust.kappa_min) & (relative <= trust.se_max)
+    trusted = np.flatnonzero(good)
+    if len(trusted) == 0:
+        p, covariance = (
+            settings.start[:n_p].astype(np.float64),
+            np.diag(settings.start_sd[:n_p].astype(np.float64) ** 2),
+        )
+        status, chi2, alarm = Reason.HELD_NOT_EXCITED, None, False
+    else:
+        p, covariance = result.p[trusted[-1], :n_p], result.covariance[trusted[-1], :n_p, :n_p]
+        # rows that are corrected later than the first publication are judged once the uncorrected past has faded
+        judged = result.misfit[
+            max(trusted[0], _FADING * int(result.corrected.any()) + int(np.argmax(result.corrected))) :
+        ]
+        judged = judged[np.isfinite(judged)]
+        chi2 = _judged(float(result.chi2[trusted[-1]]))
+        lately = len(judged) >= MISFIT_WINDOWS and float(np.mean(judged)) > trust.misfit_max
+        alarm = trust.misfit_max > 0 and (lately or not result.agrees[trusted[-1]])
+        status = Reason.MISFIT if alarm else Reason.UPDATED
+        if not good[-1]:
+            status = Reason.HELD_UNCERTAIN if result.updated[-1] else Reason.HELD_NOT_EXCITED
+    return _identification(
+        rig,
+        run,
+        p=p,
+        covariance=covariance,
+        kappa=float(result.kappa[trusted[-1]]) if len(trusted) else result.last.kappa,
+        trusted_s=float(run.t[0] + result.t[trusted[-1]]) if len(trusted) else None,
+        first_publication_s=float(run.t[0] + result.t[trusted[0]]) if len(trusted) else None,
+        reasons=_windows_counted(result.updated, good),
+        chi2=chi2,
+        alarm=alarm,
+        status=status.text,
+        ticks=len(run.t),
+        updates=config.iterations * int(result.updated.sum()),
+        lost=0,
+        running_hash=None,
+        trajectory=_trajectory(run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig, result.kappa),
+    )
+
+
+def _in_q31(
+    run: Run, rig: RigFile, config: StrongConfigQ31 | WeakConfigQ31, every: int, native: Native
+) -> Identification:
+    phi, y = counts_of(rig, run)
+    identifier = (
+        WeakIdentifierQ31(native, config) if isinstance(config, WeakConfigQ31) else StrongIdentifierQ31(native, config)
+    )
+    record = identifier.run(phi, y, sums=False, estimate_every=every)
+    last = identifier.estimate if isinstance(identifier, WeakIdentifierQ31) else identifier.assess()
+    n_p = record.p.shape[1]
+    p = p_of(config, last["p"][:n_p])
+    if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
+        p[3] += float(np.nanmean(run.phi - phi * rig.sensor.phi_lsb))
+    trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
+    status, linear = _final_status(record.reason), np.zeros(3)
+    if isinstance(config, WeakConfigQ31) and rig.identifier.full_angle and len(trusted):
+        found = linear_error(rig, run, p)
+        if found is None or np.abs(found).max() > WORST_LINEAR:
+            trusted, status = trusted[:0], Reason.HELD_OUT_OF_RANGE.text
+        else:
+            linear = found
+    told = len(trusted) > 0
+    counters = identifier.counters
+    publications = Publications.none()
+    if isinstance(identifier, WeakIdentifierQ31):
+        published = p_of(config, record.published[trusted])[:, :3]
+        publications = Publications(
+            t=run.t[trusted],
+            p=published,
+            se=np.hypot(se_of(config, record.published_se[trusted])[:, :3], linear * published),
+            alarm=record.reason[trusted] == Reason.MISFIT,
+        )
+    beyond = beyond_range(config, phi, y, counters["rejected_saturated"])
+    estimates = p_of(config, record.estimate["p"][:, :n_p])
+    return _identification(
+        rig,
+        run,
+        p=p,
+        covariance=_with_linear_error(covariance_of(config, last), p, linear),
+        kappa=float(last["kappa"]) / 2**30,
+        trusted_s=float(run.t[trusted[-1]]) if told and isinstance(identifier, WeakIdentifierQ31) else None,
+        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        reasons=_counted(record.reason),
+        beyond=beyond,
+        beyond_words=beyond.words(rig.sensor),
+        chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifierQ31) else None,
+        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        status=status,
+        ticks=len(run.t),
+        updates=counters["updates"],
+        lost=counters["rejected_saturated"],
+        running_hash=identifier.running_hash,
+        trajectory=_trajectory(
+            run.t[::every],
+            estimates[:, :3],
+            _with_linear_error(covariance_of(config, record.estimate), estimates, linear)[:, :3, :3],
+            rig,
+            record.estimate["kappa"] / 2**30,
+        ),
+        publications=publications,
+        linear=linear,
+    )
+
+
+def _with_linear_error(covariance: Float, p: Float, linear: Float) -> Float:
+    """Covariance [..., n_p, n_p] at p [..., n_p] with the error that linear rows make, relative of w, d1, d2 [3]."""
+    error = np.zeros_like(p)
+    error[..., :3] = p[..., :3] * linear
+    return np.asarray(covariance + error[..., :, None] * error[..., None, :])
+
+
+def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
+    """The answer to a run without a drive: the start, with the start's own standard deviations."""
+    p = config.estimator.start.astype(np.float64)
+    covariance = np.diag(config.estimator.start_sd.astype(np.float64) ** 2)
+    return _identification(
+        rig,
+        run,
+        p=p,
+        covariance=covariance,
+        kappa=0.0,
+        trusted_s=None,
+        chi2=None,
+        alarm=False,
+        status=Reason.HELD_NOT_EXCITED.text,
+        reasons={Reason.HELD_NOT_EXCITED.text: len(run.t)},
+        ticks=len(run.t),
+        updates=0,
+        lost=0,
+        running_hash=None,
+        trajectory=_trajectory(run.t[[0, -1]], np.stack([p, p]), np.stack([covariance, covariance]), rig, np.zeros(2)),
+    )
+
+
+def _trajectory(t: Float, p: Float, covariance: Float, rig: RigFile, kappa: Float) -> Trajectory:
+    wide = covariance + added_covariance(p, rig.sensor.y_gain_sd, rig.l1_sd)
+    scales = scale_errors(p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
+    noise = oracle.physical_errors(p, covariance, rig.l1)
+    return Trajectory(
+        t=t,
+        p=p,
+        se=np.sqrt(np.diagonal(wide, axis1=-2, axis2=-1)),
+        physical=oracle.physical(p, rig.l1),
+        physical_se=np.sqrt(noise**2 + scales.y_gain_physical**2 + scales.l1_physical**2),
+        kappa=kappa,
+    )
+
+
+_REJECTED = (Reason.REJECTED_NOT_FINITE, Reason.REJECTED_SATURATED)
+
+
+def _final_status(reasons: npt.NDArray[np.uint8]) -> str:
+    """The last reason in words; with a divider, the last one that followed a solve. Windows that fill again after a
+    rejected sample are warming up for that reason."""
+    solved = reasons[reasons != Reason.ACCUMULATED]
+    if len(solved) == 0:
+        return Reason.ACCUMULATED.text
+    before = solved[solved != Reason.WARMING_UP]
+    if solved[-1] == Reason.WARMING_UP and len(before) and before[-1] in _REJECTED:
+        return Reason(int(before[-1])).text
+    return Reason(int(solved[-1])).text
+
+
+def _counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:
+    """How often each reason came."""
+    counts = np.bincount(reasons)
+    return {Reason(int(one)).text: int(counts[one]) for one in np.flatnonzero(counts)}
+
+
+def _windows_counted(updated: npt.NDArray[np.bool_], good: npt.NDArray[np.bool_]) -> dict[str, int]:
+    """Of the float64 core's windows: `updated` moved p [n], `good` were published, too [n]."""
+    counts = {
+        Reason.UPDATED.text: int(good.sum()),
+        Reason.HELD_UNCERTAIN.text: int((updated & ~good).sum()),
+        Reason.HELD_NOT_EXCITED.text: int((~updated).sum()),
+    }
+    return {name: count for name, count in counts.items() if count}
+
+
+def _judged(misfit: float) -> float | None:
+    """A core's misfit, which is 0 until it has been judged."""
+    return misfit if np.isfinite(misfit) and misfit > 0.0 else None
+
+
+def largest_angle(run: Run, rest: float | None) -> float:
+    """Of phi from its rest [rad]; where that is not known, from the median."""
+    phi = run.phi[np.isfinite(run.phi)]
+    if not len(phi):
+        return 0.0
+    return float(np.abs(phi - (np.median(phi) if rest is None else rest)).max())
+
+
+def _identification(
+    rig: RigFile,
+    run: Run,
+    *,
+    p: Float,
+    covariance: Float,
+    kappa: float,
+    trusted_s: float | None,
+    first_publication_s: float | None = None,
+    chi2: float | None,
+    alarm: bool,
+    status: str,
+    reasons: Mapping[str, int],
+    ticks: int,
+    updates: int,
+    lost: int,
+    running_hash: int | None,
+    trajectory: Trajectory,
+    publications: Publications | None = None,
+    friction: tuple[float, ...] = (),
+    beyond: Beyond | None = None,
+    beyond_words: str | None = None,
+    linear: Float | None = None,
+) -> Identification:
+    """`linear`: relative errors of w, d1, d2 [3] that linear rows make, which the covariance contains."""
+    names = (*LINEAR, ZERO)[: len(p)]
+    value = dict(zip(names, map(float, p), strict=True))
+    unexplained, parts_disagree, skew, judged = None, False, 0.0, True
+    if rig.identifier.form == "weak" and trusted_s is not None:
+        unbiased = np.append(p, friction)
+        if linear is not None:  # the verdict's rows are corrected
+            unbiased[:3] /= 1 + linear
+        over_run = verdict(rig, run, unbiased)
+        own = np.sqrt(np.diag(covariance))
+        wider = np.maximum(over_run.se[: len(p)] / own, 1.0)
+        covariance = covariance * np.outer(wider, wider)
+        unexplained, parts_disagree = over_run.unexplained, bool(wider[:3].max() > DISAGREES)
+        skew, judged = over_run.skew, over_run.judged
+        if publications is not None:  # windows that scatter by more than the core expects did so from the first one on
+            scatter = np.maximum(over_run.scatter[:3] / own[:3], 1.0)
+            publications = replace(publications, se=publications.se * scatter)
+    noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    physical = oracle.physical(p[:3], rig.l1)
+    if np.isfinite(physical).all():
+        value.update(zip(PHYSICAL, map(float, physical), strict=True))
+        noise.update(zip(PHYSICAL, map(float, oracle.physical_errors(p[:3], covariance[:3, :3], rig.l1)), strict=True))
+    se, parts = noise, {}
+    answered = _is_answer(rig.identifier.form, trusted_s, updates, status, noise["w"], value["w"])
+    if answered:
+        parts = _parts(noise, p[:3], rig)
+        se = {name: float(np.sqrt(one.noise**2 + one.y_gain**2 + one.l1**2)) for name, one in parts.items()}
+    elif beyond is not None and beyond.share >= _BEYOND_FATAL:
+        status = SATURATED
+    elif rig.identifier.form == "weak" and status == Reason.HELD_NOT_EXCITED.text and not excitation_of(run, rig).weak:
+        status = UNEXPLAINED
+    return Identification(
+        value=value,
+        se=se,
+        parts=parts,
+        friction=friction,
+        kappa=kappa,
+        trusted_s=trusted_s,
+        first_publication_s=first_publication_s,
+        chi2=chi2,
+        alarm=alarm,
+        unexplained=unexplained,
+        parts_disagree=parts_disagree,
+        skew=skew,
+        judged=judged,
+        linear_error=0.0 if linear is None else float(np.abs(linear).max()),
+        status=status,
+        reasons=reasons,
+        ticks=ticks,
+        updates=updates,
+        lost=lost,
+        largest_angle=largest_angle(run, value.get(ZERO) if answered else None),
+        beyond=beyond,
+        beyond_words=beyond_words,
+        hash=running_hash,
+        core=rig.identifier.core,
+        form=rig.identifier.form,
+        law=rig.identifier.law,
+        on="host",
+        trajectory=trajectory,
+        publications=Publications.none() if publications is None else _widened(publications, rig),
+    )
+
+
+def _widened(published: Publications, rig: RigFile) -> Publications:
+    """With the scales' errors in the standard errors."""
+    scales = scale_errors(published.p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
+    se = np.sqrt(published.se**2 + scales.y_gain_p**2 + scales.l1_p**2)
+    return Publications(published.t, published.p, se, published.alarm)
+
+
+def _parts(noise: Mapping[str, float], p: Float, rig: RigFile) -> dict[str, ErrorParts]:
+    """Of the standard errors of every parameter whose own is in `noise`."""
+    scales = scale_errors(p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
+    gain = dict(zip((*LINEAR, *PHYSICAL), (*scales.y_gain_p, *scales.y_gain_physical), strict=True))
+    rod = dict(zip((*LINEAR, *PHYSICAL), (*scales.l1_p, *scales.l1_physical), strict=True))
+    return {
+        name: ErrorParts(one, abs(float(gain.get(name, 0.0))), abs(float(rod.get(name, 0.0))))
+        for name, one in noise.items()
+    }

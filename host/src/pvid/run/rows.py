@@ -1,0 +1,286 @@
+"""Rows of the weak form for all windows of a run at once, in float64, and the least squares over them.
+
+    samples -> RunRows (columns of every driven window) -> corrected for large angles at p -> whitened at p -> Fit
+
+Source: theory, 4 (constrained least squares) and 5 (weak form); the same rows as `weak_oracle`, which takes them window
+by window as the core does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.design.weak import WeakDesign, disturbance_gram
+from pvid.oracle.self_consistent import self_consistent
+from pvid.oracle.weak import A, N, columns, frames, front_end, jacobian, noise_gram, packed_to_square, theta
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.setup.f32 import row_sd_of, weak_drive_threshold
+
+Float = npt.NDArray[np.float64]
+
+# Windows with this many times the median residual energy hold a jolt or a lost sample, not the mechanism.
+JOLT = 25.0
+_WHITENINGS = 3
+_STEPS = 40
+_LONGEST_STEP = 0.5  # of log w, log d1, log d2
+_DONE = 1e-8
+# Fewer windows say nothing.
+FEWEST = 4
+_CORE = 4  # w, d1, d2, c; friction adds two
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Least squares over whitened rows, at p = (w, d1, d2, c), with friction (w, d1, d2, c, c1, c2).
+
+    Attributes
+    ----------
+    p : the estimate
+    chi2 : variance of the rows over what the encoder's noise, and the disturbance where there is one, explain
+    information : S = C^T M C [n_p, n_p]
+    scores : C^T N e of each window [windows, n_p]; they sum to 0 at the least squares
+    energy, signal : sums of squares of e and of Y over each window's rows [windows]
+    row_sd : noise of a row [rad]
+    """
+
+    p: Float
+    chi2: float
+    information: Float
+    scores: Float
+    energy: Float
+    signal: Float
+    row_sd: float
+
+    @property
+    def clustered_se(self) -> Float:
+        """Standard errors of p [n_p] from the scatter of the windows' scores, whatever makes it.
+
+        S^-1 (sum g g^T) S^-1 with the products of neighbours, which share samples, counted; never less than without
+        them, and inflated for the few windows of a short run.
+        """
+        windows = len(self.scores)
+        inverse = np.linalg.pinv(self.information, hermitian=True)
+        own = self.scores.T @ self.scores
+        shared = self.scores[:-1].T @ self.scores[1:]
+        variance = np.diag(inverse @ own @ inverse)
+        with_neighbours = np.diag(inverse @ (own + shared + shared.T) @ inverse)
+        few = windows / max(windows - 2, 1)
+        return np.asarray(np.sqrt(np.maximum(variance, with_neighbours) * few))
+
+
+@dataclass(frozen=True)
+class RunRows:
+    """Columns Y, N1..N8, with friction two more, a, b [windows, 11 or 13, K] of the driven windows, their angle and u
+    [windows, W], their numbers in the run [windows]."""
+
+    design: WeakDesign
+    row_sd: float
+    columns: Float
+    phi: Float
+    u: Float
+    number: npt.NDArray[np.int64]
+    part: float = 1.0  # of the run's windows
+    sound: npt.NDArray[np.bool_] | None = None
+
+    @classmethod
+    def of(cls, rig: RigFile, run: Run, design: WeakDesign) -> RunRows:
+        """Of the windows that are driven and lack no sample.
+
+        Raises
+        ------
+        PvidError
+            When there is none.
+        """
+        present = np.isfinite(run.phi) & np.isfinite(run.y)
+        phi, y = (_bridged(x, present) for x in (run.phi, run.y))
+        smooth, u = front_end(phi, y, design)
+        phi_frames, u_frames = frames(smooth, design), frames(u, design)
+        usable = np.var(u_frames, axis=1) >= weak_drive_threshold(rig, design) ** 2
+        if not present.all():
+            usable &= _whole(present, design, len(phi_frames))
+        if not usable.any():
+            raise PvidError("the pivot stands still in every window of the run")
+        number = np.flatnonzero(usable)
+        phi_frames, u_frames = phi_frames[number], u_frames[number]
+        of_both = columns(phi_frames, u_frames, design)
+        return cls(design, row_sd_of(rig, design.decimation), of_both, phi_frames, u_frames, number)
+
+    @property
+    def spans(self) -> Float:
+        """First and last instant of each window's samples, from the run's first sample on [windows, 2] in s."""
+        design = self.design
+        first = self.number * design.hop * design.decimation
+        last = first + design.taps - 1 + design.decimation * (design.window - 1)
+        return np.stack([first, last], axis=1) / design.sample_rate
+
+    def only(self, which: npt.NDArray[np.bool_] | slice) -> RunRows:
+        """Some of the windows."""
+        return replace(
+            self,
+            columns=self.columns[which],
+            phi=self.phi[which],
+            u=self.u[which],
+            number=self.number[which],
+            sound=None if self.sound is None else self.sound[which],
+        )
+
+    def thinned(self, most: int) -> RunRows:
+        """At most so many windows, evenly spread over the run."""
+        fewer = self.only(slice(None, None, -(-len(self.phi) // most)))
+        return replace(fewer, part=self.part * len(fewer.phi) / len(self.phi))
+
+    def within(self, zero: float, angle: float, fewest: int) -> RunRows:
+        """The windows whose angle stays within +-`angle` of `zero` [rad]; all of them where those are too few."""
+        inside = np.abs(self.phi - zero).max(axis=1) <= angle
+        return self.only(inside) if int(inside.sum()) >= fewest else self
+
+    def corrected(self, p: Float, full_angle: bool = True) -> RunRows:
+        """With what the linear rows lack at large angles taken off Y, at p; with the columns of friction where p has
+        its two coefficients. `sound` tells the windows in which the lack was found; the others stay linear."""
+        friction = len(p) > _CORE
+        damping = p[_CORE:] if friction else np.zeros(2)
+        y = np.zeros((len(self.phi), self.design.functions))
+        k = np.zeros((len(self.phi), 2, self.design.functions))
+        sound = np.zeros(len(self.phi), np.bool_)
+        for window, (one, phi, u) in enumerate(zip(self.columns, self.phi, self.u, strict=True)):
+            lack = self_consistent(p[:_CORE], damping, one, phi, u, self.design, full_angle)
+            if lack is not None:
+                y[window], k[window], sound[window] = lack.y, lack.k, True
+        parts = [self.columns[:, :1] - y[:, None], self.columns[:, N], self.columns[:, A:]]
+        if friction:
+            parts.insert(2, k)
+        return replace(self, columns=np.concatenate(parts, axis=1), sound=sound)
+
+    def sound_only(self) -> RunRows:
+        """The windows that could be corrected."""
+        return self if self.sound is None else self.only(self.sound)
+
+    def covariance(self, p: Float) -> Float:
+        """Of a window's rows at p for noise of 1 of the decimated angle [K, K]."""
+        return noise_gram(self.design, p)
+
+    def covariance_of_disturbance(self, p: Float) -> Float:
+        """Of a window's rows at p for a disturbance of 1 [K, K]."""
+        return packed_to_square(disturbance_gram(self.design.gram, p))
+
+    def whitened(self, p: Float, disturbance: float = 0.0) -> Float:
+        """Rows (Y, N) [windows, 9 or 11, K] whose noise is white at p, without what a and b, their last, explain.
+
+        `disturbance` is that of `weak_design.design`.
+        """
+        gram = self.covariance(p)
+        if disturbance > 0:
+            gram = gram + disturbance**2 * self.covariance_of_disturbance(p)
+        inverse = np.linalg.inv(np.linalg.cholesky(gram))
+        white = self.columns @ inverse.T
+        for column in (-2, -1):
+            direction = white[:, column]
+            length = np.linalg.norm(direction, axis=1, keepdims=True)
+            direction = np.divide(direction, length, out=np.zeros_like(direction), where=length > 0)
+            white = white - np.einsum("wik,wk->wi", white, direction)[:, :, None] * direction[:, None, :]
+        return np.asarray(white[:, :-2])
+
+    def fitted(self, p: Float, disturbance: float = 0.0) -> Fit:
+        """The least squares from p on, whitened at the estimate itself; windows with a jolt are left out."""
+        kept = np.ones(len(self.columns), np.bool_)
+        for _ in range(_WHITENINGS):
+            white = self.whitened(p, disturbance)
+            energy = np.sum(_residuals(white, p) ** 2, axis=1)
+            kept = energy <= JOLT * np.median(energy)
+            p = least_squares(np.einsum("wik,wjk->ij", white[kept], white[kept]), p)
+        return self.judged(p, disturbance, kept)
+
+    def judged(self, p: Float, disturbance: float = 0.0, kept: npt.NDArray[np.bool_] | None = None) -> Fit:
+        """What the rows say of a p that may come from elsewhere."""
+        white = self.whitened(p, disturbance)
+        if kept is not None:
+            white = white[kept]
+        e, n, c = _residuals(white, p), white[:, 1:], _jacobian(p)
+        energy = np.sum(e**2, axis=1)
+        freedom = len(white) * (self.design.functions - 2) - len(p)
+        return Fit(
+            p=p,
+            chi2=float(energy.sum()) / max(freedom, 1) / self.row_sd**2,
+            information=c.T @ np.einsum("wik,wjk->ij", n, n) @ c,
+            scores=np.einsum("wik,wk->wi", n, e) @ c,
+            energy=energy,
+            signal=np.sum(white[:, 0] ** 2, axis=1),
+            row_sd=self.row_sd,
+        )
+
+
+def _residuals(white: Float, p: Float) -> Float:
+    """Y - N^T theta(p) [windows, K]."""
+    return np.asarray(white[:, 0] - np.einsum("j,wjk->wk", _theta(p), white[:, 1:]))
+
+
+def _bridged(x: Float, present: npt.NDArray[np.bool_]) -> Float:
+    if present.all():
+        return x
+    at = np.flatnonzero(present)
+    if len(at) == 0:
+        raise PvidError("the run has no sample that is a number")
+    return np.interp(np.arange(len(x)), at, x[at])
+
+
+def _whole(present: npt.NDArray[np.bool_], design: WeakDesign, windows: int) -> npt.NDArray[np.bool_]:
+    """Which windows lack no sample."""
+    missing = np.concatenate([[0], np.cumsum(~present)])
+    first = design.decimation * design.hop * np.arange(windows)
+    last = first + design.taps + design.decimation * (design.window - 1)
+    return np.asarray(missing[np.minimum(last, len(present))] == missing[first])
+
+
+def energy_at(moments: Float, p: Float) -> Float:
+    """Sum of squares of Y - N^T theta(p), from the moments of (Y, N) [..., n, n]: [...]."""
+    weights = np.append(1.0, -_theta(p))
+    return np.asarray(moments @ weights @ weights)
+
+
+def least_squares(moments: Float, p: Float) -> Float:
+    """Constrained least squares of theta(p) by damped Gauss-Newton steps in (log w, log d1, log d2, c and friction),
+    from p on."""
+    m, b = moments[1:, 1:], moments[1:, 0]
+    damping, energy = 1e-3, float(energy_at(moments, p))
+    units = np.ones(len(p))
+    for _ in range(_STEPS):
+        units[:3] = p[:3]
+        c = _jacobian(p) * units
+        information, force = c.T @ m @ c, c.T @ (b - m @ _theta(p))
+        scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+        normal = information * np.outer(scale, scale)
+        step, there, better = np.zeros(len(p)), p, False
+        while not better and damping < 1e12:
+            step = scale * np.linalg.solve(normal + damping * np.eye(len(p)), scale * force)
+            step[:3] = np.clip(step[:3], -_LONGEST_STEP, _LONGEST_STEP)
+            there = np.append(p[:3] * np.exp(step[:3]), p[3:] + step[3:])
+            now = float(energy_at(moments, there))
+            better = math.isfinite(now) and now <= energy
+            damping *= 1 / 8 if better else 4
+        if not better:
+            break
+        p, energy = there, float(energy_at(moments, there))
+        if np.abs(step[:3]).max() < _DONE:
+            break
+    return p
+
+
+def _theta(p: Float) -> Float:
+    """theta(p), friction last."""
+    return np.append(theta(p[:_CORE]), p[_CORE:])
+
+
+def _jacobian(p: Float) -> Float:
+    """d theta / d p, friction last."""
+    core = jacobian(p[:_CORE])
+    (rows, columns), friction = core.shape, len(p) - _CORE
+    out = np.zeros((rows + friction, columns + friction))
+    out[:rows, :columns] = core
+    out[rows:, columns:] = np.eye(friction)
+    return out

@@ -1,0 +1,1 @@
+"""From a rig file to the settings of the core."""

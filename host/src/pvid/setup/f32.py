@@ -1,0 +1,200 @@
+"""From a rig file to the settings of the core: the one place where defaults meet a rig."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.core.native import MAX_WINDOW, EstimatorConfig, GateConfig, Law, StrongConfig, TrustConfig, WeakConfig
+from pvid.design.fir import FirBank, finite_difference, savitzky_golay
+from pvid.design.weak import WeakDesign, design
+from pvid.design.weak_sizing import Sizes, decimation_of
+from pvid.oracle import strong as oracle
+from pvid.oracle.weak import VALID_ANGLE
+from pvid.rig.file import RigFile
+
+# The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
+START_RELATIVE_SD = 0.5
+BOUND_FACTOR = 20.0
+
+# Rough size of Y - N^T theta relative to w^4 [rad/s^8]: only the first ticks feel it, through H0.
+ROW_SD_OF_W4 = 0.1
+
+LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
+
+
+def nominal_start(rig: RigFile) -> npt.NDArray[np.float64]:
+    """p = (w, d1, d2) of the rig file's rough guess."""
+    return oracle.linear(rig.nominal.g, rig.nominal.l2, rig.nominal.rho2, rig.l1)
+
+
+def bank_of(rig: RigFile, sample_rate: float) -> FirBank:
+    """The FIR bank a rig file asks for at `sample_rate` [Hz]."""
+    settings = rig.identifier
+    if settings.differentiator == "finite-difference":
+        bank = finite_difference(settings.stride)
+    else:
+        points = max(round(settings.strong_window_s * sample_rate / settings.stride), settings.degree + 1)
+        bank = savitzky_golay(points | 1, settings.degree, settings.stride)
+    if bank.window > MAX_WINDOW:
+        raise PvidError(
+            f"the differentiator's window is {bank.window} samples at {sample_rate:g} Hz and the core holds "
+            f"{MAX_WINDOW} (PVID_MAX_WINDOW): shorten window_s or raise stride"
+        )
+    return bank
+
+
+def estimator_config(rig: RigFile, bank: FirBank, start: npt.ArrayLike | None = None) -> EstimatorConfig:
+    """Settings of the strong form's estimator; `start` overrides the nominal p."""
+    settings = rig.identifier
+    p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
+    return EstimatorConfig(
+        start=p.astype(np.float32),
+        start_sd=(START_RELATIVE_SD * p).astype(np.float32),
+        lower=(p / BOUND_FACTOR).astype(np.float32),
+        upper=(p * BOUND_FACTOR).astype(np.float32),
+        row_sd=ROW_SD_OF_W4 * float(p[0]) ** 4,
+        forgetting_s=settings.forgetting_s,
+        feedback_hz=settings.feedback_hz,
+        # rows closer than the bank's reach share samples: count half a window as one row
+        correlation=float(max(bank.half, 1)),
+        kappa_min=settings.kappa_min,
+        law=LAWS[settings.law],
+        dead_zone=settings.dead_zone,
+        divider=settings.divider,
+    )
+
+
+def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
+    """Rms of u [1/s^2] below which the pivot counts as still: ten times the noise the bank makes of a still sensor.
+
+    The sensor's noise is taken as half an LSB (rounding, 0.29 LSB, and somewhat more of its own); without a
+    resolution in the rig file, a thousandth of w.
+    """
+    weights = bank.weights[2]
+    white_gain = np.sqrt(2 * np.sum(weights**2) + 4 * np.sum(weights) ** 2)
+    noise = 0.5 * rig.sensor.y_lsb * white_gain * (sample_rate / bank.stride) ** 2 / rig.l1
+    return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
+
+
+def gate_config(rig: RigFile) -> GateConfig:
+    """What the rig file says of outliers."""
+    return GateConfig(rig.identifier.gate, rig.identifier.patience_s)
+
+
+def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig:
+    """Settings of the strong-form identifier for samples at `sample_rate` [Hz]."""
+    bank = bank_of(rig, sample_rate)
+    return StrongConfig(
+        sample_rate=sample_rate,
+        l1=rig.l1,
+        drive_min=drive_threshold(rig, bank, sample_rate),
+        weights=bank.weights32,
+        stride=bank.stride,
+        gate=gate_config(rig),
+        estimator=estimator_config(rig, bank, start),
+    )
+
+
+# The unknown encoder zero c [rad]: where it may lie, and how far from 0 it is expected; steps are limited to
+# 0.3 of the latter, which must not hold back a zero of 0.1 rad.
+ZERO_BOUND = 3.0
+ZERO_SD = 0.5
+
+# Friction over the mass of body 2 [m^2/s]: a rig's is some 1e-4; a tenth would stop the pendulum within a second.
+FRICTION_SD = 1e-3
+FRICTION_BOUND = 0.1
+
+# Noise of a sensor in LSB: rounding, and half an LSB of its own.
+NOISE_LSB = float(np.sqrt(1 / 12 + 1 / 4))
+
+# Below this kappa rounding alone speaks of w: without a drive float32 leaves up to 6e-7.
+WEAK_KAPPA_MIN = 5e-6
+
+
+def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
+    """The tables a rig file asks for at `sample_rate` [Hz], whitened at its nominal p."""
+    settings = rig.identifier
+    sizes = Sizes(
+        window_s=settings.window_s or None,
+        functions=settings.test_functions or None,
+        decimation=settings.decimation or None,
+        taps=round(min(settings.smoothing_s * sample_rate, 1e9)) | 1 if settings.smoothing_s > 0 else None,
+        pass_hz=settings.pass_hz or None,
+    )
+    nominal = nominal_start(rig)
+    if settings.disturbance == 0:
+        return design(rig.l1, sample_rate, nominal, sizes)
+    dt = decimation_of(nominal, sample_rate, sizes) / sample_rate
+    ratio = settings.disturbance / math.sqrt(dt) / row_sd_of(rig, round(dt * sample_rate))
+    return design(rig.l1, sample_rate, nominal, sizes, ratio)
+
+
+def row_sd_of(rig: RigFile, decimation: int) -> float:
+    """Noise of a decimated angle [rad]: the rows listen where the filters pass, at the density of the samples' noise.
+
+    An exact sensor has float32's noise.
+    """
+    return max(rig.sensor.phi_lsb * NOISE_LSB, 1e-8) / math.sqrt(decimation)
+
+
+# A window counts as driven when the rms of u exceeds the noise of a still pivot's so many times: in all, and in the
+# rows' band, where noise passes for drive and draws the estimate towards less of it (a hundredth of its variance).
+_STILL = 1.3
+_STILL_IN_BAND = 10.0
+
+
+def weak_drive_threshold(rig: RigFile, tables: WeakDesign) -> float:
+    """Rms of u [1/s^2] below which a window counts as undriven."""
+    whole, band = tables.drive_noise(NOISE_LSB * rig.sensor.y_lsb)
+    return float(max(np.hypot(_STILL * whole, _STILL_IN_BAND * band), 1e-3 * nominal_start(rig)[0]))
+
+
+def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfig:
+    """Settings of the weak-form identifier for samples at `sample_rate` [Hz]; `start` overrides the nominal p."""
+    settings = rig.identifier
+    tables = weak_design_of(rig, sample_rate)
+    p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
+    zero = 1 if settings.zero else 0
+    # the zero c [rad], then the frictions c1 and c2 [m^2/s]: what they may be, and how far they are expected
+    extra_sd = [ZERO_SD] * zero + [FRICTION_SD] * (2 * settings.damping)
+    extra_bound = [ZERO_BOUND] * zero + [FRICTION_BOUND] * (2 * settings.damping)
+    extra = np.array([rig.sensor.phi_zero] * zero + [0.0] * (2 * settings.damping))
+    if settings.damping and not settings.zero:
+        raise PvidError("[identifier] damping needs zero = true: friction is estimated beside the encoder's zero")
+    return WeakConfig(
+        sample_rate=sample_rate,
+        l1=rig.l1,
+        design=tables.f32,
+        zero_unknown=settings.zero,
+        full_angle=settings.full_angle,
+        friction=settings.damping,
+        angle_limit=VALID_ANGLE if settings.full_angle else 0.0,
+        drive_min=weak_drive_threshold(rig, tables),
+        pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
+        trust=TrustConfig(),
+        gate=gate_config(rig),
+        estimator=EstimatorConfig(
+            start=np.concatenate([p, extra]).astype(np.float32),
+            start_sd=np.concatenate([START_RELATIVE_SD * p, extra_sd]).astype(np.float32),
+            lower=np.concatenate([p / BOUND_FACTOR, extra - extra_bound]).astype(np.float32),
+            upper=np.concatenate([p * BOUND_FACTOR, extra + extra_bound]).astype(np.float32),
+            row_sd=row_sd_of(rig, tables.decimation),
+            forgetting_s=settings.forgetting_s,
+            feedback_hz=0.0,
+            kappa_min=min(settings.kappa_min, WEAK_KAPPA_MIN),
+            law=LAWS[settings.law],
+            dead_zone=settings.dead_zone,
+            divider=settings.divider,
+        ),
+    )
+
+
+def config_of(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig | WeakConfig:
+    """Settings of the form the rig file asks for."""
+    if rig.identifier.form == "weak":
+        return weak_config(rig, sample_rate, start)
+    return strong_config(rig, sample_rate, start)

@@ -1,0 +1,343 @@
+"""From a rig file to the settings of the fixed-point core."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.core.native import EstimatorConfig, GateConfig, Law
+from pvid.core.native_q31 import (
+    EstimatorConfigQ31,
+    GateConfigQ31,
+    ScaleQ31,
+    StrongConfigQ31,
+    TrustConfigQ31,
+    WeakConfigQ31,
+)
+from pvid.design.strong_q31 import StrongDesignQ31, strong_design_q31
+from pvid.design.weak_q31 import WeakTablesQ31, weak_tables_q31
+from pvid.rig.file import RigFile, Sensor
+from pvid.rig.run import Run
+from pvid.setup.f32 import bank_of, nominal_start, strong_config, weak_config, weak_design_of
+from pvid.setup.ranges_q31 import Beyond, beyond_ranges, middle_of_travel, reach, with_default_ranges, with_ranges_of
+
+Float = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+ConfigQ31 = WeakConfigQ31 | StrongConfigQ31
+
+PATIENCE_MAX = 2**30  # groups of rows, of gate_q31.h
+FORGETTING_MIN, FORGETTING_MAX = 4, 2**24  # likewise, of estimator_q31.h
+
+
+def format_of(largest: float) -> int:
+    """Bits after the point with which |x| <= largest fits an int32."""
+    return math.floor(math.log2((2**31 - 2) / largest))
+
+
+def _counting(rig: RigFile) -> Sensor:
+    """The sensors of a rig, which must count in something, with a range each."""
+    sensor = with_default_ranges(rig)
+    for name, lsb in (("phi_lsb", sensor.phi_lsb), ("y_lsb", sensor.y_lsb)):
+        if not lsb > 0:
+            raise PvidError(
+                f"[sensor] {name} is 0, and the fixed-point core counts in it: say what the sensor resolves"
+            )
+    return sensor
+
+
+def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
+    """The tables a rig file asks for."""
+    sensor = _counting(rig)
+    return weak_tables_q31(
+        weak_design_of(rig, sample_rate),
+        sensor.phi_lsb,
+        sensor.y_lsb,
+        sensor.phi_range,
+        sensor.y_range,
+        sensor.acceleration_range,
+    )
+
+
+def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
+    """The strong form's formats that a rig file asks for."""
+    sensor = _counting(rig)
+    w, d1, d2 = nominal_start(rig)
+    mode = math.sqrt(w * (d1 + math.sqrt(max(d1**2 - 4 * d2, 0.0))) / 2)  # the faster one of the nominal mechanism
+    # the motion is as fast as twice that, or as a drive that uses both of its ranges
+    fastest = max(2 * mode, math.sqrt(sensor.acceleration_range / sensor.y_range))
+    return strong_design_q31(
+        bank_of(rig, sample_rate),
+        sample_rate,
+        rig.l1,
+        sensor.phi_lsb,
+        sensor.y_lsb,
+        sensor.phi_range,
+        sensor.y_range,
+        sensor.acceleration_range,
+        fastest,
+    )
+
+
+def counts_of(rig: RigFile, run: Run) -> tuple[Int64, Int64]:
+    """What the sensors of a rig count in a run: phi and y, both [ticks]."""
+    return counts_of_samples(run.phi, rig.sensor.phi_lsb), counts_of_samples(run.y, rig.sensor.y_lsb)
+
+
+def counts_of_samples(values: npt.NDArray[np.float64], lsb: float) -> Int64:
+    """As a 32-bit register holds them; what is not a number is as far beyond full scale as can be."""
+    counts = np.rint(np.nan_to_num(values / lsb, nan=-(2.0**31), posinf=2.0**31, neginf=-(2.0**31)))
+    return np.clip(counts, -(2.0**31), 2.0**31 - 1).astype(np.int64)
+
+
+def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> ConfigQ31:
+    """Settings of the form the rig file asks for, with ranges that hold the run where the file leaves them open.
+
+    A run that does not fit about 0 is counted about the middle of its travel; the strong form takes the encoder's zero
+    for the equilibrium, and of the pivot only what changes counts.
+    """
+    if rig.identifier.form == "weak" and rig.identifier.damping:
+        raise PvidError("core q31 has no damping: use --core f32")
+    rig = with_ranges_of(rig, run)
+    config = config_of_q31(rig, run.sample_rate, start)
+    phi, y = counts_of(rig, run)
+    if isinstance(config, StrongConfigQ31):
+        return replace(config, y_offset=_offset(y, config.design.bank.y_max))
+    design = config.design
+    return replace(
+        config, phi_offset=_offset(phi, design.phi_max, config.phi_offset), y_offset=_offset(y, design.y_max)
+    )
+
+
+def _offset(counts: Int64, limit: int, given: int = 0) -> int:
+    """Where a sensor's travel has its middle, or its median where the travel is longer than the full scale `limit`; the
+    one that is given where that is within half of the full scale and the whole travel fits about it [counts]."""
+    ordinary = counts[np.abs(counts) < 2**31 - 1]
+    middle, median = round(middle_of_travel(ordinary)), round(float(np.median(ordinary))) if len(ordinary) else 0
+    if abs(median - given) <= limit // 2 and reach(ordinary.astype(np.float64), float(given)) <= limit:
+        return given
+    return max((middle, median, given), key=lambda at: int((np.abs(ordinary - at) <= limit).sum()))
+
+
+def beyond_range(config: ConfigQ31, phi: Int64, y: Int64, rejected: int) -> Beyond:
+    """Which of the counts phi, y [n] a core of this configuration could not take in; `rejected` of them in all."""
+    if isinstance(config, StrongConfigQ31):
+        bank = config.design.bank
+        return beyond_ranges(phi, y - config.y_offset, bank.phi_max, bank.y_max, 0)
+    design = config.design
+    return beyond_ranges(phi - config.phi_offset, y - config.y_offset, design.phi_max, design.y_max, rejected)
+
+
+def _estimator_q31(
+    settings: EstimatorConfig,
+    nominal: EstimatorConfig,
+    unit: Float,
+    n_bits: tuple[int, ...],
+    y_bits: int,
+    row_unit: float,
+    **own: int,
+) -> EstimatorConfigQ31:
+    """Settings of the estimator in integers.
+
+    Parameters
+    ----------
+    settings
+        Those of the float core; start, start_sd and row_sd among them.
+    nominal
+        Likewise for the nominal start, whose bounds, and with them formats, are those of every start: one program.
+    unit
+        Of p in SI [n_p].
+    n_bits, y_bits
+        Formats of a row.
+    row_unit
+        What Y is counted in, in SI.
+    own
+        Settings that the forms see differently.
+    """
+    n_p = len(unit)
+    lower, upper, start, sd = (
+        np.asarray(x, np.float64)[:n_p] / unit
+        for x in (nominal.lower, nominal.upper, settings.start, settings.start_sd)
+    )
+    bits = [format_of(x) for x in np.maximum(np.abs(lower), upper)]
+
+    def integers(x: Float) -> tuple[int, ...]:
+        return tuple(int(np.rint(v * 2.0**b)) for v, b in zip(x, bits, strict=True))
+
+    return EstimatorConfigQ31(
+        start=integers(start),
+        start_sd=integers(sd),
+        lower=tuple(max(1, x) if i < 3 else x for i, x in enumerate(integers(lower))),
+        upper=integers(upper),
+        p_bits=tuple(bits),
+        n_bits=n_bits,
+        y_bits=y_bits,
+        row_sd=min(max(1, round(settings.row_sd / row_unit * 2.0 ** (y_bits + 8))), 2**31 - 1),
+        step_limit=round(settings.step_limit * 2**16),
+        kappa_min=round(settings.kappa_min * 2**30),
+        dead_zone=round(settings.dead_zone * 2**16),
+        divider=settings.divider,
+        **own,
+    )
+
+
+def forgetting_groups_q31(forgetting_s: float, groups_hz: float) -> int:
+    """The time constant of forgetting in rows or windows, which come at groups_hz; 0: none."""
+    groups = round(forgetting_s * groups_hz)
+    if forgetting_s > 0 and not FORGETTING_MIN <= groups <= FORGETTING_MAX:
+        wrong = "short" if groups < FORGETTING_MIN else "long"
+        raise PvidError(
+            f"[identifier] forgetting_s = {forgetting_s:g} is too {wrong} for core q31, which forgets within 4 to 2^24 "
+            f"rows or windows ({FORGETTING_MIN / groups_hz:.4g} to {FORGETTING_MAX / groups_hz:.4g} s here); 0 is never"
+        )
+    return groups
+
+
+def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
+    """The gate of the float core in integers, for rows or windows that come at groups_hz."""
+    patience = gate.patience_s * groups_hz
+    if patience > PATIENCE_MAX:
+        raise PvidError(
+            f"[identifier] outlier_patience_s = {gate.patience_s:g} is too long for core q31, which counts up to 2^30 "
+            f"rows or windows ({PATIENCE_MAX / groups_hz:.4g} s here); 0 is for ever"
+        )
+    return GateConfigQ31(round(gate.sigmas * 2**16), max(round(patience), 1) if patience > 0 else 0)
+
+
+def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
+    """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p.
+
+    What the encoder reads at rest becomes the offset of its counts, and c is counted from there.
+    """
+    tables = tables_of(rig, sample_rate)
+    offset = round(rig.sensor.phi_zero / rig.sensor.phi_lsb)
+    rig = replace(rig, sensor=replace(rig.sensor, phi_zero=0.0))
+    float_config = weak_config(rig, sample_rate, start)
+    windows_hz = sample_rate / (tables.decimation * float_config.hop)
+    e = float_config.estimator
+    n_p = 4 if float_config.zero_unknown else 3
+    functions = tables.functions
+    estimator = _estimator_q31(
+        e,
+        weak_config(rig, sample_rate).estimator,
+        _p_units(tables)[:n_p],
+        tables.column_bits[: 8 if n_p == 4 else 5],
+        tables.column_bits[8],
+        tables.f_unit,
+        forgetting_groups=forgetting_groups_q31(e.forgetting_s, windows_hz),
+        gain=0 if e.law is Law.PSEUDOVELOCITY else 2**30,
+        correlation=round(tables.overlap * 2**16),
+        row_weight=round((functions - 2) / functions * 2**16),
+        noise_margin=round(e.noise_margin * 2**16),
+    )
+    lag_s = tables.lag * tables.dt
+    return WeakConfigQ31(
+        design=tables,
+        estimator=estimator,
+        phi_offset=offset,
+        zero_unknown=float_config.zero_unknown,
+        iterations=float_config.iterations,
+        drive_min=round(float_config.drive_min * tables.dt**2 * 2.0**tables.u_bits),
+        pivot_noise=_scaled(float_config.pivot_noise / lag_s**4 * 4.0**estimator.y_bits),
+        trust=TrustConfigQ31(
+            kappa_min=round(float_config.trust.kappa_min * 2**30),
+            se_max=round(float_config.trust.se_max * 2**24),
+            misfit_max=round(float_config.trust.misfit_max * 2**16),
+            groups_min=float_config.trust.groups_min,
+            shut_max=float_config.trust.shut_max,
+            renewal=round(float_config.trust.renewal * 2**16),
+        ),
+        gate=gate_config_q31(float_config.gate, windows_hz),
+    )
+
+
+def _scaled(x: float) -> tuple[int, int]:
+    """x >= 0 as pvid_scaled_q31: m 2^e, m of 30 bits."""
+    part, exponent = math.frexp(x)
+    return (round(part * 2.0**30), exponent - 30) if x > 0 else (0, 0)
+
+
+def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfigQ31:
+    """Settings of the strong form at `sample_rate` [Hz]; `start` overrides the nominal p."""
+    design = strong_design_of(rig, sample_rate)
+    config = strong_config(rig, sample_rate, start)
+    e = config.estimator
+    gain = e.feedback_hz * e.divider / sample_rate if e.feedback_hz > 0 else 1.0
+    estimator = _estimator_q31(
+        e,
+        strong_config(rig, sample_rate).estimator,
+        _p_units(design),
+        design.n_bits,
+        design.y_bits,
+        design.angle_unit / design.dt**8,
+        forgetting_groups=forgetting_groups_q31(e.forgetting_s, sample_rate),
+        gain=0 if e.law is Law.PSEUDOVELOCITY else round(min(gain, 1.0) * 2**30),
+        correlation=round(e.correlation * 2**16),
+    )
+    return StrongConfigQ31(
+        design=design,
+        estimator=estimator,
+        drive_ticks=min(max(round(sample_rate), 1), 2**30),
+        gate=gate_config_q31(config.gate, sample_rate),
+        drive_min=min(round(config.drive_min * design.dt**2 * 2.0**design.u_bits), 2**30),
+    )
+
+
+def config_of_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> ConfigQ31:
+    """Settings of the form the rig file asks for."""
+    make = weak_config_q31 if rig.identifier.form == "weak" else strong_config_q31
+    return make(rig, sample_rate, start)
+
+
+def _p_units(design: WeakTablesQ31 | StrongDesignQ31) -> Float:
+    """What w, d1, d2 and, in the weak form, c are counted in, in SI."""
+    zero = [design.f_unit] if isinstance(design, WeakTablesQ31) else []
+    return np.array([1 / design.dt**2, 1.0, 1.0, *zero])
+
+
+def units_of(config: ConfigQ31) -> Float:
+    """One unit of each of the core's integers p in SI [n_p]."""
+    bits = np.array(config.estimator.p_bits, np.float64)
+    return np.asarray(_p_units(config.design)[: len(bits)] * 2.0**-bits)
+
+
+def p_of(config: ConfigQ31, p: npt.ArrayLike) -> Float:
+    """p = (w, d1, d2, c) in SI from the core's integers [..., n_p]; c is the encoder's reading at rest."""
+    values = np.asarray(p, np.float64) * units_of(config)
+    if values.shape[-1] > 3 and isinstance(config, WeakConfigQ31):
+        lsb = config.design.f_unit * 2.0 ** (config.design.smooth_bits - config.design.phi_shift)
+        values[..., 3] += config.phi_offset * lsb
+    return np.asarray(values)
+
+
+def se_of(config: ConfigQ31, se: npt.ArrayLike) -> Float:
+    """Standard errors in SI from the core's integers [..., n_p]."""
+    return np.asarray(np.asarray(se, np.float64) * units_of(config))
+
+
+def covariance_of(config: ConfigQ31, estimate: npt.NDArray[np.void]) -> Float:
+    """Covariance of p in SI [..., n_p, n_p] from estimates of the core."""
+    n_p = len(config.estimator.p_bits)
+    se = se_of(config, estimate["se"][..., :n_p])
+    correlation = np.asarray(estimate["correlation"], np.float64)[..., :n_p, :n_p] / 2**30
+    return np.asarray(correlation * se[..., :, None] * se[..., None, :])
+
+
+LENGTH_BITS = 24  # of pvid_kapitza_q31
+
+
+def scale_of(config: ConfigQ31, l1: float) -> ScaleQ31:
+    """What turns the estimates of a configuration into metres for a rod of l1 [m]."""
+    if not 2.0**-LENGTH_BITS <= l1 < 2.0 ** (31 - LENGTH_BITS):
+        raise PvidError(f"l1 = {l1:g} m does not fit the fixed-point core's lengths, which end at 127 m")
+    mantissa, exponent = math.frexp(units_of(config)[0] * l1 * 2.0**LENGTH_BITS)
+    return ScaleQ31(
+        l1=round(l1 * 2.0**LENGTH_BITS),
+        g_multiplier=min(round(mantissa * 2.0**31), 2**31 - 1),
+        g_shift=31 - exponent,
+        d1_bits=config.estimator.p_bits[1],
+        d2_bits=config.estimator.p_bits[2],
+    )

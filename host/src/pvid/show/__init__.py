@@ -1,0 +1,1 @@
+"""Figures, reports, the terminal view and the live page."""

@@ -1,0 +1,151 @@
+"""`pvid log --web`: the live page, served by a separate process that follows the log like any other reader.
+
+The page requests the next state when it has drawn the last one: a slow browser skips states, and no queue grows. The
+recording neither waits for this process nor shares its memory, and it has the higher priority.
+
+    python -m pvid.show.page FD LOG TITLE        serves on the listening socket FD until its standard input ends
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import importlib.util
+import os
+import re
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+from pvid.base.errors import PvidError
+from pvid.base.hosts import addresses
+from pvid.base.wording import reason
+
+DEFAULT = "127.0.0.1:8765"
+_LOOPBACK = ("127.0.0.1", "::1", "localhost")
+_ASSETS = Path(__file__).parent / "web"
+_TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css": "text/css"}
+_NICENESS = 5
+_MOST_CLIENTS = 32
+# Nothing but this server is ever asked; plotly.js sets styles in place and draws its icons from data.
+_POLICY = (
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'; "
+    "base-uri 'none'; form-action 'none'"
+)
+
+
+def listen(at: str) -> tuple[socket.socket, str]:
+    """A listening socket at HOST:PORT and the address of its page; port 0 is any that is free.
+
+    Raises
+    ------
+    PvidError
+        When it is no HOST:PORT, or nobody can listen there.
+    """
+    match = re.fullmatch(r"(\[[0-9A-Fa-f:.]+\]|[^\[\]:/\s]+):(\d{1,5})", at)
+    if match is None or int(match[2]) > 65535:
+        raise PvidError(f"--web takes HOST:PORT, as in {DEFAULT}, and {at!r} is none")
+    host, port = match[1].strip("[]"), int(match[2])
+    refused = f"cannot serve the live page at {at}"
+    family, address = addresses(host, port, socket.SOCK_STREAM, refused)[0]
+    try:
+        listening = socket.create_server(address[:2], family=family)
+    except OSError as error:
+        raise PvidError(f"{refused}: {reason(error)}") from error
+    shown = f"[{host}]" if ":" in host else host
+    return listening, f"http://{shown}:{listening.getsockname()[1]}/"
+
+
+def is_local(address: str) -> bool:
+    """Whether only this machine can see the page of that address."""
+    host = re.sub(r"^http://\[?(.*?)\]?:\d+/$", r"\1", address)
+    return host in _LOOPBACK
+
+
+@contextlib.contextmanager
+def page(at: str, log: Path, title: str) -> Iterator[str]:
+    """Serves the live page of a log while the context lasts; yields its address.
+
+    Raises
+    ------
+    PvidError
+        As `listen`, and when the packages of the extra `web` are not installed.
+    """
+    lacking = [name for name in ("plotly", "starlette", "uvicorn") if importlib.util.find_spec(name) is None]
+    if lacking:
+        raise PvidError(f"the live page needs {' and '.join(lacking)}: install pvid[web]")
+    listening, address = listen(at)
+    command = [sys.executable, "-P", "-m", "pvid.show.page", str(listening.fileno()), str(log), title]
+    with listening, open(os.devnull, "wb") as nowhere:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,  # its end tells that this program is gone, however it went
+            stdout=nowhere,
+            stderr=nowhere,
+            pass_fds=[listening.fileno()],
+            start_new_session=True,  # Ctrl-C ends the recording, and that ends the page
+        )
+    try:
+        yield address
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def _serve(listening: socket.socket, log: Path, title: str) -> None:
+    import uvicorn
+    from starlette.applications import Starlette
+    from starlette.middleware import Middleware
+    from starlette.middleware.trustedhost import TrustedHostMiddleware
+    from starlette.requests import Request
+    from starlette.responses import FileResponse, Response
+    from starlette.routing import Route
+
+    from pvid.show.page_state import LiveState
+    from pvid.show.patience import Impatient
+
+    state = LiveState(log, title)
+    headers = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff"}
+
+    def asset(path: Path) -> Route:
+        def respond(_: Request) -> Response:
+            return FileResponse(path, media_type=_TYPES[path.suffix], headers=headers)
+
+        return Route("/" if path.suffix == ".html" else f"/{path.name}", respond)
+
+    def respond_state(_: Request) -> Response:
+        return Response(state.as_json(), media_type="application/json", headers=headers)
+
+    plotly = importlib.metadata.distribution("plotly").locate_file("plotly/package_data/plotly.min.js")
+    files = [*sorted(_ASSETS.iterdir()), Path(str(plotly))]
+    host = listening.getsockname()[0]
+    # a page elsewhere whose name is made to point here gets nothing
+    guard = [Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost", "[::1]"])]
+    application = Starlette(
+        routes=[*map(asset, files), Route("/state", respond_state)], middleware=guard if host in _LOOPBACK else []
+    )
+    state.start()
+    settings = uvicorn.Config(
+        application, http=Impatient, ws="none", log_level="critical", limit_concurrency=_MOST_CLIENTS, lifespan="off"
+    )
+    uvicorn.Server(settings).run(sockets=[listening])
+
+
+def _end_with_input() -> None:
+    sys.stdin.buffer.read()
+    os._exit(0)
+
+
+def main() -> None:
+    """See the module."""
+    number, log, title = sys.argv[1:]
+    os.nice(_NICENESS)
+    threading.Thread(target=_end_with_input, daemon=True).start()
+    _serve(socket.socket(fileno=int(number)), Path(log), title)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""What the live page shows, as one JSON object of bounded size: a log that is followed while it grows."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.base.rounding import with_error
+from pvid.log.history import History, Rates, envelope
+from pvid.log.reader import LogStream
+from pvid.log.tail import LogTail
+from pvid.log.words import (
+    PARAMETERS,
+    board_words,
+    kappa_share,
+    kappa_words,
+    link_words,
+    loss_words,
+    reason_words,
+    received_words,
+    residual_words,
+)
+from pvid.rig.file import RigFile
+from pvid.show.axis_limits import interesting
+
+Float = npt.NDArray[np.float64]
+
+_LOOK_S = 0.1
+_BINS = 400  # of the motion: twice as many points
+
+
+class LiveState(threading.Thread):
+    """Follows a log from its beginning; the file may come later. Nobody waits for it: it reads what is there.
+
+    A record that it fails on is left out of the page, and counted there.
+    """
+
+    def __init__(self, log: Path, title: str) -> None:
+        super().__init__(name="follower", daemon=True)
+        self.log = log
+        self.title = title
+        self._lock = threading.Lock()
+        self._stream = LogStream()
+        self._history = History()
+        self._rates = Rates()
+        self._rig: str | None = None
+        self._failed = 0
+
+    def run(self) -> None:
+        """See the class."""
+        while not self.log.exists():
+            time.sleep(_LOOK_S)
+        with self.log.open("rb") as file:
+            tail = LogTail(file, self._stream)
+            while True:
+                with self._lock:
+                    data = tail.read()
+                self.take(data)
+                if not data:
+                    time.sleep(_LOOK_S)
+
+    def take(self, data: bytes) -> None:
+        """The next bytes of the log."""
+        with self._lock:
+            for record in self._stream.feed(data):
+                try:
+                    if self._stream.rig != self._rig:
+                        self._rig = self._stream.rig
+                        self._know_rig()
+                    self._history.take(record)
+                except Exception:  # whatever a board sends, the page shows what comes after it
+                    self._failed += 1
+
+    def _know_rig(self) -> None:
+        if self._rig is not None:
+            try:
+                self._history.know(RigFile.parse(self._rig).l1)
+            except PvidError:
+                return  # of another version: the page does without g, l2 and rho2
+
+    def as_json(self) -> bytes:
+        """The state of now; page.js says what becomes of it."""
+        with self._lock:
+            state = self._state()
+        return json.dumps(state, allow_nan=False, separators=(",", ":")).encode()
+
+    def _state(self) -> dict[str, Any]:
+        history, account = self._history, self._stream.account
+        up, link = link_words(account)
+        newest = history.newest
+        kappa, residual = newest.get("kappa", math.nan), newest.get("residual", math.nan)
+        return {
+            "title": self.title,
+            "board": board_words(history.hello, account),
+            "up": up,
+            "link": link,
+            "received": received_words(account, *self._rates.now(account, time.monotonic())),
+            "lost": loss_words(account) + (f"; {self._failed} records cannot be shown" if self._failed else ""),
+            "reason": history.reason,
+            "reasonWords": reason_words(history.reason),
+            "kappa": f"{kappa:.2g}, {kappa_words(kappa)}" if newest else "",
+            "kappaShare": kappa_share(kappa),
+            "residual": f"{residual:.3g} {residual_words(history.hello)}" if newest else "",
+            "parameters": self._table(),
+            "estimates": self._estimates(),
+            "motion": self._motion(),
+        }
+
+    def _table(self) -> list[dict[str, str]]:
+        rows = []
+        for name, (symbol, meaning, unit) in PARAMETERS.items():
+            value = self._history.newest.get(name, math.nan)
+            if not math.isnan(value):
+                told, spread = with_error(value, self._history.newest[f"{name}_se"])
+                rows.append({"symbol": symbol, "meaning": meaning, "unit": unit, "value": told, "error": f"± {spread}"})
+        if not self._history.is_physical:
+            meaning = "outside the physical region"
+            rows.append({"symbol": "g*, l2, rho2", "meaning": meaning, "unit": "", "value": "", "error": ""})
+        return rows
+
+    def _estimates(self) -> dict[str, Any]:
+        """Of the physical parameters, or of the linear ones where rod 1 is not known."""
+        history = self._history
+        curves = []
+        for name in ("g", "l2", "rho2") if history.has_physical else ("w", "d1", "d2"):
+            symbol, meaning, unit = PARAMETERS[name]
+            value, band = history.estimates(name), 2 * history.estimates(f"{name}_se")
+            limits = interesting(value, band)
+            curves.append(
+                {
+                    "label": f"{symbol}, {meaning}" + (f" [{unit}]" if unit else ""),
+                    "value": _numbers(value),
+                    "low": _numbers(value - band),
+                    "high": _numbers(value + band),
+                    "limits": list(limits) if limits[0] < limits[1] else None,
+                }
+            )
+        residual, kappa = history.estimates("residual"), history.estimates("kappa")
+        largest = interesting(residual, np.zeros(len(residual)))[1]
+        return {
+            "t": _numbers(history.estimates("t")),
+            "curves": curves,
+            "residual": _numbers(residual),
+            "residualLabel": f"residual, {residual_words(history.hello)}",
+            "residualLimits": [0.0, 1.3 * largest] if largest > 0 else None,
+            "kappa": _numbers(np.where(kappa > 0, kappa, np.nan)),
+        }
+
+    def _motion(self) -> dict[str, Any]:
+        t, phi, y = self._history.samples()
+        angle, drive = envelope(t, phi, _BINS), envelope(t, 1e3 * y, _BINS)
+        return {
+            "phi": {"t": _numbers(angle[0]), "x": _numbers(angle[1])},
+            "y": {"t": _numbers(drive[0]), "x": _numbers(drive[1])},
+        }
+
+
+def _numbers(x: Float) -> list[float | None]:
+    """To seven digits; what is not finite is None."""
+    return [float(f"{one:.7g}") if math.isfinite(one) else None for one in x.tolist()]

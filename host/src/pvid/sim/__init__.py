@@ -1,0 +1,1 @@
+"""Simulated rigs: equations of motion, drives, sensors."""

@@ -1,0 +1,1 @@
+"""The float32 core in numpy, operation by operation."""

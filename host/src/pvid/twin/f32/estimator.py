@@ -1,0 +1,486 @@
+"""Twin of estimator_f32.c: one tick of every lane at a time.
+
+`Estimator` is that of the strong form, whose model projects its sums by itself; `RelativeEstimator` is that of a
+model known by its pattern, which keeps B relative to the estimate and solves in stages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.core.native import ESTIMATE_DTYPE, EstimatorConfig, Law, Reason
+from pvid.twin.f32 import cholesky
+from pvid.twin.f32.gate import Gate
+from pvid.twin.f32.information import Information
+from pvid.twin.f32.misfit import Misfit
+from pvid.twin.f32.pattern import PatternModel
+from pvid.twin.kapitza import strong as model
+
+Float32 = npt.NDArray[np.float32]
+
+ROW_LIMIT = np.float32(1.0e14)
+RESIDUAL_FLOOR = np.float32(4.8e-7)
+RESIDUAL_MAX = np.float32(1e30)
+ROUNDING = np.float32(2.4e-7)  # of a step's terms
+_COUNTERS = (
+    "rows",
+    "updates",
+    "limited",
+    "bounded",
+    "held_not_excited",
+    "held_pivot",
+    "rejected_not_finite",
+    "rejected_saturated",
+    "held_uncertain",
+    "held_out_of_range",
+    "misfits",
+    "rejected_outlier",
+    "at_rest",
+)
+
+
+def _capped(residual: Float32) -> Float32:
+    """No more than RESIDUAL_MAX, which stands for what is no number as well."""
+    return np.where(residual <= RESIDUAL_MAX, residual, RESIDUAL_MAX)
+
+
+def _squares(n: Float32, y: Float32) -> Float32:
+    """Y^2 + N_0^2 + N_1^2 + .., summed in this order [lanes]."""
+    each = np.concatenate([y[None], n])
+    total: Float32 = np.add.accumulate(each * each)[-1]
+    return total
+
+
+def _lanes(values: Sequence[float]) -> Float32:
+    return np.array(values, np.float32)
+
+
+class Estimator:
+    """pvid_estimator_f32 in every lane; one EstimatorConfig a lane.
+
+    p float32 [n_p, lanes], counters: name -> int64 [lanes].
+    """
+
+    def __init__(
+        self,
+        configs: Sequence[EstimatorConfig],
+        update_rate: float,
+        n_p: int = model.N_P,
+        n_sums: int = model.SUMS,
+    ) -> None:
+        rate = np.float32(update_rate)
+        stack = {
+            name: np.stack([np.asarray(getattr(c, name), np.float32)[:n_p] for c in configs], axis=1)
+            for name in ("start", "start_sd", "lower", "upper")
+        }
+        row_sd = _lanes([c.row_sd for c in configs])
+        ratio = row_sd / stack["start_sd"]
+        self.p = stack["start"].copy()
+        self.prior = ratio * ratio
+        self.start_sd = stack["start_sd"]
+        self.lower = stack["lower"]
+        self.upper = stack["upper"]
+        self.row_variance = row_sd * row_sd
+        self.correlation = _lanes([c.correlation for c in configs])
+        self.step_limit = _lanes([c.step_limit for c in configs])
+        self.kappa_min = _lanes([c.kappa_min for c in configs])
+        dead_zone = _lanes([c.dead_zone for c in configs])
+        self.dead_zone = dead_zone * dead_zone
+        self.divider = np.array([c.divider for c in configs])
+        self.phase = np.zeros(len(configs), np.int64)
+        self.gain = np.array([self._gain(c, rate) for c in configs], np.float32)
+        self.innovation = np.zeros_like(self.p)
+        self.information = Information(n_sums, _lanes([c.forgetting_s for c in configs]) * rate)
+        self.sums = self.information.read()
+        self.counters = {name: np.zeros(len(configs), np.int64) for name in _COUNTERS}
+        self.size = np.zeros(len(configs), np.float32)
+
+    @staticmethod
+    def _gain(config: EstimatorConfig, rate: np.float32) -> np.float32:
+        if config.law is Law.PSEUDOVELOCITY:
+            return np.float32(0)
+        gain = (np.float32(config.feedback_hz) * np.float32(config.divider)) / rate
+        return np.float32(gain if config.feedback_hz > 0 and gain < 1 else 1)
+
+    def step(
+        self, n: Float32, y: Float32, gate: Gate | None = None, misfit: Misfit | None = None
+    ) -> npt.NDArray[np.uint8]:
+        """One row a lane: N [11, lanes], Y [lanes]. Returns the reasons [lanes]; `sums` is up to date after it."""
+        with np.errstate(all="ignore"):
+            e, gradient = model.innovate(self.p, n, y)
+            if misfit is not None:
+                misfit.take(e, gradient[0] * self.p[0])
+            passed = np.ones(len(y), np.bool_) if gate is None else gate.passes(e * e)
+            reason = self._step(n, y, e, gradient, passed)
+            if misfit is not None:
+                told = misfit.alarm & (reason == Reason.UPDATED)
+                reason[told] = Reason.MISFIT
+                self.counters["misfits"] += told
+            return reason
+
+    def _step(
+        self, n: Float32, y: Float32, e: Float32, gradient: Float32, passed: npt.NDArray[np.bool_]
+    ) -> npt.NDArray[np.uint8]:
+        usable = _squares(n, y) <= ROW_LIMIT * ROW_LIMIT
+        taken = passed & usable
+        reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
+        if not taken.all():
+            not_finite = passed & ~usable & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
+            saturated = passed & ~usable & ~not_finite
+            reason[not_finite] = Reason.REJECTED_NOT_FINITE
+            reason[saturated] = Reason.REJECTED_SATURATED
+            reason[~passed] = Reason.REJECTED_OUTLIER
+            self.counters["rejected_outlier"] += ~passed
+            self.counters["rejected_not_finite"] += not_finite
+            self.counters["rejected_saturated"] += saturated
+        if not taken.any():
+            return reason
+        listening = taken & (self.gain < 1)
+        if listening.any():
+            self.innovation = np.where(listening, self.innovation + gradient * e, self.innovation)
+        self.sums = self.information.add(model.terms(n, y), taken)
+        self.counters["rows"] += taken
+        self.phase += taken
+        due = taken & (self.phase >= self.divider)
+        if due.any():
+            self.phase[due] = 0
+            reason[due] = self._solve(due)[due]
+        self.information.end_group(taken)
+        self.sums = self.information.read()
+        return reason
+
+    def _solve(self, due: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+        s, force, _ = model.project(self.p, self.sums)
+        everywhere = np.ones(len(due), np.bool_)
+        x, reason, rests = self._step_from(s, force, self.gain, due, everywhere)
+        moving = due & (reason == Reason.UPDATED) & ~rests
+        self.p = np.where(moving, x, self.p)
+        self.counters["updates"] += moving
+        return reason
+
+    def _reference(self) -> Float32:
+        """What the size of a step is measured by [n_p, lanes]."""
+        return self.p
+
+    def _kappa(self, s: Float32, whole: cholesky.Factor) -> cholesky.Factor:
+        """The factor of the leading parameters that the gates look at; `whole` is that of all."""
+        return whole
+
+    def _step_from(
+        self,
+        s: Float32,
+        force: Float32,
+        gain: Float32,
+        due: npt.NDArray[np.bool_],
+        informed: npt.NDArray[np.bool_],
+    ) -> tuple[Float32, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
+        """Where p goes from S and F, whether it may (UPDATED or why it is held), and whether it rests in its dead zone,
+        in every lane."""
+        for a in range(len(self.p)):
+            s[a, a] = s[a, a] + self.prior[a]
+        rhs = gain * force + (np.float32(1) - gain) * self.innovation
+        self.innovation = np.where(due, np.float32(0), self.innovation)
+        f = cholesky.factor(s)
+        kappa = self._kappa(s, f)
+        solvable = f.ok & kappa.ok
+        own = (kappa.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
+        excited = informed & (kappa.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
+        rests = due & solvable & excited & self._at_rest(f, force)
+        dp = cholesky.solve(f, rhs)
+        magnitudes = (dp / self._reference()).view(np.uint32) & np.uint32(0x7FFFFFFF)
+        size = magnitudes.max(axis=0).view(np.float32)
+        moving = due & solvable & excited & np.isfinite(size) & ~rests
+        self.size = np.where(moving, size, np.float32(0))
+        limited = size > self.step_limit
+        factor = np.where(limited, self.step_limit / size, np.float32(1)).astype(np.float32, copy=False)
+        x = self.p + factor * dp
+        above = x > self.upper
+        x = np.where(above, self.upper, x)
+        below = x < self.lower
+        x = np.where(below, self.lower, x)
+        reason = np.full(len(due), Reason.UPDATED, np.uint8)
+        reason[~np.isfinite(size) & ~rests] = Reason.HELD_PIVOT
+        reason[~excited] = Reason.HELD_NOT_EXCITED
+        reason[~solvable] = Reason.HELD_PIVOT
+        self.counters["limited"] += moving & limited
+        self.counters["bounded"] += moving & (above | below).any(axis=0)
+        self.counters["held_not_excited"] += due & (reason == Reason.HELD_NOT_EXCITED)
+        self.counters["held_pivot"] += due & (reason == Reason.HELD_PIVOT)
+        self.counters["at_rest"] += rests
+        return x, reason, rests
+
+    def _at_rest(self, f: cholesky.Factor, force: Float32) -> npt.NDArray[np.bool_]:
+        """Where p is within the dead zone: f the factor of S + H0."""
+        if not (self.dead_zone > 0).any():
+            return np.zeros(len(self.dead_zone), np.bool_)
+        sums = self.information.read()
+        found = self._variance(sums, self._assessed(sums)[1])
+        x = cholesky.solve(f, force)
+        square = np.zeros(len(found), np.float32)
+        for a in range(len(x)):
+            square = square + force[a] * x[a]
+        noise = np.where(found < self.row_variance, found, self.row_variance)
+        return (self.dead_zone > 0) & (square <= self.dead_zone * (self.correlation * noise))
+
+    def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
+        """S [n_p, n_p, lanes] and the sum of squared residuals [lanes], not below its rounding."""
+        s, _, energy = model.project(self.p, sums)
+        floor = RESIDUAL_FLOOR * sums[-2]
+        residual = _capped(sums[-2] + energy)
+        return s, np.where(residual > floor, residual, floor)
+
+    def assess(self) -> npt.NDArray[np.void]:
+        """pvid_estimator_assess_f32 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        with np.errstate(all="ignore"):
+            sums = self.information.read()
+            s, residual = self._assessed(sums)
+            return self._assess(sums, s, self._variance(sums, residual))
+
+    def misfit(self, sums: Float32) -> Float32:
+        """Residual variance over what the sensors explain; nobody has told what that is [lanes]."""
+        return np.zeros(sums.shape[1], np.float32)
+
+    def _variance(self, sums: Float32, residual: Float32) -> Float32:
+        """s^2 of a row [lanes]."""
+        freedom = sums[-1] - np.float32(len(self.p))
+        return np.where(freedom >= 1, residual / freedom, self.row_variance)
+
+    def _assess(self, sums: Float32, s: Float32, variance: Float32) -> npt.NDArray[np.void]:
+        n_p = len(self.p)
+        weight = sums[-1]
+        kappa = self._kappa(s, cholesky.factor(s))
+        most = np.ones(len(weight), np.float32)
+        for j in range(len(kappa.u)):
+            scaled = kappa.u[j, j] * kappa.scale[j]
+            imitated = (scaled * scaled) * s[j, j]
+            most = np.where(imitated > most, imitated, most)
+        wide = variance * self.correlation
+        for a in range(n_p):
+            s[a, a] = s[a, a] + wide / (self.start_sd[a] * self.start_sd[a])
+        f = cholesky.factor(s)
+        covariance = cholesky.inverse(f) * wide
+        se = np.sqrt(np.stack([covariance[a, a] for a in range(n_p)]))
+        known = f.ok & np.isfinite(covariance).all(axis=(0, 1)) & np.isfinite(se).all(axis=0)
+        out = np.zeros(self.p.shape[1], ESTIMATE_DTYPE)
+        out["p"][:, :n_p] = self.p.T
+        out["kappa"] = np.where(kappa.ok, kappa.first_pivot, np.float32(0))
+        out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))
+        out["residual_sd"] = np.sqrt(variance)
+        out["weight"] = weight
+        out["misfit"] = self.misfit(sums)
+        for a in range(n_p):
+            start_variance = self.start_sd[a] * self.start_sd[a]
+            out["se"][:, a] = np.where(known, se[a], self.start_sd[a])
+            for b in range(n_p):
+                unknown = start_variance if a == b else np.float32(0)
+                out["covariance"][:, a, b] = np.where(known, covariance[a, b], unknown)
+        return out
+
+
+class RelativeEstimator(Estimator):
+    """pvid_estimator_f32 on a model known by its pattern. All lanes share law, feedback and divider.
+
+    theta float32 [n_theta, lanes] is f(p); B and yy are b = B - M theta and the sum of squared residuals.
+    """
+
+    _ROWS_A_STAGE = 4
+    _COLUMNS_A_STAGE = 3
+
+    def __init__(self, configs: Sequence[EstimatorConfig], update_rate: float, pattern: PatternModel) -> None:
+        super().__init__(configs, update_rate, pattern.n_p, pattern.n_sums)
+        schedules = {(c.law, c.feedback_hz, c.divider) for c in configs}
+        if len(schedules) != 1:
+            raise PvidError("lanes of one twin must share law, feedback and divider: their schedules differ")
+        self.model = pattern
+        with np.errstate(all="ignore"):
+            self.theta = pattern.theta(self.p)
+        self.row_weight = _lanes([c.row_weight for c in configs])
+        self.noise_margin = _lanes([c.noise_margin for c in configs])
+        self.noise = np.zeros((3, len(configs)), np.float32)
+        self.energy = np.zeros(len(configs), np.float32)
+        self.group_energy = self.energy
+        self.taken = np.zeros(len(configs), np.float32)
+        self.expected = np.zeros(len(configs), np.float32)
+        self.everywhere = np.ones(len(configs), np.bool_)
+        self.was_due = True
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether the law is a rate (g < 1) that does not iterate."""
+        return bool(self.gain[0] < 1)
+
+    def add(self, n: Float32, y: Float32) -> npt.NDArray[np.uint8]:
+        """One row of a group: N [n_theta, lanes], Y [lanes]."""
+        with np.errstate(all="ignore"):
+            fits = _squares(n, y) <= ROW_LIMIT * ROW_LIMIT
+            not_finite = ~fits & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
+            e = y
+            for entry, theta in zip(n, self.theta, strict=True):
+                e = e - entry * theta
+            fits = fits & (e * e <= ROW_LIMIT * ROW_LIMIT)
+            if self.is_rate:
+                gradient = self.model.transpose_times(self.model.jacobian(self.p), n)
+                self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
+            self.energy = np.where(fits, self.energy + e * e, self.energy)
+            self.taken = np.where(fits, self.taken + self.row_weight, self.taken)
+            self.sums = self.information.add(self.model.terms(n, e, self.row_weight), fits)
+        reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
+        reason[not_finite] = Reason.REJECTED_NOT_FINITE
+        self.counters["rows"] += fits
+        self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
+        self.counters["rejected_not_finite"] += not_finite
+        return reason
+
+    def solve(
+        self, ends_group: bool, refuge: tuple[npt.NDArray[np.bool_], Float32] | None = None
+    ) -> Iterator[npt.NDArray[np.uint8] | None]:
+        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one.
+
+        refuge: in which lanes p goes elsewhere if it may not step, and where.
+        """
+        reason = np.full(len(self.phase), Reason.ACCUMULATED, np.uint8)
+        self.was_due = True
+        self.size = np.zeros(len(reason), np.float32)
+        if ends_group:
+            self.group_energy = self.energy
+            self.energy = np.zeros_like(self.energy)
+            self.taken = np.zeros_like(self.taken)
+            self.phase += 1
+            self.was_due = bool(self.phase[0] >= self.divider[0])
+        elif self.is_rate:
+            yield reason
+            return
+        if self.was_due:
+            if ends_group:
+                self.phase[:] = 0
+            for _ in range(self.solve_stages(False) - 1):
+                yield None
+            with np.errstate(all="ignore"):
+                reason = self._commit(self.gain if ends_group else np.ones_like(self.gain), refuge)
+            self.sums = self.information.read()
+            yield None if ends_group else reason
+        if ends_group:
+            self.information.end_group(self.everywhere)
+            self.sums = self.information.read()
+            yield reason
+
+    @property
+    def _projection_stages(self) -> int:
+        columns = self.model.c_column
+        return 1 + sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
+
+    def solve_stages(self, ends_group: bool) -> int:
+        """Stages of a solve that is due."""
+        return self._projection_stages + 4 + -(-self.model.n_theta // self._ROWS_A_STAGE) + ends_group
+
+    @property
+    def assessment_stages(self) -> int:
+        """Stages of an assessment."""
+        return self._projection_stages + 4 + self.model.n_p
+
+    def judged(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
+        """The assessment, and where the data say more than noise of the variance found would [lanes]."""
+        sums = self.information.read()
+        s, residual = self._assessed(sums)
+        variance = self._variance(sums, residual)
+        return self._assess(sums, s.copy(), variance), self._informed(s, variance, sums[-1])
+
+    def _informed(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
+        if self.model.noise is None:
+            return self.everywhere
+        gated = self.model.gated
+        rest = np.zeros((gated, gated, s.shape[2]), np.float32)
+        much = (self.noise_margin * variance) * weight
+        noise = self.model.noise(self.p, self.noise)
+        for a in range(gated):
+            for b in range(a, gated):
+                rest[a, b] = s[a, b] - much * noise[a, b]
+        return cholesky.factor(rest).ok | ~(self.noise_margin > 0)
+
+    def _kappa(self, s: Float32, whole: cholesky.Factor) -> cholesky.Factor:
+        gated = self.model.gated
+        return whole if gated == self.model.n_p else cholesky.factor(s[:gated, :gated])
+
+    def _commit(self, gain: Float32, refuge: tuple[npt.NDArray[np.bool_], Float32] | None) -> npt.NDArray[np.uint8]:
+        pattern = self.model
+        sums = self.information.read()
+        matrix = pattern.matrix(sums)
+        b = sums[pattern.moments : pattern.moments + pattern.n_theta]
+        c = pattern.jacobian(self.p)
+        force = pattern.transpose_times(c, b)
+        s = pattern.project(c, matrix)
+        informed = self._informed(s, self.row_variance, sums[-1])
+        x, reason, rests = self._step_from(s, force, gain, self.everywhere, informed)
+        stepping = (reason == Reason.UPDATED) & ~rests
+        x = np.where(stepping, x, self.p)
+        fleeing = np.zeros_like(stepping)
+        if refuge is not None:
+            fleeing = ~stepping & ~rests & refuge[0]
+            x = np.where(fleeing, refuge[1], x)
+        theta = pattern.theta(x)
+        step = theta - self.theta
+        moved = pattern.times(matrix, step)
+        fall = np.zeros(len(reason), np.float32)
+        size = np.zeros(len(reason), np.float32)
+        for i in range(pattern.n_theta):
+            fall = fall + step[i] * (b[i] + (b[i] - moved[i]))
+            size = size + matrix[i, i] * (step[i] * step[i])
+        residual = self.information.low[-2] - fall
+        finite = np.isfinite(fall) & np.isfinite(residual)
+        overflow = stepping & ~finite
+        reason[overflow] = Reason.HELD_PIVOT
+        self.counters["held_pivot"] += overflow
+        moving = (stepping | fleeing) & finite
+        places = slice(pattern.moments, pattern.moments + pattern.n_theta)
+        low = self.information.low.copy()
+        low[places] = low[places] - moved
+        low[-2] = residual
+        self.information.low = np.where(moving, low, self.information.low)
+        lost = _capped(self.information.rounding + ROUNDING * size)
+        self.information.rounding = np.where(moving, lost, self.information.rounding)
+        self.theta = np.where(moving, theta, self.theta)
+        self.p = np.where(moving, x, self.p)
+        self.counters["updates"] += moving & stepping
+        return reason
+
+    def place(self, p: Float32) -> None:
+        """Sets p [n_p, lanes] before the first row, within its bounds; what is no number leaves its entry."""
+        x = np.where(p < self.lower, self.lower, p)
+        self.p = np.where(np.isfinite(p), np.where(x > self.upper, self.upper, x), self.p)
+        with np.errstate(all="ignore"):
+            self.theta = self.model.theta(self.p)
+
+    def _reference(self) -> Float32:
+        positive = np.array(self.model.positive)[:, None]
+        return np.where(positive, self.p, self.start_sd)
+
+    def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
+        s = self.model.project(self.model.jacobian(self.p), self.model.matrix(sums))
+        floor = self.expected * (sums[-1] - np.float32(len(self.p)))
+        residual = _capped(sums[-2] + self.information.rounding)
+        return s, np.where(residual > floor, residual, floor)
+
+    def expect(self, variance: Float32) -> None:
+        """pvid_estimator_expect_f32: variance [lanes] that the sensors' noise gives the rows since the last group."""
+        with np.errstate(all="ignore"):
+            part = self.taken / self.sums[-1]
+            share = np.where(self.taken < self.sums[-1], part, np.float32(1))
+            moved = self.expected + (_capped(variance) - self.expected) * share
+        self.expected = np.where(self.taken > 0, moved, self.expected)
+
+    def misfit(self, sums: Float32) -> Float32:
+        """pvid_estimator_misfit_f32 [lanes]."""
+        freedom = sums[-1] - np.float32(len(self.p))
+        explained = freedom * self.expected
+        known = (freedom >= 1) & (explained > 0) & (sums[-2] > 0)
+        return np.where(known, _capped(sums[-2] / explained), np.float32(0))
+
+    @property
+    def rounded(self) -> npt.NDArray[np.bool_]:
+        """pvid_estimator_is_rounded_f32 [lanes]."""
+        return np.asarray(self.information.rounding > self.sums[-2])

@@ -1,0 +1,1 @@
+"""The pendulum's own parts of the twin."""

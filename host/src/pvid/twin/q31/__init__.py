@@ -1,0 +1,1 @@
+"""The fixed-point core in numpy, integer by integer."""

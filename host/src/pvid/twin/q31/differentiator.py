@@ -1,0 +1,61 @@
+"""Twin of differentiator_q31.c. It feeds forward, so all ticks are computed at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.design.fir import ORDERS
+from pvid.design.fir_q31 import Y_LOWEST, FirBankQ31
+from pvid.twin.f32.differentiator import segments
+from pvid.twin.q31.integer import Int, round_shift
+
+Mask = npt.NDArray[np.bool_]
+
+
+def derivatives(phi: Int, y: Int, within: Mask, bank: FirBankQ31) -> tuple[Int, Int, Mask]:
+    """Derivatives after every tick.
+
+    Parameters
+    ----------
+    phi, y
+        Counts about their offsets, int64 [ticks].
+    within
+        bool [ticks]: which samples are within full scale; one that is not empties the window.
+    bank
+        The integer bank.
+
+    Returns
+    -------
+    int64 [ticks, 5] of phi and [ticks, 3] (orders 2, 3, 4) of y, zero until the window is full, and bool [ticks]:
+    whether it was.
+    """
+    out_phi = np.zeros((len(phi), ORDERS), np.int64)
+    out_y = np.zeros((len(phi), ORDERS - Y_LOWEST), np.int64)
+    ready = np.zeros(len(phi), np.bool_)
+    delay = bank.delay
+    for first, last in segments(within):
+        count = last - first - 2 * delay
+        if count <= 0:
+            continue
+        now = slice(first + 2 * delay, last)
+        ready[now] = True
+        for k in range(ORDERS):
+            out_phi[now, k] = round_shift(_sum(phi[first:last], count, bank, k), bank.phi_shift[k])
+        for k in range(Y_LOWEST, ORDERS):
+            out_y[now, k - Y_LOWEST] = round_shift(_sum(y[first:last], count, bank, k), bank.y_shift[k - Y_LOWEST])
+    return out_phi, out_y, ready
+
+
+def _sum(x: Int, count: int, bank: FirBankQ31, order: int) -> Int:
+    """The exact sum of one order in each of the `count` full windows."""
+    delay = bank.delay
+    middle = x[delay : delay + count]
+    total = middle * bank.centre if order == 0 else np.zeros(count, np.int64)
+    for i in range(bank.half):
+        away = (i + 1) * bank.stride
+        after = x[delay + away : delay + away + count]
+        before = x[delay - away : delay - away + count]
+        pair = (after + before) - 2 * middle if order % 2 == 0 else after - before
+        total = total + int(bank.weights[order, i]) * pair
+    return total

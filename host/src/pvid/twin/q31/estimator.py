@@ -1,0 +1,556 @@
+"""Twin of estimator_q31.c and information_q31.c: integers, one lane a start, lanes last."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.core.native import Reason
+from pvid.core.native_q31 import ESTIMATE_DTYPE, EstimatorConfigQ31
+from pvid.twin.kapitza.weak_q31 import ModelQ31
+from pvid.twin.q31 import cholesky
+from pvid.twin.q31.integer import (
+    WIDE,
+    Int,
+    bit_length,
+    clamp,
+    integers,
+    root_of,
+    round_shift,
+    scale,
+    times_q31,
+)
+from pvid.twin.q31.scaled import Scaled, pick, scaled
+
+Mask = npt.NDArray[np.bool_]
+Reasons = npt.NDArray[np.uint8]
+
+ONE = 2**30
+ROW_LIMIT = 2**28
+SUM_LIMIT = 2**60  # above it the sums are divided by 4
+SUM_LOW = 2**54  # below it, if they were divided, they are multiplied by 4 again
+STEP_MAX = 2**40  # of |dp|, far beyond the bounds of p
+SIZE_BITS = 22  # format of the size of a step
+TERM_MAX = 2**40  # of |N_i theta_i|, far beyond the limit of a row
+HELD_LIMIT = 2 * SUM_LIMIT  # of |b|, rr and what a step may add to them
+UNIT_BITS = cholesky.RHS_BITS - 1
+_REST_BITS = 28  # of F, where a dead zone is asked for
+_NOTHING = -200  # exponent of a number that is 0
+_COUNTERS = (
+    "rows",
+    "updates",
+    "limited",
+    "bounded",
+    "held_not_excited",
+    "held_pivot",
+    "rejected_not_finite",
+    "rejected_saturated",
+    "held_uncertain",
+    "held_out_of_range",
+    "misfits",
+    "rejected_outlier",
+    "at_rest",
+)
+
+
+def length(x: Int) -> Int:
+    """Bits of |x|; very negative for 0, so that it never is the largest."""
+    return np.where(x == 0, _NOTHING, bit_length(np.abs(x)))
+
+
+def decay(groups: int, block: int) -> int:
+    """exp(-block / groups) in Q31, block <= groups / 4."""
+    x = (block << 31) // groups
+    total = 1 << 31
+    for k in range(12, 0, -1):
+        total = (1 << 31) - (((x * total) >> 31) // k)
+    return total
+
+
+class EstimatorQ31:
+    """pvid_estimator_q31 in every lane; all lanes share model, formats, divider and whether the law is a rate.
+
+    p int64 [n_p, lanes]; sums int64 [n_sums, lanes]: M, b, rr times 4^-exponent, weight in Q16.
+    """
+
+    _ROWS_A_STAGE = 8
+    _ENTRIES_A_STAGE = 18
+    _PIVOTS_A_STAGE = 2
+    _END_PARTS = 2
+
+    def __init__(self, configs: Sequence[EstimatorConfigQ31], model: ModelQ31) -> None:
+        first = configs[0]
+        for c in configs:
+            if (c.p_bits, c.n_bits, c.y_bits, c.divider, c.gain < ONE) != (
+                first.p_bits,
+                first.n_bits,
+                first.y_bits,
+                first.divider,
+                first.gain < ONE,
+            ):
+                raise PvidError("lanes of one twin must share formats, divider and whether the law is a rate")
+        self.model = model
+        self._upper = np.triu_indices(model.n_theta)
+        self._diagonal = np.flatnonzero(self._upper[0] == self._upper[1])
+        self._c_row, self._c_column = np.array(model.c_row), np.array(model.c_column)
+        self._columns = [np.flatnonzero(self._c_column == a) for a in range(model.n_p)]
+        lanes = len(configs)
+
+        def stacked(name: str) -> Int:
+            return np.stack([integers(getattr(c, name))[: model.n_p] for c in configs], axis=1)
+
+        def lane(name: str) -> Int:
+            return integers([getattr(c, name) for c in configs])
+
+        self.p = stacked("start")
+        self.start_sd = stacked("start_sd")
+        self.lower = stacked("lower")
+        self.upper = stacked("upper")
+        self.row_sd = lane("row_sd")
+        self.correlation = lane("correlation")
+        self.row_weight = lane("row_weight")
+        self.step_limit = lane("step_limit")
+        self.kappa_min = lane("kappa_min")
+        self.noise_margin = lane("noise_margin")
+        self.dead_zone = lane("dead_zone")
+        self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
+        self.energy = np.zeros(lanes, np.int64)
+        self.taken = np.zeros(lanes, np.int64)
+        self.expected = scaled(np.zeros(lanes, np.int64), 0)
+        self.group_energy = self.energy
+        self.size = self.energy
+        self.gain = lane("gain")
+        self.is_rate = first.gain < ONE  # a law that does not iterate
+        self.divider = first.divider
+        self.block, self.retention = integers([self._forgetting(c.forgetting_groups) for c in configs]).T
+        theta_bits, c_bits = model.formats(first.p_bits)
+        # e = Y - sum N_i theta_i 2^-align_i;  C in units of e per N_i per p_a is c_k 2^c_exponent_k
+        self.align = [t + n - first.y_bits for t, n in zip(theta_bits, first.n_bits, strict=True)]
+        self.c_exponent = [
+            first.y_bits - first.n_bits[row] - first.p_bits[column] - bits
+            for row, column, bits in zip(model.c_row, model.c_column, c_bits, strict=True)
+        ]
+        self.theta_bits = theta_bits
+        self.theta = model.theta(self.p)
+        self.phase = 0
+        self.age = np.zeros(lanes, np.int64)
+        self.exponent = np.zeros(lanes, np.int64)
+        self.sums = np.zeros((model.n_sums, lanes), np.int64)
+        self.fresh = np.zeros((model.n_theta, lanes), np.int64)
+        self.counters = {name: np.zeros(lanes, np.int64) for name in _COUNTERS}
+        self.was_due = True
+        self.prior, self.prior_exponent = self._square_ratio(self.row_sd, integers(-8))
+
+    def _square_ratio(self, sd: Int, exponent: Int) -> tuple[Int, Int]:
+        """(sd 2^exponent / start_sd)^2 = prior 2^-prior_exponent, prior of 31 bits."""
+        ratio = (sd << 31) // self.start_sd
+        up = 31 - bit_length(ratio)
+        mantissa = np.minimum(scale(ratio, -up), 1 << 31)
+        prior = np.minimum(round_shift(mantissa * mantissa, 31), 2**31 - 1)
+        return prior, 2 * ((31 + up) - exponent) - 31
+
+    @staticmethod
+    def _in_units_of_s(prior: Int, prior_exponent: Int, f: Int) -> Int:
+        return np.minimum(scale(prior, prior_exponent + 2 * f + 32), WIDE // 2)
+
+    @staticmethod
+    def _forgetting(groups: int) -> tuple[int, int]:
+        if groups == 0:
+            return 64, 2**31 - 1
+        block = 1 if groups < 32 else min(groups // 16, 64)
+        return block, min(decay(groups, block), 2**31 - 1)
+
+    @property
+    def lanes(self) -> int:
+        """Number of lanes."""
+        return int(self.p.shape[1])
+
+    def mantissas(self, values: Int) -> tuple[Int, Int]:
+        """values = m 2^h with m of 30 bits."""
+        h = bit_length(np.abs(values)) - 30
+        return scale(values, h), h
+
+    def place(self, index: int, value: int) -> None:
+        """A better start of p[index], within its bounds."""
+        self.p = self.p.copy()
+        self.p[index] = np.clip(value, self.lower[index], self.upper[index])
+        self.theta = self.model.theta(self.p)
+
+    def innovation(self, n: Int, y: Int) -> tuple[Int, Mask]:
+        """e = Y - N^T theta of a row [lanes], and where the row fits; shapes as in `add`."""
+        return self.terms(n, y)[1:]
+
+    def terms(self, n: Int, y: Int) -> tuple[Int, Int, Mask]:
+        """N_i theta_i of a row [n_theta, lanes], and its innovation."""
+        m, h = self.mantissas(self.theta)
+        terms = clamp(scale(clamp(n, ROW_LIMIT) * m, integers(self.align)[:, None] - h), TERM_MAX)
+        e = y - terms.sum(axis=0)
+        return terms, e, (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
+
+    @property
+    def expected_variance(self) -> Scaled:
+        """row_sd^2 [lanes], in units of the sums."""
+        return scaled(self.row_sd * self.row_sd, -2 * (8 + self.exponent))
+
+    def add(self, n: Int, y: Int) -> Reasons:
+        """One row of a group: N [n_theta, lanes], Y [lanes]."""
+        return self.take_row(n, *self.innovation(n, y))
+
+    def take_row(self, n: Int, innovation: Int, fits: Mask) -> Reasons:
+        """The same, its innovation known and where it fits."""
+        e = np.where(fits, innovation, 0)
+        self.energy = clamp(self.energy + e * e, WIDE)
+        e = round_shift(e, self.exponent)
+        row = round_shift(np.where(fits, n, 0), self.exponent)
+        upper, column = self._upper
+        weight = np.where(fits, self.row_weight, 0)
+        self.taken = self.taken + weight
+        self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
+        if self.is_rate:
+            self.fresh = self.fresh + row * e
+        reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
+        self.counters["rows"] += fits
+        self.counters["rejected_saturated"] += ~fits
+        return reason
+
+    def solve(self, ends_group: bool, refuge: tuple[Mask, Int] | None = None) -> Iterator[Reasons | None]:
+        """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one.
+
+        refuge: in which lanes p goes elsewhere if it may not step, and where [n_p, lanes].
+        """
+        reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
+        self.was_due = True
+        self.size = np.zeros(self.lanes, np.int64)
+        if ends_group:
+            self.group_energy = self.energy
+            self.energy = np.zeros(self.lanes, np.int64)
+            self.taken = np.zeros(self.lanes, np.int64)
+            self.phase += 1
+            self.was_due = self.phase >= self.divider
+        elif self.is_rate:
+            yield reason
+            return
+        if self.was_due:
+            if ends_group:
+                self.phase = 0
+            for _ in range(self._stages_before_commit()):
+                yield None
+            reason = self._commit(refuge)
+            yield None if ends_group else reason
+        if ends_group:
+            self._forget(slice(0, self.model.n_sums // 2))
+            yield None
+            self._forget(slice(self.model.n_sums // 2, None))
+            self._end_group()
+            yield reason
+
+    def solve_stages(self, ends_group: bool) -> int:
+        """Stages of a solve that is due."""
+        return self._stages_before_commit() + 1 + (self._END_PARTS if ends_group else 0)
+
+    @property
+    def assessment_stages(self) -> int:
+        """Stages of an assessment: those that look, residual, two factors, kappa, columns and errors."""
+        return self._looking_stages() + 2 + 2 * self._factor_parts() + 2 * self.model.n_p
+
+    def _stages_before_commit(self) -> int:
+        """Those that look, factor, force, solve, step, rows of M dtheta."""
+        follow = -(-self.model.n_theta // self._ROWS_A_STAGE)
+        return self._looking_stages() + self._factor_parts() + follow + 3
+
+    def _factor_parts(self) -> int:
+        return 1 + -(-self.model.n_p // self._PIVOTS_A_STAGE)
+
+    def _looking_stages(self) -> int:
+        """Rows of M, C, rows of S, and whether there is more in it than noise."""
+        return self._matrix_stages() + 1 + self.model.n_p + self._factor_parts()
+
+    def _matrix_stages(self) -> int:
+        """Stages that scale M, a few rows each."""
+        stages = row = 0
+        while row < self.model.n_theta:
+            entries = 0
+            while row < self.model.n_theta and entries < self._ENTRIES_A_STAGE:
+                entries += self.model.n_theta - row
+                row += 1
+            stages += 1
+        return stages
+
+    # ---- information ----
+
+    def _forget(self, places: slice) -> None:
+        """Lets some of the sums fade if it is time to."""
+        due = (self.age + 1 >= self.block) & (self.retention < 2**31 - 1)
+        if due.any():
+            self.sums[places] = np.where(due, times_q31(self.sums[places], self.retention), self.sums[places])
+
+    def fade(self, factor: Int) -> Iterator[None]:
+        """Multiplies all that was gathered by factor [lanes], Q31, in stages; 0: not at all."""
+        half = self.model.n_sums // 2
+        for places in (slice(0, half), slice(half, None)):
+            faded = times_q31(self.sums[places], np.maximum(factor, 1))
+            self.sums[places] = np.where(factor > 0, faded, self.sums[places])
+            yield None
+
+    def _end_group(self) -> None:
+        self.age = np.where(self.age + 1 >= self.block, 0, self.age + 1)
+        largest = np.maximum(self.sums[self._diagonal].max(axis=0), self.sums[-2])
+        high = largest > SUM_LIMIT
+        low = (largest < SUM_LOW) & (self.exponent > 0)
+        if not (high | low).any():
+            return
+        change = np.where(high, 2, np.where(low, -2, 0))
+        self.sums[:-1] = scale(self.sums[:-1], change)
+        self.fresh = scale(self.fresh, change)
+        self.exponent = self.exponent + change // 2
+
+    def _matrix(self, sums: Int) -> Int:
+        n = self.model.n_theta
+        m = np.empty((n, n, sums.shape[1]), np.int64)
+        upper, column = self._upper
+        m[upper, column] = sums[: self.model.moments]
+        m[column, upper] = sums[: self.model.moments]
+        return m
+
+    # ---- the solve ----
+
+    def _equilibrated(self) -> tuple[Int, Int]:
+        """(m, h): M_ij = m_ij 2^(h_i + h_j), m within 30 bits."""
+        h = cholesky.half_exponent(self.sums[self._diagonal])
+        row, column = self._upper
+        m = clamp(scale(self.sums[: self.model.moments], h[row] + h[column]), ONE)
+        return self._matrix(m), h
+
+    def _jacobian(self, h: Int) -> tuple[Int, Int]:
+        """(c, f): C_ka = c_k 2^(f_a - h_row), c within 29 bits."""
+        model = self.model
+        c = model.jacobian(self.p)
+        exponent = integers(self.c_exponent)[:, None] + h[self._c_row]
+        lengths = length(c) + exponent
+        f = np.stack([np.maximum(lengths[own].max(axis=0), _NOTHING) for own in self._columns]) - 29
+        return clamp(scale(c, f[self._c_column] - exponent), ONE // 2), f
+
+    def _project(self, c: Int, m: Int) -> Int:
+        """The upper triangle of C^T M C, in units of 2^(f_a + f_b + 32) [n_p, n_p, lanes]."""
+        model = self.model
+        s = np.zeros((model.n_p, model.n_p, self.lanes), np.int64)
+        rows = self._c_row
+        for a, own in enumerate(self._columns):
+            t = round_shift((m[rows[own]] * c[own][:, None]).sum(axis=0), 32)
+            for b in range(a, model.n_p):
+                there = self._columns[b]
+                s[a, b] = (c[there] * t[rows[there]]).sum(axis=0)
+        return s
+
+    def _equilibrated_system(self, s: Int) -> tuple[Int, Int]:
+        """(S in Q30, g): s_ab = S_ab 2^(g_a + g_b)."""
+        n_p = self.model.n_p
+        g = cholesky.half_exponent(np.stack([s[a, a] for a in range(n_p)]))
+        return clamp(scale(s, g[:, None] + g[None]), ONE), g
+
+    def _informed(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
+        """Whether S less what noise of this variance puts there, so many times over, is still positive."""
+        model = self.model
+        if model.noisy is None:
+            return np.ones(self.lanes, np.bool_)
+        first, second = model.noisy
+        much = scaled(self.noise_margin, -16).times(scaled(self.sums[-1], -16).times(variance))
+        noise = [
+            clamp(much.times(own).fixed(-(h[i] + h[j])), 2**31 - 1)
+            for own, i, j in zip(self.noise, (first, first, second), (first, second, second), strict=True)
+        ]
+        rows = np.zeros((2, model.n_p, self.lanes), np.int64)
+        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
+            if row in model.noisy:
+                rows[model.noisy.index(row), column] = c[k]
+        rest = s.copy()
+        for a in range(model.n_p):
+            t = [round_shift(noise[i] * rows[0, a] + noise[i + 1] * rows[1, a], 32) for i in range(2)]
+            for b in range(a, model.n_p):
+                rest[a, b] = rest[a, b] - (rows[0, b] * t[0] + rows[1, b] * t[1])
+        return np.asarray((self.noise_margin == 0) | cholesky.factor(self._equilibrated_system(rest)[0]).ok)
+
+    def _commit(self, refuge: tuple[Mask, Int] | None) -> Reasons:
+        model = self.model
+        m, h = self._equilibrated()
+        c, f = self._jacobian(h)
+        s = self._project(c, m)
+        informed = self._informed(s, c, h, self.expected_variance)
+        prior = self._in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
+        for a in range(model.n_p):
+            s[a, a] = s[a, a] + prior[a]
+        q, g = self._equilibrated_system(s)
+        factor = cholesky.factor(q)
+        own = round_shift(factor.first_pivot * q[0, 0], 31) >= scale(prior[0], 2 * g[0])
+        excited = (factor.first_pivot >= self.kappa_min) & (own | (self.kappa_min == 0))
+        reason = np.full(self.lanes, Reason.UPDATED, np.uint8)
+        reason[~(excited & informed)] = Reason.HELD_NOT_EXCITED
+        reason[~factor.ok] = Reason.HELD_PIVOT
+
+        b = self.sums[model.moments : model.moments + model.n_theta]
+        rests = (reason == Reason.UPDATED) & self._at_rest(factor, c, scale(b, h), g)
+        force, force_h = cholesky.to_block(scale(self._driving(b), h), 30)
+        self.fresh[:] = 0
+        _, x, x_h = self._solve_for(factor, c, force, g)
+        dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
+        steps = reason == Reason.UPDATED
+        self.counters["at_rest"] += rests
+        p = self._limited(dp, steps & ~rests)
+        fleeing = np.zeros(self.lanes, np.bool_)
+        if refuge is not None:
+            fleeing = ~steps & refuge[0]
+            p = np.where(fleeing, refuge[1], p)
+        return self._follow(p, m, h, b, reason, fleeing, rests)
+
+    def _solve_for(self, factor: cholesky.Factor, c: Int, force: Int, g: Int) -> tuple[Int, Int, Int]:
+        """(rhs, x, h): C^T force, scaled as the rows of q, and its solution x 2^h."""
+        rhs = scale(np.stack([(c[own] * force[self._c_row[own]]).sum(axis=0) for own in self._columns]), g)
+        return rhs, *cholesky.solve(factor, rhs)
+
+    def _at_rest(self, factor: cholesky.Factor, c: Int, b: Int, g: Int) -> Mask:
+        """Where p is within the dead zone; b scaled as the rows of C."""
+        if not (self.dead_zone > 0).any():
+            return np.zeros(self.lanes, np.bool_)
+        force, down = cholesky.to_block(b, 30)
+        rhs, x, exponent = self._solve_for(factor, c, force, g)
+        f, more = cholesky.to_block(rhs, _REST_BITS)
+        asked = scaled((f * x).sum(axis=0), exponent + more + 2 * down - 62)
+        found, told = self._row_variance(), self.expected_variance
+        noise = pick(found.exceeds(told), told, found)
+        zone = scaled(self.dead_zone * self.dead_zone, -32)
+        bound = zone.times(noise.times(scaled(self.correlation, -16)))
+        return (self.dead_zone > 0) & ~asked.exceeds(bound)
+
+    def _driving(self, b: Int) -> Int:
+        """g b + (1 - g) sum N e since the last solve."""
+        if not self.is_rate:
+            return b
+        both = times_q31(b, 2 * self.gain) + times_q31(self.fresh, 2 * np.minimum(ONE - self.gain, ONE - 1))
+        return np.where(self.gain == 0, self.fresh, both)
+
+    def _limited(self, dp: Int, moving: Mask) -> Int:
+        """Where the step leads: shortened to the step limit, within the bounds; p where nothing moves."""
+        size = np.zeros(self.lanes, np.int64)
+        for a in range(self.model.n_p):
+            reference = self.p[a] if self.model.positive[a] else self.start_sd[a]
+            size = np.maximum(size, (np.abs(dp[a]) << SIZE_BITS) // reference)
+        self.size = np.where(moving, size, 0)
+        limit = self.step_limit << (SIZE_BITS - 16)
+        limited = size > limit
+        factor = np.minimum((limit << 31) // np.maximum(size, limit + 1), 2**31 - 1)
+        x = self.p + np.where(limited, times_q31(dp, factor), dp)
+        above, below = x > self.upper, x < self.lower
+        x = np.where(above, self.upper, np.where(below, self.lower, x))
+        self.counters["limited"] += moving & limited
+        self.counters["bounded"] += moving & (above | below).any(axis=0)
+        return np.where(moving, x, self.p)
+
+    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons, fleeing: Mask, rests: Mask) -> Reasons:
+        """Moves p, theta, b and rr together: b -= M dtheta, rr -= dtheta^T (b_old + b_new)."""
+        model = self.model
+        theta = model.theta(p)
+        step = theta - self.theta
+        align = integers(self.align)[:, None]
+        v_h = np.max(length(step) - align + h, axis=0) - 29
+        v = clamp(scale(step, v_h + align - h), ONE // 2)
+        b = clamp(b, HELD_LIMIT)
+        moved = clamp(scale((m * v[:, None]).sum(axis=0), -(h + v_h)), HELD_LIMIT)
+        w, w_h = cholesky.to_block(scale(2 * b - moved, h), 30)
+        fall = (v * w).sum(axis=0)
+        residual = self.sums[-2] - clamp(scale(fall, -(v_h + w_h)), HELD_LIMIT)
+        overflow = (residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0)
+        reason[overflow & (reason == Reason.UPDATED) & ~rests] = Reason.HELD_PIVOT
+        stepping = (reason == Reason.UPDATED) & ~rests
+        moving = stepping | (fleeing & ~overflow)
+        kept = self.sums[model.moments : -2]
+        self.sums[model.moments : -2] = np.where(moving, b - moved, kept)
+        self.sums[-2] = np.where(moving, np.maximum(residual, 0), self.sums[-2])
+        self.theta = np.where(moving, theta, self.theta)
+        self.p = np.where(moving, p, self.p)
+        self.counters["updates"] += stepping
+        self.counters["held_not_excited"] += reason == Reason.HELD_NOT_EXCITED
+        self.counters["held_pivot"] += reason == Reason.HELD_PIVOT
+        return reason
+
+    # ---- what is published ----
+
+    def _row_variance(self) -> Scaled:
+        """s^2 of a row, divided by 4^exponent as the sums are."""
+        found = self._found_variance()
+        explained = self._explained_variance()
+        from_rows = pick(explained.exceeds(found), explained, found)
+        return pick(self._freedom() < (1 << 16), self.expected_variance, from_rows)
+
+    def _freedom(self) -> Int:
+        """Degrees of freedom of the residuals, Q16 [lanes]."""
+        return np.asarray(self.sums[-1] - (self.model.n_p << 16))
+
+    def _found_variance(self) -> Scaled:
+        return scaled(self.sums[-2], 0).over(scaled(np.maximum(self._freedom(), 1 << 16), -16))
+
+    def _explained_variance(self) -> Scaled:
+        """What the sensors' noise explains of it."""
+        return self.expected.shifted(-2 * self.exponent)
+
+    def expect(self, variance: Scaled) -> None:
+        """pvid_estimator_expect_q31: variance that the sensors' noise gives the rows since the last group."""
+        weight = self.sums[-1]
+        told = (self.taken > 0) & (weight >= self.taken)
+        share = scaled(self.taken, 0).over(scaled(np.maximum(weight, 1), 0))
+        self.expected = pick(told, self.expected.plus(share.times(variance.minus(self.expected))), self.expected)
+
+    def _misfit(self) -> Int:
+        """Residual variance over what the sensors explain of it, Q16; 0 where that is not known [lanes]."""
+        known = (self._freedom() >= (1 << 16)) & (self.expected.m > 0)
+        explained = self._explained_variance()
+        one = scaled(np.ones(self.lanes, np.int64), 0)
+        misfit = self._found_variance().over(pick(known, explained, one))
+        return np.where(known, clamp(misfit.fixed(16), 2**31 - 1), 0)
+
+    def assess(self) -> npt.NDArray[np.void]:
+        """pvid_estimator_assess_q31 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        return self.judged()[0]
+
+    def judged(self) -> tuple[npt.NDArray[np.void], Mask]:
+        """The assessment, and where the data say more than noise of the variance found would [lanes]."""
+        n_p = self.model.n_p
+        out = np.zeros(self.lanes, ESTIMATE_DTYPE)
+        out["p"][:, :n_p] = self.p.T
+        out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
+        out["misfit"] = self._misfit()
+        variance = self._row_variance()
+        residual, residual_e = root_of(*variance)
+        out["residual_sd"] = clamp(scale(residual, -(residual_e + self.exponent + 8)), 2**31 - 1)
+        root, root_e = root_of(*variance.times(scaled(self.correlation, -16)))
+        m, h = self._equilibrated()
+        c, f = self._jacobian(h)
+        s = self._project(c, m)
+        informed = self._informed(s, c, h, variance)
+        alone = cholesky.factor(self._equilibrated_system(s)[0])
+        out["kappa"] = alone.first_pivot
+        out["least_pivot"] = alone.least_pivot
+        prior, prior_exponent = self._square_ratio(root, root_e)
+        for a in range(n_p):
+            s[a, a] = s[a, a] + self._in_units_of_s(prior[a], prior_exponent[a], f[a])
+        q, g = self._equilibrated_system(s)
+        factor = cholesky.factor(q)
+        units = [np.zeros((n_p, self.lanes), np.int64) for _ in range(n_p)]
+        for a in range(n_p):
+            units[a][a] = 1 << UNIT_BITS
+        columns = [cholesky.lower_solve(factor, unit) for unit in units]
+        roots = [root_of(np.maximum(np.sum(column * column, axis=0), 1), integers(0)) for column in columns]
+        for a, (r, e) in enumerate(roots):
+            se = clamp(scale(root * r, f[a] + g[a] - (root_e + e) + 31 + UNIT_BITS), 2**31 - 1)
+            out["se"][:, a] = np.where(factor.ok, se, self.start_sd[a])
+            out["correlation"][:, a, a] = ONE
+            for b in range(a):
+                r_b, e_b = roots[b]
+                x = scale(np.sum(columns[a] * columns[b], axis=0), e + e_b)
+                part = np.sign(x) * np.minimum(((np.abs(x) // r) << 30) // r_b, ONE)
+                out["correlation"][:, a, b] = np.where(factor.ok, part, 0)
+                out["correlation"][:, b, a] = out["correlation"][:, a, b]
+        return out, informed

@@ -1,0 +1,48 @@
+"""Twin of gate_q31.c: which residuals are let in, in several lanes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.native_q31 import GateConfigQ31
+from pvid.twin.q31.integer import integers
+from pvid.twin.q31.scaled import Scaled, pick, scaled
+
+Mask = npt.NDArray[np.bool_]
+
+_GROWTH, _GROWTH_BITS = 150902, 14
+_SCALE_MAX = scaled(1, 100)
+
+
+class GateQ31:
+    """The gate of every lane; all share the configuration, `floor` [lanes] is their own."""
+
+    def __init__(self, config: GateConfigQ31, memory: int, floor: Scaled) -> None:
+        self.is_on = config.sigmas > 0
+        self.limit = scaled(config.sigmas * config.sigmas, -32)
+        self.floor = floor
+        self.widening = scaled(1, 0)
+        if config.patience_groups > 0:
+            growth = scaled(_GROWTH, -_GROWTH_BITS).over(scaled(config.patience_groups, 0))
+            self.widening = self.widening.plus(growth)
+        self.scale = floor
+        self.memory = max(memory, 1)
+        self.judged = np.zeros(np.shape(floor.m), np.int64)
+
+    def passes(self, square: Scaled, asked: Mask | None = None) -> Mask:
+        """Which lanes let a residual of this square in [lanes]; those that are not asked do."""
+        if not self.is_on:
+            return np.ones(self.judged.shape, np.bool_)
+        asking = np.ones(self.judged.shape, np.bool_) if asked is None else asked
+        learning = self.judged < self.memory
+        passes = learning | ~square.exceeds(self.limit.times(self.scale))
+        judged = np.where(passes & learning, self.judged + 1, self.judged)
+        part = scaled(np.ones_like(judged), 0).over(scaled(np.maximum(judged, 1), 0))
+        change = square.minus(self.scale).times(part)
+        scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))
+        scale = pick((scale.e < self.floor.e - 1) | self.floor.exceeds(scale), self.floor, scale)
+        scale = pick((scale.e > _SCALE_MAX.e + 1) | scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)
+        self.judged = np.where(asking, judged, self.judged)
+        self.scale = pick(asking, Scaled(integers(scale.m), integers(scale.e)), self.scale)
+        return passes | ~asking

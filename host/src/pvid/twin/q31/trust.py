@@ -1,0 +1,148 @@
+"""Twin of trust_q31.c: which estimate is published, in every lane."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.native import Reason
+from pvid.core.native_q31 import ESTIMATE_DTYPE, TrustConfigQ31
+from pvid.twin.f32.trust import shut_after, tell
+from pvid.twin.q31.estimator import ONE, SIZE_BITS, EstimatorQ31
+from pvid.twin.q31.integer import Int, clamp, round_shift, square_root
+
+Mask = npt.NDArray[np.bool_]
+Reasons = npt.NDArray[np.uint8]
+
+SURPLUS_BITS = 24
+_SHORT, _LONG, _LONG_MEMORY = 8, 16, 4096
+_ARRIVED = 19661  # 0.3 in Q16
+_SMALL_STEP = (1 << SIZE_BITS) // 10000
+_SURPLUS_MAX = 1_000_000 << SURPLUS_BITS
+_ERROR_BITS = 24
+_COUNT_MAX = 0xFFFF
+_SETTLED_STEP = (1 << SIZE_BITS) // 50
+_NEAR = (1 << _ERROR_BITS) // 10
+_AGEING, _AGEING_GROUPS = 644245094, 4  # 0.3 in Q31
+
+
+class TrustQ31:
+    """pvid_trust_q31 of every lane of an estimator; `estimate` is what is published, ESTIMATE_DTYPE [lanes]."""
+
+    def __init__(self, config: TrustConfigQ31, estimator: EstimatorQ31) -> None:
+        self.config = config
+        self.estimator = estimator
+        lanes = estimator.lanes
+        self.groups = 0
+        self.shut = np.zeros(lanes, np.int64)
+        self.judged = np.zeros(lanes, np.int64)
+        self.long_memory = np.clip((estimator.block << 31) // (2**31 - estimator.retention), _LONG, _LONG_MEMORY)
+        self.next = np.zeros(lanes, np.int64)
+        self.ageing = np.zeros(lanes, np.int64)
+        self.known = np.zeros(lanes, np.bool_)
+        self.near = np.zeros(lanes, np.bool_)
+        self.published = np.zeros(lanes, np.bool_)
+        self.misfit = np.zeros(lanes, np.bool_)
+        self.long_mean = np.zeros(lanes, np.int64)
+        self.recent = np.zeros((_SHORT, lanes), np.int64)
+        self.estimate = np.zeros(lanes, ESTIMATE_DTYPE)
+        self.place()
+        for a, sd in enumerate(estimator.start_sd):
+            self.estimate["se"][:, a] = sd
+            self.estimate["correlation"][:, a, a] = ONE
+
+    def place(self) -> None:
+        """Publishes the start again."""
+        self.estimate["p"][:, : len(self.estimator.p)] = self.estimator.p.T
+        self.anchor = self.estimator.p.copy()
+
+    @property
+    def refuge(self) -> tuple[Mask, Int]:
+        """In which lanes p has one, and where [n_p, lanes]."""
+        some = (self.config.shut_max > 0) & (self.shut >= self.config.shut_max)
+        return some, self.estimate["p"][:, : len(self.estimator.p)].T.astype(np.int64)
+
+    def _take_surplus(self, lanes: Mask, surplus: Int) -> Mask:
+        """Where the windows alone raise the alarm, of the given lanes."""
+        x = clamp(surplus, _SURPLUS_MAX)
+        self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
+        change = x - self.long_mean
+        step = np.sign(change) * (np.abs(change) // np.maximum(self.judged, 1))
+        self.long_mean = np.where(lanes, clamp(self.long_mean + step, _SURPLUS_MAX), self.long_mean)
+        places = np.flatnonzero(lanes)
+        self.recent[self.next[places], places] = x[places]
+        self.next = np.where(lanes, (self.next + 1) % _SHORT, self.next)
+        limit = self.config.misfit_max << (SURPLUS_BITS - 16)
+        lately = (self.judged >= _SHORT) & (2 * np.sum(self.recent, axis=0) > 3 * limit * _SHORT)
+        at_length = (self.judged >= _LONG) & (self.long_mean > limit)
+        return np.asarray(lanes & (lately | at_length))
+
+    def _restart_alarm(self, lanes: Mask) -> None:
+        self.judged = np.where(lanes, 0, self.judged)
+        self.next = np.where(lanes, 0, self.next)
+        self.long_mean = np.where(lanes, 0, self.long_mean)
+        self.recent = np.where(lanes, 0, self.recent)
+
+    def _all_agree(self, candidate: npt.NDArray[np.void]) -> Mask:
+        freedom = np.maximum(candidate["weight"].astype(np.int64) - self.estimator.model.n_p, 1)
+        chance = square_root((1 << 33) // freedom)
+        limit = self.config.misfit_max * ((1 << 16) + 3 * chance)
+        return np.asarray((candidate["misfit"].astype(np.int64) << 16) <= limit)
+
+    def next_ageing(self) -> Int:
+        """pvid_trust_ageing_q31 [lanes]."""
+        fading = (self.ageing > 0) & self.known
+        self.ageing = np.where(fading, self.ageing - 1, self.ageing)
+        return np.where(fading, _AGEING, 0)
+
+    def _settle(self, lanes: Mask, agrees: Mask) -> None:
+        moved = np.zeros(len(lanes), np.bool_)
+        for a, positive in enumerate(self.estimator.model.positive):
+            if positive:
+                way = np.abs(self.estimator.p[a] - self.anchor[a])
+                moved = moved | ((way << 16) > self.anchor[a] * self.config.renewal)
+        stale = lanes & ~agrees & moved
+        self.ageing = np.where(stale, _AGEING_GROUPS, self.ageing)
+        self._restart_alarm(stale)
+        self.anchor = np.where(stale | (lanes & agrees), self.estimator.p, self.anchor)
+
+    def _raise_alarm(self, settled: Mask, known: Mask, surplus: Int, candidate: npt.NDArray[np.void]) -> None:
+        """The alarm, and the renewal that may follow from it; where p has settled, and where it is known well."""
+        agrees = self._all_agree(candidate)
+        renewing = self.ageing > 0
+        self.known = known
+        self._restart_alarm(renewing)
+        lately = self._take_surplus(~renewing & self.near, surplus)
+        self.misfit = (self.config.misfit_max > 0) & (~agrees | lately)
+        self.near = self.near | (~renewing & settled & known & (self.groups >= self.config.groups_min))
+        if self.config.renewal > 0:
+            self._settle(settled & known & ~renewing, agrees)
+
+    def _widest(self, candidate: npt.NDArray[np.void]) -> Int:
+        widest = np.zeros(len(candidate), np.int64)
+        for a, positive in enumerate(self.estimator.model.positive):
+            if positive:
+                relative = (candidate["se"][:, a].astype(np.int64) << _ERROR_BITS) // candidate["p"][:, a]
+                widest = np.maximum(widest, relative)
+        return widest
+
+    def judge(
+        self, reason: Reasons, size: Int, informed: Mask, surplus: Int, candidate: npt.NDArray[np.void]
+    ) -> Reasons:
+        """pvid_trust_judge_q31 in every lane; shapes [lanes]."""
+        self.groups = min(self.groups + 1, _COUNT_MAX)
+        if (reason == Reason.ACCUMULATED).all():
+            return reason
+        stepped = reason == Reason.UPDATED
+        self.shut = shut_after(self.shut, stepped, self.refuge[0])
+        error = self._widest(candidate)
+        self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _NEAR, surplus, candidate)
+        near = round_shift(clamp(error, 1 << 44) * _ARRIVED, 16 + (_ERROR_BITS - SIZE_BITS))
+        arrived = size <= np.maximum(near, _SMALL_STEP)
+        enough_kappa = self.config.kappa_min
+        excited = informed & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
+        sure = (self.groups >= self.config.groups_min) & (error <= self.config.se_max) & arrived
+        good = stepped & excited & sure
+        self.estimate = np.where(good, candidate, self.estimate)
+        self.published = self.published | good
+        return tell(self.estimator.counters, reason, excited, sure, self.misfit)

@@ -1,0 +1,98 @@
+"""Emulators belong to the program that started them: it alone gets Ctrl-C, and none is left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from pvid.board.target import HOST_TARGET
+from pvid.log.reader import LogReader, LogStream
+from pvid.rig.file import RigFile
+
+PATIENCE_S = 120
+
+
+def until(done: Callable[[], bool]) -> None:
+    limit = time.monotonic() + PATIENCE_S
+    while not done():
+        assert time.monotonic() < limit, "it never came so far"
+        time.sleep(0.05)
+
+
+def samples_in(path: Path) -> int:
+    """That the log holds."""
+    stream = LogStream()
+    if path.exists():
+        list(stream.feed(path.read_bytes()))
+    return stream.account.samples
+
+
+def children_of(pid: int) -> list[int]:
+    """Processes of which this one is the parent, and that still run."""
+    found = []
+    for one in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            number, _, rest = one.read_text().rpartition(")")
+        except OSError:
+            continue
+        state, parent = rest.split()[:2]
+        if int(parent) == pid and state != "Z":
+            found.append(int(number.split()[0]))
+    return found
+
+
+def runs(pid: int) -> bool:
+    """Whether there is such a process and it has not ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.fixture
+def logger(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """`pvid log` of this machine's build in a process group of its own, as a shell would start it; it has recorded."""
+    RigFile.standard().write(tmp_path / "rig.toml")
+    command = [sys.executable, "-m", "pvid", "log", HOST_TARGET, "a.pvlog", "--rig", "rig.toml"]
+    process = subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    until(lambda: samples_in(tmp_path / "a.pvlog") > 500 or process.poll() is not None)
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_ctrl_c_ends_the_recording_and_not_the_emulator_before_it(
+    tmp_path: Path, logger: subprocess.Popen[str]
+) -> None:
+    """A terminal sends its SIGINT to the whole group; an emulator that got it would be gone before the recording."""
+    (emulator,) = children_of(logger.pid)
+    os.killpg(logger.pid, signal.SIGINT)
+    out, err = logger.communicate(timeout=PATIENCE_S)
+    assert logger.returncode == 0, err
+    assert "ended by SIGINT" in out and "gone" not in out
+    assert not runs(emulator)
+    reader = LogReader(tmp_path / "a.pvlog")
+    assert list(reader) and reader.account.lost_share == 0
+
+
+def test_a_killed_recording_leaves_no_emulator_behind(tmp_path: Path, logger: subprocess.Popen[str]) -> None:
+    (emulator,) = children_of(logger.pid)
+    logger.kill()
+    logger.communicate(timeout=PATIENCE_S)
+    until(lambda: not runs(emulator))
+    reader = LogReader(tmp_path / "a.pvlog")
+    assert list(reader) and reader.account.samples > 500 and reader.account.lost_share == 0

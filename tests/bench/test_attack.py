@@ -1,0 +1,147 @@
+"""Mutated rig files, runs and command lines, in short form: nothing but answers and sentences comes back.
+
+The long form is `pvid bench attack`; its figures are in tests/ATTACK.md.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from bench.attack import KINDS, Outcome, attack, call, complaint
+from bench.attack_commands import command_line
+from bench.attack_files import distorted_run, mutated_run, rig_text
+from pvid.base.errors import PvidError
+from pvid.base.toml_text import MOST_BYTES, toml_document
+from pvid.rig import size as run_size
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run, read_run, write_run
+from pvid.sim.pendulum import simulate
+
+SHORT = {"rigs": 50, "runs": 25, "commands": 40}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_mutants_get_answers_and_sentences_alone(kind: str, tmp_path: Path) -> None:
+    tally = attack(kind, SHORT[kind], 7, tmp_path)
+    assert tally.defects == []
+    assert tally.tried == SHORT[kind] == sum(tally.codes.values())
+    assert tally.codes[2] > 0  # some are refused, and
+    assert tally.codes[0] > 0  # some are answered
+
+
+def test_mutants_are_drawn_from_their_seed() -> None:
+    run = simulate(duration=1.0).run
+    for draw_one in (
+        rig_text,
+        command_line,
+        lambda draw: distorted_run(run, draw),
+        lambda draw: mutated_run(b"ab", draw),
+    ):
+        first, again, other = ([draw_one(draw) for _ in range(20)] for draw in map(Random, (1, 1, 2)))
+        assert first == again != other
+
+
+@pytest.mark.parametrize(
+    ("outcome", "told"),
+    [
+        (Outcome(None, "", "", (), "Traceback\nValueError: x", 0.1), "ValueError: x"),
+        (Outcome(0, "", "", ("overflow",), "", 0.1), "warning: overflow"),
+        (Outcome(7, "", "", (), "", 0.1), "exit code 7"),
+        (Outcome(2, "", "Usage: ...", (), "", 0.1), "a refusal without its sentence"),
+        (Outcome(0, "g  nan", "", (), "", 0.1), "no number"),
+        (Outcome(2, "", "pvid: no", (), "", 0.1), None),
+        (Outcome(0, "g  9.8", "", (), "", 0.1), None),
+    ],
+)
+def test_what_an_attack_calls_a_defect(outcome: Outcome, told: str | None) -> None:
+    found = complaint(outcome)
+    assert found == told if told is None else told in str(found)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["log", "hwgrep://(", "x.pvlog"], "cannot open the port hwgrep"),
+        (["log", "run.csv", "x.pvlog"], "run.csv"),
+        (["log", "loop://", "x.pvlog", "--web", "a..b:80"], "is not a host's name"),
+        (["log", "loop://", "x.pvlog", "--tee", "udp://a..b:80"], "is not a host's name"),
+        (["log", "loop://", "x.pvlog", "--tee", "udp://[::1"], "is no address to send to"),
+        (["tune", ""], "Is a directory"),
+        (["plot", "/dev/full", "--set", "l1=0.3"], "is a device and no log"),
+        (["simulate", "out.csv", "--l1", "1e-300"], "l1 must be from 1e-06 to 1e+06 m"),
+        (["simulate", "out.csv", "--rho2", "1e300"], "rho2 must be from"),
+        (["simulate", "out.csv", "--l2", "1e6", "--rho2", "1e-6"], "rho2 of 1e-06 m is less than"),
+        (["simulate", "out.csv", "--gravity", "1e300"], "g must be up to"),
+        (["design", "--rig", "run.toml", "--release", "1e300", "1e300"], "grows without bound"),
+        (["design", "--rig", "run.toml", "--tone", "1e-300,1,0"], "pvid: "),
+        (["fir-table", "--points", "1000000000000001"], "no core takes more than 8191"),
+        (["bench", "log", "--frames", "0"], "--frames"),
+        (["identify", "run.csv", "--rig", "run.toml", "--figure", "x.pgf"], "must end in .png, .svg, .pdf"),
+        (["identify", "run\x1b[31m\n.csv"], "run\\x1b[31m\\n.csv"),
+    ],
+)
+def test_odd_words_are_refused_by_name(
+    arguments: list[str], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_run("run.csv", simulate(duration=2.0).run)
+    RigFile.standard().write("run.toml")
+    outcome = call(arguments)
+    assert (outcome.code, complaint(outcome)) == (2, None)
+    assert named in outcome.err
+
+
+def test_names_are_told_and_drawn_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "nonsense")
+    name = "[red]$x$[x]漢\udcff.csv"
+    told = call(["simulate", name, "--duration", "5"])
+    assert (told.code, complaint(told)) == (0, None)
+    assert "[red]$x$[x]漢\\udcff.csv: 5000 samples" in told.err
+    drawn = call(["plot", name])
+    assert (drawn.code, complaint(drawn)) == (0, None)
+    assert "MPLBACKEND" not in os.environ
+
+
+# ---- limits
+
+
+def test_a_run_of_more_rows_than_fit_is_refused_in_every_format(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = simulate(duration=3.0).run
+    names = [tmp_path / f"run{suffix}" for suffix in (".csv", ".csv.gz", ".npz", ".parquet")]
+    for path in names:
+        write_run(path, run)
+    monkeypatch.setattr(run_size, "MOST_ROWS", 1000)
+    for path in names:
+        with pytest.raises(PvidError, match="more than 1000 rows of data, and no run is that long"):
+            read_run(path)
+    monkeypatch.setattr(run_size, "BYTES_A_ROW", 1 << 40)
+    with pytest.raises(PvidError, match="this machine has memory for no more"):
+        read_run(names[0])
+
+
+def test_numbers_beyond_every_unit_are_refused() -> None:
+    run = simulate(duration=1.0).run
+    phi = run.phi.copy()
+    phi[17] = 1e300
+    with pytest.raises(PvidError, match="phi is 1e.300 at 0.017 s, which is too large for any unit"):
+        Run(run.t, phi, run.y, run.sample_rate).refuse_damaged()
+
+
+def test_a_file_of_settings_is_short() -> None:
+    for text, named in (("a" * (MOST_BYTES + 1), "longer than 64 kB"), (".".join("a" * 3000), "a line of more than")):
+        with pytest.raises(PvidError, match=named):
+            toml_document(text)
+
+
+def test_a_rig_file_has_no_number_next_to_zero() -> None:
+    for key in ("[sensor]\nphi_lsb", "[identifier]\nforgetting_s"):
+        with pytest.raises(PvidError, match="must be 0 or from 1e-12 to"):
+            RigFile.parse(f"l1 = 0.3\n{key} = 5e-324")
+        RigFile.parse(f"l1 = 0.3\n{key} = 0.0")

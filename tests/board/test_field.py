@@ -1,0 +1,164 @@
+"""Field mode: a board that samples by itself; its samples from the sensor's twin, its bits from the host's core."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from test_stream import KINDS, standard_rig
+
+from pvid.base.errors import PvidError
+from pvid.board.field import FieldRecord, collect
+from pvid.board.stream_image import settings_number
+from pvid.board.stream_rig import StreamRig
+from pvid.board.target import HOST_TARGET, Target, open_target
+from pvid.core.native import Native
+from pvid.link.frames import SCHEMA_TEXT, Source, encode
+from pvid.link.port import Port
+from pvid.twin.sensor import SensorConstants, counts
+
+TICKS = 9000  # two announcements more in the weak form's 1 kHz
+
+
+@cache
+def sensed(form: str) -> npt.NDArray[np.int32]:
+    rig = standard_rig(form)
+    return counts(SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb), TICKS)
+
+
+@pytest.fixture
+def host_target() -> Iterator[Target]:
+    target = open_target(HOST_TARGET, standard_rig("weak"))
+    yield target
+    target.close()
+
+
+def assert_replays(record: FieldRecord, rig: StreamRig, form: str, native: Native) -> None:
+    """The samples are the twin's, the hashes and estimates those of the host's core on them."""
+    phi, y = record.samples(0, record.ticks)
+    expected = rig.from_counts(sensed(form)[: record.ticks])
+    assert all(np.array_equal(a.view(np.uint32), b.view(np.uint32)) for a, b in zip((phi, y), expected, strict=True))
+    hashes = rig.hashes(native, phi, y)
+    assert len(record.hashes) >= record.ticks // 500 - 1
+    assert all(hashes[tick - 1] == value for tick, value in record.hashes.items())
+
+
+@pytest.mark.parametrize(("form", "core"), KINDS)
+@pytest.mark.parametrize("name", [HOST_TARGET, "microbit", "mps2-an386", "virt-rv32imac"])
+def test_a_board_samples_by_itself(name: str, form: str, core: str, native: Native) -> None:
+    rig = standard_rig(form, core)
+    ticks = 5000 if form == "weak" else 1000
+    target = open_target(name, rig)
+    try:
+        record = collect(target, ticks, begin=rig)
+    finally:
+        target.close()
+    assert record.gaps == [] and record.received.missing == 0 and record.first == 0
+    assert_replays(record, rig, form, native)
+    assert record.schema == SCHEMA_TEXT
+    assert record.configuration is not None and record.configuration.settings == settings_number(rig)
+    assert record.hello is not None and record.status is not None
+    assert record.hello.p_unit == tuple(np.asarray(rig.p_unit, np.float32).tolist())
+    assert (record.hello.sample_rate, record.hello.core, record.hello.form) == (rig.sample_rate, rig.core, rig.form)
+    assert sorted(record.estimates) == list(range(500, max(record.estimates) + 1, 500))
+
+
+def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target, native: Native) -> None:
+    rig = standard_rig("weak")
+    record = collect(host_target, TICKS, begin=rig)
+    tick = max(record.estimates)
+    identifier = native.weak(rig.config)  # type: ignore[arg-type]
+    identifier.run(*record.samples(0, tick))
+    last, estimate = identifier.assess(), record.estimates[tick]
+    assert np.array_equal(np.array(estimate.p, np.float32), last["p"])
+    truth = np.array([31.6667, 8.875, 5.625])
+    assert np.abs(last["p"][:3] / truth - 1).max() < 0.02  # a plausible run of the rig
+
+
+def test_who_joins_late_learns_all_but_the_past(host_target: Target, native: Native) -> None:
+    rig = standard_rig("weak")
+    assert collect(host_target, 600, begin=rig).first == 0
+    late = collect(host_target, 5000)  # 4 s of the board's time hold an announcement
+    assert late.first >= 600
+    assert late.hello is not None and late.schema == SCHEMA_TEXT and late.configuration is not None
+    assert late.hello.session == late.configuration.session
+    phi, y = late.samples(late.first, late.ticks)
+    expected = rig.from_counts(sensed("weak")[late.first : late.ticks])
+    assert np.array_equal(phi, expected[0]) and np.array_equal(y, expected[1])
+
+
+def test_in_time_a_sample_takes_its_time(host_target: Target, native: Native) -> None:
+    rig = standard_rig("weak")
+    collect(host_target, 100, begin=rig, source=Source.SENSOR)
+    began = time.monotonic()
+    record = collect(host_target, 2000)
+    assert 1.5 < time.monotonic() - began < 6.0  # 2000 samples at 1 kHz; a busy machine may be late, never early
+    assert record.gaps == []
+
+
+@dataclass
+class Dropping:
+    """A line that loses a piece of what comes, once."""
+
+    port: Port
+    begin: int
+    end: int
+    at: int = 0
+
+    def read(self, size: int = 1, /) -> bytes:
+        data = self.port.read(size)
+        kept = bytes(b for i, b in enumerate(data, self.at) if not self.begin <= i < self.end)
+        self.at += len(data)
+        return kept
+
+    def write(self, data: bytes, /) -> int | None:
+        return self.port.write(data)
+
+    def close(self) -> None:
+        self.port.close()
+
+
+def test_what_the_line_loses_is_named(native: Native) -> None:
+    rig = standard_rig("weak")
+    target = open_target(HOST_TARGET, rig, lambda port: Dropping(port, 20_000, 21_000))
+    try:
+        record = collect(target, 5000, begin=rig)
+    finally:
+        target.close()
+    assert record.received.missing >= 3
+    (gap,) = record.gaps
+    assert 64 <= gap[1] - gap[0] <= 160
+    with pytest.raises(PvidError, match=f"ticks {gap[0]} to {gap[1] - 1} are missing"):
+        record.samples(0, record.ticks)
+    phi, y = record.samples(gap[1], record.ticks)  # what came after it is good
+    expected = rig.from_counts(sensed("weak")[gap[1] : record.ticks])
+    assert np.array_equal(phi, expected[0]) and np.array_equal(y, expected[1])
+
+
+def test_an_unknown_source_is_refused(host_target: Target) -> None:
+    rig = standard_rig("weak")
+    with pytest.raises(PvidError, match="no such source of samples"):
+        collect(host_target, 100, begin=rig, source=7)  # type: ignore[arg-type]
+
+
+def test_samples_from_the_pc_are_not_mixed_in(host_target: Target, native: Native) -> None:
+    rig = standard_rig("weak")
+    collect(host_target, 100, begin=rig)
+    host_target.port.write(encode(rig.sample(np.ones(64, np.float32), np.ones(64, np.float32)), 9, tick=0))
+    record = collect(host_target, 3000)
+    phi, _ = record.samples(record.first, record.ticks)
+    assert np.array_equal(phi, rig.from_counts(sensed("weak")[record.first : record.ticks])[0])
+
+
+def test_the_sensors_motion_stays_what_it_was() -> None:
+    rig = standard_rig("weak")
+    constants = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
+    long = counts(constants, 600_000) * np.array([rig.phi_lsb, rig.y_lsb])
+    first, last = np.abs(long[:60_000]).max(axis=0), np.abs(long[-60_000:]).max(axis=0)
+    assert np.allclose(first, last, rtol=0.1)  # after 10 minutes neither grown nor died away
+    assert 0.05 < first[0] < 0.15 and 0.005 < first[1] < 0.015

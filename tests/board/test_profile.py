@@ -1,0 +1,48 @@
+"""Where a tick's instructions go: functions' counts are the whole, and the table in host/docs/benchmarks/cost.md is theirs."""
+
+from __future__ import annotations
+
+import pytest
+from conftest import ROOT
+
+from pvid.base.errors import PvidError
+from pvid.board.boards import BOARDS
+from pvid.board.profile import HEADER, Profile, profile, table_rows
+
+BOARD = "mps2-an386"
+FORMS = ("strong", "weak")
+MOST_OF_A_CALL = 12  # instructions of the main loop between the two readings: arguments, call, the second reading
+
+
+@pytest.fixture(scope="module")
+def profiles() -> dict[str, Profile]:
+    return {form: profile(BOARDS[BOARD], form) for form in FORMS}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_functions_add_up_to_the_measured_mean(profiles: dict[str, Profile], form: str) -> None:
+    one = profiles[form]
+    assert 0 < one.measured - one.total < MOST_OF_A_CALL
+    assert min(one.functions.values()) > 0
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_only_what_a_tick_calls_is_counted(profiles: dict[str, Profile], form: str) -> None:
+    names = {name for name, _ in profiles[form].functions}
+    assert f"pvid_{form}_step_f32" in names
+    assert not names & {"main", "pvid_port_instructions", "pvid_fnv_estimator_f32", f"pvid_{form}_init_f32"}
+
+
+def test_the_readme_shows_what_is_measured(profiles: dict[str, Profile]) -> None:
+    text = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
+    table = text.split("<!-- profile -->\n")[1].split("<!-- /profile -->")[0].splitlines()[2:]
+    shown = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
+    measured = table_rows(profiles)
+    at = HEADER.index("instructions")
+    assert [row[:at] for row in shown] == [list(row[:at]) for row in measured]
+    assert [int(row[at]) for row in shown] == pytest.approx([int(row[at]) for row in measured], rel=0.02, abs=1)
+
+
+def test_an_emulator_without_plugins_is_one_sentence() -> None:
+    with pytest.raises(PvidError, match="only QEMU"):
+        profile(BOARDS["atmega2560"], "strong")

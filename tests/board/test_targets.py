@@ -1,0 +1,126 @@
+"""The core on every board: built by its cross compiler, run in its emulator, the bits of the host and the twin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from pvid.base.errors import PvidError
+from pvid.board import sizes
+from pvid.board.boards import BOARDS, run
+from pvid.board.replay_image import (
+    REPORT_EVERY,
+    ReplayReport,
+    ReplayRun,
+    build_image,
+    native_hashes,
+    parse_report,
+    play,
+    standard_run,
+    twin_hashes,
+)
+from pvid.core.native import Native
+
+LONG_TICKS = 40_000
+LONG = ("mps2-an386", "virt-rv32imac")
+TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
+
+Measured = dict[sizes.Configuration, tuple[sizes.Footprint, ReplayReport]]
+
+
+@pytest.fixture(scope="module")
+def measured() -> Measured:
+    """Every configuration of `pvid sizes`, built and run."""
+    return {configuration: sizes.measure(configuration) for configuration in sizes.CONFIGURATIONS}
+
+
+def assert_same_hashes(report: ReplayReport, replay: ReplayRun, native: Native) -> None:
+    expected = native_hashes(replay, native)
+    assert report.ticks == replay.ticks
+    assert report.hashes == {
+        tick: int(expected[tick - 1]) for tick in range(REPORT_EVERY, report.ticks + 1, REPORT_EVERY)
+    }
+    assert report.hash == int(expected[-1])
+
+
+@pytest.mark.parametrize("form", ["strong", "weak"])
+def test_the_host_computes_the_bits_of_the_twin(form: str, native: Native) -> None:
+    for ticks in (sizes.TICKS, LONG_TICKS):
+        replay = standard_run(form, ticks)
+        assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
+
+
+@pytest.mark.parametrize(("form", "core"), [(form, core) for form in ("strong", "weak") for core in ("f32", "q31")])
+def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measured: Measured, native: Native) -> None:
+    boards = set()
+    for configuration, (_, report) in measured.items():
+        if (configuration.form, configuration.core) == (form, core):
+            assert_same_hashes(report, standard_run(form, sizes.TICKS, core), native)
+            boards.add(configuration.board.name)
+    avrs = {name for name, runs in sizes.ON_AVR.items() if (form, core) in runs}
+    assert boards == {board.name for board in BOARDS.values() if board.toolchain != "avr"} | avrs
+
+
+@pytest.mark.parametrize("form", ["strong", "weak"])
+@pytest.mark.parametrize("name", LONG)
+def test_long_runs_end_with_the_bits_of_the_host(name: str, form: str, native: Native) -> None:
+    replay = standard_run(form, LONG_TICKS)
+    image, _ = build_image(BOARDS[name], replay)
+    assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), replay, native)
+
+
+def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> None:
+    """A product of the port, not of the core: the figures that benchmarks/cost.md gives for the AVR are from here."""
+    replay = standard_run("strong", 1000)
+    image, _ = build_image(BOARDS["atmega2560"], replay)
+    report = play(BOARDS["atmega2560"], image, TIMEOUT_S)
+    assert_same_hashes(report, replay, native)
+    assert report.instructions_mean == pytest.approx(114_000, rel=0.05)  # clock cycles
+    with pytest.raises(PvidError, match="overflowed"):
+        build_image(BOARDS["atmega328p"], replay)
+
+
+def test_no_figure_exceeds_its_budget(measured: Measured) -> None:
+    footprints = {configuration: footprint for configuration, (footprint, _) in measured.items()}
+    over = sizes.over_budget(ROOT / "tests" / "budget.toml", footprints)
+    assert not over, "if it has to be so: ./tools/pvid sizes --budget tests/budget.toml --update host/docs/benchmarks/cost.md"
+
+
+def test_the_readme_shows_what_is_measured(measured: Measured) -> None:
+    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8").splitlines()
+    rows = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in page if line.startswith("| ")}
+    shown = {row[:2]: row[2:] for row in rows}
+    for row in sizes.table_rows({configuration: footprint for configuration, (footprint, _) in measured.items()}):
+        figures = [int(cell) for cell in shown[row[:2]]]
+        assert figures == pytest.approx([int(cell) for cell in row[2:]], rel=0.02), row
+
+
+def test_the_stack_that_is_seen_lies_within_the_bound(measured: Measured) -> None:
+    for configuration, (footprint, report) in measured.items():
+        assert 0 < footprint.stack_seen <= footprint.stack_bound < report.stack_size, configuration.name
+
+
+def test_a_figure_over_its_budget_is_named(tmp_path: Path) -> None:
+    configuration = sizes.CONFIGURATIONS[0]
+    footprint = sizes.Footprint(1000, 0, 0, 0, 0, 100, 100, 50, 60)
+    budget = tmp_path / "budget.toml"
+    budget.write_text(f"{sizes.OPENING}\n{sizes.CLOSING}\n", encoding="utf-8")
+    assert len(sizes.over_budget(budget, {configuration: footprint})) == 9  # none has one
+    sizes.write_budget(budget, {configuration: footprint})
+    assert sizes.over_budget(budget, {configuration: footprint}) == []
+    larger = sizes.Footprint(1021, 0, 0, 0, 0, 102, 100, 50, 60)  # 2.1 % and 2.0 %
+    assert sizes.over_budget(budget, {configuration: larger}) == [
+        f"{configuration.name}: text is 1021, its budget 1000"
+    ]
+
+
+def test_an_image_for_an_fpu_reports_the_fault_on_a_core_without_one() -> None:
+    board = BOARDS["mps2-an386"]
+    image, _ = build_image(board, standard_run("weak", sizes.TICKS))
+    outcome = run(board, image, TIMEOUT_S, machine="mps2-an385")
+    assert outcome.exit_code == 112
+    with pytest.raises(PvidError, match="FPU instruction and no FPU, exception 0x00000003 pc 0x"):
+        parse_report(outcome.text)

@@ -1,0 +1,197 @@
+"""End to end through the command line: what a user types, what comes back, and the exit code."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+from pvid.cli.demo import stage
+from pvid.rig.file import RigFile
+from pvid.rig.run import write_run
+from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+
+
+def pvid(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "pvid", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a good run (run.csv, 20 bits, 12 s) and its rig file (run.toml)."""
+    folder = tmp_path_factory.mktemp("cli")
+    done = pvid("simulate", "run.csv", "--duration", "12", "--bits", "20", "--truth", "linear", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def strong(*arguments: str) -> tuple[str, ...]:
+    return (*arguments, "--rig", "run.toml", "--form", "strong")
+
+
+def test_simulate_writes_a_run_and_its_rig_file(place: Path) -> None:
+    assert (place / "run.csv").read_text(encoding="utf-8").splitlines()[0].startswith("t,phi,y")
+    assert (place / "run.toml").is_file()
+
+
+def test_identify_json_has_what_design_promises(place: Path) -> None:
+    done = pvid(*strong("identify", "run.csv", "--json"), cwd=place)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    names = {"w", "d1", "d2", "g", "l2", "rho2", "kappa", "status", "ticks", "updates", "lost", "hash"}
+    assert names | {"core", "form", "law", "on"} <= set(answer)
+    assert answer["ticks"] == 12_000
+    assert answer["g"]["value"] == pytest.approx(STANDARD_PENDULUM.g, rel=0.02)
+    assert answer["g"]["se"] > 0
+    assert answer["status"] == "updated"
+
+
+def test_both_cores_agree(place: Path) -> None:
+    single = json.loads(pvid(*strong("identify", "run.csv", "--json", "--core", "f32"), cwd=place).stdout)
+    double = json.loads(pvid(*strong("identify", "run.csv", "--json", "--core", "f64"), cwd=place).stdout)
+    assert double["hash"] is None
+    for name in ("w", "d1", "d2"):
+        # float32 differentiates with about 1e-6 relative noise of its own: far below a standard error
+        assert abs(single[name]["value"] - double[name]["value"]) < 0.5 * double[name]["se"]
+
+
+def test_both_cores_of_the_weak_form_agree(place: Path) -> None:
+    answers = [
+        pvid("identify", "run.csv", "--rig", "run.toml", "--json", "--core", core, cwd=place) for core in ("f32", "f64")
+    ]
+    single, double = (json.loads(answer.stdout) for answer in answers)
+    assert double["hash"] is None
+    assert double["core"] == "f64"
+    assert double["updates"] >= single["updates"] > 0  # f32 may still be at work on the last window
+    for name in ("w", "d1", "d2", "c", "l2"):
+        # float32 rounds far below a standard error; the last of 17 windows moves p by a part of one
+        assert abs(single[name]["value"] - double[name]["value"]) < double[name]["se"], name
+        assert single[name]["se"] == pytest.approx(double[name]["se"], rel=0.3), name
+
+
+def test_the_float64_weak_form_corrects_full_angles(tmp_path: Path) -> None:
+    assert pvid("simulate", "run.csv", "--duration", "20", "--truth", "full", cwd=tmp_path).returncode == 0
+    rig = tmp_path / "run.toml"
+    errors = []
+    for corrected in ("false", "true"):
+        rig.write_text(re.sub("full_angle = .*", f"full_angle = {corrected}", rig.read_text()), encoding="utf-8")
+        answer = json.loads(
+            pvid("identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--json", cwd=tmp_path).stdout
+        )
+        errors.append(abs(answer["g"]["value"] / STANDARD_PENDULUM.g - 1))
+    assert errors[0] > 2e-3  # README: 0.4 % at 0.107 rad
+    assert errors[1] < 1e-3
+
+
+def test_the_float64_weak_form_refuses_the_other_law(place: Path) -> None:
+    done = pvid("identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--law", "pseudovelocity", cwd=place)
+    assert done.returncode == 2
+    assert "stationary law" in done.stderr
+
+
+def test_the_law_can_be_chosen(place: Path) -> None:
+    answers = [
+        json.loads(pvid(*strong("identify", "run.csv", "--json", "--law", law), cwd=place).stdout)
+        for law in ("stationary", "pseudovelocity")
+    ]
+    assert [answer["law"] for answer in answers] == ["stationary", "pseudovelocity"]
+    assert answers[0]["hash"] != answers[1]["hash"]
+
+
+def test_compare_finds_both_laws_equal(place: Path) -> None:
+    done = pvid(*strong("compare", "run.csv"), cwd=place)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("equal") == 2
+
+
+def test_demo_prints_its_table_and_draws_its_figure(tmp_path: Path) -> None:
+    done = pvid("demo", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("streamed to mps2-an386, Cortex-M4F in QEMU: 40000 ticks, equal to here, hash ") == 2
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = readme.split("<!-- demo -->")[1].split("<!-- /demo -->")[0].strip().strip("`").strip("\n")
+    assert shown == done.stdout.rstrip(), "./tools/pvid bench demo --update README.md"
+    for word in (
+        "g [m/s^2]",
+        "l2 [m]",
+        "rho2 [m]",
+        "truth",
+        "standard error",
+        "error %",
+        "equal in every bit",
+    ):
+        assert word in done.stdout
+    assert (tmp_path / "pvid-demo.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_an_emulator_the_demo_says_where_it_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert stage().where == "mps2-an386, Cortex-M4F in QEMU"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert stage().where == "this machine, over a pseudo-terminal"
+    assert stage().lacking == "mps2-an386 needs arm-none-eabi-gcc and qemu-system-arm"
+
+
+def test_a_run_without_motion_is_not_identified(tmp_path: Path) -> None:
+    run = simulate(sensors=standard_sensors(20), truth="linear", duration=3.0, release=(0.0, 0.0)).run
+    run.phi[:] = 0.0
+    write_run(tmp_path / "still.csv", run)
+    RigFile.standard().write(tmp_path / "run.toml")
+    done = pvid(*strong("identify", "still.csv"), cwd=tmp_path)
+    assert done.returncode == 3
+    assert "nothing identified" in done.stderr
+
+
+BAD_RUNS = {
+    "empty": "",
+    "header only": "t,phi,y\n",
+    "wrong columns": "time,angle,pivot\n0,0,0\n0.001,0,0\n",
+    "text in numbers": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,fast,0\n",
+    "not a number": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,inf,0\n",
+    "gap": "t,phi,y\n" + "".join(f"{(k + (k > 200) * 500) / 1000},0.1,0\n" for k in range(400)),
+    "clock runs back": "t,phi,y\n" + "".join(f"{k % 200 / 1000},0.1,0\n" for k in range(400)),
+    "too short": "t,phi,y\n0,0.1,0\n0.001,0.1,0\n0.002,0.1,0\n",
+}
+
+
+@pytest.mark.parametrize("case", BAD_RUNS)
+def test_a_bad_run_is_one_sentence_and_exit_code_2(case: str, place: Path, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text(BAD_RUNS[case], encoding="utf-8")
+    done = pvid("identify", bad, "--rig", place / "run.toml", "--form", "strong", cwd=tmp_path)
+    assert done.returncode == 2, done.stdout
+    assert done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert "bad.csv" in done.stderr or case == "too short"
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("identify", "absent.csv", "--rig", "run.toml"), "absent.csv"),
+        (("identify", "run.csv", "--rig", "absent.toml"), "absent.toml"),
+        (("identify", "lone.csv"), "lone.csv does not exist"),
+        (("identify", "run.csv", "--set", "l3=1"), "--set 'l3' is not a key"),
+        (("identify", "run.csv", "--columns", "phi=angle:grad"), "'grad' is no unit of phi"),
+        (("identify", "run.csv", "--rig", "run.toml", "--core", "f16"), "f16"),
+        (("simulate", "out.csv", "--tone", "loud"), "loud"),
+        (("simulate", "out.csv", "--duration", "-1"), "-1 s"),
+        (("nonsense",), "nonsense"),
+    ],
+)
+def test_bad_usage_is_one_sentence_that_names_it(arguments: tuple[str, ...], named: str, place: Path) -> None:
+    done = pvid(*arguments, cwd=place)
+    assert done.returncode == 2, done.stdout
+    assert named in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr

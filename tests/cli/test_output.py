@@ -1,0 +1,141 @@
+"""Output that is full, closed or read by nobody, and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import resource
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import pytest
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.errors import PvidError
+from pvid.base.figure_file import format_of
+from pvid.rig.file import RigFile
+from pvid.rig.run import write_run
+from pvid.sim.pendulum import simulate
+
+PVID = [sys.executable, "-P", "-m", "pvid"]
+READER_GONE = 141
+
+
+def printing(*arguments: str, to: IO[Any] | int, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*PVID, *arguments], stdout=to, stderr=subprocess.PIPE, text=True, check=False, **options)
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("link-schema",), ("fir-table", "--points", "21")])
+def test_a_full_disk_is_one_sentence_and_exit_code_2(arguments: tuple[str, ...]) -> None:
+    with open("/dev/full", "wb") as full:
+        done = printing(*arguments, to=full)
+    assert done.returncode == 2
+    assert done.stderr == "pvid: the output cannot be written: No space left on device\n"
+
+
+def test_a_closed_output_is_one_sentence_and_exit_code_2() -> None:
+    command = f"{' '.join(PVID)} link-schema >&-"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "pvid: the output cannot be written: standard output is closed\n"
+
+
+def test_a_reader_that_has_gone_ends_the_command_without_a_word() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = printing("link-schema", to=writing)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (READER_GONE, "")
+
+
+def test_messages_that_nobody_takes_change_nothing(tmp_path: Path) -> None:
+    for where in ("2>&-", "2>/dev/full"):
+        command = f"{' '.join(PVID)} simulate run.csv --duration 1 {where}"
+        done = subprocess.run(command, shell=True, cwd=tmp_path, check=False)
+        assert done.returncode == 0
+
+
+def test_a_table_that_does_not_fit_leaves_an_empty_file(tmp_path: Path) -> None:
+    def bounded() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+
+    table = tmp_path / "table.h"
+    with table.open("wb") as file:
+        done = printing("fir-table", to=file, preexec_fn=bounded)
+    assert done.returncode == 2
+    assert done.stderr == "pvid: the output cannot be written: File too large\n"
+    assert table.read_bytes() == b""
+
+
+# ---- files
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """As a disk that is nearly full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_what_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    from pvid.base.figure_file import save
+
+    run = simulate(duration=1.0).run
+    figure = Figure()
+    figure.subplots().plot(run.t, run.phi)
+    names = [tmp_path / name for name in ("rig.toml", "figure.png", "run.csv")]
+    for path in names:
+        path.write_text("old", encoding="utf-8")
+    with files_up_to(100):
+        with pytest.raises(PvidError, match="rig.toml: cannot be written: File too large"):
+            RigFile.standard().write(names[0])
+        with pytest.raises(PvidError, match="cannot write the figure .*File too large"):
+            save(figure, names[1], dpi=50)
+        with pytest.raises(PvidError, match="run.csv cannot be written: File too large"):
+            write_run(names[2], run)
+    assert sorted(tmp_path.iterdir()) == sorted(names)
+    assert all(path.read_text(encoding="utf-8") == "old" for path in names)
+
+
+def test_a_device_is_written_to_and_stays_one() -> None:
+    write_whole(Path("/dev/null"), "nothing")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(Path("/dev/full"), "nothing")
+    assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
+
+
+def test_a_link_stays_and_its_target_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    target, link = tmp_path / "there" / "rig.toml", tmp_path / "link.toml"
+    target.write_text("old", encoding="utf-8")
+    link.symlink_to(target)
+    write_whole(link, "new")
+    assert link.is_symlink() and target.read_text(encoding="utf-8") == "new"
+
+
+def test_the_longest_name_is_written_and_a_folder_is_refused(tmp_path: Path) -> None:
+    name = tmp_path / ("a" * 251 + ".csv")
+    write_whole(name, "new")
+    assert name.read_text(encoding="utf-8") == "new"
+    with pytest.raises(IsADirectoryError):
+        write_whole(tmp_path, "new")
+
+
+def test_a_figure_has_a_format_that_every_machine_writes() -> None:
+    assert [format_of(Path(name)) for name in ("a.PNG", "a.svg", "a.pdf", "a")] == ["png", "svg", "pdf", "png"]
+    for name in ("a.pgf", "a.exe", "a.png.txt"):
+        with pytest.raises(PvidError, match="must end in .png, .svg, .pdf"):
+            format_of(Path(name))

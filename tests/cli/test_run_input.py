@@ -1,0 +1,238 @@
+"""Runs as people have them, through the command line: no rig file, other columns, gaps, jitter; and their cost."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner, Result
+
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.log.rig_settings import parse_settings, rig_for, rig_path_of
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run, read_run, write_run
+from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+
+Float = npt.NDArray[np.float64]
+
+
+def pvid(*arguments: str | Path) -> Result:
+    """The command's result; a refusal is raised."""
+    return CliRunner().invoke(commands, [*map(str, arguments)], standalone_mode=False, catch_exceptions=False)
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    """The standard rig, linear truth, 14 bits, 20 s at 1 kHz."""
+    return simulate(sensors=standard_sensors(14), truth="linear", duration=20.0, seed=4).run
+
+
+def write(path: Path, run: Run, rows: npt.NDArray[np.int64] | None = None, t: Float | None = None) -> Path:
+    """The rows of a run, with other times where they are given."""
+    rows = np.arange(len(run)) if rows is None else rows
+    t = run.t if t is None else t
+    columns = (t[rows].tolist(), run.phi[rows].tolist(), run.y[rows].tolist())
+    lines = [",".join(map(repr, cells)) for cells in zip(*columns, strict=True)]
+    path.write_text("\n".join(["t,phi,y", *lines]) + "\n")
+    return path
+
+
+def answer(*arguments: str | Path) -> dict[str, Any]:
+    done = pvid("identify", *arguments, "--set", "l1=0.3", "--json")
+    assert done.return_value == 0, done.output
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+# ---- the rig
+
+
+def test_l1_is_all_that_is_needed(run: Run, tmp_path: Path) -> None:
+    path = write(tmp_path / "run.csv", run)
+    found = answer(path)
+    assert found["g"]["value"] == pytest.approx(STANDARD_PENDULUM.g, rel=0.01)  # the README's promise
+    assert found["input"] == []
+    with pytest.raises(PvidError, match=r"no rig file, and l1, .* is all that is needed: use --set l1=0\.25$"):
+        pvid("identify", path)
+    with pytest.raises(PvidError, match="does not exist"):
+        pvid("identify", tmp_path / "absent.csv")
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.csv.gz", "run.npz", "run.parquet"])
+def test_the_rig_file_beside_a_run_is_taken_by_itself(name: str, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / name
+    write_run(path, run)
+    RigFile.standard().write(tmp_path / "run.toml")
+    assert rig_path_of(path) == tmp_path / "run.toml"
+    assert rig_for(path, None) == RigFile.standard()
+    assert rig_for(path, None, ["l1=0.5"]).l1 == 0.5
+    (tmp_path / "other.toml").write_text("l1 = 0.7\n")
+    assert rig_for(path, tmp_path / "other.toml").l1 == 0.7
+
+
+def test_settings_come_before_what_the_file_holds(tmp_path: Path) -> None:
+    file = tmp_path / "rig.toml"
+    file.write_text("sample_rate = 500\n[sensor]\nphi_lsb = 1e-3\ny_lsb = 2e-5\n[identifier]\nlaw = 'stationary'\n")
+    with pytest.raises(PvidError, match="rig.toml: l1 is missing"):
+        rig_for(None, file)
+    given = ["l1=0.25", "sensor.phi_lsb = 0.0015", "identifier.zero=false", "identifier.core=q31", "nominal.l2=1"]
+    rig = rig_for(None, file, given)
+    assert (rig.l1, rig.sample_rate, rig.sensor.phi_lsb, rig.sensor.y_lsb) == (0.25, 500.0, 0.0015, 2e-5)
+    assert (rig.identifier.zero, rig.identifier.core, rig.nominal.l2) == (False, "q31", 1.0)
+    assert rig_for(None, None, given).sample_rate is None
+    assert rig_for(None, None, ["l1=0.25", "identifier.core='f64'"]).identifier.core == "f64"
+    file.write_text("l1 = 0.3\nsensor = 3\n")
+    with pytest.raises(PvidError, match="sensor must be a table"):
+        rig_for(None, file, ["sensor.phi_lsb=0.1"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "part"),
+    [
+        ("l1", "--set 'l1' is not KEY=VALUE, as in --set l1=0.25"),
+        ("=3", "--set '=3' is not KEY=VALUE"),
+        ("l1=", "--set 'l1=' is not KEY=VALUE"),
+        ("l1=long", "--set l1 must be a number, not 'long'"),
+        ("l1=-1", "--set l1 must be from 1e-06 to 1e[+]06 m, not -1"),
+        ("l1=nan", "--set l1 must be from"),
+        ("l1=true", "--set l1 must be a number, not true"),
+        ("l1=[1,2]", "--set l1 must be a number"),
+        ("l3=1", "--set 'l3' is not a key of a rig file; known are l1, sample_rate"),
+        ("phi_lsb=1e-3", "--set 'phi_lsb' is not a key of a rig file; it is sensor.phi_lsb"),
+        ("sensor.lsb=1", "--set 'sensor.lsb' is not a key of a rig file; known are phi_lsb"),
+        ("sensor=1", "--set 'sensor' is not a key"),
+        ("motor.torque=1", "--set 'motor.torque': a rig file has no table 'motor'; it has sensor, nominal, identifier"),
+        ("sensor.phi_lsb=2", "--set sensor.phi_lsb must be from 0 to 1 rad, not 2"),
+        ("identifier.law=round", '--set identifier.law must be "stationary" or'),
+        ("identifier.zero=1", "--set identifier.zero must be true or false, not 1"),
+        ("identifier.divider=1.5", "--set identifier.divider must be a whole number"),
+    ],
+)
+def test_a_wrong_setting_is_one_sentence_that_names_the_key(setting: str, part: str) -> None:
+    with pytest.raises(PvidError, match=f"^{part}") as caught:
+        parse_settings([setting])
+    assert str(caught.value).isprintable()
+
+
+def test_a_setting_is_given_once() -> None:
+    with pytest.raises(PvidError, match="--set sensor.phi_lsb is given twice"):
+        parse_settings(["sensor.phi_lsb=1e-3", "l1=1", "sensor.phi_lsb=1e-3"])
+
+
+def test_every_command_that_reads_a_run_takes_rig_settings_and_columns(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    rows = zip(range(8000), np.rad2deg(run.phi).tolist(), (1e3 * run.y).tolist(), strict=False)
+    path.write_text("time_ms;angle_deg;h\n" + "".join(f"{k};{a!r};{b!r}\n".replace(".", ",") for k, a, b in rows))
+    given = ["--set", "l1=0.3", "--columns", "t=time_ms:ms,phi=angle_deg:deg,y=h:mm"]
+    assert pvid("identify", path, *given).return_value == 0
+    assert pvid("compare", path, *given, "--law", "stationary").return_value == 0
+    assert pvid("plot", path, *given, "-o", tmp_path / "a.png").return_value == 0
+    assert pvid("design", "--run", path, *given, "--set", "sample_rate=1000").return_value == 0
+    with pytest.raises(PvidError, match="use --columns t=time_ms:ms,phi=angle_deg:deg,y=h:m"):
+        pvid("identify", path, *given[:2])
+    with pytest.raises(PvidError, match="--columns is for the run: name it with --run"):
+        pvid("design", *given)
+
+
+# ---- gaps and jitter, up to the answer
+
+
+def test_dropped_samples_and_jitter_leave_the_answer(run: Run, tmp_path: Path) -> None:
+    clean = answer(write(tmp_path / "clean.csv", run))
+    random = np.random.default_rng(1)
+    kept = np.delete(np.arange(len(run)), random.choice(np.arange(1, len(run) - 1), 20, replace=False))
+    dropped = answer(write(tmp_path / "dropped.csv", run, kept))
+    late = answer(write(tmp_path / "late.csv", run, t=run.t + 2e-4 * random.uniform(-1, 1, len(run))))
+    for found, told in ((dropped, "missing samples: 20 of 20000, in 20 gaps"), (late, "smoother without that")):
+        assert told in str(found["input"])
+        for name in ("w", "d1", "d2"):
+            # other noise at 20 of 20 000 samples
+            assert abs(found[name]["value"] - clean[name]["value"]) < 0.3 * clean[name]["se"], name
+
+
+def test_a_clock_off_by_a_thousandth_is_told(run: Run, tmp_path: Path) -> None:
+    path = write(tmp_path / "run.csv", run, t=run.t * 1.001)
+    RigFile.standard().write(tmp_path / "run.toml")
+    done = pvid("identify", path, "--json")
+    assert done.stderr.startswith("pvid: input: t runs at 999 Hz, -0.1 % off the rig's sample rate: t is believed")
+    assert json.loads(done.stdout)["input"] == [done.stderr.splitlines()[0].removeprefix("pvid: input: ")]
+
+
+@pytest.mark.parametrize("core", ["f32", "q31", "f64"])
+def test_a_long_gap_costs_windows_and_no_answer(core: str, run: Run, tmp_path: Path) -> None:
+    rows = np.delete(np.arange(len(run)), np.arange(6000, 6500))
+    clean = answer(write(tmp_path / "clean.csv", run), "--core", core)
+    found = answer(write(tmp_path / "run.csv", run, rows), "--core", core)
+    assert "missing samples: 500 of 20000, in 1 gap (first at 6 s, longest 0.5 s)" in found["input"][0]
+    assert len(found["input"]) == (2 if core == "f64" else 1)  # float64 uses the longest stretch, and tells
+    for name in ("w", "d1", "d2"):
+        # two windows of 16 less, in float64 a third of them: well below the errors that both share
+        assert abs(found[name]["value"] - clean[name]["value"]) < 2 * found[name]["se"], name
+
+
+def test_both_cores_and_their_twins_take_gaps_alike(run: Run, tmp_path: Path) -> None:
+    rows = np.delete(np.arange(9000), np.r_[3000:3001, 4000:4100])
+    path = write(tmp_path / "run.csv", run, rows)
+    done = pvid("compare", path, "--set", "l1=0.3", "--core", "all", "--law", "stationary")
+    assert done.return_value == 0, done.output
+
+
+# ---- what reading costs
+
+# VmHWM and not getrusage, whose peak a child has from its parent.
+_MEASURED = """
+import re, sys, time
+import numpy, pyarrow.csv
+from pvid.rig.run import read_run
+def peak():
+    return int(re.search("VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1])
+before, begin = peak(), time.process_time()
+rows = len(read_run(sys.argv[1]))
+print(rows, peak() - before, time.process_time() - begin)
+"""
+
+
+def reading(path: Path) -> tuple[int, float, float]:
+    """Rows, growth of the largest resident memory [bytes] and processor time [s]."""
+    done = subprocess.run([sys.executable, "-c", _MEASURED, str(path)], capture_output=True, text=True, check=True)
+    rows, kilobytes, seconds = done.stdout.split()
+    return int(rows), 1024.0 * float(kilobytes), float(seconds)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 2e-4])
+def test_a_row_costs_a_few_numbers_of_memory_and_a_microsecond(jitter: float, tmp_path: Path) -> None:
+    """The same per row at 200 000 rows as at 10^7: three numbers, and as many again while they grow."""
+    random = np.random.default_rng(1)
+    small, large = 20_000, 220_000
+    costs = []
+    for rows in (small, large):
+        t = np.arange(rows) / 1000.0 + jitter * random.uniform(-1, 1, rows)
+        table = np.stack([t, 0.1 * np.sin(5 * t), 0.01 * np.cos(7 * t)], axis=1).tolist()
+        path = tmp_path / f"{rows}.csv"
+        path.write_text("t,phi,y\n" + "".join(f"{a!r},{b!r},{c!r}\n" for a, b, c in table))
+        costs.append(reading(path))
+        assert costs[-1][0] == pytest.approx(rows, abs=1)
+    (_, low, _), (_, high, seconds) = costs
+    # 10^7 rows within 500 MB leave 40 bytes a row beside the interpreter's own 100 MB; the blocks of what is read take
+    # 8 MB more until there are several
+    assert high - low < 40 * (large - small) + 8e6
+    assert high < 100e6
+    # 600 000 rows in 1 s of processor time leave 1.7 us a row; 1 us more for a busy machine
+    assert seconds < 2.7e-6 * large + 0.3
+
+
+def test_the_run_in_a_file_of_many_blocks_is_whole(tmp_path: Path) -> None:
+    rows = 100_000
+    t = np.arange(rows) / 1000.0
+    run = Run(t, np.random.default_rng(2).standard_normal(rows), np.sqrt(t), 1000.0)
+    write_run(tmp_path / "run.csv", run)
+    again = read_run(tmp_path / "run.csv")
+    for name in ("t", "phi", "y"):
+        assert getattr(again, name).tobytes() == getattr(run, name).tobytes()

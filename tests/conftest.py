@@ -1,0 +1,54 @@
+"""What several tests share: the builds of the core and the standard rig, made once a session."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pvid.core.native import Native
+from pvid.sim.pendulum import Simulation, simulate, standard_sensors
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# tools/test gives each of its workers a file at a time: those that take a minute and more come first, the longest
+# before the others, so that the workers end together.
+LONGEST = (
+    "targets",
+    "strong_bits_q31",
+    "stream",
+    "bits",
+    "log",
+    "tune",
+    "longevity",
+    "memory",
+    "mutate",
+    "weak_starts",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts the longest files first; within a file, and among the others, nothing moves."""
+    places = {f"test_{name}.py": place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
+
+
+@pytest.fixture(scope="session")
+def native() -> Native:
+    """The build that tools/pvid uses."""
+    return Native()
+
+
+@pytest.fixture(scope="session")
+def matrix() -> dict[str, Native]:
+    """The core at -O0, -O2 and -O3 by gcc and by clang, by name (gcc-O0 ...)."""
+    done = subprocess.run([ROOT / "tools" / "build-matrix"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return {Path(line).parent.name: Native(Path(line)) for line in done.stdout.splitlines()}
+
+
+@pytest.fixture(scope="session")
+def standard_20_bits() -> Simulation:
+    """The standard rig, linear truth, 20-bit encoder, 40.5 s at 1 kHz."""
+    return simulate(sensors=standard_sensors(20), truth="linear", duration=40.5, seed=1)

@@ -1,0 +1,189 @@
+"""The fixed-point core as a user meets it: no floating point in its objects, the command line, the C header."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from conftest import ROOT
+from linear_rig import LINEAR_RIG
+
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.core.native import Native
+from pvid.core.native_q31 import WeakIdentifierQ31
+from pvid.design.weak_q31 import weak_tables_q31
+from pvid.rig.file import RigFile
+from pvid.rig.run import write_run
+from pvid.setup.f32 import weak_design_of
+from pvid.setup.q31 import counts_of, weak_config_q31
+from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+
+FIRMWARE = ROOT / "firmware"
+# What both cores need.
+SHARED = [FIRMWARE / "src" / name for name in ("crc32.c", "fnv.c", "publication.c", "snapshot.c")]
+SOURCES = sorted([*(FIRMWARE / "src").glob("*_q31.c"), *SHARED])
+COMPILERS = {
+    "arm-none-eabi": ["-mcpu=cortex-m0plus", "-mthumb"],
+    "riscv64-unknown-elf": ["-march=rv32imac", "-mabi=ilp32"],
+}
+# What libgcc's soft float is called, and what an instruction on floats looks like where there are registers for them.
+SOFT_FLOAT = re.compile(
+    r"__aeabi_(?:[cdf]|u?[il]2[df])|__(?:add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|fix|float|extend)\w*[sdtx]f"
+)
+FLOAT_INSTRUCTION = re.compile(
+    r"\t(?:v(?:add|sub|mul|div|ldr|str|mov|cvt|sqrt|cmp)|f(?:add|sub|mul|div|lw|sw|ld|sd|cvt|mv))"
+)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A run of the standard rig, 10 s, and its rig file."""
+    folder = tmp_path_factory.mktemp("q31")
+    run = simulate(sensors=standard_sensors(14), truth="linear", duration=10.0, seed=2).run
+    write_run(folder / "run.csv", run)
+    exact = replace(LINEAR_RIG.sensor, y_gain_sd=0.0)  # else the errors are those of the gain and of l1
+    replace(LINEAR_RIG, l1_sd=0.0, sensor=exact).write(folder / "rig.toml")
+    return folder / "run.csv", folder / "rig.toml"
+
+
+def tool(*command: str | Path) -> str:
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("prefix", COMPILERS)
+def test_no_object_has_floating_point(prefix: str, tmp_path: Path) -> None:
+    includes = [f"-I{FIRMWARE}/{folder}" for folder in ("include", "src", "ports/freestanding/include")]
+    flags = ["-std=c99", "-O2", "-ffreestanding", *COMPILERS[prefix], *includes]
+    assert len(SOURCES) >= 10
+    for source in SOURCES:
+        compiled = tmp_path / f"{source.stem}.o"
+        tool(f"{prefix}-gcc", *flags, "-c", source, "-o", compiled)
+        called = tool(f"{prefix}-nm", "--undefined-only", compiled)
+        assert not SOFT_FLOAT.search(called), f"{source.name}: {called}"
+        listing = tool(f"{prefix}-objdump", "-d", compiled)
+        assert not FLOAT_INSTRUCTION.search(listing), source.name
+
+
+def test_the_search_for_floating_point_finds_it(tmp_path: Path) -> None:
+    """The test above can fail: float32's own solve is full of it."""
+    compiled = tmp_path / "float.o"
+    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src"]
+    tool(
+        "arm-none-eabi-gcc", "-mcpu=cortex-m0plus", *includes, "-c", FIRMWARE / "src" / "pattern_f32.c", "-o", compiled
+    )
+    assert SOFT_FLOAT.search(tool("arm-none-eabi-nm", "--undefined-only", compiled))
+
+
+def test_identify_answers_from_the_fixed_point_core(recorded: tuple[Path, Path]) -> None:
+    run, rig = recorded
+    done = CliRunner().invoke(commands, ["identify", str(run), "--rig", str(rig), "--core", "q31", "--json"])
+    answer = json.loads(done.stdout)
+    assert answer["core"] == "q31"
+    truth = dict(zip(("w", "d1", "d2"), STANDARD_PENDULUM.linear, strict=True))
+    for name, value in truth.items():
+        # ten seconds: 4 standard errors, and these below half a per cent
+        assert abs(answer[name]["value"] - value) < 4 * answer[name]["se"] < 0.005 * 4 * value
+    assert answer["g"]["value"] == pytest.approx(STANDARD_PENDULUM.g, rel=0.005)
+
+
+def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
+    run, rig = recorded
+    done = CliRunner().invoke(
+        commands, ["compare", str(run), "--rig", str(rig), "--core", "all", "--law", "stationary"]
+    )
+    assert re.search(r"f32 .*equal", done.stdout) and re.search(r"q31 .*equal", done.stdout), done.stdout
+    assert "DIFFERENT" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"sensor": {"phi_lsb": 0.0}}, "phi_lsb is 0"),
+        ({"sensor": {"phi_range": 1e-6}}, "phi_range is 0 counts"),
+        ({"identifier": {"damping": True}}, "core q31 has no damping"),
+    ],
+)
+def test_what_it_cannot_do_is_said(
+    recorded: tuple[Path, Path], tmp_path: Path, change: dict[str, dict[str, object]], sentence: str
+) -> None:
+    rig = RigFile.standard()
+    for table, keys in change.items():
+        rig = replace(rig, **{table: replace(getattr(rig, table), **keys)})
+    rig.write(tmp_path / "rig.toml")
+    command = ["identify", str(recorded[0]), "--rig", str(tmp_path / "rig.toml"), "--core", "q31"]
+    with pytest.raises(PvidError, match=sentence):
+        CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False)
+
+
+PROGRAM = """
+#include <stdio.h>
+#include "pvid/pvid.h"
+#include "table.h"
+int main(void)
+{
+    static pvid_weak_q31 identifier;
+    uint32_t hash = PVID_FNV_START;
+    int phi, y;
+    if (pvid_weak_init_q31(&identifier, &standard) != PVID_OK) return 1;
+    while (scanf("%d %d", &phi, &y) == 2) {
+        hash = pvid_fnv_estimator_q31(hash, &identifier.estimator, pvid_weak_step_q31(&identifier, phi, y));
+    }
+    printf("%08x", (unsigned)hash);
+    return 0;
+}
+"""
+
+
+def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: Path, native: Native) -> None:
+    """A program made from the generated header and the sources alone computes the bits of the shared library."""
+    _, rig_path = recorded
+    command = ["weak-table", "--core", "q31", "--rig", str(rig_path), "--name", "standard"]
+    header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
+    (tmp_path / "table.h").write_text(header)
+    (tmp_path / "main.c").write_text(PROGRAM)
+    program = tmp_path / "program"
+    sanitizers = ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
+    # the hash wraps by its definition, and by nothing else
+    (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
+    sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
+    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src", f"-I{tmp_path}"]
+    warnings = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
+    flags = ["-std=c99", "-O1", *warnings, *sanitizers, *includes]
+    tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", program)
+    rig = RigFile.standard()
+    run = simulate(sensors=standard_sensors(14), truth="linear", duration=10.0, seed=2).run
+    phi, y = counts_of(rig, run)
+    random = np.random.default_rng(3)
+    # a hostile tail: full scale in any order, and words beyond it
+    phi = np.concatenate([phi, random.integers(-1304, 1305, 4000), random.integers(-(2**31), 2**31, 2000)])
+    y = np.concatenate([y, y[:4000], random.integers(-(2**31), 2**31, 2000)])
+    lines = "\n".join(f"{a} {b}" for a, b in zip(phi, y, strict=True))
+    done = subprocess.run([program], input=lines, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    core = WeakIdentifierQ31(native, weak_config_q31(rig, 1000.0))
+    core.run(phi, y)
+    assert done.stdout == f"{core.running_hash:08x}"
+
+
+def test_margins_are_positive_or_the_design_is_refused() -> None:
+    design = weak_design_of(RigFile.standard(), 1000.0)
+    tables = weak_tables_q31(design, 2 * np.pi / 2**14, 5e-6, 0.5, 0.03, 39.2)
+    assert min(tables.margins.values()) >= 0
+    # by what the proof says: the worst sum of any function, computed from the tables themselves
+    chi = np.abs(tables.chi[:, 2].astype(np.int64)).sum(axis=0).max()
+    largest_f = (tables.phi_max * (2**tables.smooth_bits + 4 * int(np.abs(tables.smooth.astype(np.int64)).sum()))) >> (
+        tables.phi_shift
+    )
+    assert largest_f < 2**20
+    assert (chi * largest_f) >> tables.sum_shift < 2**31
+    with pytest.raises(PvidError, match="fixed-point core"):
+        weak_tables_q31(design, 1e-9, 5e-6, 0.5, 0.03, 39.2)

@@ -1,0 +1,250 @@
+"""Saved and restored identifiers continue bit for bit; a configuration that differs in any field is refused."""
+
+from __future__ import annotations
+
+import ctypes
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from struct_fields import Field, fields_of
+
+from pvid.core import snapshot
+from pvid.core.native import Native
+from pvid.core.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
+from pvid.core.snapshot import Identifier, SnapshotStatus
+from pvid.rig.file import RigFile
+from pvid.setup.f32 import strong_config, weak_config
+from pvid.setup.q31 import strong_config_q31, weak_config_q31
+from pvid.sim.pendulum import Simulation
+
+TICKS = 20_000
+RIG = RigFile.standard()
+# Before anything, in the first window, in its middle, while a window is worked off, at the end.
+PLACES = (0, 1, 777, 1254, 1290, 5003, 12_345, TICKS - 1)
+
+Samples = npt.NDArray[Any]
+
+
+def rig_with(**settings: Any) -> RigFile:
+    return replace(RIG, identifier=replace(RIG.identifier, **settings))
+
+
+def strong_of(native: Native) -> Identifier:
+    return native.strong(strong_config(rig_with(form="strong", forgetting_s=3.0), 1000.0))
+
+
+def savitzky_golay_of(native: Native) -> Identifier:
+    return native.strong(strong_config(rig_with(form="strong", differentiator="savitzky-golay"), 1000.0))
+
+
+def weak_of(native: Native) -> Identifier:
+    return native.weak(weak_config(rig_with(full_angle=False), 1000.0))
+
+
+def forgetting_of(native: Native) -> Identifier:
+    return native.weak(weak_config(rig_with(forgetting_s=5.0), 1000.0))
+
+
+def corrected_of(native: Native) -> Identifier:
+    return native.weak(weak_config(rig_with(full_angle=True, damping=True), 1000.0))
+
+
+def fixed_point_of(native: Native) -> Identifier:
+    return WeakIdentifierQ31(native, weak_config_q31(RIG, 1000.0))
+
+
+def strong_fixed_point_of(native: Native) -> Identifier:
+    rig = rig_with(form="strong", forgetting_s=3.0, outlier_gate=6.0)
+    return StrongIdentifierQ31(native, strong_config_q31(rig, 1000.0))
+
+
+FOUR = (strong_of, weak_of, strong_fixed_point_of, fixed_point_of)  # every form and core
+KINDS = (*FOUR, savitzky_golay_of, forgetting_of, corrected_of)
+Maker = Callable[[Native], Identifier]
+
+
+def samples_for(identifier: Identifier, simulation: Simulation) -> tuple[Samples, Samples]:
+    phi, y = simulation.run.phi[:TICKS], simulation.run.y[:TICKS]
+    if isinstance(identifier, WeakIdentifierQ31 | StrongIdentifierQ31):
+        return np.rint(phi / RIG.sensor.phi_lsb).astype(np.int64), np.rint(y / RIG.sensor.y_lsb).astype(np.int64)
+    return phi, y
+
+
+@pytest.mark.parametrize("maker", KINDS, ids=lambda maker: maker.__name__)
+def test_a_restored_run_continues_bit_for_bit(maker: Maker, native: Native, standard_20_bits: Simulation) -> None:
+    phi, y = samples_for(maker(native), standard_20_bits)
+    whole = maker(native)
+    uninterrupted = whole.run(phi, y, sums=False)
+    for place in PLACES:
+        first, second = maker(native), maker(native)
+        record = first.run(phi[:place], y[:place], sums=False)
+        assert snapshot.restore(second, snapshot.save(first)) is SnapshotStatus.RESTORED
+        second._hash[0] = first.running_hash  # the hash is kept beside the identifier, not in it
+        rest = second.run(phi[place:], y[place:], sums=False)
+        assert second.running_hash == whole.running_hash, place
+        assert np.array_equal(np.concatenate([record.p, rest.p]), uninterrupted.p), place
+        assert np.array_equal(np.concatenate([record.reason, rest.reason]), uninterrupted.reason), place
+        assert second.counters == whole.counters
+        assert snapshot.save(second) == snapshot.save(whole)
+
+
+def test_every_build_of_a_machine_restores_what_another_saved(
+    matrix: dict[str, Native], standard_20_bits: Simulation
+) -> None:
+    for maker in FOUR:
+        images = set()
+        for native in matrix.values():
+            identifier = maker(native)
+            phi, y = samples_for(identifier, standard_20_bits)
+            identifier.run(phi[:3000], y[:3000], sums=False)
+            images.add(snapshot.save(identifier))
+        for native in matrix.values():
+            for image in images:
+                assert snapshot.restore(maker(native), image) is SnapshotStatus.RESTORED
+
+
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
+def test_another_form_or_core_is_refused(maker: Maker, native: Native) -> None:
+    for other in FOUR:
+        status = SnapshotStatus.RESTORED if other is maker else SnapshotStatus.OTHER_KIND
+        assert snapshot.restore(maker(native), snapshot.save(other(native))) is status
+
+
+# Filled in by the identifiers, or a pointer of which the contents are hashed.
+NOT_SETTINGS: dict[Maker, set[str]] = {
+    strong_of: {"estimator.model", "estimator.update_rate_hz", "bank.weights"},
+    weak_of: {
+        *(f"estimator.{name}" for name in ("model", "update_rate_hz", "correlation", "row_weight")),
+        *(f"design.{name}" for name in ("smooth", "second", "chi", "gram")),
+        "angle",
+        "passes",  # of a correction that is not asked for
+    },
+    strong_fixed_point_of: {"estimator.model", "bank.weights"},
+    fixed_point_of: {
+        "estimator.model",
+        *(f"design.{name}" for name in ("smooth", "second", "chi", "gram", "multiplier")),
+    },
+}
+
+
+def changed(value: Any) -> Any:
+    """Another value; a size gets smaller, so that no table is read beyond its end."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, float):
+        return 1.5 * value + 0.25
+    return value - 1 if value > 0 else value + 1
+
+
+def is_unused(field: Field, n_p: int, n_theta: int) -> bool:
+    """An entry beyond those of the model."""
+    name = field.group.removeprefix("estimator.")
+    if name in ("start", "start_sd", "lower", "upper", "p_bits"):
+        return field.place >= n_p
+    return name == "n_bits" and field.place >= n_theta
+
+
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
+def test_every_setting_that_differs_is_seen(maker: Maker, native: Native) -> None:
+    identifier = maker(native)
+    image = snapshot.save(identifier)
+    before = bytes(identifier.state)
+    tried = 0
+    for field in fields_of(identifier.config_struct):
+        if field.name in NOT_SETTINGS[maker] or is_unused(
+            field, identifier.n_p, 11 if maker is strong_fixed_point_of else 8
+        ):
+            continue
+        kept = field.value
+        field.value = changed(kept)
+        assert snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG, field.name
+        field.value = kept
+        assert bytes(identifier.state) == before
+        tried += 1
+    assert tried >= 25
+    assert snapshot.restore(identifier, image) is SnapshotStatus.RESTORED
+
+
+def test_every_table_that_differs_is_seen(native: Native) -> None:
+    for maker in FOUR:
+        identifier = maker(native)
+        image = snapshot.save(identifier)
+        assert identifier._tables
+        for table in identifier._tables.values():
+            # the arrays are read-only for Python, as the tables are for the core
+            raw = (ctypes.c_uint8 * table.nbytes).from_address(table.ctypes.data)
+            for place in (0, table.nbytes // 2, table.nbytes - 1):
+                raw[place] ^= 1
+                assert snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG
+                raw[place] ^= 1
+
+
+def test_a_correction_that_is_not_asked_for_has_no_passes(native: Native) -> None:
+    image = snapshot.save(weak_of(native))
+    identifier = weak_of(native)
+    identifier.config_struct.passes += 1
+    assert snapshot.restore(identifier, image) is SnapshotStatus.RESTORED
+
+
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
+def test_what_is_damaged_cut_short_or_of_another_version_changes_nothing(maker: Maker, native: Native) -> None:
+    identifier = maker(native)
+    image = snapshot.save(identifier)
+    before = bytes(identifier.state)
+    for place in (*range(0, 28, 4), 28, len(image) // 2, len(image) - 5, len(image) - 1):
+        for bit in (1, 128):
+            damaged = image[:place] + bytes([image[place] ^ bit]) + image[place + 1 :]
+            assert snapshot.restore(identifier, damaged) is not SnapshotStatus.RESTORED, place
+    for length in (0, 3, 27, 31, 32, len(image) // 2, len(image) - 1):
+        status = SnapshotStatus.NONE if length < 32 else SnapshotStatus.CUT_SHORT
+        assert snapshot.restore(identifier, image[:length]) is status
+    sealed = image[:8] + b"\x00\x00\x00\x7f" + image[12:-4]
+    other = sealed + zlib.crc32(sealed).to_bytes(4, "little")
+    assert snapshot.restore(identifier, other) is SnapshotStatus.OTHER_VERSION
+    assert bytes(identifier.state) == before
+    assert snapshot.restore(identifier, image + b"and what follows") is SnapshotStatus.RESTORED
+
+
+@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
+def test_power_that_fails_at_any_byte_leaves_the_older_slot(
+    maker: Maker, native: Native, standard_20_bits: Simulation
+) -> None:
+    identifier = maker(native)
+    phi, y = samples_for(identifier, standard_20_bits)
+    identifier.run(phi[:1500], y[:1500], sums=False)
+    older = snapshot.save(identifier, 1)
+    identifier.run(phi[1500:2000], y[1500:2000], sums=False)
+    newer = snapshot.save(identifier, 2)
+    slot = snapshot.save(identifier, 0)  # what the slot held before
+    for cut in range(len(newer)):
+        torn = newer[:cut] + slot[cut:]
+        if torn != newer:
+            assert snapshot.choose(native, older, torn) == snapshot.Choice(0, 1, 2), cut
+    assert snapshot.choose(native, older, newer) == snapshot.Choice(1, 0, 3)
+    restored = maker(native)
+    assert snapshot.restore(restored, older) is SnapshotStatus.RESTORED
+    restored.run(phi[1500:2000], y[1500:2000], sums=False)
+    assert snapshot.save(restored, 2) == newer
+
+
+@given(noise=st.binary(max_size=200))
+def test_noise_is_never_a_snapshot(noise: bytes) -> None:
+    native = Native()
+    identifier = weak_of(native)
+    assert snapshot.restore(identifier, noise) is not SnapshotStatus.RESTORED
+    slot = noise.ljust(200, b"\xff")
+    assert snapshot.choose(native, slot, slot[::-1]) == snapshot.Choice(None, 0, 1)
+
+
+def test_slots_are_chosen_by_generation(native: Native) -> None:
+    older, newer = (snapshot.save(strong_of(native), generation) for generation in (7, 8))
+    assert snapshot.choose(native, older, newer) == snapshot.Choice(1, 0, 9)
+    assert snapshot.choose(native, newer, older) == snapshot.Choice(0, 1, 9)
+    assert snapshot.choose(native, older, newer[:-1] + b"?") == snapshot.Choice(0, 1, 8)

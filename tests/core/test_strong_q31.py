@@ -1,0 +1,253 @@
+"""The fixed-point strong form as a user meets it: what it is worth, the command line, the C header under sanitizers."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+from test_core_q31 import FIRMWARE, SOURCES, tool
+
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.core.native import Native, Reason
+from pvid.core.native_q31 import RowEstimatorQ31, StrongConfigQ31, StrongIdentifierQ31, strong_rows_q31
+from pvid.oracle import strong as oracle
+from pvid.rig.file import Law, RigFile
+from pvid.rig.run import write_run
+from pvid.setup.f32 import bank_of, estimator_config, strong_config
+from pvid.setup.q31 import counts_of, covariance_of, p_of, se_of, strong_config_q31, strong_design_of
+from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
+
+TRUTH = STANDARD_PENDULUM.linear
+STANDARD = RigFile.standard()
+STRONG = replace(
+    STANDARD,
+    identifier=replace(STANDARD.identifier, form="strong"),
+    sensor=replace(STANDARD.sensor, phi_lsb=standard_sensors(20).phi_lsb),
+)
+
+
+@pytest.fixture(scope="module")
+def exact() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Exact derivatives of the standard rig: phi [40001, 5] and u [40001, 3], SI."""
+    found = simulate(truth="linear").exact
+    assert found is not None
+    return found.phi, found.u
+
+
+def of_law(law: Law, seed: int) -> tuple[RigFile, StrongConfigQ31]:
+    rig = replace(STRONG, identifier=replace(STRONG.identifier, law=law))
+    return rig, strong_config_q31(rig, 1000.0, standard_start(seed))
+
+
+def from_exact(
+    native: Native, config: StrongConfigQ31, phi: npt.NDArray[np.float64], u: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Final p of the fixed-point core fed rows of exact derivatives."""
+    n, y, fits = strong_rows_q31(native, config.design.row, *config.design.integers(phi, u))
+    assert fits.all()
+    record = RowEstimatorQ31(native, config.estimator).run(n, y, sums=False, hashes=False)
+    return p_of(config, record.p[-1])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_exact_derivatives_stationary_law_reaches_the_truth(
+    native: Native, exact: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]], seed: int
+) -> None:
+    """float64's solution of these rows is the truth; the float32 core's tolerance is a hundredth of a per cent."""
+    _, config = of_law("stationary", seed)
+    assert np.abs(from_exact(native, config, *exact) / TRUTH - 1).max() < 1e-4
+
+
+@pytest.mark.parametrize("law", ["stationary", "pseudovelocity"])
+@pytest.mark.parametrize("seed", [0, 3])
+def test_exact_derivatives_end_within_a_twentieth_of_a_per_cent_of_float64(
+    native: Native, exact: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]], law: Law, seed: int
+) -> None:
+    """Law against law, from the same start; issue 4 asks for 0.05 %."""
+    rig, config = of_law(law, seed)
+    settings = estimator_config(rig, bank_of(rig, 1000.0), standard_start(seed))
+    n, y = oracle.strong_rows(*exact)
+    reference = oracle.identify_strong(
+        n,
+        y,
+        oracle.Settings(
+            start=settings.start.astype(np.float64),
+            start_sd=settings.start_sd.astype(np.float64),
+            lower=settings.lower.astype(np.float64),
+            upper=settings.upper.astype(np.float64),
+            row_sd=settings.row_sd,
+            rate=1000.0,
+            law=law,
+            feedback_hz=settings.feedback_hz,
+            correlation=settings.correlation,
+            step_limit=settings.step_limit,
+            kappa_min=settings.kappa_min,
+        ),
+        estimate_every=len(y),
+    ).last.p
+    assert np.abs(from_exact(native, config, *exact) / reference - 1).max() < 5e-4
+
+
+@pytest.mark.parametrize(("stride", "told"), [(0, Reason.UPDATED), (20, Reason.MISFIT)])
+def test_a_sensor_of_20_bits_is_identified_as_by_float32(
+    native: Native, standard_20_bits: Simulation, stride: int, told: Reason
+) -> None:
+    """On the same counts within a twentieth of a standard error: Savitzky-Golay in 14 bits, and five points, whose 3 %
+    of bias both verdicts see."""
+    rig = STRONG
+    if stride:
+        five = replace(rig.identifier, differentiator="finite-difference", stride=stride)
+        rig = replace(rig, identifier=five)
+    run = standard_20_bits.run
+    config = strong_config_q31(rig, 1000.0, standard_start(3))
+    core = StrongIdentifierQ31(native, config)
+    record = core.run(*counts_of(rig, run), sums=False, hashes=False)
+    last = core.assess()
+    p, se = p_of(config, record.p[-1]), se_of(config, last["se"][:3])
+    float_core = native.strong(strong_config(rig, 1000.0, standard_start(3)))
+    float_record = float_core.run(run.phi, run.y, sums=False, hashes=False)
+    expected, known = float_record.p[-1], float_core.assess()
+    assert (np.abs(p - expected) < 0.05 * se).all()
+    # s^2 is a difference of sums that agree to about 1e-3: float32 keeps four digits of it
+    np.testing.assert_allclose(se, known["se"][:3], rtol=0.02)
+    np.testing.assert_allclose(covariance_of(config, last), known["covariance"][:3, :3], rtol=0.05, atol=0)
+    np.testing.assert_allclose(last["kappa"] / 2**30, known["kappa"], rtol=0.01)
+    assert (record.reason[-1000:] == told).all()
+    assert (float_record.reason[-1000:] == told).all()
+
+
+def test_forgetting_and_the_law_come_from_the_rig_file() -> None:
+    rig = replace(STRONG, identifier=replace(STRONG.identifier, forgetting_s=3.0, law="pseudovelocity", divider=4))
+    estimator = strong_config_q31(rig, 1000.0).estimator
+    assert (estimator.forgetting_groups, estimator.gain, estimator.divider) == (3000, 0, 4)
+    rig = replace(rig, identifier=replace(rig.identifier, law="stationary", feedback_hz=25.0))
+    assert strong_config_q31(rig, 1000.0).estimator.gain == round(0.1 * 2**30)
+
+
+# ---- command line
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A run of the standard rig with 20 bits, 100 Hz, 12 s, five points 20 ms apart, and its rig file."""
+    folder = tmp_path_factory.mktemp("strong-q31")
+    run = simulate(sensors=standard_sensors(20), truth="linear", sample_rate=100.0, duration=12.0, seed=2).run
+    write_run(folder / "run.csv", run)
+    settings = replace(STRONG.identifier, differentiator="finite-difference", stride=2)
+    replace(STRONG, identifier=settings, sample_rate=100.0).write(folder / "rig.toml")
+    return folder / "run.csv", folder / "rig.toml"
+
+
+def test_identify_and_compare_take_the_fixed_point_core(recorded: tuple[Path, Path]) -> None:
+    run, rig = recorded
+    common = [str(run), "--rig", str(rig), "--core", "q31", "--form", "strong"]
+    done = CliRunner().invoke(commands, ["identify", *common, "--json"])
+    answer = json.loads(done.stdout)
+    assert (answer["core"], answer["form"]) == ("q31", "strong")
+    other = json.loads(CliRunner().invoke(commands, ["identify", *common, "--core", "f32", "--json"]).stdout)
+    assert answer["w"]["value"] == pytest.approx(other["w"]["value"], rel=1e-4)
+    assert answer["status"] == other["status"] == "misfit"  # five points 20 ms apart are 3 % off
+    assert answer["lost"] == 0
+    done = CliRunner().invoke(commands, ["compare", *common])
+    assert len(re.findall(r"q31 .*strong .*equal", done.stdout)) == 2, done.stdout
+    assert "DIFFERENT" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("sensor", "sentence"),
+    [
+        ({"phi_lsb": 0.0}, "phi_lsb is 0"),
+        ({"phi_range": 1e-5}, "phi_range is 2 counts"),
+        ({"y_lsb": 0.01}, "y_range is 3 counts"),
+        ({"phi_lsb": 2e-8}, "phi_range is 25000000 counts of the sensor and the fixed-point core takes"),
+    ],
+)
+def test_what_it_cannot_hold_is_said(sensor: dict[str, float], sentence: str) -> None:
+    rig = replace(STRONG, sensor=replace(STRONG.sensor, **sensor))
+    with pytest.raises(PvidError, match=sentence):
+        strong_design_of(rig, 1000.0)
+
+
+PROGRAM = """
+#include <stdio.h>
+#include "pvid/pvid.h"
+#include "table.h"
+int main(void)
+{
+    static pvid_strong_q31 identifier;
+    const pvid_kapitza_scale_q31 scale = STRONG_SCALE;
+    pvid_estimate_q31 estimate;
+    pvid_kapitza_q31 value = {0, 0, 0}, se = {0, 0, 0};
+    uint32_t hash = PVID_FNV_START;
+    int phi, y;
+    if (pvid_strong_init_q31(&identifier, &strong) != PVID_OK) return 1;
+    while (scanf("%d %d", &phi, &y) == 2) {
+        hash = pvid_fnv_estimator_q31(hash, &identifier.estimator, pvid_strong_step_q31(&identifier, phi, y));
+        if (hash % 64u == 0u) {
+            pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+            (void)pvid_kapitza_physical_q31(&estimate, &scale, &value, &se);
+        }
+    }
+    printf("%08x", (unsigned)hash);
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("differentiator", ["finite-difference", "savitzky-golay"])
+def test_the_header_is_the_configuration_and_nothing_overflows(
+    tmp_path: Path, native: Native, differentiator: str
+) -> None:
+    """A program made from the generated header and the sources alone, with every sanitizer: the bits of the shared
+    library, on motion, on full scale in any order, and on words beyond it."""
+    stride = 20 if differentiator == "finite-difference" else 1
+    settings = replace(STRONG.identifier, differentiator=differentiator, stride=stride)  # type: ignore[arg-type]
+    rig = replace(STRONG, identifier=settings)
+    rig.write(tmp_path / "rig.toml")
+    command = ["strong-table", "--rig", str(tmp_path / "rig.toml"), "--name", "strong"]
+    header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
+    (tmp_path / "table.h").write_text(header)
+    (tmp_path / "main.c").write_text(PROGRAM)
+    # the hash wraps by its definition, and by nothing else
+    (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
+    sanitizers = ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
+    sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
+    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src", f"-I{tmp_path}"]
+    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", *sanitizers, *includes]
+    tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", tmp_path / "program")
+    run = simulate(sensors=standard_sensors(20), truth="linear", duration=3.0, seed=2).run
+    phi, y = counts_of(rig, run)
+    random = np.random.default_rng(3)
+    config = strong_config_q31(rig, 1000.0)
+    full = config.design.bank.phi_max, config.design.bank.y_max
+    tails = [
+        (random.integers(-full[0], full[0] + 1, 1500), y[:1500]),
+        (full[0] * np.where(np.arange(1500) // 20 % 2, 1, -1), full[1] * np.where(np.arange(1500) // 20 % 2, 1, -1)),
+        (full[0] * np.where(np.arange(1500) // 100 % 2, 1, -1), y[:1500]),
+        tuple(random.integers(-(2**31), 2**31, (2, 500))),
+    ]
+    phi = np.concatenate([phi, *(tail[0] for tail in tails)])
+    y = np.concatenate([y, *(tail[1] for tail in tails)])
+    lines = "\n".join(f"{a} {b}" for a, b in zip(phi, y, strict=True))
+    (tmp_path / "counts").write_text(lines)
+    printed = tool("sh", "-c", f"{tmp_path / 'program'} < {tmp_path / 'counts'}")
+    core = StrongIdentifierQ31(native, config)
+    core.run(phi, y)
+    assert printed == f"{core.running_hash:08x}"
+
+
+def test_the_table_can_be_checked(recorded: tuple[Path, Path], tmp_path: Path) -> None:
+    command = ["strong-table", "--rig", str(recorded[1])]
+    header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
+    (tmp_path / "table.h").write_text(header)
+    checked = [*command, "--check", str(tmp_path / "table.h")]
+    assert CliRunner().invoke(commands, checked, catch_exceptions=False, standalone_mode=False).return_value == 0
+    (tmp_path / "table.h").write_text(header.replace("centre = 12", "centre = 13"))
+    assert CliRunner().invoke(commands, checked, catch_exceptions=False, standalone_mode=False).return_value == 1

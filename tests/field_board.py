@@ -1,0 +1,183 @@
+"""A board in the field, played by the C core on this machine: what it would send, and the same on a pseudo-terminal.
+
+python field_board.py LINK '{"ticks": 5000, ...}'     one run; LINK becomes a symbolic link to the terminal
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import sys
+import time
+import tty
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from linear_rig import LINEAR_RIG
+
+from pvid.board.stream_image import settings_number
+from pvid.board.stream_rig import stream_rig
+from pvid.core.native import Native, Reason, WeakConfig
+from pvid.link import frames as link
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.sim.pendulum import simulate, standard_sensors, standard_start
+from pvid.twin import fnv
+
+SAMPLES_A_FRAME = 16
+
+
+@dataclass(frozen=True)
+class Field:
+    """A board's run: an estimate and a hash every so many ticks, who it is every `hello_every`; ticks count from
+    `first_tick`, a multiple of the others."""
+
+    ticks: int
+    seed: int = 1
+    estimate_every: int = 160  # multiples of SAMPLES_A_FRAME
+    hash_every: int = 160
+    hello_every: int = 2000
+    first_tick: int = 0
+
+    @property
+    def run(self) -> Run:
+        """What its sensors read: the standard rig, 14 bits."""
+        duration = self.ticks / 1000
+        return simulate(sensors=standard_sensors(14), truth="linear", duration=duration, seed=self.seed).run
+
+
+def rig() -> RigFile:
+    """The rig file that goes with it."""
+    sensors = standard_sensors(14)
+    return replace(
+        LINEAR_RIG,
+        sample_rate=1000.0,
+        sensor=replace(LINEAR_RIG.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+    )
+
+
+def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[int, link.Message]]:
+    """(tick, message) in the order in which a board sends them."""
+    run = field.run
+    board = stream_rig(rig(), run.sample_rate, start=standard_start(field.seed))
+    assert isinstance(board.config, WeakConfig)
+    settings = settings_number(board)
+    configure = board.configure(settings, field.hash_every, field.estimate_every, first_tick=field.first_tick)
+    configure = replace(configure, session=session)
+    hello = link.Hello(
+        form=int(board.form),
+        core=int(board.core),
+        n_p=board.n_p,
+        window=256,
+        settings=settings,
+        session=session,
+        sample_rate=board.sample_rate,
+        phi_lsb=board.phi_lsb,
+        y_lsb=board.y_lsb,
+        p_unit=board.p_unit,
+        board="field",
+    )
+    identifier = native.weak(board.config)
+    phi, y = run.phi.astype(np.float32)[: field.ticks], run.y.astype(np.float32)[: field.ticks]
+    verdict = int(Reason.WARMING_UP)
+    sample_hash = fnv.START
+    for first in range(0, field.ticks, SAMPLES_A_FRAME):
+        at = field.first_tick + first
+        if first % field.hello_every < SAMPLES_A_FRAME:
+            yield at, hello
+            yield at, link.Schema(link.SCHEMA_TEXT.encode())
+            yield at, configure
+            yield at, link.Status(session, link.Code.RUNNING, 0, identifier.counters["updates"], *[0] * 7)
+        last = min(first + SAMPLES_A_FRAME, field.ticks)
+        raw = replace(link.Raw.of_values(phi[first:last], y[first:last]), session=session)
+        sample_hash = fnv.fold_bytes(sample_hash, raw.phi_y)
+        yield at, raw
+        for tick in range(first, last):
+            reason = int(identifier.run(phi[tick : tick + 1], y[tick : tick + 1], sums=False).reason[0])
+            verdict = verdict if reason == Reason.ACCUMULATED else reason
+            done = field.first_tick + tick + 1
+            if field.estimate_every and (tick + 1) % field.estimate_every == 0:
+                yield done, _estimate(session, identifier.counters["updates"], identifier.assess(), verdict)
+            if field.hash_every and (tick + 1) % field.hash_every == 0:
+                yield done, link.Hash(session, hash=identifier.running_hash, sample_hash=sample_hash)
+
+
+def _estimate(session: int, updates: int, assessed: npt.NDArray[np.void], reason: int) -> link.Estimate:
+    covariance = assessed["covariance"][np.triu_indices(link.MAX_P)]
+    return link.Estimate(
+        session=session,
+        updates=updates,
+        p=tuple(map(float, assessed["p"])),
+        covariance=tuple(map(float, covariance)),
+        kappa=float(assessed["kappa"]),
+        residual_sd=float(assessed["residual_sd"]),
+        weight=float(assessed["weight"]),
+        reason=reason,
+    )
+
+
+def in_time(sent: Iterable[tuple[int, link.Message]], per_second: int) -> Iterator[tuple[int, link.Message]]:
+    """The same, so many ticks a second; 0: at once."""
+    began = time.monotonic()
+    for tick, message in sent:
+        if per_second and (ahead := began + tick / per_second - time.monotonic()) > 0:
+            time.sleep(ahead)
+        yield tick, message
+
+
+def frames(sent: Iterable[tuple[int, link.Message]], first_sequence: int = 0) -> Iterator[bytes]:
+    """Encoded."""
+    for sequence, (tick, message) in zip(itertools.count(first_sequence), sent):  # noqa: B905
+        yield link.encode(message, sequence, tick)
+
+
+def cheap_frames(count: int) -> Iterator[bytes]:
+    """`count` frames of samples that cost next to nothing to make, for measurements."""
+    payload = link.Raw.of_values(np.zeros(SAMPLES_A_FRAME), np.zeros(SAMPLES_A_FRAME)).payload
+    for sequence in range(count):
+        yield link.encode_raw(link.Raw.TYPE, sequence, SAMPLES_A_FRAME * sequence, payload)
+
+
+class PtyLine:
+    """A pseudo-terminal with a symbolic link to its other end, as a serial adapter would have a fixed name."""
+
+    def __init__(self, place: Path) -> None:
+        self.ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        fresh = place.with_name(place.name + ".new")
+        fresh.symlink_to(os.ttyname(theirs))
+        fresh.replace(place)
+        self._theirs = theirs  # kept open: without it writing fails while nobody listens
+
+    def await_word(self) -> None:
+        """Until the other end has sent something: what was written before it opened is thrown away when it does."""
+        os.read(self.ours, 4096)
+
+    def write(self, data: bytes) -> None:
+        """All of it, however slowly it is read."""
+        while data:
+            data = data[os.write(self.ours, data) :]
+
+
+def main() -> None:
+    """See the module."""
+    place, settings = Path(sys.argv[1]), json.loads(sys.argv[2])
+    line = PtyLine(place)
+    if "cheap" in settings:
+        sent = cheap_frames(settings["cheap"])
+    else:
+        field = Field(settings["ticks"], settings.get("seed", 1), settings.get("estimate_every", 500))
+        sent = frames(in_time(messages(field, Native()), settings.get("per_second", 0)))
+    line.await_word()
+    for frame in sent:
+        line.write(frame)
+    print("sent", flush=True)
+    sys.stdin.readline()  # what was sent and not yet read is lost with this process
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,128 @@
+"""What wrong scales of y and l1 do to the parameters, and that the standard errors say so."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from pvid.cli.main import commands
+from pvid.core.native import Native
+from pvid.oracle import strong as oracle
+from pvid.oracle.scale_errors import added_covariance, scale_errors
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run, write_run
+from pvid.run.identify import LINEAR, PHYSICAL, Identification, identify
+from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
+
+P = STANDARD_PENDULUM.linear
+L1 = STANDARD_PENDULUM.l1
+STEP = 1e-3
+STANDARD = RigFile.standard()
+# linear equations, as the truth has them, and the same design whatever the scales
+RIG = replace(STANDARD, identifier=replace(STANDARD.identifier, full_angle=False, survey=False))
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return simulate(sensors=Sensors(), truth="linear", duration=15.0).run
+
+
+def exact(result: Identification) -> dict[str, float]:
+    assert result.identified
+    return result.value
+
+
+@pytest.mark.parametrize("core", ["f64", "f32"])
+def test_y_read_too_large_moves_the_estimate_as_told(native: Native, run: Run, core: str) -> None:
+    rig = RIG
+    rig = replace(rig, identifier=replace(rig.identifier, core=core))  # type: ignore[arg-type]
+    told = scale_errors(P, L1, STEP, 0.0)
+    right = exact(identify(run, rig, native))
+    wrong = exact(identify(replace(run, y=(1 + STEP) * run.y), rig, native))
+    for names, shifts in ((LINEAR, told.y_gain_p), (PHYSICAL, told.y_gain_physical)):
+        for name, shift in zip(names, shifts, strict=True):
+            # the next order is 0.1 to 0.5 % of the step; float32 rounds by some 1e-6 of the value
+            assert wrong[name] - right[name] == pytest.approx(shift, rel=0.02, abs=1e-5 * right[name]), name
+    assert wrong["w"] / right["w"] - 1 == pytest.approx(STEP, rel=0.01)
+    assert wrong["d1"] / right["d1"] - 1 == pytest.approx(-STEP, rel=0.01)
+    assert wrong["d2"] / right["d2"] - 1 == pytest.approx(-2 * STEP, rel=0.01)
+
+
+def test_an_l1_too_long_moves_the_estimate_as_told(native: Native, run: Run) -> None:
+    rig = RIG
+    rig = replace(rig, identifier=replace(rig.identifier, core="f64"))
+    told = scale_errors(P, L1, 0.0, STEP)
+    right = exact(identify(run, rig, native))
+    wrong = exact(identify(run, replace(rig, l1=(1 + STEP) * L1), native))
+    for names, shifts in ((LINEAR, told.l1_p), (PHYSICAL, told.l1_physical)):
+        for name, shift in zip(names, shifts, strict=True):
+            assert wrong[name] - right[name] == pytest.approx(shift, rel=0.02, abs=1e-7 * right[name]), name
+    assert told.l1_physical[0] == pytest.approx(0.0, abs=1e-12)  # g* = w l1 does not hang on l1
+
+
+def test_the_covariance_of_both_scales_is_their_products() -> None:
+    gain, rod = scale_errors(P, L1, 0.003, 0.0).y_gain_p, scale_errors(P, L1, 0.0, 0.001).l1_p
+    expected = np.outer(gain, gain) + np.outer(rod, rod)
+    np.testing.assert_allclose(added_covariance(P, 0.003, 0.001), expected, rtol=1e-12)
+    np.testing.assert_allclose(added_covariance(np.stack([P, 2 * P]), 0.003, 0.001)[0], expected, rtol=1e-12)
+
+
+def test_physical_errors_of_the_gain_are_those_of_its_covariance() -> None:
+    through = oracle.physical_errors(P, added_covariance(P, 0.003, 0.0), L1)
+    np.testing.assert_allclose(np.abs(scale_errors(P, L1, 0.003, 0.0).y_gain_physical), through, rtol=1e-9)
+
+
+def test_outside_the_physical_region_there_are_no_physical_errors() -> None:
+    told = scale_errors(np.array([11.56, 0.25, 0.2]), L1, 0.003, 0.001)
+    assert np.isnan(told.y_gain_physical).all() and np.isnan(told.l1_physical).all()
+    assert np.isfinite(told.y_gain_p).all()
+
+
+@pytest.mark.parametrize("core", ["f32", "q31", "f64"])
+def test_standard_errors_contain_the_scales_and_keep_the_cores_own(native: Native, core: str) -> None:
+    run = simulate(sensors=standard_sensors(14), truth="linear", duration=15.0, seed=2).run
+    exactly = RIG
+    exactly = replace(exactly, identifier=replace(exactly.identifier, core=core))  # type: ignore[arg-type]
+    roughly = replace(exactly, l1_sd=0.001, sensor=replace(exactly.sensor, y_gain_sd=0.003))
+    alone, wide = identify(run, exactly, native), identify(run, roughly, native)
+    assert alone.value == wide.value and alone.hash == wide.hash
+    assert wide.se["c"] == alone.se["c"]
+    assert wide.se["w"] == pytest.approx(np.hypot(alone.se["w"], 0.00316 * wide.value["w"]), rel=1e-3)
+    for name in (*LINEAR, *PHYSICAL):
+        assert wide.parts[name].noise == alone.se[name] == alone.parts[name].noise
+        assert alone.parts[name].y_gain == alone.parts[name].l1 == 0
+    assert wide.parts["g"].l1 < 1e-9 < wide.parts["l2"].l1
+    assert wide.trajectory.se[-1, 0] > alone.trajectory.se[-1, 0]
+    assert (wide.trajectory.physical_se[-1] > alone.trajectory.physical_se[-1]).all()
+
+
+def test_a_start_has_no_errors_of_scales(native: Native) -> None:
+    run = simulate(drive=(), sensors=standard_sensors(14), duration=8.0).run
+    rig = RigFile.parse("l1 = 0.3")
+    held = identify(run, rig, native)
+    assert not held.identified and held.parts == {}
+    assert held.se["w"] == pytest.approx(0.5 * held.value["w"], rel=1e-6)
+
+
+def test_identify_tells_what_the_standard_errors_are_made_of(tmp_path: Path) -> None:
+    write_run(tmp_path / "run.csv", simulate(sensors=standard_sensors(14), truth="linear", duration=15.0).run)
+    (tmp_path / "run.toml").write_text(
+        "l1 = 0.3\nl1_sd = 0.002\n[sensor]\ny_gain_sd = 0.01\n[identifier]\nfull_angle = false\n", encoding="utf-8"
+    )
+    arguments = ["identify", str(tmp_path / "run.csv"), "--rig", str(tmp_path / "run.toml")]
+    told = CliRunner().invoke(commands, arguments, standalone_mode=False)
+    assert told.return_value == 0, told.output
+    assert "from the gain of y, known to 1 % (y_gain_sd), g 1 %, l2 3.1 %" in told.output
+    assert "from l1, known to 0.2 % (l1_sd), l2 0.41 %" in told.output
+    answer = json.loads(CliRunner().invoke(commands, [*arguments, "--json"], standalone_mode=False).stdout)
+    g = answer["parameters"]["g"]
+    assert g["se_y_gain"] == pytest.approx(0.01 * g["value"], rel=1e-6)
+    assert g["se"] == pytest.approx(np.sqrt(g["se_noise"] ** 2 + g["se_y_gain"] ** 2 + g["se_l1"] ** 2), rel=1e-9)
+    RigFile.standard().write(tmp_path / "run.toml")
+    told = CliRunner().invoke(commands, arguments, standalone_mode=False)
+    assert "the gain of y and l1 count as exact" in told.output

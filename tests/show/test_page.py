@@ -1,0 +1,288 @@
+"""The live page: in a browser, beside a recording that it can neither slow nor end."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import field_board
+import numpy as np
+import pytest
+from browser import chromium
+from click.testing import CliRunner
+from conftest import ROOT
+from selenium import webdriver
+
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.core.native import Native
+from pvid.log.file import LogWriter
+from pvid.log.reader import LogReader
+from pvid.show.page import is_local, listen, page
+from pvid.show.page_state import LiveState
+
+TICKS = 12_000
+PLOTS = ("parameter0", "parameter1", "parameter2", "residualPlot", "kappaPlot", "phiPlot", "yPlot")
+
+
+@pytest.fixture(scope="module")
+def sent(native: Native) -> list[bytes]:
+    """The frames of a run of TICKS with ten estimates a second."""
+    return list(field_board.frames(field_board.messages(field_board.Field(TICKS, estimate_every=100), native)))
+
+
+def get(address: str, path: str = "", host: str | None = None) -> bytes:
+    """What the server answers."""
+    request = urllib.request.Request(address + path, headers={} if host is None else {"Host": host})
+    with urllib.request.urlopen(request, timeout=20) as answer:
+        return bytes(answer.read())
+
+
+def received(address: str) -> str:
+    """What the page says of it; empty while the server is too busy."""
+    try:
+        return str(json.loads(get(address, "state"))["received"])
+    except urllib.error.URLError:
+        return ""
+
+
+def until(done: Callable[[], Any], limit_s: float = 60) -> Any:
+    """Waits until this is true of something, and returns it."""
+    limit = time.monotonic() + limit_s
+    while time.monotonic() < limit:
+        if found := done():
+            return found
+        time.sleep(0.1)
+    raise AssertionError("it never came so far")
+
+
+def state_of(log: bytes, title: str = "") -> dict[str, Any]:
+    """The page's state after these bytes of a log."""
+    state = LiveState(Path("nowhere"), title)
+    state.take(log)
+    return dict(json.loads(state.as_json()))
+
+
+# ---- where it is served
+
+
+@pytest.mark.parametrize("at", ["", "8765", "localhost", "localhost:", "a b:1", "127.0.0.1:70000", "::1:80", "/dev/x"])
+def test_an_address_that_is_none_is_refused(at: str) -> None:
+    with pytest.raises(PvidError, match="--web takes HOST:PORT, as in 127.0.0.1:8765"):
+        listen(at)
+
+
+def test_an_address_that_is_taken_is_refused_and_port_0_is_any() -> None:
+    listening, address = listen("127.0.0.1:0")
+    with listening:
+        port = listening.getsockname()[1]
+        assert address == f"http://127.0.0.1:{port}/"
+        with pytest.raises(PvidError, match=f"cannot serve the live page at 127.0.0.1:{port}"):
+            listen(f"127.0.0.1:{port}")
+
+
+def test_what_is_local() -> None:
+    assert all(is_local(f"http://{host}:1/") for host in ("127.0.0.1", "localhost", "[::1]"))
+    assert not any(is_local(f"http://{host}:1/") for host in ("0.0.0.0", "[::]", "192.168.1.2", "lab"))
+
+
+def test_the_page_listens_on_the_loopback_alone_and_answers_no_other_name(tmp_path: Path) -> None:
+    with page("127.0.0.1:0", tmp_path / "none.pvlog", "title") as address:
+        until(lambda: _answers(address))
+        port = int(address.rstrip("/").rsplit(":", 1)[1])
+        others = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)]
+        for other in {str(one) for one in others} - {"127.0.0.1"}:
+            if not other.startswith("127."):
+                with pytest.raises(OSError):
+                    socket.create_connection((other, port), timeout=2)
+        with pytest.raises(urllib.error.HTTPError, match="400"):
+            get(address, "state", host="evil.example")
+        assert json.loads(get(address, "state", host=f"localhost:{port}"))["title"] == "title"
+        assert b"<title>pvid log</title>" in get(address)
+    assert not _answers(address)
+
+
+def _answers(address: str) -> bool:
+    try:
+        return bool(get(address, "state"))
+    except (urllib.error.URLError, OSError):
+        return False
+
+
+def test_the_page_ends_with_the_program_however_that_goes(tmp_path: Path) -> None:
+    code = (
+        "import time; from pathlib import Path; from pvid.show.page import page\n"
+        "with page('127.0.0.1:0', Path('none'), '') as address: print(address, flush=True); time.sleep(60)"
+    )
+    program = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert program.stdout is not None
+    address = program.stdout.readline().strip()
+    until(lambda: _answers(address))
+    program.kill()
+    program.communicate()
+    until(lambda: not _answers(address), 10)
+
+
+def test_log_refuses_an_address_before_it_records(tmp_path: Path) -> None:
+    arguments = ["log", "nowhere", str(tmp_path / "out.pvlog"), "--web", "here"]
+    with pytest.raises(PvidError, match="--web takes HOST:PORT"):
+        CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
+    assert not (tmp_path / "out.pvlog").exists()
+
+
+# ---- what it says
+
+
+def test_the_state_is_that_of_the_log_and_bounded(sent: list[bytes], tmp_path: Path) -> None:
+    writer = LogWriter(tmp_path / "a.pvlog", rig=field_board.rig().text())
+    writer.begin("a port", None)
+    writer.take(b"".join(sent))
+    writer.close()
+    log = (tmp_path / "a.pvlog").read_bytes()
+    state = state_of(log, "a title")
+    assert state["title"] == "a title" and state["up"] and state["lost"] == ""
+    assert f"{TICKS} samples" in state["received"] and "weak form, core f32" in state["board"]
+    assert state["reason"] == "updated" and state["kappa"].endswith("good: parameters identifiable")
+    assert [row["symbol"] for row in state["parameters"]] == ["g*", "l2", "rho2", "w", "d1", "d2", "c"]
+    estimates = state["estimates"]
+    assert len(estimates["t"]) == TICKS // 100
+    g = estimates["curves"][0]
+    assert g["label"] == "g*, gravity in the plane [m/s²]"
+    assert g["low"][-1] < 9.5 < g["high"][-1] and g["limits"][0] < g["value"][-1] < g["limits"][1]
+    run = field_board.Field(TICKS).run
+    assert max(state["motion"]["phi"]["x"]) == pytest.approx(run.phi[2000:TICKS].max(), rel=1e-6)
+    assert min(state["motion"]["y"]["x"]) == pytest.approx(1e3 * run.y[2000:TICKS].min(), rel=1e-6)
+    assert state["motion"]["phi"]["t"][-1] == pytest.approx(TICKS / 1000, abs=0.03)
+    longer = state_of(log + 8 * b"".join(sent))
+    assert len(longer["estimates"]["t"]) <= 800 and len(longer["motion"]["phi"]["x"]) <= 800
+    assert len(json.dumps(longer)) < 250_000
+
+
+def test_every_beginning_of_a_log_has_a_state(sent: list[bytes], tmp_path: Path) -> None:
+    writer = LogWriter(tmp_path / "a.pvlog")  # no rig file: the linear parameters
+    writer.begin("a port", None)
+    writer.take(b"".join(sent[:200]))
+    writer.close()
+    log = (tmp_path / "a.pvlog").read_bytes()
+    state = LiveState(Path("nowhere"), "")
+    for at in range(0, len(log), 101):
+        state.take(log[at : at + 101])
+        told = json.loads(state.as_json())
+        assert [one["label"][:2] for one in told["estimates"]["curves"]] == ["w,", "d1", "d2"]
+    noise = np.random.default_rng(1).bytes(50_000) + b"\0"
+    assert "damaged pieces" in state_of(log + noise + sent[200])["lost"]
+
+
+# ---- in a browser
+
+
+@pytest.fixture
+def board(tmp_path: Path) -> Iterator[Path]:
+    """A board behind a symbolic link that samples for 40 s, in time."""
+    place = tmp_path / "board"
+    program = str(ROOT / "tests" / "field_board.py")
+    command = [sys.executable, program, str(place), '{"ticks": 40000, "estimate_every": 100, "per_second": 1000}']
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    until(place.exists, 30)
+    yield place
+    process.kill()
+    process.communicate()
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[webdriver.Chrome]:
+    """A window at about:blank."""
+    with chromium(tmp_path / "chromium", 1500, 1150) as driver:
+        driver.get("about:blank")
+        requests_of(driver)  # those of the browser's own first page
+        yield driver
+
+
+def requests_of(browser: webdriver.Chrome) -> list[str]:
+    """Addresses that were asked for since the last call."""
+    events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]  # type: ignore[no-untyped-call]
+    return [
+        str(event["params"]["request"]["url"]) for event in events if event["method"] == "Network.requestWillBeSent"
+    ]
+
+
+def drawn(browser: webdriver.Chrome, plot: str) -> list[dict[str, Any]]:
+    """What Plotly holds of a plot: points of each curve, and the length of its path on the screen."""
+    script = """
+        const div = document.getElementById(arguments[0]);
+        const paths = [...div.querySelectorAll(".scatterlayer .js-line")];
+        return (div.data ?? []).map((one, i) => ({
+            last: one.y.at(-1), until: one.x.at(-1), points: one.y.filter((y) => y !== null).length,
+            title: div.layout.title.text, path: (paths[i]?.getAttribute("d") ?? "").length}));
+    """
+    return list(browser.execute_script(script, plot))
+
+
+def test_the_page_moves_in_a_browser_and_asks_nobody_else(
+    tmp_path: Path, board: Path, browser: webdriver.Chrome
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        at = f"127.0.0.1:{free.getsockname()[1]}"
+    command = [sys.executable, "-m", "pvid", "log", "board", "out.pvlog", f"--web={at}"]
+    logger = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        until(lambda: _answers(f"http://{at}/"))
+        browser.get(f"http://{at}/")
+        until(lambda: all(drawn(browser, plot) and drawn(browser, plot)[-1]["points"] > 20 for plot in PLOTS))
+        first = {plot: drawn(browser, plot) for plot in PLOTS}
+        before = browser.execute_script("return received.textContent")
+        until(lambda: drawn(browser, "phiPlot")[0]["until"] > first["phiPlot"][0]["until"] + 3)
+        for plot in PLOTS:
+            now = drawn(browser, plot)
+            assert all(one["path"] > 10 for one in now), plot  # a straight line is "M0,165L510,165"
+            assert now[-1]["until"] > first[plot][-1]["until"], plot
+        assert browser.execute_script("return received.textContent") != before
+        assert drawn(browser, "parameter0")[0]["title"].startswith("w, ")  # the log has no rig file
+        words = browser.find_element("tag name", "body").text
+        assert "board -> out.pvlog" in words and "samples per second" in words and "nothing" in words
+        assert browser.execute_script("return alarm.hidden") is True
+        asked = requests_of(browser)
+        assert any(one.endswith("/plotly.min.js") for one in asked)
+        assert all(one.startswith((f"http://{at}/", "data:", "blob:")) for one in asked), set(asked)
+        assert browser.get_log("browser") == []  # type: ignore[no-untyped-call]
+        logger.send_signal(signal.SIGINT)
+        out, err = logger.communicate(timeout=30)
+        assert logger.returncode == 0, err
+        assert f"live page: http://{at}/" in err
+        until(lambda: browser.execute_script("return !alarm.hidden"))
+        assert "has ended" in browser.find_element("id", "alarm").text
+    finally:
+        logger.kill()
+        logger.communicate()
+    reader = LogReader(tmp_path / "out.pvlog")
+    assert list(reader) and reader.account.lost_share == 0
+
+
+def test_browsers_that_never_read_their_answers_cost_the_log_nothing(tmp_path: Path, sent: list[bytes]) -> None:
+    """Twenty connections that ask and do not listen, while the log grows; another one is served all the same."""
+    writer = LogWriter(tmp_path / "a.pvlog")
+    with page("127.0.0.1:0", tmp_path / "a.pvlog", "") as address:
+        until(lambda: _answers(address))
+        port = int(address.rstrip("/").rsplit(":", 1)[1])
+        deaf = [socket.create_connection(("127.0.0.1", port)) for _ in range(20)]
+        for one in deaf:
+            one.sendall(200 * f"GET /plotly.min.js HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        writer.begin("a port", None)
+        began = time.monotonic()
+        for frame in sent:
+            writer.take(frame)
+        lasted = time.monotonic() - began
+        writer.close()
+        until(lambda: f"{TICKS} samples" in received(address))
+        for one in deaf:
+            one.close()
+    assert lasted < TICKS / 1000  # in less than the time in which they come

@@ -1,0 +1,37 @@
+"""The strong form's core in every build against its twin, some estimators at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.native import EstimatorConfig, Native, StrongConfig
+from pvid.run.compare import first_difference
+from pvid.twin.strong import StrongTwin
+
+
+def strong_lanes(
+    config: StrongConfig,
+    lanes: Sequence[EstimatorConfig],
+    phi: npt.NDArray[Any],
+    y: npt.NDArray[Any],
+    matrix: Mapping[str, Native],
+) -> list[tuple[dict[str, int], npt.NDArray[np.uint8]]]:
+    """Asserts that every build has the twin's bits and counters in every lane; returns counters and reasons a lane."""
+    twin = StrongTwin(config, list(lanes))
+    expected = twin.run(phi, y)
+    found = []
+    for lane, estimator in enumerate(lanes):
+        counters = {name: int(of[lane]) for name, of in twin.estimator.counters.items()}
+        for native in matrix.values():
+            core = native.strong(replace(config, estimator=estimator))
+            record = core.run(phi, y, hashes=False)
+            theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
+            assert first_difference(record, *theirs) is None, native.build
+            assert core.counters == counters
+        found.append((counters, expected.reason[:, lane]))
+    return found

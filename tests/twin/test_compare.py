@@ -1,0 +1,66 @@
+"""The comparison itself must be able to fail: a core with one constant changed is caught and the bit is named."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+from pvid.core.native import SIZES
+
+MUTANTS = {
+    "estimator_f32.c": (
+        "    s[a][a] += self->prior[a];\n",
+        "    s[a][a] += 1.0000001f * self->prior[a];\n",
+    ),
+    "kapitza_strong_f32.c": ("four_d2 = 4.0f * d2;", "four_d2 = 4.0000005f * d2;"),
+    "information_f32.c": (
+        "*low = (kept_high - (total - part)) + (kept_low - part);",
+        "*low = 0.0f * part;",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run and its rig file."""
+    folder = tmp_path_factory.mktemp("recorded")
+    assert pvid(folder, "simulate", "run.csv", "--duration", "2", "--bits", "20").returncode == 0
+    return folder
+
+
+def pvid(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "pvid", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={**os.environ, **environment},
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("source", MUTANTS)
+def test_a_changed_core_exits_1_and_names_tick_variable_and_words(source: str, recorded: Path, tmp_path: Path) -> None:
+    original, changed = MUTANTS[source]
+    core = ROOT / "firmware" / "src"
+    text = (core / source).read_text(encoding="utf-8")
+    assert text.count(original) == 1
+    (tmp_path / source).write_text(text.replace(original, changed), encoding="utf-8")
+    library = tmp_path / "libpvid_native.so"
+    others = [str(path) for path in sorted(core.glob("*.c")) if path.name != source]
+    includes = [f"-I{ROOT / 'firmware/include'}", f"-I{core}", '-DPVID_NATIVE_BUILD="mutant"']
+    includes += SIZES
+    command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / source)]
+    subprocess.run([*command, *others, str(ROOT / "host/native/replay.c"), "-o", str(library), "-lm"], check=True)
+
+    compare = ("compare", "run.csv", "--rig", "run.toml", "--form", "strong")
+    done = pvid(recorded, *compare, PVID_NATIVE_LIBRARY=str(library))
+    assert done.returncode == 1, done.stdout + done.stderr
+    words = " ".join(done.stdout.split())
+    assert "DIFFERENT: tick" in words
+    assert "core" in words and "twin" in words

@@ -1,0 +1,90 @@
+"""The fixed-point estimator fed rows: sums that come near the end of an int64, forgetting, rows beyond the limit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.native import Native, Reason
+from pvid.core.native_q31 import EstimatorConfigQ31, RecordQ31, RowEstimatorQ31
+from pvid.rig.file import RigFile
+from pvid.setup.q31 import weak_config_q31
+from pvid.twin.kapitza.weak_q31 import WEAK
+from pvid.twin.q31.estimator import SUM_LIMIT, EstimatorQ31
+
+CONFIG = weak_config_q31(RigFile.standard(), 1000.0).estimator
+LIMIT = 2**28
+Rows = npt.NDArray[np.int64]
+
+
+def against_twin(native: Native, config: EstimatorConfigQ31, n: Rows, y: Rows) -> RecordQ31:
+    """Steps the core and the twin through rows N [ticks, 8], Y [ticks], a group each; all integers must be equal."""
+    core = RowEstimatorQ31(native, config)
+    record = core.run(n, y)
+    twin = EstimatorQ31([config], WEAK)
+    for tick in range(len(y)):
+        reason = twin.add(n[tick][:, None], y[tick : tick + 1])
+        if reason[0] == Reason.ACCUMULATED:
+            for told in twin.solve(ends_group=True):
+                reason = reason if told is None else told
+        assert reason[0] == record.reason[tick], tick
+        assert np.array_equal(twin.p[:, 0], record.p[tick]), tick
+        assert np.array_equal(twin.sums[:, 0], record.sums[tick]), tick
+        assert twin.exponent[0] == record.exponent[tick], tick
+    assert core.counters == {name: int(of[0]) for name, of in twin.counters.items()}
+    assert core.assess().tobytes() == twin.assess()[0].tobytes()
+    return record
+
+
+def loud_rows(ticks: int, largest: int = LIMIT) -> tuple[Rows, Rows]:
+    """Rows at the limit in the one place where theta is 0 at the start, N8, and small elsewhere."""
+    random = np.random.default_rng(5)
+    n = random.integers(-2000, 2001, (ticks, 8))
+    n[:, 7] = largest
+    return n, random.integers(-1000, 1001, ticks)
+
+
+def test_sums_at_full_scale_are_divided_and_never_wrap(native: Native) -> None:
+    config = replace(CONFIG, kappa_min=2**29)  # held: what is to be seen are the sums
+    record = against_twin(native, config, *loud_rows(1200))
+    # 2^56 a row: beyond 2^60 after 16 of them, beyond 2^66 after 1200, which is 2^60 times 4^3
+    assert record.exponent[10] == 0
+    assert record.exponent[-1] == 4
+    assert np.abs(record.sums[:, :-1]).max() <= 2 * SUM_LIMIT
+    # M_88 is still the sum: 1200 2^56
+    assert abs(int(record.sums[-1, 35]) * 4**4 - 1200 * 2**56) < 2**56
+
+
+def test_forgetting_brings_the_sums_back(native: Native) -> None:
+    loud, y_loud = loud_rows(300)
+    quiet, y_quiet = loud_rows(1200, largest=2000)
+    n, y = np.concatenate([loud, quiet]), np.concatenate([y_loud, y_quiet])
+    record = against_twin(native, replace(CONFIG, forgetting_groups=20, kappa_min=2**29), n, y)
+    assert record.exponent.max() == 1
+    assert record.exponent[-1] == 0
+    # rows of one weight, the last forgotten once and each before it once more: a geometric sum, in Q16
+    expected = CONFIG.row_weight / np.expm1(1 / 20)
+    assert abs(int(record.sums[-1, -1]) - expected) < 1e-4 * expected
+
+
+def test_a_row_beyond_the_limit_is_refused_and_changes_nothing(native: Native) -> None:
+    n, y = loud_rows(20, largest=1000)
+    n[7, 2] = LIMIT + 1
+    n[8, 0] = -(2**31)
+    y[9] = 2**31 - 1
+    record = against_twin(native, CONFIG, n, y)
+    assert (record.reason[7:10] == Reason.REJECTED_SATURATED).all()
+    assert np.array_equal(record.sums[9], record.sums[6])
+    assert record.reason[10] != Reason.REJECTED_SATURATED
+
+
+def test_random_rows_equal_the_twin(native: Native) -> None:
+    random = np.random.default_rng(11)
+    scales = 2 ** random.integers(0, 29, (400, 8))
+    n = np.rint(random.uniform(-1, 1, (400, 8)) * scales).astype(np.int64)
+    y = random.integers(-LIMIT, LIMIT + 1, 400)
+    for kappa_min in (0, CONFIG.kappa_min):
+        record = against_twin(native, replace(CONFIG, kappa_min=kappa_min), n, y)
+        assert (record.p >= np.array(CONFIG.lower)).all() and (record.p <= np.array(CONFIG.upper)).all()

@@ -1,0 +1,219 @@
+"""The outlier gate of the fixed-point core: its bits, its rule beside float32's, what it keeps out, settings."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pvid.base.errors import PvidError
+from pvid.core.native import GateConfig, Native, Reason, Status
+from pvid.core.native_q31 import GateConfigQ31, StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.run.compare_q31 import first_difference, identifier_q31
+from pvid.setup.q31 import config_for_run, counts_of, gate_config_q31, p_of, strong_config_q31, weak_config_q31
+from pvid.setup.strong_header_q31 import strong_header_q31
+from pvid.setup.weak_header_q31 import to_c_header_q31
+from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.twin.f32.gate import Gate
+from pvid.twin.q31.gate import GateQ31
+from pvid.twin.q31.scaled import Scaled, scaled
+from pvid.twin.strong_q31 import StrongTwinQ31
+from pvid.twin.weak_q31 import WeakTwinQ31
+
+RIG = RigFile.standard()
+OUTLIER = Reason.REJECTED_OUTLIER
+Counts = npt.NDArray[np.int64]
+
+
+def rig_with(**identifier: Any) -> RigFile:
+    return replace(RIG, identifier=replace(RIG.identifier, **identifier))
+
+
+def jolt(run: Run) -> Run:
+    """At 25 s somebody touches the mechanism, at 30 s its encoder sticks."""
+    phi = run.phi.copy()
+    phi[25_000:25_600] += 0.02 * np.sin(np.pi * np.arange(600) / 600) ** 2
+    phi[30_000:30_300] = phi[30_000]
+    return replace(run, phi=phi)
+
+
+@pytest.fixture(scope="module")
+def jolted() -> Run:
+    """40 s of the standard rig with an encoder of 14 bits."""
+    return jolt(simulate(sensors=standard_sensors(14), truth="linear", duration=40.0, seed=1).run)
+
+
+# ---- the rule ----
+
+
+def one_lane(value: float) -> Scaled:
+    mantissa, exponent = np.frexp(np.array([value]))
+    return scaled(np.rint(mantissa * 2**30).astype(np.int64), exponent.astype(np.int64) - 30)
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    squares=st.lists(st.floats(-6, 6), min_size=1, max_size=60),
+    patience=st.sampled_from([0.0, 0.5, 10.0]),
+    sigmas=st.sampled_from([2.0, 4.0, 1000.0]),
+)
+def test_it_follows_that_of_float32(squares: list[float], patience: float, sigmas: float) -> None:
+    config = GateConfig(sigmas, patience)
+    single = Gate(config, np.float32(100.0), np.float32(10.0), np.array([1.0], np.float32))
+    integer = GateQ31(gate_config_q31(config, 100.0), 10, one_lane(1.0))
+    for power in squares:
+        square = np.float32(10.0**power)
+        limit = float(single.limit * single.scale[0])
+        expected = bool(single.passes(np.array([square]))[0])
+        if abs(float(square) / limit - 1) > 1e-4:  # else rounding may decide
+            assert bool(integer.passes(one_lane(float(square)))[0]) == expected
+        elif bool(integer.passes(one_lane(float(square)))[0]) != expected:
+            return
+        scale = float(integer.scale.m[0]) * 2.0 ** float(integer.scale.e[0])
+        assert scale == pytest.approx(float(single.scale[0]), rel=1e-4)  # 60 float32 roundings, and ln 1e4 to 3e-6
+
+
+def test_who_is_not_asked_passes_and_leaves_the_scale_as_it_was() -> None:
+    gate = GateQ31(GateConfigQ31(4 << 16), 1, one_lane(1.0))
+    before = gate.scale
+    assert gate.passes(one_lane(1e9), np.zeros(1, np.bool_)).all()
+    assert gate.judged[0] == 0
+    assert (gate.scale.m == before.m).all() and (gate.scale.e == before.e).all()
+
+
+# ---- in the identifiers ----
+
+
+def gated_like(
+    twin: WeakTwinQ31 | StrongTwinQ31,
+    config: WeakConfigQ31 | StrongConfigQ31,
+    phi: npt.NDArray[Any],
+    y: npt.NDArray[Any],
+    matrix: dict[str, Native],
+) -> list[WeakIdentifierQ31 | StrongIdentifierQ31]:
+    """The core in every build, whose bits and counters were the twin's, and whose gate has kept something out."""
+    expected = twin.run(phi, y)
+    cores = [identifier_q31(native, config) for native in matrix.values()]
+    for core in cores:
+        record = core.run(phi, y, hashes=False)
+        assert first_difference(record, expected) is None, core.native.build
+        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+        assert (record.reason == OUTLIER).sum() == core.counters["rejected_outlier"] > 0
+    return cores
+
+
+@pytest.mark.parametrize(("patience_s", "zero"), [(0.0, True), (2.0, False)])
+def test_the_weak_form_equals_its_twin(patience_s: float, zero: bool, matrix: dict[str, Native], jolted: Run) -> None:
+    rig = rig_with(outlier_gate=4.0, outlier_patience_s=patience_s, zero=zero, test_functions=8)
+    config = weak_config_q31(rig, 1000.0)
+    phi, y = counts_of(rig, jolted)
+    twin = WeakTwinQ31(config)
+    for core in gated_like(twin, config, phi, y, matrix):
+        assert isinstance(core, WeakIdentifierQ31)
+        assert core.estimate.tobytes() == twin.trust.estimate[0].tobytes()
+
+
+@pytest.mark.parametrize("patience_s", [0.0, 0.5])
+def test_the_strong_form_equals_its_twin(patience_s: float, matrix: dict[str, Native], jolted: Run) -> None:
+    rig = rig_with(form="strong", stride=8, outlier_gate=6.0, outlier_patience_s=patience_s, forgetting_s=2.0)
+    config = strong_config_q31(rig, 1000.0)
+    phi, y = (c[28_500:31_000] for c in counts_of(rig, jolted))
+    assert gated_like(StrongTwinQ31(config), config, phi, y, matrix)
+
+
+def test_windows_that_were_touched_are_kept_out(native: Native, jolted: Run) -> None:
+    errors = {}
+    for sigmas in (0.0, 4.0):
+        rig = rig_with(outlier_gate=sigmas)
+        config = weak_config_q31(rig, 1000.0)
+        core = WeakIdentifierQ31(native, config)
+        record = core.run(*counts_of(rig, jolted), sums=True)
+        errors[sigmas] = np.abs(p_of(config, record.published[-1])[:3] / STANDARD_PENDULUM.linear - 1).max()
+        refused = np.flatnonzero(record.reason == OUTLIER)
+        # each lies in two or three windows of 1.25 s, and nothing else is refused
+        assert len(refused) == 0 if sigmas == 0.0 else 4 <= len(refused) <= 6
+        assert np.isin(refused // 1000, (25, 26, 27, 30, 31, 32)).all()
+        for tick in refused:  # and it changes nothing but its counter
+            assert np.array_equal(record.p[tick - 300], record.p[tick])
+            assert np.array_equal(record.sums[tick - 300], record.sums[tick])
+    assert errors[4.0] < 5e-4 < errors[0.0]
+
+
+def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
+    """A row beyond its formats is not an outlier, and the gate never sees it."""
+    rig = rig_with(form="strong", stride=8, outlier_gate=2.0)
+    config = strong_config_q31(rig, 1000.0)
+    bank = config.design.bank
+    t = np.arange(1500)
+    y = np.rint(2000 * np.sin(2 * np.pi * 4.0 * t / 1000)).astype(np.int64)
+    phi = np.where(y > 0, bank.phi_max, -bank.phi_max).astype(np.int64)
+    twin = StrongTwinQ31(replace(config, drive_min=0))
+    expected = twin.run(phi, y)
+    core = StrongIdentifierQ31(native, replace(config, drive_min=0))
+    assert first_difference(core.run(phi, y, hashes=False), expected) is None
+    assert core.counters["rejected_saturated"] > 0
+
+
+# ---- settings ----
+
+
+def test_it_is_on_as_in_float32_unless_the_law_is_the_paper_s(jolted: Run) -> None:
+    for form, sigmas in (("weak", 4), ("strong", 6)):
+        assert config_for_run(rig_with(form=form, stride=8), jolted).gate == GateConfigQ31(sigmas << 16, 0)
+        paper = rig_with(form=form, stride=8, law="pseudovelocity")
+        assert config_for_run(paper, jolted).gate == GateConfigQ31(0, 0)
+
+
+def test_a_rig_file_s_gate_reaches_the_core_and_the_board(jolted: Run) -> None:
+    settings = {"outlier_gate": 4.5, "outlier_patience_s": 60.0}
+    weak = weak_config_q31(rig_with(**settings), 1000.0)
+    windows = 60.0 * 1000.0 / (weak.design.decimation * weak.hop)
+    assert weak.gate == GateConfigQ31(round(4.5 * 2**16), round(windows))
+    strong = strong_config_q31(rig_with(form="strong", stride=8, **settings), 1000.0)
+    assert strong.gate == GateConfigQ31(round(4.5 * 2**16), 60_000)
+    assert ".gate = {294912u, 60000u}," in strong_header_q31(strong, RIG.l1, "strong", "a test")
+    assert f".gate = {{294912u, {round(windows)}u}}," in to_c_header_q31(weak, RIG.l1, "weak", "a test")
+
+
+def test_a_patience_that_cannot_be_counted_is_refused() -> None:
+    assert gate_config_q31(GateConfig(4.0, 1e-9), 1000.0).patience_groups == 1
+    assert gate_config_q31(GateConfig(4.0, 2.0**20), 1024.0).patience_groups == 2**30
+    with pytest.raises(PvidError, match=r"outlier_patience_s = 2e\+06 is too long for core q31"):
+        strong_config_q31(rig_with(form="strong", stride=8, outlier_gate=4.0, outlier_patience_s=2e6), 1000.0)
+
+
+@pytest.mark.parametrize("form", ["weak", "strong"])
+@pytest.mark.parametrize(("forgetting_s", "sentence"), [(1e-9, "1e-09 is too short"), (1e9, "1e+09 is too long")])
+def test_a_forgetting_that_cannot_be_counted_is_refused_before_the_patience_that_follows_it(
+    form: str, forgetting_s: float, sentence: str
+) -> None:
+    config = {"weak": weak_config_q31, "strong": strong_config_q31}[form]
+    with pytest.raises(PvidError, match=re.escape(f"forgetting_s = {sentence} for core q31")):
+        config(rig_with(form=form, forgetting_s=forgetting_s), 1000.0)
+
+
+@pytest.mark.parametrize("form", ["weak", "strong"])
+@pytest.mark.parametrize(
+    ("gate", "status"),
+    [
+        (GateConfigQ31(1), Status.BAD_GATE_SIGMAS),
+        (GateConfigQ31(2**17 - 1), Status.BAD_GATE_SIGMAS),
+        (GateConfigQ31((1000 << 16) + 1), Status.BAD_GATE_SIGMAS),
+        (GateConfigQ31(4 << 16, 2**30 + 1), Status.BAD_GATE_PATIENCE),
+    ],
+)
+def test_what_makes_no_gate_is_refused(form: str, gate: GateConfigQ31, status: Status, native: Native) -> None:
+    with pytest.raises(PvidError, match=status.name.lower().replace("_", " ")):
+        if form == "weak":
+            WeakIdentifierQ31(native, replace(weak_config_q31(RIG, 1000.0), gate=gate))
+        else:
+            config = strong_config_q31(rig_with(form="strong", stride=8), 1000.0)
+            StrongIdentifierQ31(native, replace(config, gate=gate))

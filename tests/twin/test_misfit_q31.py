@@ -1,0 +1,152 @@
+"""The fixed-point strong form's verdict on itself: its integers, and that it speaks where float32's does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.core.native import Native, Reason
+from pvid.core.native_q31 import StrongIdentifierQ31
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.run.compare_q31 import first_difference
+from pvid.run.identify import identify
+from pvid.setup.f32 import nominal_start, strong_config
+from pvid.setup.q31 import counts_of, p_of, strong_config_q31
+from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
+from pvid.twin.kapitza import strong_q31 as kapitza_strong_q31
+from pvid.twin.q31.estimator import EstimatorQ31
+from pvid.twin.strong_q31 import StrongTwinQ31
+
+SLOW_HZ = 125.0  # the default filter with one sample in eight: 31 points
+CHANGE = 9 * 125  # tick
+FINE_BITS = 22
+DOUBTED = (Reason.MISFIT, Reason.REJECTED_OUTLIER)
+Counts = npt.NDArray[np.int64]
+
+
+def rig_of(bits: int, **identifier: Any) -> RigFile:
+    rig = RigFile.standard()
+    settings = replace(rig.identifier, form="strong", core="q31", **identifier)
+    return replace(rig, identifier=settings, sensor=replace(rig.sensor, phi_lsb=standard_sensors(bits).phi_lsb))
+
+
+def reasons_of(native: Native, rig: RigFile, run: Run) -> npt.NDArray[np.uint8]:
+    core = StrongIdentifierQ31(native, strong_config_q31(rig, run.sample_rate))
+    return core.run(*counts_of(rig, run), sums=False).reason
+
+
+@pytest.fixture(scope="module")
+def changed() -> Run:
+    """30 s at 125 Hz with a fine encoder; after 9 s w is larger by 20 %."""
+    sensors = replace(standard_sensors(FINE_BITS), random_offset=False)
+    before, after = (
+        simulate(
+            replace(STANDARD_PENDULUM, g=g), sensors=sensors, truth="linear", sample_rate=SLOW_HZ, duration=30.0, seed=1
+        ).run
+        for g in (STANDARD_PENDULUM.g, 1.2 * STANDARD_PENDULUM.g)
+    )
+    return replace(before, phi=np.where(np.arange(len(before.phi)) < CHANGE, before.phi, after.phi))
+
+
+@pytest.mark.parametrize(
+    "identifier",
+    [{}, {"forgetting_s": 1.0, "outlier_gate": 0.0}, {"feedback_hz": 0.0, "divider": 3}, {"law": "pseudovelocity"}],
+)
+def test_the_core_equals_its_twin_under_the_alarm(
+    identifier: dict[str, Any], matrix: dict[str, Native], changed: Run
+) -> None:
+    rig = rig_of(FINE_BITS, **identifier)
+    phi, y = (counts[:2000] for counts in counts_of(rig, changed))
+    config = strong_config_q31(rig, SLOW_HZ)
+    twin = StrongTwinQ31(config)
+    expected = twin.run(phi, y)
+    assert twin.estimator.counters["misfits"][0] > 0
+    for native in matrix.values():
+        core = StrongIdentifierQ31(native, config)
+        assert first_difference(core.run(phi, y, hashes=False), expected) is None, native.build
+        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+
+
+def test_a_change_that_sums_cannot_follow_is_told(native: Native, changed: Run) -> None:
+    reason = reasons_of(native, rig_of(FINE_BITS), changed)
+    assert not (reason[:CHANGE] == Reason.MISFIT).any()
+    assert np.isin(reason[CHANGE + 500 :], DOUBTED).all()
+    assert (reason[-1000:] == Reason.MISFIT).any()
+
+
+def test_a_change_that_is_followed_is_over_with_its_block(native: Native, changed: Run) -> None:
+    rig = rig_of(FINE_BITS, forgetting_s=0.5)
+    config = strong_config_q31(rig, SLOW_HZ)
+    core = StrongIdentifierQ31(native, config)
+    reason = core.run(*counts_of(rig, changed), sums=False).reason
+    assert (reason == Reason.MISFIT).any()
+    assert (reason[-1000:] == Reason.UPDATED).all()
+    assert p_of(config, core.assess()["p"][:3])[0] == pytest.approx(1.2 * STANDARD_PENDULUM.linear[0], rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("bits", "alarm"), [(22, False), (20, False), (18, False), (16, True), (14, True), (12, True)])
+def test_an_encoder_that_is_too_coarse_is_told_as_by_float32(bits: int, alarm: bool, seed: int, native: Native) -> None:
+    run = simulate(sensors=standard_sensors(bits), truth="linear", duration=40.0, seed=seed).run
+    rig = rig_of(bits)
+    reasons = reasons_of(native, rig, run)[8_500:]  # the second block is the first that is judged
+    assert np.isin(reasons, DOUBTED).all() if alarm else not (reasons == Reason.MISFIT).any()
+    single = native.strong(strong_config(rig, run.sample_rate))
+    theirs = single.run(run.phi, run.y, sums=False).reason[8_500:]
+    assert np.array_equal(reasons == Reason.MISFIT, theirs == Reason.MISFIT) or alarm
+
+
+def test_the_standard_rig_is_never_doubted_from_any_start(native: Native, standard_20_bits: Simulation) -> None:
+    rig = rig_of(20)
+    counts = [c[:14_000] for c in counts_of(rig, standard_20_bits.run)]
+    for seed in range(20):
+        core = StrongIdentifierQ31(native, strong_config_q31(rig, 1000.0, standard_start(seed)))
+        assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any(), seed
+    core = StrongIdentifierQ31(native, strong_config_q31(rig_of(20, law="pseudovelocity"), 1000.0))
+    assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any()
+
+
+def test_other_drives_are_no_misfit(native: Native) -> None:
+    # the same motion and drive, smaller and larger by turns: residuals go with them, and their part stays
+    sensors = replace(standard_sensors(24), random_offset=False)
+    run = simulate(sensors=sensors, truth="linear", sample_rate=SLOW_HZ, duration=14.0, seed=1).run
+    phi = np.concatenate([run.phi, 0.3 * run.phi, run.phi])
+    whole = replace(run, t=np.arange(len(phi)) / SLOW_HZ, phi=phi, y=np.concatenate([run.y, run.y, run.y]))
+    reason = reasons_of(native, rig_of(24), whole)
+    settled = np.concatenate([np.arange(563, 1750), np.arange(3250, 3500), np.arange(5000, 5250)])
+    assert not (reason[settled] == Reason.MISFIT).any()
+
+
+def test_what_is_told_of_a_row_is_w_times_the_gradient_in_w(changed: Run) -> None:
+    rig = rig_of(FINE_BITS)
+    config = strong_config_q31(rig, SLOW_HZ)
+    n, y, fate = StrongTwinQ31(config).rows(*counts_of(rig, changed))
+    rows = np.flatnonzero(fate == Reason.ACCUMULATED)[::50]
+
+    def predicted(w_factor: float) -> npt.NDArray[np.float64]:
+        w, d1, d2 = nominal_start(rig)
+        start = strong_config_q31(rig, SLOW_HZ, (w * w_factor, d1, d2)).estimator
+        terms = EstimatorQ31([start], kapitza_strong_q31.STRONG).terms(n[rows].T, y[rows])[0]
+        return np.asarray(terms.sum(axis=0), np.float64)
+
+    terms = EstimatorQ31([config.estimator], kapitza_strong_q31.STRONG).terms(n[rows].T, y[rows])[0]
+    told = kapitza_strong_q31.told(terms)
+    slope = (predicted(1.001) - predicted(0.999)) / 0.002
+    # of third order in 0.001, and terms rounded to 1
+    assert np.abs(told - slope).max() < 1e-4 * np.abs(told).max() + 11 / 0.002
+
+
+def test_identify_says_so(native: Native) -> None:
+    for bits, doubted in ((20, False), (14, True)):
+        run = simulate(sensors=standard_sensors(bits), truth="linear", duration=20.0, seed=1).run
+        answer = identify(run, rig_of(bits), native)
+        assert answer.identified
+        assert answer.alarm is doubted
+        assert (answer.warning is not None) == doubted
+        assert (answer.status == Reason.MISFIT.text) == doubted
+        assert answer.trusted_s is None

@@ -1,0 +1,257 @@
+"""The fixed-point strong form in C and its numpy twin, integer by integer: builds, laws, hostile counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.base.errors import PvidError
+from pvid.core.native import Native, Reason
+from pvid.core.native_q31 import (
+    EstimatorConfigQ31,
+    GateConfigQ31,
+    RowEstimatorQ31,
+    StrongConfigQ31,
+    StrongIdentifierQ31,
+    strong_rows_q31,
+)
+from pvid.rig.file import Differentiator, RigFile
+from pvid.rig.run import Run
+from pvid.run.compare_q31 import first_difference, twin_hashes
+from pvid.setup.q31 import counts_of, strong_config_q31
+from pvid.sim.pendulum import STANDARD_DRIVE, Drive, Simulation, simulate, standard_sensors, standard_start
+from pvid.twin.kapitza import strong_q31 as kapitza_strong_q31
+from pvid.twin.q31.estimator import EstimatorQ31
+from pvid.twin.strong_q31 import StrongTwinQ31, run_rows
+
+BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
+STARTS = 20
+PIECE = 2000
+STRIDE: dict[Differentiator, int] = {"finite-difference": 20, "savitzky-golay": 1}
+LAWS = ("stationary", "pseudovelocity")
+Counts = npt.NDArray[np.int64]
+
+
+def rig_of(differentiator: Differentiator = "savitzky-golay", law: str = "stationary", tau: float = 0.0) -> RigFile:
+    """The standard rig with an encoder of 20 bits."""
+    rig = RigFile.standard()
+    settings = replace(
+        rig.identifier,
+        form="strong",
+        differentiator=differentiator,
+        stride=STRIDE[differentiator],
+        law=law,  # type: ignore[arg-type]
+        forgetting_s=tau,
+    )
+    return replace(rig, identifier=settings, sensor=replace(rig.sensor, phi_lsb=standard_sensors(20).phi_lsb))
+
+
+def configuration(rig: RigFile, seed: int = 0) -> StrongConfigQ31:
+    """Its settings at 1 kHz, a start within 50 % of the truth; every row is taken in."""
+    return replace(strong_config_q31(rig, 1000.0, standard_start(seed)), drive_min=0)
+
+
+def counts(run: Run) -> tuple[Counts, Counts]:
+    return counts_of(rig_of(), run)
+
+
+def assert_equal(
+    natives: list[Native], config: StrongConfigQ31, phi: Counts, y: Counts
+) -> tuple[StrongTwinQ31, npt.NDArray[np.uint8]]:
+    """Runs every build and the twin; returns the twin and its reasons."""
+    twin = StrongTwinQ31(config)
+    expected = twin.run(phi, y)
+    hashes = twin_hashes(expected)
+    for native in natives:
+        core = StrongIdentifierQ31(native, config)
+        record = core.run(phi, y)
+        assert first_difference(record, expected) is None, native.build
+        assert np.array_equal(record.hash, hashes), native.build
+        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+        assert core.assess().tobytes() == twin.estimator.assess()[0].tobytes()
+        assert (record.p >= np.array(config.estimator.lower)).all()
+        assert (record.p <= np.array(config.estimator.upper)).all()
+    return twin, expected.reason[:, 0]
+
+
+@pytest.mark.parametrize("differentiator", STRIDE)
+def test_the_whole_identifier_equals_the_twin_in_every_build(
+    matrix: dict[str, Native], standard_20_bits: Simulation, differentiator: Differentiator
+) -> None:
+    phi, y = counts(standard_20_bits.run)
+    config = configuration(rig_of(differentiator))
+    _, reason = assert_equal([matrix[name] for name in BUILDS], config, phi[:3000], y[:3000])
+    assert (reason == Reason.UPDATED).sum() >= 2700
+
+
+def test_twenty_starts_with_both_laws_with_and_without_forgetting_equal_the_twin(
+    native: Native, standard_20_bits: Simulation
+) -> None:
+    """40 000 rows through eighty estimators and one twin of eighty lanes, compared after every tick."""
+    n, y, fate = StrongTwinQ31(configuration(rig_of())).rows(*counts(standard_20_bits.run))
+    ready = fate == Reason.ACCUMULATED
+    assert ready.sum() >= 40_000
+    rigs = [rig_of(law=law, tau=tau) for law in LAWS for tau in (0.0, 2.0)]
+    lanes = [configuration(rig, seed).estimator for rig in rigs for seed in range(STARTS)]
+    assert len({(lane.gain, lane.forgetting_groups) for lane in lanes}) == 4
+    assert_lanes_equal(native, lanes, n[ready], y[ready])
+
+
+def assert_lanes_equal(native: Native, lanes: list[EstimatorConfigQ31], n: Counts, y: Counts) -> None:
+    twin = EstimatorQ31(lanes, kapitza_strong_q31.STRONG)
+    cores = [RowEstimatorQ31(native, lane) for lane in lanes]
+    for first in range(0, len(y), PIECE):
+        part = slice(first, first + PIECE)
+        expected = run_rows(twin, n[part], y[part], np.full(len(y[part]), Reason.ACCUMULATED, np.uint8))
+        for lane, core in enumerate(cores):
+            assert first_difference(core.run(n[part], y[part], hashes=False), expected, lane) is None, (first, lane)
+    for lane, core in enumerate(cores):
+        assert core.assess().tobytes() == twin.assess()[lane].tobytes()
+
+
+HOSTILE = (
+    "square waves",
+    "slow square waves",
+    "steps",
+    "stuck",
+    "wrap",
+    "zeros",
+    "random words",
+    "random counts",
+    "full scale in phase",
+    "one count",
+    "beyond full scale",
+)
+
+
+def hostile(name: str, config: StrongConfigQ31, ticks: int = 700) -> tuple[Counts, Counts]:
+    """Counts that no mechanism makes."""
+    bank = config.design.bank
+    random = np.random.default_rng(7)
+    t = np.arange(ticks)
+    phi, y = np.zeros(ticks, np.int64), np.zeros(ticks, np.int64)
+    swing = np.rint(2000 * np.sin(2 * np.pi * 4.0 * t / 1000)).astype(np.int64)  # of the pivot, 10 mm
+    if name == "square waves":
+        phi = bank.phi_max * np.where(t // 50 % 2, 1, -1)
+        y = bank.y_max * np.where(t // 70 % 2, 1, -1)
+    elif name == "slow square waves":
+        phi = bank.phi_max * np.where(t // 125 % 2, 1, -1)
+        y = swing
+    elif name == "steps":
+        phi = bank.phi_max * (t > 350)
+        y = np.where(t > 500, bank.y_max, 0)
+    elif name == "stuck":
+        phi = np.full(ticks, bank.phi_max)
+        y = swing
+    elif name == "wrap":
+        phi = (t * 700) % 2**20 - 2**19
+        y = swing
+    elif name == "random words":
+        phi = random.integers(-(2**31), 2**31, ticks)
+        y = random.integers(-(2**31), 2**31, ticks)
+    elif name == "random counts":
+        phi = random.integers(-bank.phi_max, bank.phi_max + 1, ticks)
+        y = swing
+    elif name == "full scale in phase":
+        phi = np.where(swing > 0, bank.phi_max, -bank.phi_max)
+        y = swing
+    elif name == "one count":
+        phi = (t // 150) % 2
+        y = swing
+    elif name == "beyond full scale":
+        phi = swing // 4
+        y = swing.copy()
+        phi[300] = bank.phi_max + 1
+        y[601] = -(2**31)
+    return np.asarray(phi, np.int64), np.asarray(y, np.int64)
+
+
+@pytest.mark.parametrize("differentiator", STRIDE)
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_counts_equal_the_twin(native: Native, name: str, differentiator: Differentiator) -> None:
+    for law, tau in zip(LAWS, (0.0, 0.5), strict=True):
+        config = configuration(rig_of(differentiator, law, tau))
+        assert_equal([native], config, *hostile(name, config))
+        assert_equal([native], replace(config, gate=GateConfigQ31(2 << 16, 50)), *hostile(name, config))
+
+
+def test_hostile_counts_are_not_merely_refused_at_the_door(native: Native) -> None:
+    taken = 0
+    for name in HOSTILE:
+        config = configuration(rig_of("finite-difference"))
+        core = StrongIdentifierQ31(native, config)
+        core.run(*hostile(name, config))
+        taken += core.counters["rows"] > 250
+    assert taken >= 5
+
+
+def test_hostile_rows_equal_the_twin(native: Native) -> None:
+    """Derivatives up to their limit in any order, as no bank makes them: rows fit or are refused in both alike."""
+    random = np.random.default_rng(5)
+    shifts = configuration(rig_of()).design.row
+    phi = random.integers(-(2**30), 2**30 + 1, (4000, 5)) >> random.integers(0, 31, (4000, 5))
+    u = random.integers(-(2**30), 2**30 + 1, (4000, 3)) >> random.integers(0, 31, (4000, 3))
+    phi[:4], u[:4] = 2**30, -(2**30)
+    n, y, fits = strong_rows_q31(native, shifts, phi, u)
+    expected_n, expected_y, expected_fits = kapitza_strong_q31.rows(shifts, phi, u)
+    assert np.array_equal(fits, expected_fits)
+    assert 400 < fits.sum() < 3600
+    assert np.array_equal(n[fits], expected_n[fits])
+    assert np.array_equal(y[fits], expected_y[fits])
+
+
+def test_a_drive_that_comes_and_goes_equals_the_twin(native: Native) -> None:
+    drive = Drive(STANDARD_DRIVE, on=((1.0, 2.0),))
+    run = simulate(drive=drive, sensors=standard_sensors(20), duration=4.0).run
+    config = strong_config_q31(rig_of(), 1000.0)
+    _, reason = assert_equal([native], config, *counts(run))
+    assert set(reason[:1000]) == {Reason.WARMING_UP, Reason.HELD_NOT_EXCITED}
+    assert (reason[1500:2000] == Reason.UPDATED).all()
+
+
+def test_a_sample_beyond_full_scale_costs_a_window_and_no_more(native: Native, standard_20_bits: Simulation) -> None:
+    phi, y = counts(standard_20_bits.run)
+    config = configuration(rig_of())
+    phi = phi.copy()
+    phi[5000] = config.design.bank.phi_max + 1
+    core = StrongIdentifierQ31(native, config)
+    record = core.run(phi[:8000], y[:8000])
+    window = config.design.bank.window
+    assert record.reason[5000] == Reason.REJECTED_SATURATED
+    assert (record.reason[5001 : 5000 + window] == Reason.WARMING_UP).all()
+    assert (record.reason[5000 + window :] == Reason.UPDATED).all()
+    assert core.counters["rejected_saturated"] == 1
+
+
+def test_a_run_in_pieces_is_the_same_run(native: Native, standard_20_bits: Simulation) -> None:
+    phi, y = counts(standard_20_bits.run)
+    whole = StrongIdentifierQ31(native, configuration(rig_of()))
+    whole.run(phi, y)
+    pieces = StrongIdentifierQ31(native, configuration(rig_of()))
+    for part in np.array_split(np.arange(len(phi)), 7):
+        pieces.run(phi[part], y[part])
+    assert pieces.running_hash == whole.running_hash
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"drive_min": -1}, "bad drive min"),
+        ({"drive_ticks": 0}, "bad drive ticks"),
+        ({"design": {"u_multiplier": 0}}, "bad u multiplier"),
+        ({"design": {"u_shift": 63}}, "bad shift"),
+        ({"estimator": {"row_sd": 0}}, "bad row sd"),
+        ({"estimator": {"gain": 2**30 + 1}}, "bad feedback"),
+    ],
+)
+def test_what_is_out_of_range_is_refused_by_name(native: Native, changes: dict[str, object], sentence: str) -> None:
+    config = configuration(rig_of())
+    own = {
+        name: replace(getattr(config, name), **value) if isinstance(value, dict) else value
+        for name, value in changes.items()
+    }
+    with pytest.raises(PvidError, match=f"refused the configuration: {sentence}"):
+        StrongIdentifierQ31(native, replace(config, **own))  # type: ignore[arg-type]

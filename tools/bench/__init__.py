@@ -1,0 +1,1 @@
+"""Long measurements: commands of `./tools/pvid bench` and `./tools/pvid campaign`; not part of the package."""

@@ -1,0 +1,374 @@
+"""The commands `pvid bench ...`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import click
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.console import DIFFERENT, DONE, progress_bar, tell
+from pvid.base.errors import PvidError
+from pvid.cli.page_table import UPDATE, markdown, put_table
+from pvid.core.native import Native
+
+
+@click.group()
+def bench() -> None:
+    """Measures what the README and the benchmark pages claim and prints it as tables."""
+
+
+@bench.command(name="demo")
+@UPDATE
+def bench_demo(update: Path | None) -> int:
+    """What the demo prints, as the README shows it."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-P", "-m", "pvid", "demo"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != DONE:
+        raise PvidError(f"the demo failed: {(done.stderr or done.stdout).strip()[-300:]}")
+    put_table(update, "demo", f"```\n{done.stdout.rstrip()}\n```")
+    return DONE
+
+
+@bench.command(name="laws")
+@UPDATE
+def bench_laws(update: Path | None) -> int:
+    """Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."""
+    from bench import laws
+
+    with progress_bar("laws", laws.NUMBER_OF_ROWS) as advance:
+        rows = [row.cells() for row in laws.laws_table(Native(), advance)]
+    put_table(update, "laws", markdown(laws.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="strong")
+@UPDATE
+def bench_strong(update: Path | None) -> int:
+    """Errors of the strong form by encoder resolution and differentiator."""
+    from bench import strong
+
+    with progress_bar("strong form", len(strong.CASES)) as advance:
+        rows = list(strong.strong_table(Native(), advance))
+    put_table(update, "strong", markdown(strong.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="weak")
+@UPDATE
+def bench_weak(update: Path | None) -> int:
+    """Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."""
+    from bench import weak
+
+    with progress_bar("weak form", len(weak.CASES)) as advance:
+        rows = list(weak.weak_table(Native(), advance))
+    put_table(update, "weak", markdown(weak.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="tune")
+@UPDATE
+def bench_tune(update: Path | None) -> int:
+    """Errors against the truth with the default settings and with those that `tune` picks, on several rigs."""
+    from bench import tuning
+
+    with progress_bar("tuning", len(tuning.CASES) * tuning.SEEDS) as advance:
+        rows = list(tuning.tuning_table(Native(), advance))
+    put_table(update, "tune", markdown(tuning.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="cost")
+@UPDATE
+def bench_cost(update: Path | None) -> int:
+    """Instructions a tick by stage, by callgrind, beside recursive least squares (needs valgrind)."""
+    from bench import cost
+
+    with tempfile.TemporaryDirectory() as folder:
+        costs = {level: cost.stage_costs(cost.build(Path(folder), level=level)) for level in ("-O2", "-O3")}
+        state_bytes = cost.state_bytes(Path(folder))
+    put_table(update, "cost", cost.as_markdown(costs, state_bytes))
+    return DONE
+
+
+@bench.command(name="design-cost")
+@click.option("--update", is_flag=True, help="Write the coefficients that `pvid design` computes with.")
+def bench_design_cost(update: bool) -> int:
+    """Instructions of the weak form over a grid of designs beside the formula of `pvid design` (needs valgrind)."""
+    from bench import design_cost
+    from pvid.design import weak_cost
+
+    with progress_bar("designs", len(design_cost.GRID)) as advance:
+        spreads = design_cost.measured_grid(advance)
+    mean, longest = design_cost.fit(spreads) if update else weak_cost.coefficients()
+    if update:
+        write_whole(weak_cost.COEFFICIENTS_FILE, design_cost.as_toml(mean, longest))
+        tell(f"{weak_cost.COEFFICIENTS_FILE.name} written")
+    click.echo(markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
+    return DONE
+
+
+@bench.command(name="hard")
+@UPDATE
+def bench_hard(update: Path | None) -> int:
+    """Noise until the answer fails, little motion or drive, one mode, friction, large angles: 40 runs a case."""
+    from bench import hard
+
+    with progress_bar("hard cases", len(hard.CASES) * hard.SEEDS) as advance:
+        rows = list(hard.hard_table(Native(), progress=advance))
+    put_table(update, "hard", markdown(hard.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="longevity")
+@click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7; 10^6 held out or on a board.")
+@click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option(
+    "--columns", "columns", multiple=True, help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, peers."
+)
+@click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
+@click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")
+@click.option("--on", "board", metavar="BOARD", help="In this emulator, hash for hash with this machine: mps2-an386.")
+@UPDATE
+def bench_longevity(
+    ticks: int | None,
+    chosen: tuple[str, ...],
+    columns: tuple[str, ...],
+    processes: int,
+    held_out: bool,
+    board: str | None,
+    update: Path | None,
+) -> int:
+    """Millions of ticks of every disturbance, beside textbook and UD recursive least squares (needs gcc).
+
+    What is done is kept in build/longevity, for the present core: the next call goes on from there.
+    """
+    from bench import longevity_tables as kept
+    from bench import longevity_target
+    from bench.longevity import COLUMNS, OURS
+    from bench.longevity_signals import HELD_OUT, SCENARIOS
+    from pvid.board.boards import board as board_of
+
+    for name, given, known in (("scenario", chosen, SCENARIOS), ("column", columns, COLUMNS)):
+        unknown = set(given) - set(known)
+        if unknown:
+            raise PvidError(f"no such {name}: {', '.join(sorted(unknown))}; there are {', '.join(known)}")
+    scenarios = chosen or tuple(SCENARIOS)
+    if board is not None:
+        runs = longevity_target.combinations(scenarios, columns or OURS)
+        with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(runs)) as advance:
+            rows = longevity_target.run_missing_on(board_of(board), ticks or 1_000_000, runs, Path(folder), advance)
+        put_table(update, "longevity-board", markdown(longevity_target.HEADER, rows))
+        return DONE if all(row[-1] == "equal" for row in rows) else DIFFERENT
+    if held_out:
+        ticks = ticks or kept.HELD_OUT_TICKS
+        tasks = kept.tasks_of((one for one in HELD_OUT if one.kind in scenarios), columns or OURS, ticks)
+    else:
+        ticks = ticks or kept.TICKS
+        tasks = kept.tasks_of((SCENARIOS[name] for name in scenarios), columns or COLUMNS, ticks)
+    with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(tasks)) as advance:
+        kept.run_missing(tasks, Path(folder), processes, advance)
+    for marker, header, rows in [kept.held_out_table(ticks)] if held_out else kept.tables(ticks):
+        if rows:
+            put_table(update, marker, markdown(header, rows))
+    return DONE
+
+
+@bench.command(name="noise")
+@UPDATE
+def bench_noise(update: Path | None) -> int:
+    """Bias by the noise inside the weak form's rows, as it is and with that noise taken off, in float64."""
+    from bench import noise
+
+    with progress_bar("noise in the rows", len(noise.CASES)) as advance:
+        rows = list(noise.noise_table(Native(), progress=advance))
+    put_table(update, "noise", markdown(noise.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="reading")
+@UPDATE
+def bench_reading(update: Path | None) -> int:
+    """Processor time and memory of reading runs of ten minutes at 1 kHz and of 10^7 samples."""
+    from bench import reading
+
+    put_table(update, "reading", markdown(reading.HEADER, list(reading.reading_table())))
+    return DONE
+
+
+@bench.command(name="fuzz-link")
+@click.option("--runs", default=10_000_000, show_default=True, type=click.IntRange(min=1))
+def bench_fuzz_link(runs: int) -> int:
+    """The C side of the serial link under libFuzzer, with sanitizers (needs clang)."""
+    from bench.fuzz import fuzz_link
+
+    folder = Path(tempfile.mkdtemp(prefix="pvid-fuzz-"))
+    click.echo(f"{fuzz_link(folder, runs)} inputs, none broke the codec")
+    return DONE
+
+
+@bench.command(name="fuzz-api")
+@click.option("--calls", default=10_000_000, show_default=True)
+@click.option("--seed", default=1, show_default=True)
+def bench_fuzz_api(calls: int, seed: int) -> int:
+    """Random calls of the C core's public API, with sanitizers (needs clang)."""
+    from bench.fuzz import fuzz_api
+
+    with tempfile.TemporaryDirectory(prefix="pvid-fuzz-") as folder:
+        click.echo(fuzz_api(Path(folder), calls, seed).text)
+    return DONE
+
+
+@bench.command(name="codec")
+@click.option("--frames", default=1_000_000, show_default=True, type=click.IntRange(min=1))
+def bench_codec(frames: int) -> int:
+    """Corrupted frames of every length against both decoders of the serial link."""
+    from bench.codec import corrupt
+
+    with progress_bar("corrupted frames", frames) as advance:
+        tally = corrupt(frames, Native(), progress=advance)
+    click.echo(
+        f"{tally.frames} corrupted frames, C and Python alike: {tally.wrong} let through wrong; of the good frames "
+        f"behind them the first was lost {tally.lost_first} times, the second {tally.lost_second} times"
+    )
+    return DIFFERENT if tally.wrong or tally.lost_second else DONE
+
+
+@bench.command(name="log")
+@click.option("--frames", default=200_000, show_default=True, type=click.IntRange(min=1000))
+def bench_log(frames: int) -> int:
+    """Frames a minute of processor time through `pvid log`, losses, memory."""
+    from bench.field import throughput
+
+    seen = throughput(frames)
+    click.echo(
+        f"{seen.frames} of {frames} frames, {seen.lost} lost; {seen.cpu_s:.1f} s of processor time, "
+        f"{60 * seen.frames / seen.cpu_s:.0f} frames a minute of it; resident memory {seen.early_kb} kB after a "
+        f"quarter, {seen.late_kb} kB at the end"
+    )
+    return DONE if seen.frames == frames and not seen.lost else DIFFERENT
+
+
+@bench.command(name="liar")
+@UPDATE
+@click.option("--mutants", default=100_000, show_default=True, help="Frames changed at random.")
+@click.option("--only", metavar="BEHAVIOUR", multiple=True, help="A behaviour named in the table; repeatable.")
+def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
+    """A board that sends false data, against `pvid log` and all readers of its logs; then mutants of frames."""
+    from bench import liar
+    from bench.liar_mutants import mutate
+    from bench.lies import BEHAVIOURS
+
+    if unknown := [name for name in only if name not in BEHAVIOURS]:
+        raise PvidError(f"there is no behaviour {', '.join(unknown)}")
+    chosen = [BEHAVIOURS[name] for name in only] or list(BEHAVIOURS.values())
+    performances = []
+    with tempfile.TemporaryDirectory() as folder:
+        with progress_bar("lies", len(chosen)) as advance:
+            for behaviour in chosen:
+                performances.append(one := liar.perform(behaviour, Path(folder)))
+                for fault in one.faults:
+                    click.echo(f"{behaviour.name}: {fault}", err=True)
+                advance(len(performances))
+        with progress_bar("mutants", mutants) as advance:
+            tally = mutate(mutants, Path(folder), progress=advance)
+    for fault in tally.faults:
+        click.echo(fault, err=True)
+    faults = sum(len(one.faults) for one in performances)
+    put_table(update, "liar", markdown(liar.HEADER, [one.cells() for one in performances]))
+    runs = sum(len(one.codes) for one in performances)
+    summary = (
+        f"{len(performances)} behaviours, {runs} runs of a command: {faults} defects, at most "
+        f"{max((one.peak_kb for one in performances), default=0) / 1024:.0f} MB of memory, at most "
+        f"{max((one.late_s for one in performances), default=0):.1f} s late. {tally.mutants} mutants in {tally.logs} "
+        f"logs: {len(tally.faults)} defects."
+    )
+    put_table(update, "liar-summary", summary)
+    return DIFFERENT if faults or tally.faults else DONE
+
+
+@bench.command(name="attack")
+@click.option("--mutants", default=33_400, show_default=True, type=click.IntRange(min=1), help="Of each kind.")
+@click.option("--seed", default=1, show_default=True, help="Of the mutants.")
+@click.option("--only", type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again.")
+@click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
+@click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that caused a defect.")
+@UPDATE
+def bench_attack(
+    mutants: int, seed: int, only: tuple[str, ...], processes: int, keep: Path | None, update: Path | None
+) -> int:
+    """Runs mutated rig files, runs and command lines, and counts defects."""
+    from bench.attack import HEADER, KINDS, campaign
+
+    kinds = only or KINDS
+    with progress_bar("mutants", mutants * len(kinds)) as advance:
+        tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve())
+    for tally in tallies:
+        for arguments, wrong, number in tally.defects:
+            tell(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
+    put_table(update, "attack", markdown(HEADER, [tally.cells for tally in tallies]))
+    return DIFFERENT if any(tally.defects for tally in tallies) else DONE
+
+
+@bench.command(name="field-log")
+@click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
+@click.option(
+    "--samples", default=3_600_000, show_default=True, type=click.IntRange(min=10_000), help="An hour at 1 kHz."
+)
+@click.option("--out", type=click.Path(path_type=Path), default=Path("field-log.pvlog"), show_default=True)
+def bench_field_log(target: str, samples: int, out: Path) -> int:
+    """An hour in the field, shortened in time: the board killed twice, its line closed once, every segment verified."""
+    from bench.field import field_log
+    from pvid.log.verify import Verdict
+
+    with progress_bar("verifying", samples) as advance:
+        account, stretches = field_log(target, samples, out, advance)
+    verdict = Verdict()
+    for stretch in stretches:
+        click.echo(stretch.text)
+        verdict.add(stretch)
+    click.echo(verdict.text)
+    click.echo(account.text)
+    whole = len(verdict.good) == len(account.segments) and not verdict.different and not account.missing_samples
+    return DONE if whole else DIFFERENT
+
+
+@bench.command(name="year")
+@click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
+@click.option("--core", default="f32", show_default=True, type=click.Choice(["f32", "q31"]))
+@click.option("--form", default="weak", show_default=True, type=click.Choice(["weak", "strong"]))
+@click.option("--samples", default=20_000, show_default=True, help="At each passage.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("year.pvlog"), show_default=True)
+def bench_year(target: str, core: str, form: str, samples: int, out: Path) -> int:
+    """A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page."""
+    from bench.year import emulated_year, passages_of_a_year, rig_of
+
+    if out.exists():
+        raise PvidError(f"{out} exists")
+    rig = rig_of(core, form)
+    passages = tuple(range(1, 1 + passages_of_a_year(rig.sample_rate or 0.0)))
+    with progress_bar("verifying", None) as advance:
+        year = emulated_year(target, passages, samples, out, rig, advance)
+    click.echo(f"{year.passages} passages of 2^32 ticks; {year.verdict.text}")
+    click.echo(year.account.text)
+    for sentence in year.faults:
+        click.echo(f"pvid: {sentence}", err=True)
+    return DIFFERENT if year.faults or not year.verdict.verified else DONE
+
+
+@bench.command(name="side-by-side")
+@UPDATE
+def bench_side_by_side(update: Path | None) -> int:
+    """Every method on the same data: both forms, a Kalman filter, output error (counts need valgrind)."""
+    from bench import cost, side_by_side
+
+    with tempfile.TemporaryDirectory() as folder:
+        counted = {one.stage: one.instructions for one in cost.stage_costs(cost.build(Path(folder)))}
+    with progress_bar("side by side", side_by_side.NUMBER_OF_ROWS) as advance:
+        rows = list(side_by_side.side_by_side(Native(), instructions=counted, progress=advance))
+    put_table(update, "side-by-side", markdown(side_by_side.HEADER, rows))
+    return DONE

@@ -1,0 +1,248 @@
+"""Where it gets hard: noise until the answer fails, little motion, little drive, one mode, friction, large angles.
+
+Every run has an unknown encoder zero of 0.02 rad. What must not happen is a published answer that is far from the
+truth by its own standard errors and raises no alarm.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.native import Native
+from pvid.oracle.weak import sample_sd
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.run.identify import LINEAR, Identification, identify
+from pvid.sim.pendulum import (
+    STANDARD_DRIVE,
+    STANDARD_PENDULUM,
+    STANDARD_RELEASE,
+    Sensors,
+    Tone,
+    Truth,
+    simulate,
+    standard_sensors,
+    standard_start,
+)
+
+Float = npt.NDArray[np.float64]
+
+SEEDS = 40
+RATE_HZ = 1000.0
+ZERO = 0.02  # rad, what the encoder reads at rest
+LARGEST = 0.107  # rad, |phi| of the standard rig (linear equations 0.106, full ones 0.108)
+TRUTH = STANDARD_PENDULUM.linear
+HEADER = (
+    "case",
+    "published",
+    "w %",
+    "d1 %",
+    "d2 %",
+    "s.e. of w %",
+    "in 3 s.e. %",
+    "alarm",
+    "wrong, no alarm",
+    "else held",
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row: the standard rig but for what is said.
+
+    Attributes
+    ----------
+    label : in words
+    bits, noise_lsb : of the encoder
+    told : whether the rig file's phi_lsb speaks of all the noise there is
+    drive : factor on the amplitude of the tones
+    tones : of the pivot, before that factor
+    release : absolute angles at the start [rad]
+    damping : viscous friction of both joints [m^2/s]
+    truth : equations of motion
+    """
+
+    label: str
+    bits: int = 14
+    noise_lsb: float = 0.5
+    told: bool = True
+    drive: float = 1.0
+    tones: tuple[Tone, ...] = STANDARD_DRIVE
+    release: tuple[float, float] = STANDARD_RELEASE
+    damping: float = 0.0
+    truth: Truth = "linear"
+
+    @property
+    def sensors(self) -> Sensors:
+        """With the zero."""
+        return replace(standard_sensors(self.bits), phi_noise_lsb=self.noise_lsb, phi_zero=ZERO)
+
+    @property
+    def rig(self) -> RigFile:
+        """As a user would write it: phi_lsb is that of an encoder with half an LSB of noise and this much in all.
+
+        Sines are corrected where the equations have them.
+        """
+        standard = RigFile.standard()
+        lsb = self.sensors.phi_lsb
+        if self.told:
+            lsb *= sample_sd(1.0, self.noise_lsb) / sample_sd(1.0, 0.5)
+        identifier = replace(standard.identifier, full_angle=self.truth == "full")
+        return replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=lsb))
+
+    def run(self, seed: int, duration: float = 40.0) -> Run:
+        """What the sensors see in `duration` [s]."""
+        pendulum = replace(STANDARD_PENDULUM, damping1=self.damping, damping2=self.damping)
+        tones = tuple(replace(tone, amplitude_m=self.drive * tone.amplitude_m) for tone in self.tones if self.drive)
+        simulation = simulate(
+            pendulum,
+            tones,
+            self.sensors,
+            RATE_HZ,
+            duration,
+            self.release,
+            self.truth,
+            seed,
+        )
+        return simulation.run
+
+
+def modes() -> Float:
+    """Release angles (phi1, phi1 + phi) of the slow and the fast mode with phi = 1 rad, [2, 2]."""
+    w, d1, d2 = TRUTH
+    big_l2 = d1 - d2 - 1
+    stiffness = w * np.array([[1, -big_l2], [-1, big_l2 + d2]])  # of (phi1, phi), MATH.md (1)
+    squares, shapes = np.linalg.eig(stiffness)
+    shapes = shapes[:, np.argsort(squares)]
+    return np.asarray([[shape[0] / shape[1], shape[0] / shape[1] + 1] for shape in shapes.T])
+
+
+def _released(factor: float) -> tuple[float, float]:
+    return factor * STANDARD_RELEASE[0], factor * STANDARD_RELEASE[1]
+
+
+def _in_mode(which: int, phi: float) -> tuple[float, float]:
+    a1, a2 = phi * modes()[which]
+    return float(a1), float(a2)
+
+
+def _cases() -> Iterator[Case]:
+    for bits in range(14, 7, -1):
+        yield Case(f"encoder of {bits} bits", bits=bits)
+    for noise in (1, 2, 4, 8, 16, 32, 64, 128, 256, 512):
+        yield Case(f"14 bits, noise of {noise} LSB", noise_lsb=noise)
+    yield Case("14 bits, noise of 64 LSB, phi_lsb says 0.58", noise_lsb=64, told=False)
+    for bits, factors in ((14, (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)), (12, (0.2, 0.1, 0.05))):
+        for factor in factors:
+            largest = LARGEST * factor / standard_sensors(bits).phi_lsb
+            shown = f"{largest:.0f}" if largest > 10 else f"{largest:.1f}"
+            label = f"start x{factor:g}, angle up to {shown} LSB, {bits} bits"
+            yield Case(label, release=_released(factor), bits=bits)
+    for bits in (14, 12):
+        for factor in (0.3, 0.1, 0.03, 0.01):
+            yield Case(f"drive x{factor:g}, {bits} bits", drive=factor, bits=bits)
+    yield Case("no drive, free swing", drive=0.0)
+    yield Case("no drive, no motion", drive=0.0, release=(0.0, 0.0))
+    yield Case("drive, no motion", release=(0.0, 0.0))
+    slow, fast = _in_mode(0, 0.08), _in_mode(1, 0.05)
+    for bits in (16, 14, 12):
+        yield Case(f"slow mode only, one tone, {bits} bits", tones=(Tone(6e-3, 1.1, 0.3),), release=slow, bits=bits)
+        yield Case(f"slow mode only, {bits} bits", release=slow, bits=bits)
+        yield Case(f"fast mode only, {bits} bits", release=fast, bits=bits)
+    for damping in (3e-6, 1e-5, 3e-5, 1e-4, 3e-4):
+        yield Case(f"friction of {damping:g} m^2/s, 14 bits", damping=damping)
+    yield Case("friction of 0.0001 m^2/s, 12 bits", damping=1e-4, bits=12)
+    for factor in (0.25, 0.5, 1.0):
+        yield Case(f"full equations, {LARGEST * factor:.3f} rad, 14 bits", release=_released(factor), truth="full")
+    for factor in (0.5, 1.0):
+        yield Case(
+            f"full equations, {LARGEST * factor:.3f} rad, 12 bits", release=_released(factor), truth="full", bits=12
+        )
+
+
+CASES = tuple(_cases())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the runs of a case.
+
+    Attributes
+    ----------
+    published, alarmed : [seeds]
+    errors, standard_errors : of w, d1, d2, relative to the truth [seeds, 3], published or not
+    held : status of the runs that were not published
+    """
+
+    published: npt.NDArray[np.bool_]
+    alarmed: npt.NDArray[np.bool_]
+    errors: Float
+    standard_errors: Float
+    held: tuple[str, ...]
+
+    @property
+    def covered(self) -> npt.NDArray[np.bool_]:
+        """Truths within 3 standard errors, [seeds, 3]."""
+        return np.asarray(np.abs(self.errors) <= 3 * self.standard_errors)
+
+    @property
+    def wrong(self) -> int:
+        """Runs that publish, raise no alarm, and have w, d1 or d2 beyond 3 standard errors."""
+        return int((self.published & ~self.alarmed & ~self.covered.all(axis=1)).sum())
+
+
+def run_case(
+    native: Native, case: Case, seeds: int = SEEDS, progress: Callable[[int], None] = lambda _: None
+) -> Outcome:
+    """All seeds of a case through `identify`; progress is told the runs done."""
+    results: list[Identification] = []
+    for seed in range(seeds):
+        progress(seed)
+        results.append(identify(case.run(seed), case.rig, native, start=standard_start(seed)))
+    values = np.array([[result.value[name] for name in LINEAR] for result in results])
+    standard_errors = np.array([[result.se[name] for name in LINEAR] for result in results])
+    return Outcome(
+        published=np.array([result.identified for result in results]),
+        alarmed=np.array([result.alarm for result in results]),
+        errors=values / TRUTH - 1,
+        standard_errors=standard_errors / TRUTH,
+        held=tuple(result.verdict for result in results if not result.identified),
+    )
+
+
+def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
+    """The outcome as text; RMS errors, median standard error and coverage are those of the published runs."""
+    shown = outcome.published
+    runs = len(shown)
+    figures = ["-"] * 5
+    if shown.any():
+        rms = 100 * np.sqrt(np.mean(np.square(outcome.errors[shown]), axis=0))
+        middle = 100 * float(np.median(outcome.standard_errors[shown, 0]))
+        covered = 100 * outcome.covered[shown].mean(axis=0)
+        figures = [*(f"{value:.2g}" for value in (*rms, middle)), "/".join(f"{share:.0f}" for share in covered)]
+    reasons = Counter(outcome.held).most_common(1)
+    return (
+        case.label,
+        f"{shown.sum()}/{runs}",
+        *figures,
+        f"{(shown & outcome.alarmed).sum()}/{shown.sum()}" if shown.any() else "-",
+        str(outcome.wrong),
+        reasons[0][0] if reasons else "",
+    )
+
+
+def hard_table(
+    native: Native, seeds: int = SEEDS, progress: Callable[[int], None] = lambda _: None
+) -> Iterator[tuple[str, ...]]:
+    """All rows; progress is told the runs done."""
+    for place, case in enumerate(CASES):
+
+        def advance(done: int, before: int = place * seeds) -> None:
+            progress(before + done)
+
+        yield row(case, run_case(native, case, seeds, advance))

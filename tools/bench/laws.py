@@ -1,0 +1,138 @@
+"""The two laws and their limits, on exact derivatives: MATH.md 4's table, measured again in the C core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.native import EstimatorConfig, Law, Native
+from pvid.rig.file import RigFile
+from pvid.setup.f32 import bank_of, estimator_config
+from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_start
+
+STANDARD_SAMPLE_RATE = 1000.0  # Hz
+
+Float32 = npt.NDArray[np.float32]
+
+RUNS = 40
+PRIORS = (1e3, 1e4, 3e4, 1e5, 3e5, 1e6)  # row_sd [rad/s^8]: H0 = (row_sd / start_sd)^2
+FEEDBACKS_HZ = (1.1, 3.0, 10.0, 100.0)
+START_ERRORS = (0.02, 0.05, 0.10, 0.20, 0.50)
+
+
+@dataclass(frozen=True)
+class LawRow:
+    """Outcome of `runs` starts: how many end within 1 % and 0.01 % in w, d1, d2, and when they settle within 1 %."""
+
+    law: str
+    setting: str
+    start: str
+    runs: int
+    within_1_percent: int
+    within_hundredth: int
+    median_error: float
+    worst_error: float
+    slowest_s: float
+
+    def cells(self) -> tuple[str, ...]:
+        """The row as text; errors in per cent."""
+        return (
+            self.law,
+            self.setting,
+            self.start,
+            f"{self.within_1_percent}/{self.runs}",
+            f"{self.within_hundredth}/{self.runs}",
+            f"{100 * self.median_error:.2g}",
+            f"{100 * self.worst_error:.2g}",
+            f"{self.slowest_s:.1f}" if np.isfinite(self.slowest_s) else "-",
+        )
+
+
+HEADER = (
+    "law",
+    "setting",
+    "start off",
+    "< 1 %",
+    "< 0.01 %",
+    "median error %",
+    "worst %",
+    "slowest to 1 % [s]",
+)
+
+
+def exact_rows(native: Native) -> tuple[Float32, Float32]:
+    """Rows of the standard rig from exact derivatives: N [ticks, 11], Y [ticks]."""
+    exact = simulate(truth="linear").exact
+    assert exact is not None  # the linear truth always has it
+    return native.strong_rows(exact.phi, exact.u)
+
+
+def _settings(start: npt.ArrayLike, **changes: object) -> EstimatorConfig:
+    rig = RigFile.standard()
+    rig = replace(rig, identifier=replace(rig.identifier, form="strong", kappa_min=0.0))
+    config = estimator_config(rig, bank_of(rig, STANDARD_SAMPLE_RATE), start)
+    return replace(config, **changes)  # type: ignore[arg-type]
+
+
+def run_law(
+    native: Native,
+    n: Float32,
+    y: Float32,
+    starts: npt.NDArray[np.float64],
+    labels: tuple[str, str, str],
+    changes: dict[str, object],
+) -> LawRow:
+    """One row of the table, labelled (law, setting, start): every start [runs, 3] with the settings in `changes`."""
+    truth = STANDARD_PENDULUM.linear
+    last, settled = [], []
+    for one in starts:
+        core = native.estimator(_settings(one, **changes), STANDARD_SAMPLE_RATE)
+        record = core.run(n, y, sums=False, hashes=False)
+        error = np.abs(record.p / truth - 1).max(axis=1)
+        outside = np.flatnonzero(error > 0.01)
+        last.append(error[-1])
+        settled.append((outside[-1] + 1) / STANDARD_SAMPLE_RATE if len(outside) else 0.0)
+    errors = np.array(last)
+    good = errors < 0.01
+    return LawRow(
+        *labels,
+        len(starts),
+        int(good.sum()),
+        int((errors < 1e-4).sum()),
+        float(np.median(errors)),
+        float(errors.max()),
+        float(np.array(settled).max()) if good.all() else float("inf"),
+    )
+
+
+def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None) -> Iterator[LawRow]:
+    """All rows: both laws from +-50 %, over priors and feedback rates, then by the size of the start's error."""
+    n, y = exact_rows(native)
+    truth = STANDARD_PENDULUM.linear
+    anywhere = np.array([standard_start(seed) for seed in range(RUNS)])
+    jobs: list[tuple[npt.NDArray[np.float64], str, str, str, dict[str, object]]] = []
+    for row_sd in PRIORS:
+        changes: dict[str, object] = {"law": Law.PSEUDOVELOCITY, "row_sd": row_sd}
+        jobs.append((anywhere, "pseudovelocity", f"row_sd {row_sd:.0e}", "+-50 %", changes))
+    for hz in FEEDBACKS_HZ:
+        changes = {"law": Law.STATIONARY, "feedback_hz": hz}
+        jobs.append((anywhere, "stationary", f"feedback {hz:g}/s", "+-50 %", changes))
+    changes = {"law": Law.STATIONARY, "feedback_hz": 0.0}
+    jobs.append((anywhere, "stationary", "Gauss-Newton every tick", "+-50 %", changes))
+    for size in START_ERRORS:
+        signs = np.sign(np.random.default_rng(0).uniform(-1, 1, (RUNS, 3)))
+        # outside the physical region d1 - d2 > 1 a start is no pendulum: such signs are turned round
+        starts = truth * (1 + size * signs)
+        starts[starts[:, 1] - starts[:, 2] <= 1, 1:] = truth[1:] * (1 + size)
+        off = f"{100 * size:g} %"
+        jobs.append((starts, "pseudovelocity", "row_sd 1e+05", off, {"law": Law.PSEUDOVELOCITY, "row_sd": 1e5}))
+        jobs.append((starts, "stationary", "feedback 10/s", off, {"law": Law.STATIONARY, "feedback_hz": 10.0}))
+    for done, (starts, law, setting, off, changes) in enumerate(jobs):
+        progress(done)
+        yield run_law(native, n, y, starts, (law, setting, off), changes)
+
+
+NUMBER_OF_ROWS = len(PRIORS) + len(FEEDBACKS_HZ) + 1 + 2 * len(START_ERRORS)

@@ -1,0 +1,380 @@
+"""How long it lives: millions of ticks of every disturbance and forgetting, beside textbook and UD least squares.
+
+Looked for: anything that is not finite; a matrix S that is not positive without a reason told; an answer that is far
+from the truth by its own standard errors, long after the disturbance is over, and says nothing. Samples are made and
+played in chunks: memory does not grow with the ticks.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.longevity_signals import CHUNK, L1, RATE_HZ, Disturbance, Sensing, Signals
+from pvid.base.errors import PvidError
+from pvid.board.boards import ROOT
+from pvid.core.native import (
+    SIZES,
+    Native,
+    Reason,
+    StrongIdentifier,
+    WeakIdentifier,
+    default_library,
+    strong_config_struct,
+)
+from pvid.core.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
+from pvid.rig.file import RigFile
+from pvid.run.compare_q31 import identifier_q31
+from pvid.setup.f32 import strong_config, weak_config
+from pvid.setup.q31 import ConfigQ31, config_of_q31, counts_of_samples, p_of, se_of
+from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Tone
+
+Float = npt.NDArray[np.float64]
+
+LIBRARY = "liblongevity.so"
+STRIDE = 8  # ticks between the points of the strong form's Savitzky-Golay filters
+STRONG_FORGETTING_S = (0.1, 1.0, 10.0, 100.0, 0.0)
+WEAK_FORGETTING_S = (10.0, 100.0, 0.0)  # a group is a window of 0.62 s: below four of them init refuses
+PEERS = ("RLS", "UD RLS")
+ENCODER = Sensing()
+EXACT = Sensing(phi_lsb=0.0, y_lsb=0.0, zero=0.0)
+FINE = Sensing(phi_lsb=2 * np.pi / 2**22, y_lsb=2e-8, zero=0.0)  # integers have to count in something
+JUDGED = (
+    Reason.UPDATED,
+    Reason.MISFIT,
+    Reason.HELD_NOT_EXCITED,
+    Reason.HELD_PIVOT,
+    Reason.HELD_UNCERTAIN,
+    Reason.HELD_OUT_OF_RANGE,
+    Reason.REJECTED_OUTLIER,
+)
+BACK = 3.0  # standard errors
+# What the strong form's filter makes of the standard rig, relative, of w, d1, d2, and of which the standard errors know
+# nothing; see `filter_bias`.
+FILTER_BIAS = {"weak": (0.0, 0.0, 0.0), "strong": (0.0015, 0.0015, 0.0035)}
+
+
+@dataclass(frozen=True)
+class Lane:
+    """One estimator: `kind` weak, strong, RLS or UD RLS; forgetting_s 0: none; of ours in float32 or fixed point, with
+    the outlier gate as a rig file has it that does not say, or without; the strong form with exact sensors or with
+    FINE ones, as in fixed point always."""
+
+    kind: str
+    forgetting_s: float
+    gated: bool = True
+    core: str = "f32"
+    fine: bool = False
+
+    @property
+    def label(self) -> str:
+        """As the tables name it."""
+        time = f"{self.forgetting_s:g} s" if self.forgetting_s else "none"
+        more = ("" if self.gated else ", no gate") + (", 22 bits" if self.fine else "")
+        return f"{self.kind}{' q31' * (self.core == 'q31')}, {time}{more}"
+
+    @property
+    def sensing(self) -> Sensing:
+        """The weak form takes a 14-bit encoder, the others an exact or a fine one: they need it."""
+        if self.kind == "weak":
+            return ENCODER
+        return FINE if self.fine or self.core == "q31" else EXACT
+
+
+WEAK_LANES = (*(Lane("weak", tau) for tau in WEAK_FORGETTING_S), Lane("weak", 0.0, gated=False))
+STRONG_LANES = (
+    *(Lane("strong", tau) for tau in STRONG_FORGETTING_S),
+    *(Lane("strong", tau, gated=False) for tau in (10.0, 0.0)),
+)
+WEAK_Q31_LANES = tuple(Lane("weak", tau, core="q31") for tau in WEAK_FORGETTING_S)
+STRONG_Q31_LANES = tuple(Lane("strong", tau, core="q31") for tau in (10.0, 0.0))
+FINE_LANES = tuple(Lane("strong", tau, fine=True) for tau in (10.0, 0.0))
+PEER_LANES = tuple(Lane(kind, tau) for kind in PEERS for tau in STRONG_FORGETTING_S)
+# What is measured together, by the name of its columns.
+COLUMNS = {
+    "weak": WEAK_LANES,
+    "strong": STRONG_LANES,
+    "weak-q31": WEAK_Q31_LANES,
+    "strong-q31": STRONG_Q31_LANES,
+    "strong-fine": FINE_LANES,
+    "peers": PEER_LANES,
+}
+OURS = tuple(name for name in COLUMNS if name != "peers")
+
+
+@dataclass
+class Outcome:
+    """What became of a lane.
+
+    Attributes
+    ----------
+    ticks : done; fewer than asked for where a peer was no number any more
+    not_finite : ticks and looks at which anything was not finite
+    singular : looks at which p had just stepped and S with what the start brings along was not positive
+    error_before, error_after : of w, per cent, before the disturbance and at the end
+    errors : largest error of w, d1, d2 at the end, in its own standard errors, beyond FILTER_BIAS
+    told : how the last windows or ticks ended
+    disturbed : how they ended in the disturbance, by reason
+    """
+
+    ticks: int = 0
+    not_finite: int = 0
+    singular: int = 0
+    error_before: float = float("nan")
+    error_after: float = float("nan")
+    errors: float = float("nan")
+    told: str = ""
+    disturbed: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def silent(self) -> bool:
+        """Far from the truth, and nothing told."""
+        return self.told == Reason.UPDATED.text and not self.errors <= BACK
+
+
+def rig_of(lane: Lane) -> RigFile:
+    """The standard rig with the lane's settings; the strong form with a filter that is cheap enough for 10^7 ticks.
+
+    The signals are those of linear equations: no sines are corrected.
+    """
+    rig = RigFile.standard()
+    settings = replace(
+        rig.identifier,
+        full_angle=False,
+        forgetting_s=lane.forgetting_s,
+        outlier_gate=None if lane.gated else 0.0,
+        core=lane.core,  # type: ignore[arg-type]
+    )
+    sensor = replace(rig.sensor, phi_lsb=lane.sensing.phi_lsb, y_lsb=lane.sensing.y_lsb)
+    if lane.kind != "weak":
+        settings = replace(settings, form="strong", stride=STRIDE)
+    return replace(rig, identifier=settings, sensor=sensor)
+
+
+@cache
+def config_q31_of(lane: Lane) -> ConfigQ31:
+    """Settings of a lane in fixed point, of which the design takes a second."""
+    return config_of_q31(rig_of(lane), RATE_HZ)
+
+
+class _Ours(ABC):
+    """A lane of the shipped core."""
+
+    identifier: WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdentifierQ31
+
+    def __init__(self, lane: Lane) -> None:
+        self.bias = FILTER_BIAS[lane.kind]
+        self.outcome = Outcome()
+        self._lately: list[int] = []
+
+    @abstractmethod
+    def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
+        """Reasons, and ticks at which p was not finite."""
+
+    @abstractmethod
+    def look(self) -> tuple[Float, Float]:
+        """(w, d1, d2) and their standard errors, as a user sees them."""
+
+    def run(self, phi: Float, y: Float, disturbed: bool) -> None:
+        """One chunk, and a look."""
+        told, not_finite = self._play(phi, y)
+        outcome = self.outcome
+        outcome.ticks += len(phi)
+        outcome.not_finite += not_finite + sum(not np.isfinite(seen).all() for seen in self.look())
+        if disturbed:
+            counts = Counter(outcome.disturbed) + Counter(Reason(r).text for r in told[told != Reason.ACCUMULATED])
+            outcome.disturbed = dict(counts)
+        judged = told[np.isin(told, JUDGED)]
+        self._lately = [*self._lately, *judged[-8:].tolist()][-8:]
+        last = Reason(self._lately[-1]) if self._lately else Reason.WARMING_UP
+        if last is Reason.UPDATED and not (self.identifier.assess()["se"][: self.identifier.n_p] > 0).all():
+            outcome.singular += 1
+
+    def compare(self, w: float, at_end: bool) -> None:
+        """Notes the error against the truth."""
+        p, se = self.look()
+        truth = np.array([w, *STANDARD_PENDULUM.linear[1:3]])
+        error = 100 * (float(p[0]) / w - 1)
+        if not at_end:
+            self.outcome.error_before = error
+            return
+        self.outcome.error_after = error
+        beyond = np.maximum(np.abs(p - truth) - np.array(self.bias) * truth, 0.0)
+        self.outcome.errors = float(np.max(beyond / se))
+        alarms = [r for r in self._lately if r == Reason.MISFIT]
+        self.outcome.told = Reason(alarms[-1] if alarms else (self._lately or [Reason.WARMING_UP])[-1]).text
+
+
+class _InFloat(_Ours):
+    """In float32."""
+
+    identifier: WeakIdentifier | StrongIdentifier
+
+    def __init__(self, native: Native, lane: Lane) -> None:
+        super().__init__(lane)
+        rig = rig_of(lane)
+        weak = lane.kind == "weak"
+        self.identifier = native.weak(weak_config(rig, RATE_HZ)) if weak else native.strong(strong_config(rig, RATE_HZ))
+
+    def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
+        record = self.identifier.run(phi, y, sums=False, hashes=False)
+        return record.reason, int((~np.isfinite(record.p).all(axis=1)).sum())
+
+    def look(self) -> tuple[Float, Float]:
+        one = self.identifier
+        seen = one.estimate if isinstance(one, WeakIdentifier) else one.assess()
+        return seen["p"][:3].astype(np.float64), seen["se"][:3].astype(np.float64)
+
+
+class _InFixedPoint(_Ours):
+    """In integers, which are always finite."""
+
+    identifier: WeakIdentifierQ31 | StrongIdentifierQ31
+
+    def __init__(self, native: Native, lane: Lane) -> None:
+        super().__init__(lane)
+        self._sensing = lane.sensing
+        self._config = config_q31_of(lane)
+        self.identifier = identifier_q31(native, self._config)
+
+    def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
+        sensing = self._sensing
+        record = self.identifier.run(
+            counts_of_samples(phi, sensing.phi_lsb), counts_of_samples(y, sensing.y_lsb), sums=False, hashes=False
+        )
+        return record.reason, 0
+
+    def look(self) -> tuple[Float, Float]:
+        one = self.identifier
+        seen = one.estimate if isinstance(one, WeakIdentifierQ31) else one.assess()
+        n_p = one.n_p
+        return p_of(self._config, seen["p"][:n_p])[:3], se_of(self._config, seen["se"][:n_p])[:3]
+
+
+class _Peer:
+    """A lane of a baseline."""
+
+    def __init__(self, library: ctypes.CDLL, lane: Lane) -> None:
+        self._library = library
+        self.outcome = Outcome()
+        self.alive = True
+        size = ctypes.c_uint32.in_dll(library, "longevity_peer_bytes").value
+        self._state = ctypes.create_string_buffer(size)
+        w, d1, d2 = STANDARD_PENDULUM.linear
+        theta = [w, w**2, *(d1 * w**j for j in range(4)), *(d2 * w**j for j in range(5))]
+        lam = float(np.exp(-1 / (RATE_HZ * lane.forgetting_s))) if lane.forgetting_s else 1.0
+        config, self._tables = strong_config_struct(strong_config(rig_of(Lane("strong", 0.0)), RATE_HZ))
+        made = library.longevity_peer_init(
+            self._state,
+            ctypes.c_bool(lane.kind == "UD RLS"),
+            ctypes.c_float(lam),
+            ctypes.byref(config.bank),
+            ctypes.c_float(RATE_HZ),
+            ctypes.c_float(L1),
+            (ctypes.c_float * 11)(*theta),
+            ctypes.c_float(2e5),
+        )
+        if not made:
+            raise PvidError("the baseline's differentiator was refused")
+
+    def run(self, phi: Float, y: Float, disturbed: bool) -> None:
+        """One chunk, up to where it is no number any more."""
+        del disturbed
+        if not self.alive:
+            return
+        samples = [np.ascontiguousarray(x, np.float32) for x in (phi, y)]
+        pointers = [ctypes.c_void_p(a.ctypes.data) for a in samples]
+        done = int(self._library.longevity_peer_run(self._state, ctypes.c_uint32(len(phi)), *pointers))
+        self.outcome.ticks += done
+        self.alive = done == len(phi)
+        self.outcome.not_finite = 0 if self.alive else 1
+
+    def compare(self, w: float, at_end: bool) -> None:
+        """Notes the error against the truth."""
+        function = self._library.longevity_peer_w
+        function.restype = ctypes.c_float
+        error = 100 * (float(function(self._state)) / w - 1)
+        if at_end:
+            self.outcome.error_after = error
+        else:
+            self.outcome.error_before = error
+
+
+def build_library(folder: Path) -> ctypes.CDLL:
+    """The motion and the baselines of tests/longevity, built with the core's options into `folder`.
+
+    What they take of the core comes from the library that is measured.
+    """
+    include, here, cost = (ROOT / name for name in ("firmware/include", "tests/longevity", "tests/cost"))
+    sources = [*sorted(here.glob("*.c")), cost / "rls_f32.c"]
+    library, core = folder / LIBRARY, default_library().resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=default"]
+    command += SIZES
+    command += [f"-I{path}" for path in (include, here, cost)]
+    linked = [str(core), f"-Wl,-rpath,{core.parent}", "-lm"]
+    try:
+        done = subprocess.run(
+            [*command, *map(str, sources), *linked, "-o", str(library)], capture_output=True, text=True, check=False
+        )
+    except OSError as error:
+        raise PvidError(f"cannot run gcc: {error.strerror}") from error
+    if done.returncode != 0:
+        raise PvidError(f"gcc refused the baselines: {done.stderr.strip()[:200]}")
+    return ctypes.CDLL(str(library))
+
+
+def _player(native: Native, library: ctypes.CDLL, lane: Lane) -> _Ours | _Peer:
+    if lane.kind in PEERS:
+        return _Peer(library, lane)
+    return _InFixedPoint(native, lane) if lane.core == "q31" else _InFloat(native, lane)
+
+
+def measure(
+    native: Native,
+    library: ctypes.CDLL,
+    disturbance: Disturbance,
+    lanes: Sequence[Lane],
+    ticks: int,
+) -> dict[str, Outcome]:
+    """Outcomes of the lanes by label."""
+    outcomes = {}
+    for sensing in dict.fromkeys(lane.sensing for lane in lanes):
+        mine = [lane for lane in lanes if lane.sensing == sensing]
+        players = [_player(native, library, lane) for lane in mine]
+        signals = Signals(library, disturbance, ticks, sensing)
+        compared = False
+        tick = 0
+        for phi, y in signals.chunks():
+            if not compared and tick >= signals.first:
+                for one in players:
+                    one.compare(signals.w(signals.first - 1), at_end=False)
+                compared = True
+            for one in players:
+                one.run(phi, y, disturbed=signals.first < tick + len(phi) and tick < signals.last)
+            tick += len(phi)
+        for lane, one in zip(mine, players, strict=True):
+            one.compare(signals.w(ticks), at_end=True)
+            outcomes[lane.label] = one.outcome
+    return outcomes
+
+
+def filter_bias(native: Native, library: ctypes.CDLL, change: float, drive: tuple[Tone, ...] = STANDARD_DRIVE) -> Float:
+    """Errors of w, d1, d2, relative, of the strong form without forgetting after 80 s of exact samples of a rig whose w
+    is changed by this factor: what FILTER_BIAS is to cover."""
+    lane = Lane("strong", 0.0)
+    signals = Signals(library, Disturbance("step", "", change=change, drive=drive), 5 * CHUNK, lane.sensing)
+    player = _InFloat(native, lane)
+    for phi, y in list(signals.chunks())[1:]:
+        player.run(phi, y, disturbed=False)
+    truth = np.array([signals.w(signals.ticks), *STANDARD_PENDULUM.linear[1:3]])
+    return np.asarray(np.abs(player.look()[0] / truth - 1))

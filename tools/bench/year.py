@@ -1,0 +1,223 @@
+"""A year in the field: a board whose tick counter passes 2^32 again and again is recorded, verified, exported, drawn.
+
+Nobody waits for a year: each session's counter is started shortly before it passes (Configure.first_tick), so that the
+firmware itself, the link and all that reads the log see every passage of a year at 1 kHz.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.board.stream_image import settings_number
+from pvid.board.stream_rig import stream_rig
+from pvid.board.target import HOST_TARGET, open_target
+from pvid.link.frames import Configuration, Raw, RawCount, Source
+from pvid.log.export import FORMATS, export_log
+from pvid.log.file import Segment
+from pvid.log.reader import Account, LogReader
+from pvid.log.recorder import EmulatorSource, Logger
+from pvid.log.values import Rows, Values
+from pvid.log.verify import Verdict, Verifier
+from pvid.rig.file import RigFile
+from pvid.show.page_state import LiveState
+from pvid.show.report import recording_of, write_report
+
+TURN = 1 << 32
+_SOON_NS = 600 * 10**9  # from the link's coming up to the first sample
+YEAR_S = 365.25 * 86_400
+
+
+@dataclass(frozen=True)
+class Year:
+    """What became of the recording. `faults` are sentences, none where all is well."""
+
+    account: Account
+    verdict: Verdict
+    passages: int
+    faults: tuple[str, ...]
+
+
+def passages_of_a_year(sample_rate: float) -> int:
+    """How often the low 32 bits of the tick pass 2^32 in a year."""
+    return int(YEAR_S * sample_rate / TURN)
+
+
+def emulated_year(
+    name: str,
+    passages: tuple[int, ...],
+    samples: int,
+    log: Path,
+    rig: RigFile,
+    progress: Callable[[int], None] | None = None,
+) -> Year:
+    """Records, verifies, exports and draws passages of 2^32 ticks.
+
+    Parameters
+    ----------
+    name
+        Of the emulator, or stream-host.
+    passages
+        Which of them, from 1: the tick passes that many times 2^32.
+    samples
+        At least so many at each passage; the counter starts half of them before it.
+    log
+        Where; what it is exported to comes beside it.
+    progress
+        Called with the ticks verified so far.
+
+    Raises
+    ------
+    PvidError
+        When the recording fails.
+    """
+    if rig.sample_rate is None:
+        raise PvidError("the rig file has no sample_rate")
+    board = stream_rig(rig, rig.sample_rate)
+    settings = settings_number(board)
+    every = max(1, round(rig.sample_rate / 10))
+    source = Source.SENSOR if name == HOST_TARGET else Source.SENSOR_PACED  # this machine sends a hundred times as many
+
+    def configure(passage: int) -> Configuration:
+        return board.configure(settings, every, every, source, passage * TURN - samples // 2)
+
+    for passage in passages:
+        Logger(
+            source=EmulatorSource(name, lambda: open_target(name, board)),
+            out=log,
+            rig=rig.text(),
+            append=True,
+            samples=samples,
+            begin=lambda passage=passage: configure(passage),  # type: ignore[misc]
+            anew=True,
+        ).run()
+    verdict = Verdict()
+    reader = LogReader(log)
+    for stretch in Verifier(rig, progress).stretches(reader):
+        verdict.add(stretch)
+    crossed = [*_crossed(log)]
+    faults = [] if crossed == [*passages] else [f"passages {crossed} of {[*passages]} are in the log"]
+    if verdict.different or verdict.left:
+        faults.append(verdict.text)
+    if reader.account.missing_samples or reader.account.restarts:
+        faults.append(reader.account.text)
+    faults += _faults_of_board(log)
+    faults += _faults_of_times(log, rig)
+    faults += _faults_of_exports(log, rig)
+    faults += _faults_of_page(log)
+    write_report(recording_of(log, rig), log.with_suffix(".png"))
+    return Year(reader.account, verdict, len(crossed), tuple(faults))
+
+
+def _crossed(log: Path) -> Iterator[int]:
+    """Every passage with samples on both sides, in one row."""
+    before: tuple[int, int] | None = None  # segment and tick behind the last sample
+    for record in LogReader(log):
+        if isinstance(record.item, Raw | RawCount):
+            first = record.tick if before != (record.segment, record.tick) else record.tick - 1
+            before = record.segment, record.tick + record.item.count
+            if (before[1] - 1) // TURN > first // TURN:
+                yield (before[1] - 1) // TURN
+
+
+def _samples(log: Path, rig: RigFile) -> Iterator[Rows]:
+    values = Values(rig.l1)
+    for record in LogReader(log):
+        for rows in values.rows(record):
+            if rows.table == "samples":
+                yield rows
+
+
+def _faults_of_board(log: Path) -> Iterator[str]:
+    """Of the firmware: the upper bits of the tick in every frame, also of samples on both sides of a passage."""
+    for record in LogReader(log):
+        high = getattr(record.item, "tick_high", None)
+        if high is not None and high != record.tick // TURN:
+            yield f"a frame of tick {record.tick} has the upper bits {high}"
+
+
+def _began(log: Path, number: int) -> int:
+    """Unix time of a segment [ns]."""
+    found = (record for record in LogReader(log) if isinstance(record.item, Segment))
+    return next(record.unix_ns for record in found if record.segment == number)
+
+
+def _faults_of_times(log: Path, rig: RigFile) -> Iterator[str]:
+    """Of the columns that exports, views and tee share: a step of a tick in t and in log_time, within a segment."""
+    assert rig.sample_rate is not None
+    latest: dict[str, int | float] = {}
+    for rows in _samples(log, rig):
+        columns = rows.columns
+        if not np.array_equal(columns["t"], columns["tick"] / rig.sample_rate):
+            yield f"t is no multiple of a tick at tick {columns['tick'][0]}"
+        same = latest.get("segment") == columns["segment"][0]
+        for name, step in (("tick", 1), ("t", 1 / rig.sample_rate), ("log_time", 1e9 / rig.sample_rate)):
+            column = columns[name] if not same else np.concatenate([[latest[name]], columns[name]])
+            if np.any(np.abs(np.diff(column) - step) > 0.01 * step):
+                yield f"{name} does not go on by a tick at tick {columns['tick'][0]}"
+            latest[name] = columns[name][-1]
+        if not same and abs(int(columns["log_time"][0]) - _began(log, int(columns["segment"][0]))) > _SOON_NS:
+            yield f"log_time of segment {columns['segment'][0]} begins at {columns['log_time'][0]}"
+        latest["segment"] = columns["segment"][-1]
+
+
+def _faults_of_exports(log: Path, rig: RigFile) -> Iterator[str]:
+    """Of every format: the ticks of the samples that stand in it."""
+    expected = np.concatenate([rows.columns["tick"] for rows in _samples(log, rig)])
+    for form, read in {"csv": _ticks_of_csv, "npz": _ticks_of_npz, "parquet": _ticks_of_parquet, "mcap": _mcap}.items():
+        files = export_log(log, form, log.with_suffix(""), rig.l1)
+        if not np.array_equal(read(files), expected):
+            yield f"{form} has other ticks than the log"
+    if set(FORMATS) != {"csv", "npz", "parquet", "mcap"}:
+        yield f"formats that nobody looked at: {sorted(FORMATS)}"
+
+
+def _of_samples(files: list[Path]) -> Path:
+    return next(one for one in files if "samples" in one.name)
+
+
+def _ticks_of_csv(files: list[Path]) -> Any:
+    with _of_samples(files).open(newline="") as file:
+        return np.array([int(row["tick"]) for row in csv.DictReader(file)])
+
+
+def _ticks_of_npz(files: list[Path]) -> Any:
+    with np.load(files[0]) as arrays:
+        return arrays["tick"]
+
+
+def _ticks_of_parquet(files: list[Path]) -> Any:
+    from pyarrow import parquet
+
+    return parquet.read_table(_of_samples(files), columns=["tick"])["tick"].to_numpy()
+
+
+def _mcap(files: list[Path]) -> Any:
+    from mcap.reader import make_reader
+
+    with files[0].open("rb") as file:
+        found = make_reader(file).iter_messages(topics=["/samples"], log_time_order=False)
+        return np.array([json.loads(message.data)["tick"] for _, _, message in found])
+
+
+def _faults_of_page(log: Path) -> Iterator[str]:
+    """Of the live page: a time axis that goes on through the last passage."""
+    state = LiveState(log, "a year")
+    state.take(log.read_bytes())
+    motion = json.loads(state.as_json())["motion"]["phi"]["t"]
+    if not motion or np.any(np.diff(motion) < 0) or motion[-1] == motion[0]:
+        yield "the page's time axis does not go on"
+
+
+def rig_of(core: str, form: str) -> RigFile:
+    """The standard rig with that core and form."""
+    rig = RigFile.standard()
+    settings: dict[str, Any] = {"core": core, "form": form}
+    return replace(rig, identifier=replace(rig.identifier, **settings))
