@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate
 from pvid.rig.file import RigFile
+from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate
 
 DOCS = ROOT / "host" / "docs"
 README = ROOT / "README.md"
