@@ -30,7 +30,7 @@ from units import FIRMWARE, PORTS, ROOT, Unit, applications, chosen, core, deman
 
 DEVIATIONS = ROOT / "firmware" / "analysis.toml"
 PAGE = ROOT / "firmware" / "MISRA.md"
-FOLDERS = [FIRMWARE / name for name in ("src", "link", "ports", "apps")]
+FOLDERS = [FIRMWARE / name for name in ("src", "models", "link", "ports", "apps")]
 ASSERT = ["-include", "assert.h", "-DPVID_ASSERT(condition)=assert(condition)"]  # tells a tool what a caller owes
 BUILD = ROOT / "build" / "analysis"
 GCC = {  # by family: the compiler, and what it needs to be told of the processor

@@ -29,13 +29,14 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import playback  # noqa: E402 - of tests
 
+from pvid.core import sources  # noqa: E402
 from pvid.core.native import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "coverage"
 PAGE = ROOT / "tests" / "COVERAGE.md"
 REASONS = ROOT / "tests" / "coverage.toml"
 FIRMWARE = ROOT / "firmware"
-INCLUDES = [f"-I{FIRMWARE / name}" for name in ("include", "src", "link")]
+INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
@@ -73,7 +74,7 @@ def run(*command: str | Path, **environment: str) -> str:
 def build() -> list[Path]:
     """The core with counters, as the CMocka programs and the shared library have it; returns the programs."""
     shutil.rmtree(BUILD, ignore_errors=True)
-    core = [*sorted((FIRMWARE / "src").glob("*.c")), FIRMWARE / "link" / "link.c"]
+    core = [*sources.core_sources(), FIRMWARE / "link" / "link.c"]
     tests = playback.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))
     jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, "--coverage"]) for path in core]
@@ -96,7 +97,10 @@ def build() -> list[Path]:
 
 def measured() -> list[File]:
     """What the counters of all runs say."""
-    filters = ["--filter", "firmware/src", "--filter", "firmware/link", "--exclude-unreachable-branches"]
+    filters = [
+        *("--filter", "firmware/src", "--filter", "firmware/models", "--filter", "firmware/link"),
+        "--exclude-unreachable-branches",
+    ]
     run("gcovr", "-r", ".", "--object-directory", BUILD, *filters, "--json", BUILD / "coverage.json", BUILD)
     with (BUILD / "coverage.json").open(encoding="utf-8") as file:
         found: dict[str, Any] = json.load(file)
@@ -138,9 +142,10 @@ def page_of(files: list[File]) -> str:
     return f"""<!-- Written by tools/coverage.py --update; the reasons are those of tests/coverage.toml. -->
 # Branch coverage
 
-{taken} of the {branches} branches of `firmware/src` and `firmware/link` ({share(files):.1f} %) are taken by the CMocka
-programs and by what `tests/playback.py` plays, as gcov counts them at -O0: every operand of a `&&` or `||` has
-two. The slower tests were not asked. PVID_ASSERT, which ends the program, was compiled out. Missed:
+{taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
+are taken by the CMocka programs and by what `tests/playback.py` plays, as gcov counts them at -O0: every
+operand of a `&&` or `||` has two. The slower tests were not asked. PVID_ASSERT, which ends the program,
+was compiled out. Missed:
 
 | where | line | branches | why |
 |---|---|---:|---|

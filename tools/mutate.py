@@ -38,17 +38,19 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import playback  # noqa: E402 - of tests
 
+from pvid.core import sources  # noqa: E402
 from pvid.core.native import SIZES, Native  # noqa: E402
 
 BUILD = ROOT / "build" / "mutate"
 MEMORY = ROOT / "build" / "mutants.json"
 PAGE = ROOT / "tests" / "MUTANTS.md"
 REASONS = ROOT / "tests" / "mutants.toml"
-SOURCES = ROOT / "firmware" / "src"
-INCLUDES = [f"-I{ROOT / 'firmware' / name}" for name in ("include", "link")]
+FIRMWARE = sources.FIRMWARE
+INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}"]
+PRIVATE = [path.relative_to(FIRMWARE) for path in (sources.SRC, sources.MODEL)]
 BESIDES = (  # of the shared library, beside the core
     *(ROOT / "host" / "native").glob("[lr]*.c"),
-    ROOT / "firmware" / "link" / "link.c",
+    FIRMWARE / "link" / "link.c",
 )
 COUNT = 240
 LONGEST = 60  # seconds of processor time for what takes one
@@ -83,6 +85,18 @@ TOKEN = re.compile(
 # ---- mutants ----
 
 
+def files_of_core() -> list[Path]:
+    """Sources and private headers."""
+    found = [*sources.SRC.glob("*/*.[ch]"), *sources.MODEL.glob("*.[ch]")]
+    return sorted(found, key=lambda path: path.name)
+
+
+def place(name: str) -> Path:
+    """The file of this name: no two have the same."""
+    (found,) = (path for path in files_of_core() if path.name == name)
+    return found
+
+
 @dataclass(frozen=True, order=True)
 class Mutant:
     """`old` at an offset of a file becomes `new`; the `place`-th such token of its line."""
@@ -95,12 +109,12 @@ class Mutant:
 
     def text(self) -> str:
         """The file with the change."""
-        code = (SOURCES / self.file).read_text(encoding="utf-8")
+        code = place(self.file).read_text(encoding="utf-8")
         return code[: self.offset] + self.new + code[self.offset + len(self.old) :]
 
     def line(self) -> tuple[int, str]:
         """Number and text of its line as it is."""
-        code = (SOURCES / self.file).read_text(encoding="utf-8")
+        code = place(self.file).read_text(encoding="utf-8")
         number = code.count("\n", 0, self.offset)
         return number + 1, code.splitlines()[number].strip()
 
@@ -150,7 +164,7 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
 
 def ranked(seed: int) -> dict[str, list[Mutant]]:
     """The mutants of every file in the order of a draw."""
-    files = sorted(path for path in SOURCES.iterdir() if path.suffix in (".c", ".h"))
+    files = files_of_core()
     found = {path.name: sorted(mutants_of(path), key=lambda mutant: mutant.rank(seed)) for path in files}
     return {name: mutants for name, mutants in found.items() if mutants}
 
@@ -178,10 +192,10 @@ class Kit:
     options: tuple[str, ...]
     checks: tuple[str, ...] = ()  # options of the linker as well
 
-    def compiles(self, target: Path, source: Path, headers: Path = SOURCES) -> bool:
-        """Compiles a file whose private headers stand beside it, or in `headers`."""
+    def compiles(self, target: Path, source: Path, top: Path = FIRMWARE) -> bool:
+        """Compiles a file whose private headers are those under `top`."""
         target.parent.mkdir(parents=True, exist_ok=True)
-        includes = [*INCLUDES, f"-I{headers}", f"-I{SOURCES}"]
+        includes = [*INCLUDES, *(f"-I{top / folder}" for folder in PRIVATE)]
         return ran([self.compiler, *COMMON, *self.options, *self.checks, *includes, "-c", source, "-o", target])
 
     def links(self, target: Path, objects: list[Path]) -> Path:
@@ -223,7 +237,7 @@ def made(kit: Kit, sources: list[Path]) -> list[Path]:
 def tests_of(kit: Kit) -> dict[str, float]:
     """Builds the core and the CMocka programs with a kit and runs these; seconds that each takes."""
     folder = BUILD / kit.name
-    kit.links(folder / "libpvidcore.so", made(kit, [*sorted(SOURCES.glob("*.c")), BESIDES[-1]]))
+    kit.links(folder / "libpvidcore.so", made(kit, [*sources.core_sources(), BESIDES[-1]]))
     seconds = {}
     for test in made(Kit(f"{kit.name}/tests", kit.compiler, kit.options, kit.checks), playback.unit_tests()):
         before = time.monotonic()
@@ -256,15 +270,16 @@ class Baseline:
 
 def headers_of(source: Path) -> set[str]:
     """The private headers that a source includes, also by way of others."""
-    command = ["gcc", *INCLUDES, f"-I{SOURCES}", "-MM", str(source)]
+    command = ["gcc", *INCLUDES, *(f"-I{FIRMWARE / folder}" for folder in PRIVATE), "-MM", str(source)]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return {Path(word).name for word in told.split() if word.endswith(".h") and Path(word).parent == SOURCES}
+    private = {str(path) for path in files_of_core()}
+    return {Path(word).name for word in told.split() if word in private and word.endswith(".h")}
 
 
 def baseline() -> Baseline:
     """Builds the core as it is and the CMocka programs; runs them once."""
     shutil.rmtree(BUILD, ignore_errors=True)
-    core = sorted(SOURCES.glob("*.c"))
+    core = sources.core_sources()
     library = NATIVE.links(BUILD / "libbaseline.so", made(NATIVE, [*core, *BESIDES]))
     including: dict[str, set[str]] = defaultdict(set)
     for path in (*core, *playback.unit_tests()):
@@ -336,10 +351,13 @@ def workshop(mutant: Mutant) -> Iterator[Path]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     try:
-        for path in SOURCES.iterdir():
-            (folder / path.name).symlink_to(path)
-        (folder / mutant.file).unlink()
-        (folder / mutant.file).write_text(mutant.text(), encoding="utf-8")
+        for path in files_of_core():
+            target = folder / path.relative_to(FIRMWARE)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if path.name == mutant.file:
+                target.write_text(mutant.text(), encoding="utf-8")
+            else:
+                target.symlink_to(path)
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -347,12 +365,13 @@ def workshop(mutant: Mutant) -> Iterator[Path]:
 
 def changed_library(kit: Kit, mutant: Mutant, base: Baseline, folder: Path, name: str) -> tuple[Path, bool] | None:
     """The core's library with the mutant in it, and whether its code is another; None if it does not compile."""
-    sources, _ = base.dependents(mutant.file)
-    replaced = [folder / kit.name / f"{stem}.o" for stem in sources]
-    if not all(kit.compiles(target, folder / f"{target.stem}.c") for target in replaced):
+    stems, _ = base.dependents(mutant.file)
+    replaced = [folder / kit.name / f"{stem}.o" for stem in stems]
+    changed = [folder / place(f"{stem}.c").relative_to(FIRMWARE) for stem in stems]
+    if not all(kit.compiles(*pair, folder) for pair in zip(replaced, changed, strict=True)):
         return None
     differs = any(code_of(path) != code_of(BUILD / kit.name / path.name) for path in replaced)
-    kept = [path for path in (BUILD / kit.name).glob("*.o") if path.stem not in sources]
+    kept = [path for path in (BUILD / kit.name).glob("*.o") if path.stem not in stems]
     return kit.links(folder / kit.name / name, sorted(kept) + replaced), differs
 
 
@@ -546,11 +565,12 @@ def page_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
     return f"""<!-- Written by tools/mutate.py; the reasons are those of tests/mutants.toml. -->
 # Mutation check
 
-{told.mutants} mutants of the {files} files of `firmware/src`, drawn with seed {seed}, by each file's number of them:
-one operator, sign or constant changed. {told.killed} were killed: {100 * told.killed / told.mutants:.1f} % of all, and
-{100 * told.rate:.1f} % of the {could} that are not equivalent. {told.by_bits} of them by the bits of a few seconds of
-data (`tests/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over
-40 000 ticks, oracles, accuracy) were not asked.
+{told.mutants} mutants of the {files} files of `firmware/src` and `firmware/models`, drawn with seed {seed}, by each
+file's number of them: one operator, sign or constant changed. {told.killed} were killed:
+{100 * told.killed / told.mutants:.1f} % of all, and {100 * told.rate:.1f} % of the {could} that are not
+equivalent. {told.by_bits} of them by the bits of a few seconds of data
+(`tests/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over 40 000
+ticks, oracles, accuracy) were not asked.
 
 ## Survivors that a test could kill
 

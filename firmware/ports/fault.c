@@ -34,7 +34,7 @@ void pvid_fault_word(const char *name, uint32_t word)
     say_text(name);
     say_text(" 0x");
     for (uint32_t shift = 32; shift > 0u; shift -= 4u) {
-        const uint8_t digit = (uint8_t) "0123456789abcdef"[(word >> (shift - 4u)) & 0xFu];
+        const uint8_t digit = (uint8_t)"0123456789abcdef"[(word >> (shift - 4u)) & 0xFu];
         say(&digit, 1);
     }
 }

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#define FIELD(type, field) (uint32_t) offsetof(type, field)
+#define FIELD(type, field) (uint32_t)offsetof(type, field)
 
 const uint32_t pvid_native_layout[] = {
     (uint32_t)sizeof(pvid_fir_bank_f32),

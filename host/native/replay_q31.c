@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#define FIELD(type, field) (uint32_t) offsetof(type, field)
+#define FIELD(type, field) (uint32_t)offsetof(type, field)
 
 const uint32_t pvid_native_layout_q31[] = {
     (uint32_t)sizeof(pvid_estimator_config_q31),

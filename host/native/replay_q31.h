@@ -8,14 +8,14 @@
 
 /* Where a replay writes; NULL: not recorded. Rows stand one after the other, without padding. */
 typedef struct {
-    int32_t *p;             /* [ticks][n_p] */
-    int64_t *sums;          /* [ticks][n_sums] */
-    uint8_t *exponent;      /* [ticks] of the sums */
-    uint8_t *reason;        /* [ticks] */
-    uint32_t *hash;         /* [ticks] running hash after the tick */
-    uint32_t *running_hash; /* in and out; needed with hash */
-    int32_t *published;     /* [ticks][n_p] of the weak form */
-    int32_t *published_se;  /* likewise: its standard errors */
+    int32_t *p;                  /* [ticks][n_p] */
+    int64_t *sums;               /* [ticks][n_sums] */
+    uint8_t *exponent;           /* [ticks] of the sums */
+    uint8_t *reason;             /* [ticks] */
+    uint32_t *hash;              /* [ticks] running hash after the tick */
+    uint32_t *running_hash;      /* in and out; needed with hash */
+    int32_t *published;          /* [ticks][n_p] of the weak form */
+    int32_t *published_se;       /* likewise: its standard errors */
     pvid_estimate_q31 *estimate; /* [ticks / estimate_every, rounded up]; the published one in the weak form */
     uint32_t estimate_every;
 } pvid_record_q31;

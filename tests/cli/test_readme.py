@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources
 from pvid.rig.file import RigFile
 from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate
 
@@ -52,9 +53,9 @@ def test_program_identifies_the_standard_rig(program: str, tmp_path: Path) -> No
     header = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     (tmp_path / "tables.h").write_text(header, encoding="utf-8")
     binary = tmp_path / "example"
-    core = sorted(str(path) for path in (ROOT / "firmware" / "src").glob("*.c"))
+    core = map(str, core_sources())
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
-    includes = [f"-I{ROOT / 'firmware' / 'include'}", f"-I{tmp_path}"]
+    includes = [*INCLUDES, f"-I{tmp_path}"]
     subprocess.run(["gcc", *flags, *includes, str(tmp_path / "example.c"), *core, "-o", str(binary), "-lm"], check=True)
     run = simulate(truth=truth).run
     samples = "\n".join(f"{phi:.9g} {y:.9g}" for phi, y in zip(run.phi, run.y, strict=True))
@@ -72,7 +73,7 @@ def compile_as_cpp(source: str, standard: str, folder: Path) -> None:
     declared = '#include "pvid/weak.h"\nextern "C" const pvid_weak_design_f32 weak_tables;\n'
     (folder / "tables.h").write_text(declared, encoding="utf-8")
     command = ["g++", f"-std={standard}", "-fsyntax-only", "-Wall"]
-    includes = [f"-I{ROOT / 'firmware' / 'include'}", f"-I{folder}"]
+    includes = [*PUBLIC_INCLUDES, f"-I{folder}"]
     done = subprocess.run([*command, *includes, str(folder / "example.cpp")], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 

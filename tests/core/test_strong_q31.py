@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
-from test_core_q31 import FIRMWARE, SOURCES, tool
+from test_core_q31 import SOURCES, tool
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.core.native import Native, Reason
 from pvid.core.native_q31 import RowEstimatorQ31, StrongConfigQ31, StrongIdentifierQ31, strong_rows_q31
+from pvid.core.sources import INCLUDES
 from pvid.oracle import strong as oracle
 from pvid.rig.file import Law, RigFile
 from pvid.rig.run import write_run
@@ -219,7 +220,7 @@ def test_the_header_is_the_configuration_and_nothing_overflows(
     (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
     sanitizers = ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
     sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
-    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src", f"-I{tmp_path}"]
+    includes = [*INCLUDES, f"-I{tmp_path}"]
     flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", *sanitizers, *includes]
     tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", tmp_path / "program")
     run = simulate(sensors=standard_sensors(20), truth="linear", duration=3.0, seed=2).run

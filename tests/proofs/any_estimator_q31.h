@@ -4,7 +4,7 @@
 
 #include "prove.h"
 
-#include "integer_q31.h"
+#include "number/integer_q31.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/kapitza_strong_q31.h"
 #include "pvid/kapitza_weak_q31.h"

@@ -2,7 +2,7 @@
 #ifndef ESTIMATOR_CONTRACTS_H
 #define ESTIMATOR_CONTRACTS_H
 
-#include "estimator_q31.h"
+#include "solve/estimator_q31.h"
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
 

@@ -2,7 +2,7 @@
 #include "prove.h"
 
 #include "contracts.h"
-#include "misfit_q31.h"
+#include "judge/misfit_q31.h"
 
 /* Exponents: 65 535 squares below 2^62 add up to less than 2^78, and an estimate of any size is told within 2^31. */
 #define LOWEST (-1000)

@@ -1,11 +1,10 @@
-/* weak_window_q31: a window of a design as it fills, any F and U within their limits and any second differences; from its
- * first sample, and from its middle, as after a gap. Every sum of its products fits. */
+/* weak_window_q31: a window of a design as it fills, any F and U within their limits and any second differences; from
+ * its first sample, and from its middle, as after a gap. Every sum of its products fits. */
 #include "prove.h"
 
 #include "contracts.h"
 #include "weak_design.h"
-#include "weak_window_q31.h"
-
+#include "weak/window_q31.h"
 
 static pvid_weak_window_q31 window;
 static int32_t term[PVID_WEAK_TERMS_Q31];

@@ -2,8 +2,8 @@
 #ifndef STRONG_CONTRACTS_H
 #define STRONG_CONTRACTS_H
 
-#include "estimator_q31.h"
-#include "misfit_q31.h"
+#include "solve/estimator_q31.h"
+#include "judge/misfit_q31.h"
 #include "pvid/differentiator_q31.h"
 #include "pvid/gate_q31.h"
 

@@ -43,10 +43,10 @@ static void three_times_the_quietest_in_both_is_a_misfit(void **state)
     assert_false(block(0.01732, 1.0)); /* 2.9998 times */
     assert_true(block(0.01733, 1.0));  /* 3.003 times */
     assert_true(block(0.0176, 1.0));
-    assert_true(block(0.0176, 1.0));   /* the quietest stays the quietest */
-    assert_false(block(0.0176, 1.1));  /* 3.1 times the energy, 2.6 times the part */
-    assert_false(block(0.0170, 0.5));  /* 2.9 times the energy, 11.6 times the part */
-    assert_false(block(0.1, 10.0));    /* a larger drive: the part is the same */
+    assert_true(block(0.0176, 1.0));  /* the quietest stays the quietest */
+    assert_false(block(0.0176, 1.1)); /* 3.1 times the energy, 2.6 times the part */
+    assert_false(block(0.0170, 0.5)); /* 2.9 times the energy, 11.6 times the part */
+    assert_false(block(0.1, 10.0));   /* a larger drive: the part is the same */
 }
 
 static void a_quieter_block_becomes_the_measure(void **state)
@@ -89,12 +89,12 @@ static void grows_by_a_tenth_a_block(void)
     assert_int_equal(blocks, 4); /* before the fifth it is 1.1^4 = 1.46 times as large: 4 < 3 * 1.46 */
 }
 
-#define MISFIT_CASES \
-    cmocka_unit_test_setup(the_first_block_only_teaches, start_again), \
-    cmocka_unit_test_setup(beyond_the_most_is_a_misfit_however_it_was_before, start_again), \
-    cmocka_unit_test_setup(three_times_the_quietest_in_both_is_a_misfit, start_again), \
-    cmocka_unit_test_setup(a_quieter_block_becomes_the_measure, start_again), \
-    cmocka_unit_test_setup(below_the_least_nothing_is_a_misfit, start_again), \
-    cmocka_unit_test_setup(where_nothing_moves_nothing_is_said, start_again)
+#define MISFIT_CASES                                                                                                   \
+    cmocka_unit_test_setup(the_first_block_only_teaches, start_again),                                                 \
+        cmocka_unit_test_setup(beyond_the_most_is_a_misfit_however_it_was_before, start_again),                        \
+        cmocka_unit_test_setup(three_times_the_quietest_in_both_is_a_misfit, start_again),                             \
+        cmocka_unit_test_setup(a_quieter_block_becomes_the_measure, start_again),                                      \
+        cmocka_unit_test_setup(below_the_least_nothing_is_a_misfit, start_again),                                      \
+        cmocka_unit_test_setup(where_nothing_moves_nothing_is_said, start_again)
 
 #endif

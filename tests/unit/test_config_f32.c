@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "bounds.h"
-#include "fingerprint_f32.h"
+#include "keep/fingerprint_f32.h"
 #include "pvid/pvid.h"
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
@@ -17,26 +17,24 @@
 #define RATE 1024.0f                       /* Hz; four ticks are 2^-8 s exactly */
 
 /* A field of `type`, which has an estimator's configuration at `in`. */
-#define FIELD(type, in, member, kind, low, high, status)                                                              \
-    {                                                                                                                 \
-        #member, offsetof(type, in member), kind, low, high, status, PVID_OK                                          \
-    }
-#define OF_ESTIMATOR(type, in)                                                                                        \
-    FIELD(type, in, start_sd[0], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                   \
-        FIELD(type, in, start_sd[1], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                               \
-        FIELD(type, in, start_sd[2], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                               \
-        FIELD(type, in, row_sd, KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD),                                      \
-        FIELD(type, in, feedback_hz, KIND_FLOAT, 0.0, 1.0e12f, PVID_BAD_FEEDBACK),                                    \
-        FIELD(type, in, step_limit, KIND_FLOAT, 1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT),                                  \
-        FIELD(type, in, kappa_min, KIND_FLOAT, 0.0, 0.999f, PVID_BAD_KAPPA_MIN),                                      \
-        FIELD(type, in, noise_margin, KIND_FLOAT, 0.0, 1.0e6f, PVID_BAD_NOISE_MARGIN),                                \
-        FIELD(type, in, dead_zone, KIND_FLOAT, 0.0, 100.0f, PVID_BAD_DEAD_ZONE),                                      \
-        FIELD(type, in, law, KIND_INT32, 0.0, 1.0, PVID_BAD_LAW),                                                     \
+#define FIELD(type, in, member, kind, low, high, status)                                                               \
+    {#member, offsetof(type, in member), kind, low, high, status, PVID_OK}
+#define OF_ESTIMATOR(type, in)                                                                                         \
+    FIELD(type, in, start_sd[0], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                    \
+        FIELD(type, in, start_sd[1], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                \
+        FIELD(type, in, start_sd[2], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                \
+        FIELD(type, in, row_sd, KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD),                                       \
+        FIELD(type, in, feedback_hz, KIND_FLOAT, 0.0, 1.0e12f, PVID_BAD_FEEDBACK),                                     \
+        FIELD(type, in, step_limit, KIND_FLOAT, 1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT),                                   \
+        FIELD(type, in, kappa_min, KIND_FLOAT, 0.0, 0.999f, PVID_BAD_KAPPA_MIN),                                       \
+        FIELD(type, in, noise_margin, KIND_FLOAT, 0.0, 1.0e6f, PVID_BAD_NOISE_MARGIN),                                 \
+        FIELD(type, in, dead_zone, KIND_FLOAT, 0.0, 100.0f, PVID_BAD_DEAD_ZONE),                                       \
+        FIELD(type, in, law, KIND_INT32, 0.0, 1.0, PVID_BAD_LAW),                                                      \
         FIELD(type, in, divider, KIND_UINT16, 1.0, 65535.0, PVID_BAD_DIVIDER)
-#define OF_FORGETTING(type, in, seconds)                                                                              \
+#define OF_FORGETTING(type, in, seconds)                                                                               \
     FIELD(type, in, forgetting_s, KIND_FLOAT, seconds, 1.0e12f, PVID_BAD_FORGETTING)
-#define OF_GATE(type)                                                                                                 \
-    FIELD(type, , gate.sigmas, KIND_FLOAT, 2.0, 1.0e3f, PVID_BAD_GATE_SIGMAS),                                        \
+#define OF_GATE(type)                                                                                                  \
+    FIELD(type, , gate.sigmas, KIND_FLOAT, 2.0, 1.0e3f, PVID_BAD_GATE_SIGMAS),                                         \
         FIELD(type, , gate.patience_s, KIND_FLOAT, 0.0, 1.0e12f, PVID_BAD_GATE_PATIENCE)
 
 static void fill_start(pvid_estimator_config_f32 *config)
@@ -162,11 +160,11 @@ static void start_and_bounds_agree_or_are_refused(void **state)
     assert_int_equal(init_with(3, NAN, NAN, NAN), PVID_OK); /* of no parameter */
 }
 
-#define ASSERT_MODEL(change, status)                                                                                  \
-    do {                                                                                                              \
-        (void)start_own(NULL);                                                                                        \
-        change;                                                                                                       \
-        assert_int_equal(init_own(), status);                                                                         \
+#define ASSERT_MODEL(change, status)                                                                                   \
+    do {                                                                                                               \
+        (void)start_own(NULL);                                                                                         \
+        change;                                                                                                        \
+        assert_int_equal(init_own(), status);                                                                          \
     } while (0)
 
 static void a_model_fits_or_is_refused(void **state)
@@ -428,10 +426,8 @@ static const bound weak_fields[] = {
 };
 
 /* Ends of a size leave a window that cannot always be worked off in time. */
-#define SIZE(member, kind, low, high, status)                                                                         \
-    {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_f32, member), kind, low, high, status, PVID_BAD_ITERATIONS                 \
-    }
+#define SIZE(member, kind, low, high, status)                                                                          \
+    {#member, offsetof(pvid_weak_design_f32, member), kind, low, high, status, PVID_BAD_ITERATIONS}
 static const bound design_fields[] = {
     SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS, PVID_BAD_TAPS),
     SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION, PVID_BAD_DECIMATION),

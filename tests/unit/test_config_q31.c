@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "bounds.h"
-#include "fingerprint_q31.h"
+#include "keep/fingerprint_q31.h"
 #include "pvid/pvid.h"
 #include "weak_table_q31.h"
 
@@ -18,26 +18,24 @@
 #define ONE_Q30 1073741824.0
 #define KAPPA_LAST 1072668083.0 /* 2^30 - 2^30 / 1000 */
 
-#define FIELD(type, in, member, kind, low, high, status)                                                              \
-    {                                                                                                                 \
-        #member, offsetof(type, in member), kind, low, high, status, PVID_OK                                          \
-    }
+#define FIELD(type, in, member, kind, low, high, status)                                                               \
+    {#member, offsetof(type, in member), kind, low, high, status, PVID_OK}
 #define FORMAT(type, in, member) FIELD(type, in, member, KIND_INT8, -64.0, 64.0, PVID_BAD_FORMAT)
-#define OF_ESTIMATOR(type, in)                                                                                        \
-    FIELD(type, in, start_sd[0], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                     \
-        FIELD(type, in, start_sd[1], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                 \
-        FIELD(type, in, start_sd[2], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                 \
-        FORMAT(type, in, p_bits[0]), FORMAT(type, in, p_bits[1]), FORMAT(type, in, p_bits[2]),                        \
-        FORMAT(type, in, n_bits[0]), FORMAT(type, in, n_bits[4]), FORMAT(type, in, y_bits),                           \
-        FIELD(type, in, row_sd, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_ROW_SD),                                        \
-        FIELD(type, in, forgetting_groups, KIND_UINT32, 4.0, 16777216.0, PVID_BAD_FORGETTING),                        \
-        FIELD(type, in, gain, KIND_INT32, 0.0, ONE_Q30, PVID_BAD_FEEDBACK),                                           \
-        FIELD(type, in, correlation, KIND_UINT32, 65536.0, 2147483648.0, PVID_BAD_CORRELATION),                       \
-        FIELD(type, in, row_weight, KIND_UINT32, 1.0, 65536.0, PVID_BAD_ROW_WEIGHT),                                  \
-        FIELD(type, in, step_limit, KIND_UINT32, 1.0, 58982.0, PVID_BAD_STEP_LIMIT),                                  \
-        FIELD(type, in, kappa_min, KIND_INT32, 0.0, KAPPA_LAST, PVID_BAD_KAPPA_MIN),                                  \
-        FIELD(type, in, noise_margin, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_NOISE_MARGIN),                              \
-        FIELD(type, in, dead_zone, KIND_UINT32, 0.0, 6553600.0, PVID_BAD_DEAD_ZONE),                                  \
+#define OF_ESTIMATOR(type, in)                                                                                         \
+    FIELD(type, in, start_sd[0], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                      \
+        FIELD(type, in, start_sd[1], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                  \
+        FIELD(type, in, start_sd[2], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD), FORMAT(type, in, p_bits[0]),     \
+        FORMAT(type, in, p_bits[1]), FORMAT(type, in, p_bits[2]), FORMAT(type, in, n_bits[0]),                         \
+        FORMAT(type, in, n_bits[4]), FORMAT(type, in, y_bits),                                                         \
+        FIELD(type, in, row_sd, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_ROW_SD),                                         \
+        FIELD(type, in, forgetting_groups, KIND_UINT32, 4.0, 16777216.0, PVID_BAD_FORGETTING),                         \
+        FIELD(type, in, gain, KIND_INT32, 0.0, ONE_Q30, PVID_BAD_FEEDBACK),                                            \
+        FIELD(type, in, correlation, KIND_UINT32, 65536.0, 2147483648.0, PVID_BAD_CORRELATION),                        \
+        FIELD(type, in, row_weight, KIND_UINT32, 1.0, 65536.0, PVID_BAD_ROW_WEIGHT),                                   \
+        FIELD(type, in, step_limit, KIND_UINT32, 1.0, 58982.0, PVID_BAD_STEP_LIMIT),                                   \
+        FIELD(type, in, kappa_min, KIND_INT32, 0.0, KAPPA_LAST, PVID_BAD_KAPPA_MIN),                                   \
+        FIELD(type, in, noise_margin, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_NOISE_MARGIN),                               \
+        FIELD(type, in, dead_zone, KIND_UINT32, 0.0, 6553600.0, PVID_BAD_DEAD_ZONE),                                   \
         FIELD(type, in, divider, KIND_UINT16, 1.0, 65535.0, PVID_BAD_DIVIDER)
 
 /* ---- the estimator, on a model of the user's own ---- */
@@ -154,11 +152,11 @@ static void start_and_bounds_agree_or_are_refused(void **state)
     assert_int_equal(init_with(3, 0, 0, 0), PVID_OK);                  /* of no parameter */
 }
 
-#define ASSERT_MODEL(change, status)                                                                                  \
-    do {                                                                                                              \
-        (void)start_own(NULL);                                                                                        \
-        change;                                                                                                       \
-        assert_int_equal(init_own(), status);                                                                         \
+#define ASSERT_MODEL(change, status)                                                                                   \
+    do {                                                                                                               \
+        (void)start_own(NULL);                                                                                         \
+        change;                                                                                                        \
+        assert_int_equal(init_own(), status);                                                                          \
     } while (0)
 
 static void a_model_fits_or_is_refused(void **state)
@@ -337,15 +335,11 @@ static const bound weak_fields[] = {
     FORMAT(pvid_weak_config_q31, estimator., n_bits[7]),
 };
 
-#define SIZE(member, kind, low, high, status)                                                                         \
-    {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_ITERATIONS                 \
-    }
+#define SIZE(member, kind, low, high, status)                                                                          \
+    {#member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_ITERATIONS}
 /* Where F or U F would need more than 21 bits the design is refused for that. */
-#define TIGHT(member, kind, low, high, status)                                                                        \
-    {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_SHIFT                      \
-    }
+#define TIGHT(member, kind, low, high, status)                                                                         \
+    {#member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_SHIFT}
 static const bound design_fields[] = {
     SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS, PVID_BAD_TAPS),
     SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION, PVID_BAD_DECIMATION),
@@ -402,11 +396,11 @@ static void the_weak_forms_fields_end_where_they_say(void **state)
     assert_int_equal(init_weak(), PVID_BAD_FORGETTING);
 }
 
-#define ASSERT_TABLE(table)                                                                                           \
-    do {                                                                                                              \
-        (void)start_weak(NULL);                                                                                       \
-        design.table = NULL;                                                                                          \
-        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                               \
+#define ASSERT_TABLE(table)                                                                                            \
+    do {                                                                                                               \
+        (void)start_weak(NULL);                                                                                        \
+        design.table = NULL;                                                                                           \
+        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                                \
     } while (0)
 
 static void a_design_without_a_table_is_refused(void **state)
@@ -419,13 +413,13 @@ static void a_design_without_a_table_is_refused(void **state)
     ASSERT_TABLE(gram);
 }
 
-#define REFUSED_AND_NOT(place, refused, accepted)                                                                     \
-    do {                                                                                                              \
-        (place) = (refused);                                                                                          \
-        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                               \
-        (place) = (accepted);                                                                                         \
-        assert_int_equal(init_weak(), PVID_OK);                                                                       \
-        (place) = 0;                                                                                                  \
+#define REFUSED_AND_NOT(place, refused, accepted)                                                                      \
+    do {                                                                                                               \
+        (place) = (refused);                                                                                           \
+        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                                \
+        (place) = (accepted);                                                                                          \
+        assert_int_equal(init_weak(), PVID_OK);                                                                        \
+        (place) = 0;                                                                                                   \
     } while (0)
 
 /* Both ends of what an entry may be, in the first and the last place of every table. */

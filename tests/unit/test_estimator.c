@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "estimator_f32.h"
+#include "solve/estimator_f32.h"
 #include "pvid/pvid.h"
 
 #define INFINITE (3.4e38f * 10.0f)
@@ -127,7 +127,7 @@ static void standard_errors_of_own_model_match_the_noise(void **state)
     }
     pvid_estimate_f32 estimate;
     pvid_estimator_assess_f32(&estimator, &estimate);
-    assert_float_equal(estimate.residual_sd, 0.028868f, 0.0012f); /* 4 %: four times 1/sqrt(2 rows) */
+    assert_float_equal(estimate.residual_sd, 0.028868f, 0.0012f);        /* 4 %: four times 1/sqrt(2 rows) */
     assert_float_equal(estimate.se[1], 0.028868f * 0.024495f, 0.00004f); /* 6 %: M itself is random */
     assert_float_equal(estimate.se[0], 0.028868f * 0.024495f / 4.1231f, 0.00001f);
     assert_float_equal(estimate.p[1], own_truth[1], 4.0f * estimate.se[1]);
@@ -260,11 +260,21 @@ static void every_bad_field_has_its_own_status(void **state)
         {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, lower), {INFINITE, -1.0f, 0.0f, 20.0f, -INFINITE}},
         {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, upper), {INFINITE, -1.0f, 0.0f, 0.05f, -INFINITE}},
         {PVID_BAD_ROW_SD, offsetof(pvid_estimator_config_f32, row_sd), {INFINITE, -1.0f, 0.0f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_UPDATE_RATE, offsetof(pvid_estimator_config_f32, update_rate_hz), {INFINITE, -1.0f, 0.0f, 1.0e9f, 1.0e-9f}},
-        {PVID_BAD_FORGETTING, offsetof(pvid_estimator_config_f32, forgetting_s), {INFINITE, -1.0f, 0.03f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_FEEDBACK, offsetof(pvid_estimator_config_f32, feedback_hz), {INFINITE, -1.0f, -1.0e-9f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_CORRELATION, offsetof(pvid_estimator_config_f32, correlation), {INFINITE, -1.0f, 0.0f, 0.5f, 1.0e30f}},
-        {PVID_BAD_STEP_LIMIT, offsetof(pvid_estimator_config_f32, step_limit), {INFINITE, -1.0f, 0.0f, 1.0f, -INFINITE}},
+        {PVID_BAD_UPDATE_RATE,
+         offsetof(pvid_estimator_config_f32, update_rate_hz),
+         {INFINITE, -1.0f, 0.0f, 1.0e9f, 1.0e-9f}},
+        {PVID_BAD_FORGETTING,
+         offsetof(pvid_estimator_config_f32, forgetting_s),
+         {INFINITE, -1.0f, 0.03f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_FEEDBACK,
+         offsetof(pvid_estimator_config_f32, feedback_hz),
+         {INFINITE, -1.0f, -1.0e-9f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_CORRELATION,
+         offsetof(pvid_estimator_config_f32, correlation),
+         {INFINITE, -1.0f, 0.0f, 0.5f, 1.0e30f}},
+        {PVID_BAD_STEP_LIMIT,
+         offsetof(pvid_estimator_config_f32, step_limit),
+         {INFINITE, -1.0f, 0.0f, 1.0f, -INFINITE}},
         {PVID_BAD_KAPPA_MIN, offsetof(pvid_estimator_config_f32, kappa_min), {INFINITE, -1.0f, -1.0e-9f, 1.0f, 2.0f}},
     };
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {

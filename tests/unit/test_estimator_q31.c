@@ -51,8 +51,8 @@ static void begin(void)
 /* Row k of a motion that tells all parameters apart, for p = (2.2, 2.8, 1.1, 0.05) without noise. */
 static void row_of(uint32_t k, int32_t n[8], int32_t *y)
 {
-    static const double theta[8] = {2.8, 2.8 * 2.2, 1.1, 1.1 * 2.2, 1.1 * 2.2 * 2.2,
-                                    1.1 * 0.05, 1.1 * 0.05 * 2.2, 1.1 * 0.05 * 2.2 * 2.2};
+    static const double theta[8] = {
+        2.8, 2.8 * 2.2, 1.1, 1.1 * 2.2, 1.1 * 2.2 * 2.2, 1.1 * 0.05, 1.1 * 0.05 * 2.2, 1.1 * 0.05 * 2.2 * 2.2};
     double sum = 0.0;
     for (uint32_t i = 0; i < 8u; i++) {
         n[i] = (int32_t)((((k * 7u) + (i * 13u) + (k * i * i * 5u)) % 41u)) * (ONE_Q20 / 40) - (ONE_Q20 / 2);
@@ -71,8 +71,8 @@ static void add_rows(uint32_t first, uint32_t last)
     }
 }
 
-/* Rows without noise ask for nothing once p is there: every further solve is at rest, with p and the sums as they are; a
- * zone wider than the way is not left at all. */
+/* Rows without noise ask for nothing once p is there: every further solve is at rest, with p and the sums as they are;
+ * a zone wider than the way is not left at all. */
 static void within_the_dead_zone_p_stays(void **state)
 {
     (void)state;

@@ -11,11 +11,11 @@
 
 #include <cmocka.h>
 
-#include "count.h"
-#include "estimator_q31.h"
+#include "number/count.h"
+#include "solve/estimator_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 #include "strong_table_q31.h"
 
 /* ---- y = N^T p with as many entries as there may be parameters ---- */
@@ -132,8 +132,8 @@ static void rows_of_any_size_say_the_same(void **state)
             assert_int_equal(pvid_estimator_update_q31(&large), reason);
             assert_true((reason == PVID_UPDATED) || ((reason == PVID_HELD_PIVOT) && (i < 20)));
             for (size_t a = 0; a < PVID_MAX_P; a++) {
-                /* the smaller rows' innovations are rounded: 0.3 of some 40 000, over the root of so many rows; the rates
-                 * keep something of their first steps */
+                /* the smaller rows' innovations are rounded: 0.3 of some 40 000, over the root of so many rows; the
+                 * rates keep something of their first steps */
                 assert_true((i < 20) || (fabs(p_of(&small, a) - p_of(&large, a)) < ((k == 0) ? 5.0e-6 : 2.0e-3)));
             }
         }
@@ -144,7 +144,8 @@ static void rows_of_any_size_say_the_same(void **state)
         for (size_t a = 0; a < PVID_MAX_P; a++) {
             assert_true(fabs(p_of(&small, a) - truth[a]) < 2.0e-4);
             assert_true(fabs(p_of(&small, a) - p_of(&large, a)) < 5.0e-6);
-            assert_true(fabs((double)estimate[0].se[a] - (double)estimate[1].se[a]) <= 2.0 + 1.0e-3 * estimate[0].se[a]);
+            assert_true(fabs((double)estimate[0].se[a] - (double)estimate[1].se[a]) <=
+                        2.0 + 1.0e-3 * estimate[0].se[a]);
             assert_int_equal(estimate[0].correlation[a][a], 1 << 30);
             for (size_t b = 0; b < a; b++) {
                 assert_true(abs(estimate[0].correlation[a][b] - estimate[1].correlation[a][b]) < (1 << 12));

@@ -121,7 +121,7 @@ static void errors_that_cancel_or_are_none_are_no_root_of_less_than_nothing(void
     const double along[3] = {0.0, 7.875e-2, 5.625e-2};
     tell(p, along, 1.0);
     assert_true(physical());
-    assert_true((se.l2 >= 0) && (se.l2 <= 64)); /* of 85 000 for either alone */
+    assert_true((se.l2 >= 0) && (se.l2 <= 64));                                /* of 85 000 for either alone */
     estimate.correlation[PVID_KAPITZA_D1][PVID_KAPITZA_D2] = (1 << 30) + 1000; /* rounding may say a little more */
     assert_true(physical());
     assert_true((se.l2 >= 0) && (se.l2 <= 64));
@@ -191,14 +191,14 @@ static void what_is_beyond_its_format_has_none(void **state)
     assert_int_equal(se.rho2, INT32_MAX);
 }
 
-#define ASSERT_SCALE(field, good, bad)                                                                                \
-    do {                                                                                                              \
-        (void)start_again(NULL);                                                                                      \
-        estimate.p[PVID_KAPITZA_W] = 1;                                                                               \
-        scale.field = (good);                                                                                         \
-        (void)physical(); /* may be beyond its format */                                                              \
-        scale.field = (bad);                                                                                          \
-        assert_false(physical());                                                                                     \
+#define ASSERT_SCALE(field, good, bad)                                                                                 \
+    do {                                                                                                               \
+        (void)start_again(NULL);                                                                                       \
+        estimate.p[PVID_KAPITZA_W] = 1;                                                                                \
+        scale.field = (good);                                                                                          \
+        (void)physical(); /* may be beyond its format */                                                               \
+        scale.field = (bad);                                                                                           \
+        assert_false(physical());                                                                                      \
     } while (0)
 
 static void a_scale_out_of_its_range_is_refused(void **state)

@@ -3,7 +3,7 @@
 #include <stdint.h>
 
 #include "misfit_cases.h"
-#include "misfit_f32.h"
+#include "judge/misfit_f32.h"
 
 static pvid_misfit_f32 misfit;
 

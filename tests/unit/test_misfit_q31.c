@@ -3,9 +3,9 @@
 #include <stdint.h>
 
 #include "misfit_cases.h"
-#include "misfit_q31.h"
+#include "judge/misfit_q31.h"
 #include "pvid/pvid.h"
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 
 #define UNIT 1000000 /* of e and of what is told */
 
@@ -96,7 +96,8 @@ static void the_largest_rows_do_not_overflow(void **state)
     pvid_misfit_init_q31(&misfit, (uint32_t)1 << 30, 0);
     const int64_t row_max = PVID_ROW_LIMIT_Q31;
     for (int rows = 1; rows < 65535; rows++) {
-        assert_false(pvid_misfit_take_q31(&misfit, row_max * row_max, ((rows % 2) == 0) ? INT64_MAX / 2 : -(INT64_MAX / 2)));
+        assert_false(
+            pvid_misfit_take_q31(&misfit, row_max * row_max, ((rows % 2) == 0) ? INT64_MAX / 2 : -(INT64_MAX / 2)));
     }
     assert_true(pvid_misfit_take_q31(&misfit, row_max * row_max, (int64_t)1 << 31));
     const pvid_scaled_q31 energy = pvid_scaled_of_q31(65535, 56);

@@ -1,4 +1,5 @@
-/* Publications as one context sees them; how they hold while another one writes: tests/core/test_read_while_stepping.py. */
+/* Publications as one context sees them; how they hold while another one writes:
+ * tests/core/test_read_while_stepping.py. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

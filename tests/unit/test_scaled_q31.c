@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 
 static double value_of(pvid_scaled_q31 a)
 {

@@ -255,9 +255,9 @@ static void slots_are_used_in_turn(void **state)
     for (uint32_t generation = 1; generation < 6u; generation++) {
         assert_int_equal(choice.generation, generation);
         const uint8_t written = choice.next;
-        assert_int_equal(pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, slot[written],
-                                                     sizeof slot[0]),
-                         sizeof slot[0]);
+        assert_int_equal(
+            pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, slot[written], sizeof slot[0]),
+            sizeof slot[0]);
         choice = pvid_snapshot_choose(slot[0], slot[1], sizeof slot[0]);
         assert_int_equal(choice.newest, written);
         assert_int_equal(choice.next, 1 - written);

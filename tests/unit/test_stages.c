@@ -9,16 +9,16 @@
 
 #include <cmocka.h>
 
-#include "estimator_f32.h"
+#include "solve/estimator_f32.h"
 #include "plant.h"
 #include "pvid/pvid.h"
-#include "weak_angle_f32.h"
-#include "weak_finish_f32.h"
-#include "weak_finish_q31.h"
+#include "full_angle_f32.h"
+#include "weak/finish_f32.h"
+#include "weak/finish_q31.h"
 #include "weak_table.h"
 #include "weak_table_q31.h"
-#include "weak_window_f32.h"
-#include "weak_window_q31.h"
+#include "weak/window_f32.h"
+#include "weak/window_q31.h"
 
 static pvid_weak_f32 identifier;
 static pvid_weak_angle_f32 angle;
@@ -123,8 +123,7 @@ static void the_fixed_point_window_takes_the_stages_that_init_counts_with(void *
                                           &fixed.estimator, &fixed.trust, &reason);
             }
         }
-        assert_int_equal(stages,
-                         pvid_weak_finish_stages_q31(fixed.design->functions, iterations, &fixed.estimator));
+        assert_int_equal(stages, pvid_weak_finish_stages_q31(fixed.design->functions, iterations, &fixed.estimator));
     }
 }
 

@@ -196,7 +196,8 @@ static int groups_of_ageing(double *left)
 {
     int groups = 0;
     *left = 1.0;
-    for (double fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0; fade > 0.0; fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0) {
+    for (double fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0; fade > 0.0;
+         fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0) {
         *left *= fade;
         groups++;
     }

@@ -254,11 +254,11 @@ static void every_bad_table_is_refused(void **state)
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config = good_config();
     config.design = &design;
-#define REFUSED(field, value, status)                                                                                 \
-    do {                                                                                                              \
-        design = table_design;                                                                                        \
-        design.field = (value);                                                                                       \
-        assert_int_equal(status_of(&config), status);                                                                 \
+#define REFUSED(field, value, status)                                                                                  \
+    do {                                                                                                               \
+        design = table_design;                                                                                         \
+        design.field = (value);                                                                                        \
+        assert_int_equal(status_of(&config), status);                                                                  \
     } while (0)
     REFUSED(taps, 3, PVID_BAD_TAPS);
     REFUSED(taps, 6, PVID_BAD_TAPS);

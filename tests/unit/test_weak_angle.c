@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "pvid/pvid.h"
-#include "weak_angle_f32.h"
+#include "full_angle_f32.h"
 #include "weak_table.h"
 
 static pvid_weak_angle_f32 angle;

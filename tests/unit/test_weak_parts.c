@@ -7,13 +7,13 @@
 
 #include <cmocka.h>
 
-#include "pattern_f32.h"
+#include "solve/pattern_f32.h"
 #include "pvid/pvid.h"
-#include "weak_finish_f32.h"
-#include "weak_front_f32.h"
-#include "weak_schedule.h"
+#include "weak/finish_f32.h"
+#include "weak/front_f32.h"
+#include "weak/schedule.h"
 #include "weak_table.h"
-#include "weak_window_f32.h"
+#include "weak/window_f32.h"
 
 static void assert_close(double value, double expected, double tolerance)
 {
@@ -107,9 +107,10 @@ static void two_samples_at_a_time_are_one_after_the_other(void **state)
         const float phi = (i == 0u) ? 1.0e30f : noise(); /* what has no weight must not matter */
         float *now = term[i % 2u];
         window.index = i;
-        pvid_weak_window_terms_f32(&window, table_design.window, 0.008f, phi, (i == 0u) ? 1.0e30f : noise(), &no_bend, now);
-        pvid_weak_window_add_f32(&window, &table_design, (const float(*)[PVID_WEAK_SAMPLE_TERMS])term, 0, 2, sums);
-        pvid_weak_window_add_f32(&window, &table_design, (const float(*)[PVID_WEAK_SAMPLE_TERMS])term, 2,
+        pvid_weak_window_terms_f32(&window, table_design.window, 0.008f, phi, (i == 0u) ? 1.0e30f : noise(), &no_bend,
+                                   now);
+        pvid_weak_window_add_f32(&window, &table_design, (const float (*)[PVID_WEAK_SAMPLE_TERMS])term, 0, 2, sums);
+        pvid_weak_window_add_f32(&window, &table_design, (const float (*)[PVID_WEAK_SAMPLE_TERMS])term, 2,
                                  TABLE_FUNCTIONS, sums);
         const float *chi = &table_design.chi[3u * TABLE_FUNCTIONS * i];
         for (size_t k = 0; (i > 0u) && (k < TABLE_FUNCTIONS); k++) {

@@ -208,8 +208,8 @@ static void what_a_gap_cuts_off_is_summed_no_further(void **state)
     }
 }
 
-/* A table of which init knows no more than that its entries fit, and whose matrix has no Cholesky factor: a row with nine
- * entries that come out as 1, whose squares an int64 in Q60 cannot hold. */
+/* A table of which init knows no more than that its entries fit, and whose matrix has no Cholesky factor: a row with
+ * nine entries that come out as 1, whose squares an int64 in Q60 cannot hold. */
 static void a_gram_table_without_a_factor_is_noticed_whatever_it_holds(void **state)
 {
     (void)state;
@@ -423,8 +423,7 @@ static void a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_no
     assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &config, image, sizeof image), PVID_SNAPSHOT_DAMAGED);
     assert_memory_equal(&before, &identifier, sizeof before);
     image[1000] ^= 1u;
-    assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &config, image, sizeof image),
-                     PVID_SNAPSHOT_RESTORED);
+    assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &config, image, sizeof image), PVID_SNAPSHOT_RESTORED);
     assert_memory_equal(&before, &identifier, sizeof before);
 }
 

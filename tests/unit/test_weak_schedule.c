@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #include "pvid/config.h"
-#include "weak_schedule.h"
+#include "weak/schedule.h"
 
 /* A block has ticks enough: two windows of slices and the stages' own. */
 static void every_block_has_room(void **state)
@@ -18,9 +18,9 @@ static void every_block_has_room(void **state)
             const uint32_t slice = pvid_weak_functions_a_tick(decimation, functions);
             const uint32_t ticks = decimation - pvid_weak_free_ticks(decimation, functions);
             assert_true((slice >= 1u) && (slice <= functions));
-            assert_true((ticks / 2u) * slice >= functions);          /* a window takes a sample in */
-            assert_true(((ticks / 2u) - 1u) * slice < functions);    /* and wastes no tick */
-            assert_true(ticks <= decimation - (decimation / 2u));    /* in the second half */
+            assert_true((ticks / 2u) * slice >= functions);       /* a window takes a sample in */
+            assert_true(((ticks / 2u) - 1u) * slice < functions); /* and wastes no tick */
+            assert_true(ticks <= decimation - (decimation / 2u)); /* in the second half */
         }
     }
 }
@@ -94,8 +94,8 @@ static void a_job_visits_every_pair_at_its_place(void **state)
     assert_int_equal(job.pair, job.half);
 }
 
-/* A job that is done at once, in a ring as short as can be, is cut in two at an end of the ring, unless it begins in the
- * middle or at an end. */
+/* A job that is done at once, in a ring as short as can be, is cut in two at an end of the ring, unless it begins in
+ * the middle or at an end. */
 static void a_job_crosses_an_end_of_the_ring_once(void **state)
 {
     (void)state;

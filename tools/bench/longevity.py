@@ -32,6 +32,7 @@ from pvid.core.native import (
     strong_config_struct,
 )
 from pvid.core.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
+from pvid.core.sources import PUBLIC_FOLDERS
 from pvid.rig.file import RigFile
 from pvid.run.compare_q31 import identifier_q31
 from pvid.setup.f32 import strong_config, weak_config
@@ -314,13 +315,13 @@ def build_library(folder: Path) -> ctypes.CDLL:
 
     What they take of the core comes from the library that is measured.
     """
-    include, here, cost = (ROOT / name for name in ("firmware/include", "tests/longevity", "tests/cost"))
+    here, cost = (ROOT / name for name in ("tests/longevity", "tests/cost"))
     sources = [*sorted(here.glob("*.c")), cost / "rls_f32.c"]
     library, core = folder / LIBRARY, default_library().resolve()
     folder.mkdir(parents=True, exist_ok=True)
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=default"]
     command += SIZES
-    command += [f"-I{path}" for path in (include, here, cost)]
+    command += [f"-I{path}" for path in (*PUBLIC_FOLDERS, here, cost)]
     linked = [str(core), f"-Wl,-rpath,{core.parent}", "-lm"]
     try:
         done = subprocess.run(

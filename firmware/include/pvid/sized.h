@@ -22,12 +22,11 @@
 #define PVID_ENUM_SIZE 0
 #endif
 
-#define PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers, \
-                      enums)                                                                                          \
-    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak  \
-        ##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_enum##enums
-#define PVID_SIZED_OF(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers, \
-                      enums)                                                                                          \
+#define PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
+                      integers, enums)                                                                                 \
+    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_enum##enums
+#define PVID_SIZED_OF(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
+                      integers, enums)                                                                                 \
     PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers,    \
                   enums)
 #define PVID_SIZED(name)                                                                                               \

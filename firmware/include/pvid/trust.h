@@ -58,18 +58,18 @@ extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 /* State; only the functions below write to it. */
 typedef struct {
     pvid_trust_config_f32 config;
-    uint16_t groups;  /* taken in; stops at its end */
-    uint16_t shut;    /* groups in a row that said too little */
-    uint16_t judged;  /* residuals in long_mean; stops at long_memory; none before p is near */
+    uint16_t groups; /* taken in; stops at its end */
+    uint16_t shut;   /* groups in a row that said too little */
+    uint16_t judged; /* residuals in long_mean; stops at long_memory; none before p is near */
     uint16_t long_memory;
-    uint8_t next;     /* place of the next residual in recent */
-    bool known;       /* whether p's standard errors are small at present: while they are not nothing fades */
-    bool near;        /* whether p has settled with small standard errors yet */
-    bool published;   /* whether an estimate has been trusted yet */
+    uint8_t next;   /* place of the next residual in recent */
+    bool known;     /* whether p's standard errors are small at present: while they are not nothing fades */
+    bool near;      /* whether p has settled with small standard errors yet */
+    bool published; /* whether an estimate has been trusted yet */
     bool misfit;
-    uint8_t ageing;   /* groups before which the past is still to fade */
+    uint8_t ageing;           /* groups before which the past is still to fade */
     float anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
-    float long_mean;  /* of residual variances relative to what is expected */
+    float long_mean;          /* of residual variances relative to what is expected */
     float recent[PVID_TRUST_SHORT];
     pvid_publication_mark mark;
     pvid_estimate_f32 estimate; /* the published one, for the context that calls step */

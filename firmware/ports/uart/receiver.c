@@ -1,4 +1,5 @@
-/* The receiver behind a UART's interrupt. What does not fit stays in the UART, its interrupt off until there is room. */
+/* The receiver behind a UART's interrupt. What does not fit stays in the UART, its interrupt off until there is room.
+ */
 #include "../receiver.h"
 
 #include "../interrupts.h"

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.board.boards import BUILD, ROOT, Board, build, keep_header, one_at_a_time
+from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import FixedConfig, FloatConfig, StreamRig
 from pvid.core.native import MAX_MOMENTS, Law, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
 from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.core.sources import FIRMWARE, FOLDERS, without
 from pvid.design.c_tables import float_array, float_literal, struct_initializer
 from pvid.design.weak_sizing import raised_bounds
 from pvid.link.frames import MAX_P, Core
@@ -161,23 +162,21 @@ def build_image(rig: StreamRig, board: Board | None) -> Path:
 
 def _build_for_host(folder: Path, tree: Path, core: Core, sizes: dict[str, str]) -> Path:
     """With the options of the core (firmware/cmake/PvidCompile.cmake); what the other core alone needs is left out."""
-    firmware = ROOT / "firmware"
-    application = firmware / "apps" / "stream"
-    other = {Core.F32: "q31", Core.Q31: "f32"}[core]
+    application = FIRMWARE / "apps" / "stream"
     sources = [
-        *sorted(one for one in (firmware / "src").glob("*.c") if not one.stem.endswith(f"_{other}")),
-        firmware / "link" / "link.c",
-        firmware / "ports" / "host" / "port.c",
-        firmware / "ports" / "host" / "receiver.c",
+        *without({Core.F32: "q31", Core.Q31: "f32"}[core]),
+        FIRMWARE / "link" / "link.c",
+        FIRMWARE / "ports" / "host" / "port.c",
+        FIRMWARE / "ports" / "host" / "receiver.c",
         *(application / file for file in ("main.c", "answers.c", "sensor.c", f"identifier_{core.name.lower()}.c")),
     ]
     image = tree / "stream"
-    inputs = [*sources, *folder.glob("*.h"), *firmware.glob("**/*.h")]
+    inputs = [*sources, *folder.glob("*.h"), *FIRMWARE.glob("**/*.h")]
     if image.exists() and image.stat().st_mtime > max(one.stat().st_mtime for one in inputs):
         return image
     tree.mkdir(parents=True, exist_ok=True)
     fresh = tree / "stream.new"
-    includes = [firmware / "include", firmware / "link", firmware / "ports", folder]
+    includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports", folder]
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
     command += [f"-D{name}={value}" for name, value in sizes.items()]
     command += [f"-I{one}" for one in includes] + [str(one) for one in sources] + ["-lm", "-o", str(fresh)]

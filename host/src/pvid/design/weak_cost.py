@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.core.sources import PUBLIC_INCLUDES
 from pvid.design.weak import WeakDesign
 from pvid.design.weak_sizing import raised_bounds
 
@@ -202,8 +203,7 @@ def state_bytes_32(definitions: tuple[str, ...] = (), corrected: bool = False) -
     """
     if shutil.which("gcc") is None or platform.machine() not in ("x86_64", "i686"):
         return None
-    include = Path(__file__).resolve().parents[4] / "firmware" / "include"
-    command = ["gcc", "-m32", "-msse2", "-mfpmath=sse", "-std=c99", "-ffreestanding", "-fno-common", f"-I{include}"]
+    command = ["gcc", "-m32", "-msse2", "-mfpmath=sse", "-std=c99", "-ffreestanding", "-fno-common", *PUBLIC_INCLUDES]
     room = "sizeof(pvid_weak_f32)" + (" + sizeof(pvid_weak_angle_f32)" if corrected else "")
     source = f'#include "pvid/weak.h"\nchar state[{room}];\n'
     command += [*(f"-D{definition}" for definition in definitions), "-S", "-x", "c", "-", "-o", "-"]

@@ -36,7 +36,7 @@ GRAM_BITS = 30
 
 TERMS = 15
 HIGH_TERMS = 2
-# Terms by the places of weak_window_q31.h. The products with I2(u phi) and I2(phi) need more bits than one term has:
+# Terms by the places of weak/window_q31.h. The products with I2(u phi) and I2(phi) need more bits than one term has:
 # _HIGH holds what lies beyond it, so few bits that their products need no shift.
 UIUF_HIGH, UIF_HIGH, UF, F, UIUF, UIF, UIU, UI1, U, UT, CHI_UF, CHI_F, CHI_U, CHI_1, Y = range(TERMS)
 # Part of full scale that a term is expected to reach: angle and drive an eighth each, and a motion to and fro leaves a

@@ -1,4 +1,4 @@
-"""Twin of weak_schedule.h: at which tick the weak form does what, whatever its arithmetic."""
+"""Twin of weak/schedule.h: at which tick the weak form does what, whatever its arithmetic."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Twin of weak_front_f32.c. It feeds forward, so a whole stretch of samples is computed at once."""
+"""Twin of weak/front_f32.c. It feeds forward, so a whole stretch of samples is computed at once."""
 
 from __future__ import annotations
 

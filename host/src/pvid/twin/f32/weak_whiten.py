@@ -1,4 +1,4 @@
-"""Twin of weak_whiten_f32.c: the noise covariance of a window's rows at p, its factor, and what noise is in it."""
+"""Twin of weak/whiten_f32.c: the noise covariance of a window's rows at p, its factor, and what noise is in it."""
 
 from __future__ import annotations
 

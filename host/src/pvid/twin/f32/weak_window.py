@@ -1,4 +1,4 @@
-"""Twin of weak_window_f32.c: the sums of every whole window of a stretch, all windows at once."""
+"""Twin of weak/window_f32.c: the sums of every whole window of a stretch, all windows at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Twin of weak_angle_f32.c: what the linear rows of a window lack, in every lane."""
+"""Twin of models/kapitza/full_angle_f32.c: what the linear rows of a window lack, in every lane."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Twin of kapitza_q31.c: the pendulum's physical parameters from fixed-point estimates, in integers."""
+"""Twin of kapitza_physical_q31.c: the pendulum's physical parameters from fixed-point estimates, in integers."""
 
 from __future__ import annotations
 

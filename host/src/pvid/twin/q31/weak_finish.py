@@ -1,4 +1,4 @@
-"""Twin of weak_finish_q31.c: a complete window becomes rows and steps, one stage a tick."""
+"""Twin of weak/finish_q31.c: a complete window becomes rows and steps, one stage a tick."""
 
 from __future__ import annotations
 

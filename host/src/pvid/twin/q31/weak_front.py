@@ -1,4 +1,4 @@
-"""Twin of weak_front_q31.c: exact sums of counts, one rounding each for F and U."""
+"""Twin of weak/front_q31.c: exact sums of counts, one rounding each for F and U."""
 
 from __future__ import annotations
 
