@@ -132,8 +132,8 @@ typedef struct {
     float phi_sum;
     float lowest; /* phi */
     float highest;
-    float bend_square_sum; /* of the second differences of phi that fell into the window */
-    uint16_t bends;        /* how many did */
+    float curvature_square_sum; /* of the second differences of phi that fell into the window */
+    uint16_t curvatures;        /* how many did */
 } pvid_weak_window_f32;
 
 /* Second differences phi(t) - 2 phi(t - lag) + phi(t - 2 lag), one every `lag` decimated samples. */
@@ -143,7 +143,7 @@ typedef struct {
     bool due;        /* the present sample ends one */
     float before[2]; /* phi one lag and two lags ago */
     float square;    /* of the one that is due */
-} pvid_weak_bend_f32;
+} pvid_weak_curvature_f32;
 
 #define PVID_WEAK_FACTOR ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 
@@ -172,7 +172,7 @@ typedef struct {
 } pvid_weak_integral_f32;
 
 /* What the rows lack: the remainder of Y, and the columns of c1 and c2. */
-#define PVID_WEAK_LACKS 3
+#define PVID_WEAK_REMAINDERS 3
 
 /* The samples of the window in work, and what its rows lack. Only the identifier writes to it. */
 struct pvid_weak_angle_f32 {
@@ -188,7 +188,7 @@ struct pvid_weak_angle_f32 {
     uint8_t channels; /* 1, or 3 with friction */
     bool full_angle;
     bool on;       /* the estimate has settled: rows are corrected */
-    bool sensible; /* p is that of a pendulum */
+    bool physical; /* p is that of a pendulum */
     float dt;
     float inverse_l1_square; /* of rod 1 [1/m^2] */
     float p[PVID_KAPITZA_P];
@@ -200,9 +200,9 @@ struct pvid_weak_angle_f32 {
     float b;
     float normal[5]; /* A^T A, A^T B, B^T B, A^T e, B^T e */
     pvid_weak_integral_f32 motion;
-    pvid_weak_integral_f32 remainder[PVID_WEAK_LACKS];
-    float lack[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS];                        /* by the last pass */
-    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS];                        /* by this one */
+    pvid_weak_integral_f32 remainder_integral[PVID_WEAK_REMAINDERS];
+    float remainder[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];              /* by the last pass */
+    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];                   /* by this one */
     float ring[PVID_MAX_WEAK_WINDOW + ((PVID_MAX_WEAK_WINDOW + 1) / 2)][2]; /* phi [rad], u [1/s^2] */
 };
 
@@ -235,16 +235,16 @@ typedef struct {
     float pivot_noise;          /* that the pivot's gives it, for each mean square of a second difference */
     float angle_limit;          /* [rad]; 0: none */
     uint8_t iterations;
-    uint8_t slice;    /* functions a tick */
-    uint8_t together; /* stages of a complete window a tick */
-    uint8_t turn;     /* the window that takes the present decimated sample in; 2: both have */
-    uint8_t function; /* functions of that window that have, 0..K-1 */
-    bool warm;        /* a window has been completed since the restart */
-    bool frozen;      /* windows are gathered and dropped */
-    float phi;        /* the present decimated sample [rad] */
-    float u;          /* [1/s^2] */
+    uint8_t functions_per_tick; /* functions a tick */
+    uint8_t stages_per_tick;    /* stages of a complete window a tick */
+    uint8_t active;             /* the window that takes the present decimated sample in; 2: both have */
+    uint8_t function;           /* functions of that window that have, 0..K-1 */
+    bool warm;                  /* a window has been completed since the restart */
+    bool frozen;                /* windows are gathered and dropped */
+    float phi;                  /* the present decimated sample [rad] */
+    float u;                    /* [1/s^2] */
     pvid_weak_front_f32 front;
-    pvid_weak_bend_f32 bend;
+    pvid_weak_curvature_f32 curvature;
     pvid_weak_window_f32 window[2];
     pvid_weak_finish_f32 finish;
     float term[2][2][PVID_WEAK_SAMPLE_TERMS]; /* of each window: of its last even and of its last odd sample */
