@@ -140,8 +140,8 @@ class Identifier:
     damping : weak form, float32: two more regressors, for viscous friction
     zero : weak form: the zero of the encoder is unknown, a fourth parameter
     kappa_min : hold the estimate while less than this share of the information on w is its own
-    outlier_gate : reject rows or windows whose residuals exceed this multiple of the usual; 0: no gate; default: 4 (weak
-        form), 6 (strong form), and no gate with the law pseudovelocity
+    outlier_gate : reject rows or windows whose residuals exceed this multiple of the usual; 0: no gate; default: 4
+        (weak form), 6 (strong form), and no gate with the law pseudovelocity
     outlier_patience_s : the gate accepts a changed mechanism after this time; 0: never; default: forgetting_s times 3
         (weak form) or 6 (strong form)
     dead_zone : keep p while it is within this many standard errors of the solution of all data; 0: no dead zone
@@ -219,8 +219,8 @@ class RigFile:
 
     @classmethod
     def standard(cls) -> RigFile:
-        """The standard rig of MATH.md 6, as a user who knows only l1 and the sensors would write it, and both exactly:
-        a simulation has no error of l1 or of the gain of y."""
+        """The standard rig of theory.md 6, as written by a user who knows only l1 and the sensors, both exactly: a
+        simulation has no error of l1 or of the gain of y."""
         sensor = Sensor(y_gain_sd=0.0)
         return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sensor=sensor, sample_rate=1000.0, l1_sd=0.0)
 
