@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import playback  # noqa: E402 - of tests
 
 from pvid.core import sources  # noqa: E402
-from pvid.core.native import SIZES  # noqa: E402
+from pvid.settings.bounds import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "coverage"
 REPORT = ROOT / "build" / "coverage.md"

@@ -39,7 +39,8 @@ sys.path.insert(0, str(ROOT / "tests"))
 import playback  # noqa: E402 - of tests
 
 from pvid.core import sources  # noqa: E402
-from pvid.core.native import SIZES, Native  # noqa: E402
+from pvid.core.native import Native  # noqa: E402
+from pvid.settings.bounds import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "mutate"
 MEMORY = ROOT / "build" / "mutants.json"

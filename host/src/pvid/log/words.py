@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from pvid.core.native import Reason
 from pvid.link.frames import Code, Core, Form, Hello, Status
 from pvid.log.reader import Account
+from pvid.settings.enums import Reason
 
 # Values.TABLES["estimates"] has the same names.
 PARAMETERS = {
