@@ -26,7 +26,7 @@ def example() -> str:
 def test_the_example_identifies_the_standard_rig(tmp_path: Path) -> None:
     (tmp_path / "example.c").write_text(example(), encoding="utf-8")
     RigFile.standard().write(tmp_path / "rig.toml")
-    command = [sys.executable, "-P", "-m", "pvid", "weak-table", "--rig", str(tmp_path / "rig.toml")]
+    command = [sys.executable, "-P", "-m", "pvid", "tables", "--rig", str(tmp_path / "rig.toml")]
     header = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     (tmp_path / "tables.h").write_text(header, encoding="utf-8")
     binary = tmp_path / "example"

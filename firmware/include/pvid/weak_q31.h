@@ -3,7 +3,7 @@
  * The same identifier as weak.h, in the same stages and the same schedule, for cores without a floating-point unit:
  *
  *   static pvid_weak_q31 identifier;
- *   (config from the header that `pvid weak-table --core q31` writes)
+ *   (config from the header that `pvid tables --core q31` writes)
  *   if (pvid_weak_init_q31(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_weak_step_q31(&identifier, phi_counts, y_counts);
  *
@@ -42,7 +42,7 @@ extern "C" {
 #define PVID_WEAK_GRAMS 6
 #define PVID_WEAK_COLUMNS_Q31 12 /* N1..N8, Y, a, b and one that stays 0 */
 
-/* Tables and formats of a design: constant data, made by `pvid weak-table --core q31`, kept by reference. See weak.h
+/* Tables and formats of a design: constant data, made by `pvid tables --core q31`, kept by reference. See weak.h
  * for what the tables are. */
 typedef struct {
     uint16_t taps;       /* smoothing window [samples], odd, 5..PVID_MAX_TAPS */
