@@ -47,8 +47,8 @@ def command(
 ) -> int:
     """Predicts what the weak form's tables for a rig will give: standard errors, kappa, delay, memory, instructions.
 
-    The rig file holds no drive: it comes from a recorded run, or from tones. The tables themselves are printed by
-    weak-table.
+    The drive comes from a recorded run or from tones, not from the rig file. The tables themselves are printed by
+    tables.
     """
     from pvid.run.design_report import report_for_run, report_for_tones
 

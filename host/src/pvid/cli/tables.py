@@ -11,7 +11,7 @@ import click
 from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import read_input, with_overrides
-from pvid.core.native_q31 import WeakConfigQ31
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import to_c_header

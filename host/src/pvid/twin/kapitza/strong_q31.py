@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.design.strong_q31 import RowShiftsQ31
+from pvid.settings.tables import RowShiftsQ31
 from pvid.twin.kapitza.weak_q31 import ModelQ31
 from pvid.twin.q31.estimator import ROW_LIMIT
 from pvid.twin.q31.integer import Int, clamp, integers, round_shift, times_q31
