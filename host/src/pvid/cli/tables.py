@@ -11,12 +11,12 @@ import click
 from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import read_input, with_overrides
-from pvid.settings.q31 import WeakConfigQ31
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import to_c_header
 from pvid.design.weak_sizing import SizesOfDesign, raised_bounds
 from pvid.rig.file import RigFile, load
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.f32 import weak_design_of
 from pvid.setup.q31 import config_for_run, strong_config_q31, weak_config_q31
 from pvid.setup.strong_header_q31 import strong_header_q31
