@@ -178,7 +178,7 @@ def test_what_it_cannot_hold_is_said(sensor: dict[str, float], sentence: str) ->
 
 PROGRAM = """
 #include <stdio.h>
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "table.h"
 int main(void)
 {
