@@ -159,7 +159,7 @@ def weak_variants() -> list[Variant]:
     ungated: dict[str, Any] = {"kappa_min": 0, "noise_margin": 0}
     add("no gates", samples, estimator=ungated, estimator_q31=ungated)
     add("short steps", samples, estimator={"step_limit": 0.02}, estimator_q31={"step_limit": 1311})
-    hasty: dict[str, Any] = {"groups_min": 0, "shut_max": 1, "misfit_max": 0}
+    hasty: dict[str, Any] = {"groups_min": 0, "revert_after": 1, "misfit_max": 0}
     open_door = {"trust": TrustConfig(**hasty), "drive_min": 0.0}, {"trust": TrustConfigQ31(**hasty), "drive_min": 0}
     add("hostile", hostile_samples(), others=open_door[0], others_q31=open_door[1])
     add("shut at once", samples, others=open_door[0], others_q31=open_door[1])
@@ -167,8 +167,8 @@ def weak_variants() -> list[Variant]:
         "never shut",
         samples,
         with_settings(forgetting_s=1e5),
-        others={"trust": TrustConfig(shut_max=0)},
-        others_q31={"trust": TrustConfigQ31(shut_max=0)},
+        others={"trust": TrustConfig(revert_after=0)},
+        others_q31={"trust": TrustConfigQ31(revert_after=0)},
     )
     add("gate", samples, with_settings(outlier_gate=4.0, outlier_patience_s=3.0))
     add("dead zone", samples, with_settings(dead_zone=1.0))

@@ -123,7 +123,7 @@ class Mutant:
         told = f"{seed} {self.file} {self.line()[1]} {self.old} {self.new} {self.place}"
         return hashlib.sha256(told.encode()).hexdigest()
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """The change in words."""
         return f"{self.file}:{self.line()[0]} {self.old.strip()} -> {self.new.strip()}: {self.line()[1]}"
 
@@ -379,7 +379,7 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
     """The first CMocka program that fails; those that include a changed header are built anew."""
     library = changed_library(kit, mutant, base, folder, "libpvidcore.so")
     if library is None:
-        raise SystemExit(f"does not compile with {kit.name}: {mutant.told()}")
+        raise SystemExit(f"does not compile with {kit.name}: {mutant.describe()}")
     _, anew = base.dependents(mutant.file)
     for test in base.nearest_first(mutant.file):
         if kit is not PLAIN and base.seconds[test] > QUICK:
@@ -390,7 +390,7 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
             source = playback.UNIT / f"{test}.c"
             built = kit.compiles(program.with_suffix(".o"), source, folder)
             if not built or not kit.links_test(program, library[0].parent):
-                raise SystemExit(f"{test} does not compile with {kit.name}: {mutant.told()}")
+                raise SystemExit(f"{test} does not compile with {kit.name}: {mutant.describe()}")
         if not passes(program, library[0].parent):
             return test if kit is PLAIN else f"{test} ({kit.name})"
     return None
@@ -473,7 +473,7 @@ def campaign(
                 if by != "no mutant":
                     wanted[mutant.file] -= 1
                     results.append((mutant, by))
-                    print(f"{by or 'lives so far':40} {mutant.told()}", flush=True)
+                    print(f"{by or 'lives so far':40} {mutant.describe()}", flush=True)
         alive = [mutant for mutant, by in results if by is None]
         if not alive or not sanitizers:
             return results
@@ -481,7 +481,7 @@ def campaign(
             tests_of(kit)
         second = dict(zip(alive, judge(verdict_under_sanitizers, alive), strict=True))
     for mutant, by in second.items():
-        print(f"{by or 'LIVES':40} {mutant.told()}", flush=True)
+        print(f"{by or 'LIVES':40} {mutant.describe()}", flush=True)
     return [(mutant, by or second.get(mutant)) for mutant, by in results]
 
 
@@ -602,7 +602,7 @@ def main() -> int:
     )
     unexplained = [mutant for mutant, reason in told.others if reason is None]
     for mutant in unexplained:
-        print(f"no reason in {REASONS.name}: {mutant.told()}")
+        print(f"no reason in {REASONS.name}: {mutant.describe()}")
     return 1 if unexplained or told.rate < WANTED else 0
 
 

@@ -73,8 +73,8 @@ def in_stages(program: str) -> tuple[str, ...]:
     return (
         *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
         "-eva-slevel-function",
-        "main:200,asks_for_noise:5,eliminate_part:30,inform_stage:30,factor_stage:60,look:60,solve_stage:30,"
-        "pvid_estimator_advance_q31:100,pvid_estimator_assess_on_q31:100,kappa_stage:60,widen_stage:60,"
+        "main:200,checks_noise:5,eliminate_part:30,above_noise_stage:30,factor_stage:60,advance_shared:60,solve_stage:30,"
+        "pvid_estimator_advance_q31:100,pvid_estimator_assess_advance_q31:100,kappa_stage:60,widen_stage:60,"
         f"pvid_estimator_invert_q31:20,pvid_cholesky_eliminate_q31:20,{program}:5000",
     )
 
@@ -152,7 +152,7 @@ PROOFS = (
         ("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
         (
             *("-eva-auto-loop-unroll", "200", "-eva-slevel", "100", "-eva-subdivide-non-linear", "4"),
-            *("-inline-calls", "pvid_pivot_is_data_q31", "-eva-domains", "equality,symbolic-locations"),
+            *("-inline-calls", "pvid_pivot_is_significant_q31", "-eva-domains", "equality,symbolic-locations"),
             *("-eva-split-return", "full"),
         ),
         taken=(
@@ -202,8 +202,8 @@ PROOFS = (
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
             *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31"),
-            *("pvid_estimator_init_q31", "pvid_estimator_take_row_q31", "pvid_estimator_update_q31"),
-            *("pvid_misfit_init_q31", "pvid_misfit_take_q31", "pvid_misfit_judge_q31"),
+            *("pvid_estimator_init_q31", "pvid_estimator_add_row_q31", "pvid_estimator_update_q31"),
+            *("pvid_misfit_init_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
         ),
     ),
     Proof(
@@ -279,15 +279,15 @@ PROOFS = (
         (
             *("-eva-min-loop-unroll", "17", "-eva-auto-loop-unroll", "300", "-eva-split-return", "full"),
             *("-eva-slevel-function", "factor_diagonal:400,find_length:10", "-eva-subdivide-non-linear", "4"),
-            *("-inline-calls", "pvid_pivot_is_data_q31", "-eva-domains", "equality"),
+            *("-inline-calls", "pvid_pivot_is_significant_q31", "-eva-domains", "equality"),
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
             *("pvid_to_block_q31", "pvid_half_exponent_q31", *SCALED),
             *("pvid_estimator_innovation_q31", "pvid_estimator_add_q31", "pvid_estimator_begin_q31"),
-            *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_on_q31"),
-            *("pvid_gate_passes_q31", "pvid_trust_refuge_q31", "pvid_trust_judge_q31"),
-            *("pvid_estimator_expect_q31", "pvid_information_fade_q31", "pvid_trust_ageing_q31"),
+            *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_advance_q31"),
+            *("pvid_gate_passes_q31", "pvid_trust_fallback_q31", "pvid_trust_judge_q31"),
+            *("pvid_estimator_set_expected_q31", "pvid_information_fade_q31", "pvid_trust_fade_factor_q31"),
         ),
     ),
     Proof(

@@ -52,7 +52,7 @@ def test_unknown_friction_makes_it_wider(native: Native) -> None:
     assert (with_viscous > without).all() and (with_dry > without).all()
 
 
-def test_a_run_without_a_drive_says_nothing_of_w(native: Native) -> None:
+def test_run_without_drive_does_not_identify_w(native: Native) -> None:
     """One mode in free motion: amplitude and frequency do not tell three parameters."""
     acceleration = np.zeros(2 * 2000 + 1)
     bound = cramer_rao(

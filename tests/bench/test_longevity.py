@@ -109,7 +109,7 @@ LET_IN = ("one tone", "weak", 0.12)
 
 
 @pytest.mark.parametrize("scenario", OVER)
-def test_what_is_over_is_over(scenario: str, outcomes: Outcomes) -> None:
+def test_expired_alarm_does_not_return(scenario: str, outcomes: Outcomes) -> None:
     for lane in (lane for lane in LANES if lane.gated):
         outcome = outcomes[scenario][lane.label]
         assert outcome.errors <= longevity.BACK, lane.label
@@ -143,7 +143,7 @@ def test_forgetting_follows_a_parameter(lane: str, scenario: str, outcomes: Outc
 
 @pytest.mark.parametrize("scenario", ["step", "drift"])
 @pytest.mark.parametrize("kind", ["weak", "strong"])
-def test_sums_that_never_forget_say_that_they_cannot_follow(kind: str, scenario: str, outcomes: Outcomes) -> None:
+def test_sums_without_forgetting_report_a_change(kind: str, scenario: str, outcomes: Outcomes) -> None:
     outcome = outcomes[scenario][Lane(kind, 0.0).label]
     assert abs(outcome.error_after) > 3.0
     assert outcome.told != Reason.UPDATED.text
@@ -309,7 +309,7 @@ def test_a_disturbance_may_be_short_and_a_slip_slow(library: ctypes.CDLL) -> Non
     assert np.array_equal(slow[:30_000], clean[:30_000])
 
 
-def test_what_is_held_out_was_not_seen() -> None:
+def test_held_out_samples_are_not_fitted() -> None:
     assert not set(HELD_OUT) & set(SCENARIOS.values())
     assert {one.kind for one in HELD_OUT} == set(SCENARIOS)
     assert len({one.meaning + one.kind for one in HELD_OUT}) == len(HELD_OUT)
@@ -339,7 +339,7 @@ def test_comments_move_no_result_and_each_core_has_its_own() -> None:
     assert len(set(digests.values())) == 3
 
 
-def test_wrong_answers_without_a_word_are_called_silent() -> None:
+def test_wrong_answers_without_warning_are_silent() -> None:
     assert Outcome(told="updated", errors=4.0).silent
     assert Outcome(told="updated", errors=float("nan")).silent
     assert not Outcome(told="updated", errors=2.0).silent
@@ -393,7 +393,7 @@ def kept_outcomes(disturbance: Disturbance, columns: Sequence[str], ticks: int) 
         longevity_tables.keep(task.disturbance.title, column, ticks, task.made_with, {"lanes": lanes})
 
 
-def test_the_tables_say_what_is_silent(results: Path) -> None:
+def test_tables_mark_silent_errors(results: Path) -> None:
     kept_outcomes(SCENARIOS["step"], list(COLUMNS), 10**7)
     found = {marker: (header, rows) for marker, header, rows in longevity_tables.tables()}
     assert list(found) == [f"longevity-{column}" for column in COLUMNS]
@@ -440,7 +440,7 @@ def test_counts_are_the_samples(library: ctypes.CDLL) -> None:
     assert np.array_equal(run.counts[~missing, 0], np.rint(phi[~missing] / np.float64(run.phi_lsb)))
 
 
-def test_what_does_not_fit_a_count_is_left_out_and_refused(library: ctypes.CDLL) -> None:
+def test_value_beyond_a_count_is_dropped_and_refused(library: ctypes.CDLL) -> None:
     found = longevity_target.combinations(tuple(SCENARIOS))
     assert ("sensor wrap", "strong", "f32") not in found
     assert len(found) == 4 * len(SCENARIOS) - 2

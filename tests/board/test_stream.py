@@ -209,7 +209,7 @@ def test_a_killed_emulator_is_started_again_and_the_run_over(name: str, form: st
     assert playback.restarts == 1
 
 
-def test_a_port_that_is_gone_for_good_ends_with_what_is_missing(native: Native) -> None:
+def test_lost_port_ends_with_the_missing_samples(native: Native) -> None:
     target = start_to_be_killed(HOST_TARGET, "weak", 20_000)  # built first
     began = time.monotonic()
     playback = play_standard(target, "weak", patience_s=3)
@@ -263,7 +263,7 @@ def test_an_image_with_the_other_core_is_refused() -> None:
         ("divider", 0),
     ],
 )
-def test_what_the_core_refuses_is_named(field: str, value: Any) -> None:
+def test_refusal_of_the_core_is_named(field: str, value: Any) -> None:
     """Every setting that goes over the link."""
     run, rig = standard_run("weak", TICKS), standard_rig("weak")
     assert isinstance(rig.config, WeakConfig)

@@ -176,7 +176,7 @@ WEAK = {
     "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
     "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.shut_max": Range(0, 65535, Status.OK),
+    "trust.revert_after": Range(0, 65535, Status.OK),
 }
 LEAST = -(2**31)
 FORMAT = Range(-64, 64, Status.BAD_FORMAT)
@@ -214,7 +214,7 @@ WEAK_Q31 = {
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
     "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.shut_max": Range(0, 65535, Status.OK),
+    "trust.revert_after": Range(0, 65535, Status.OK),
 }
 SHIFT = Range(0, 62, Status.BAD_SHIFT)
 STRONG_Q31 = {
@@ -324,7 +324,7 @@ def values_for(field: Field, known: Range) -> st.SearchStrategy[Any]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_field_is_forgotten_here(name: str, subjects: dict[str, Subject]) -> None:
+def test_every_field_is_tested(name: str, subjects: dict[str, Subject]) -> None:
     known = {field.group for field, _ in ranged(subjects[name])}
     refused = {entry.partition("[")[0] for entry in REFUSED[name]}
     leave = NOT_HERE | (NOT_WEAK if name in ("weak", "corrected") else set()) | {"design.gram_bits"}
@@ -351,7 +351,7 @@ def test_a_field_out_of_its_range_is_refused_by_name(name: str, subjects: dict[s
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_no_number_is_always_refused(name: str, subjects: dict[str, Subject]) -> None:
+def test_not_a_number_is_always_refused(name: str, subjects: dict[str, Subject]) -> None:
     for field, known in ranged(subjects[name]):
         if isinstance(field.value, float):
             for value in (math.nan, math.inf, -math.inf):
@@ -450,7 +450,7 @@ def odd_samples(draw: Callable[..., Any], subject: Subject) -> tuple[Samples, Sa
 @pytest.mark.parametrize("name", ("strong", "weak", "corrected"))
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
-def test_what_is_accepted_stays_finite(name: str, subjects: dict[str, Subject], data: Any) -> None:
+def test_accepted_configurations_stay_finite(name: str, subjects: dict[str, Subject], data: Any) -> None:
     subject = subjects[name]
     subject.restore()
     status = subject.status_with(data.draw(odd_configs(subject), label="config"))
@@ -463,7 +463,7 @@ def test_what_is_accepted_stays_finite(name: str, subjects: dict[str, Subject], 
 @pytest.mark.parametrize("name", ("weak q31", "strong q31"))
 @settings(max_examples=100, deadline=None)
 @given(data=st.data())
-def test_what_the_fixed_point_core_accepts_keeps_its_bounds(name: str, subjects: dict[str, Subject], data: Any) -> None:
+def test_fixed_point_core_keeps_its_bounds(name: str, subjects: dict[str, Subject], data: Any) -> None:
     subject = subjects[name]
     subject.restore()
     many = st.lists(st.sampled_from(list(ranged(subject))), min_size=1, max_size=6)

@@ -130,7 +130,7 @@ def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
         ({"identifier": {"damping": True}}, "core q31 has no damping"),
     ],
 )
-def test_what_it_cannot_do_is_said(
+def test_unsupported_request_is_reported(
     recorded: tuple[Path, Path], tmp_path: Path, change: dict[str, dict[str, object]], sentence: str
 ) -> None:
     rig = RigFile.standard()

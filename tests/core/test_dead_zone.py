@@ -76,7 +76,7 @@ def test_fixed_point_equals_its_twin(form: str, law: str, native: Native, run: R
 
 
 @pytest.mark.parametrize("core_name", ["f32", "q31"])
-def test_p_rests_within_the_zone_of_where_it_would_be(core_name: str, native: Native, run: Run) -> None:
+def test_p_stays_within_the_zone_of_the_solution(core_name: str, native: Native, run: Run) -> None:
     """As far as the zone says from the answer without one, hardly moved, and the published errors are the same."""
     ends, errors, solves = [], [], []
     for dead_zone in (0.0, 1.0):
@@ -125,7 +125,7 @@ def test_a_mechanism_that_changes_is_followed(core_name: str, native: Native) ->
     assert core.counters["at_rest"] > 0
 
 
-def test_it_is_off_unless_asked_for() -> None:
+def test_off_by_default() -> None:
     for form in FORMS:
         rig = rig_with(form=form)
         assert config_of(rig, 1000.0).estimator.dead_zone == 0.0
@@ -137,7 +137,7 @@ def test_it_is_off_unless_asked_for() -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("dead_zone", [-0.1, 100.1, float("nan"), float("inf")])
-def test_what_is_no_dead_zone_is_refused(form: str, dead_zone: float, native: Native) -> None:
+def test_invalid_dead_zone_is_refused(form: str, dead_zone: float, native: Native) -> None:
     config = config_of(rig_with(form=form), 1000.0)
     bad = replace(config, estimator=replace(config.estimator, dead_zone=dead_zone))
     with pytest.raises(PvidError, match=Status.BAD_DEAD_ZONE.name.lower().replace("_", " ")):
@@ -145,13 +145,13 @@ def test_what_is_no_dead_zone_is_refused(form: str, dead_zone: float, native: Na
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_what_is_no_dead_zone_is_refused_in_integers(form: str, native: Native) -> None:
+def test_invalid_dead_zone_is_refused_in_fixed_point(form: str, native: Native) -> None:
     config = config_of_q31(rig_with(form=form), 1000.0)
     bad = replace(config, estimator=replace(config.estimator, dead_zone=(100 << 16) + 1))
     with pytest.raises(PvidError, match="bad dead zone"):
         identifier_q31(native, bad)
 
 
-def test_a_rig_file_says_how_wide_it_may_be() -> None:
+def test_rig_file_contains_the_parameter_bounds() -> None:
     with pytest.raises(PvidError, match="dead_zone"):
         RigFile.parse("l1 = 0.3\n[identifier]\ndead_zone = 101\n")

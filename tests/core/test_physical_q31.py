@@ -33,7 +33,7 @@ def estimate_of(p: npt.ArrayLike, relative_se: float, correlation: float) -> npt
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_they_are_those_of_the_closed_form(native: Native, seed: int) -> None:
+def test_values_equal_the_closed_form(native: Native, seed: int) -> None:
     random = np.random.default_rng(seed)
     g, l2, rho2 = random.uniform(2, 30), random.uniform(0.03, 0.5), random.uniform(0.03, 0.5)
     p = oracle.linear(g, l2, rho2, RIG.l1)

@@ -186,7 +186,7 @@ def test_every_table_that_differs_is_seen(native: Native) -> None:
                 raw[place] ^= 1
 
 
-def test_a_correction_that_is_not_asked_for_has_no_passes(native: Native) -> None:
+def test_disabled_correction_has_no_passes(native: Native) -> None:
     image = snapshot.save(weak_of(native))
     identifier = weak_of(native)
     identifier.config_struct.passes += 1
@@ -194,7 +194,7 @@ def test_a_correction_that_is_not_asked_for_has_no_passes(native: Native) -> Non
 
 
 @pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
-def test_what_is_damaged_cut_short_or_of_another_version_changes_nothing(maker: Maker, native: Native) -> None:
+def test_bad_snapshot_changes_nothing(maker: Maker, native: Native) -> None:
     identifier = maker(native)
     image = snapshot.save(identifier)
     before = bytes(identifier.state)

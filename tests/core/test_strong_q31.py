@@ -170,7 +170,7 @@ def test_identify_and_compare_take_the_fixed_point_core(recorded: tuple[Path, Pa
         ({"phi_lsb": 2e-8}, "phi_range is 25000000 counts of the sensor and the fixed-point core takes"),
     ],
 )
-def test_what_it_cannot_hold_is_said(sensor: dict[str, float], sentence: str) -> None:
+def test_unsupported_size_is_reported(sensor: dict[str, float], sentence: str) -> None:
     rig = replace(STRONG, sensor=replace(STRONG.sensor, **sensor))
     with pytest.raises(PvidError, match=sentence):
         strong_design_of(rig, 1000.0)

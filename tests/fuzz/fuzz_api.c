@@ -223,7 +223,7 @@ static void configure_weak(bool sound)
     config->iterations = one_in(8) ? (uint8_t)any_word() : config->iterations;
     config->passes = one_in(8) ? (uint8_t)any_word() : config->passes;
     config->trust.groups_min = one_in(8) ? (uint16_t)any_word() : config->trust.groups_min;
-    config->trust.shut_max = one_in(8) ? (uint16_t)below(3) : config->trust.shut_max;
+    config->trust.revert_after = one_in(8) ? (uint16_t)below(3) : config->trust.revert_after;
     config->angle = one_in(8) ? NULL : config->angle;
     config->full_angle = one_in(8) ? true : config->full_angle;
     config->friction = one_in(8);

@@ -177,12 +177,12 @@ def test_the_schema_describes_itself() -> None:
             link.parse_schema(broken)
 
 
-def test_the_c_header_is_what_python_says() -> None:
+def test_c_header_equals_the_python_definition() -> None:
     written = (ROOT / "firmware" / "link" / "schema.h").read_text(encoding="utf-8")
     assert written == link.c_header(), "./tools/pvid link-schema > firmware/link/schema.h"
 
 
-def test_losses_say_what_was_lost() -> None:
+def test_loss_report_names_the_lost_samples() -> None:
     hash_frame = link.encode(link.Hash(1, 2), 0)
     later = link.encode(link.Hash(1, 2), 3)
     broken = bytearray(later)
@@ -197,7 +197,7 @@ def test_the_c_side_withstands_fuzzing(tmp_path: Path) -> None:
     assert fuzz_link(tmp_path, FUZZ_RUNS) == FUZZ_RUNS
 
 
-def test_a_decoder_learns_the_schema_of_another_version() -> None:
+def test_decoder_accepts_the_schema_of_another_version() -> None:
     today = link.Hash.layout().text
     text = link.SCHEMA_TEXT.replace(today, "8 hash session:u32 hash:u64 phase:u8")
     other = zlib.crc32(text.encode())
@@ -239,7 +239,7 @@ def test_a_tick_has_48_bits_where_a_board_sends_it() -> None:
     assert frame == link.Frame(0, 5, link.Schema(b"x"))
 
 
-def test_only_a_schema_that_is_its_own_number_is_learnt() -> None:
+def test_schema_is_accepted_only_if_its_hash_matches() -> None:
     forged = link.encode_raw(link.Schema.TYPE, 0, 0, link.SCHEMA_TEXT.encode() + b" ", 12345)
     garbage = b"pvid 1\n\xff\xfe"
     senseless = link.encode_raw(link.Schema.TYPE, 0, 0, garbage, zlib.crc32(garbage))

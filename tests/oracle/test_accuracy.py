@@ -73,8 +73,8 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
     """
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0, standard_start(3))
-    n32, y32, fate = StrongTwin(config).rows(run.phi, run.y)
-    ready = fate == Reason.ACCUMULATED
+    n32, y32, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    ready = row_reason == Reason.ACCUMULATED
     n, y = n32[ready].astype(np.float64), y32[ready].astype(np.float64)
     n = n * oracle.BINOMIAL
     m, b = n.T @ n, n.T @ y
@@ -95,8 +95,8 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standar
     identifier = native.strong(config)
     identifier.run(run.phi, run.y, sums=False, hashes=False)
     last = identifier.assess()
-    n32, y32, fate = StrongTwin(config).rows(run.phi, run.y)
-    ready = fate == Reason.ACCUMULATED
+    n32, y32, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    ready = row_reason == Reason.ACCUMULATED
     n = n32[ready].astype(np.float64) * oracle.BINOMIAL
     y = y32[ready].astype(np.float64)
     p = last["p"][:3].astype(np.float64)
@@ -117,7 +117,7 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standar
 @pytest.mark.parametrize("core", ["f32", "f64"])
 @pytest.mark.parametrize("bits", [14, 20])
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_without_a_drive_the_start_is_held_and_said_to_be(native: Native, core: Core, bits: int, seed: int) -> None:
+def test_without_drive_the_start_is_held_and_reported(native: Native, core: Core, bits: int, seed: int) -> None:
     """The noise of a still pivot sensor, differentiated, must not pass for a drive (w came out 93 % off)."""
     rig = replace(STRONG, identifier=replace(STRONG.identifier, core=core))
     run = simulate(drive=(), sensors=standard_sensors(bits), truth="linear", duration=6.0, seed=seed).run

@@ -243,7 +243,7 @@ def test_kappa_is_the_schur_complement() -> None:
     assert oracle.kappa_of(np.ones((3, 3))) == 0.0
 
 
-def test_kappa_tells_a_driven_rig_from_a_resting_one(sums: tuple[Float, Float, float]) -> None:
+def test_kappa_separates_a_driven_rig_from_a_resting_one(sums: tuple[Float, Float, float]) -> None:
     c = oracle.jacobian(TRUTH)
     assert oracle.kappa_of(c.T @ sums[0] @ c) > 1e-3  # MATH.md 4: weak 1e-4, good 1e-2
 
@@ -267,7 +267,7 @@ def test_standard_errors_cover_the_truth(rows: tuple[Float, Float]) -> None:
     assert 152 <= covered < 180
 
 
-def test_standard_errors_fall_back_to_the_start_where_data_say_nothing() -> None:
+def test_standard_errors_fall_back_to_the_start_without_information() -> None:
     """Rows without drive that speak of d1 and d2 alone: w keeps what the start knew."""
     random = np.random.default_rng(3)
     n = np.zeros((200, 11))
@@ -343,7 +343,7 @@ def test_a_step_needs_as_much_information_as_the_start(row_sd: float, held: bool
     assert oracle.identify_strong(n, np.full(5, 14.0), settings).updated[-1] != held
 
 
-def test_estimates_come_when_asked_and_say_the_state_of_their_tick() -> None:
+def test_requested_estimates_contain_the_state_of_their_tick() -> None:
     n, y = noisy_rows(40, 0.1)
     result = oracle.identify_strong(n, y, settings_of(), estimate_every=10)
     assert [tick for tick, _ in result.estimates] == [10, 20, 30]  # at tick 0 one row is too few
@@ -351,7 +351,7 @@ def test_estimates_come_when_asked_and_say_the_state_of_their_tick() -> None:
         np.testing.assert_array_equal(estimate.p, result.p[tick])
 
 
-def test_no_convergence_is_said() -> None:
+def test_missing_convergence_is_reported() -> None:
     with pytest.raises(PvidError, match="did not converge"):
         oracle.constrained_least_squares(np.eye(11), np.ones(11), TRUTH, iterations=2)
 

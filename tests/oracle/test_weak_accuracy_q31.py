@@ -53,7 +53,7 @@ def started(config: WeakConfigQ31, settings: EstimatorConfig) -> WeakConfigQ31:
     return replace(config, estimator=replace(config.estimator, start=start, start_sd=sd))
 
 
-def test_another_start_is_all_that_a_start_changes() -> None:
+def test_start_changes_nothing_but_the_start() -> None:
     rig, start = LINEAR_RIG, standard_start(3)
     whole = weak_config_q31(rig, RATE, start)
     by_start = started(weak_config_q31(rig, RATE), weak_config(rig, RATE, start).estimator)

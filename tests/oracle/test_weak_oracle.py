@@ -133,7 +133,9 @@ def test_starts_off_by_half_converge_to_one_answer(standard: WeakDesign) -> None
 @pytest.mark.parametrize(
     ("bits", "allowed"), [(12, (0.06, 0.06, 0.15)), (14, (0.014, 0.014, 0.036)), (16, (0.009, 0.009, 0.02))]
 )
-def test_accuracy_is_what_the_issue_asks(standard: WeakDesign, bits: int, allowed: tuple[float, float, float]) -> None:
+def test_accuracy_is_within_its_requirement(
+    standard: WeakDesign, bits: int, allowed: tuple[float, float, float]
+) -> None:
     relative, standardised = errors(standard, 10, standard_sensors(bits), bits=bits)
     # ten seeds know an RMS to 22 %; the limits are 1.2 to 1.9 times what 60 seeds measure
     assert (100 * np.sqrt(np.mean(relative**2, axis=0)) < allowed).all()
@@ -234,7 +236,7 @@ def test_prediction_from_rough_parameters(standard: WeakDesign) -> None:
     assert (rough.relative > 2e-5).all()
 
 
-def test_what_cannot_be_identified_is_said(standard: WeakDesign) -> None:
+def test_unidentifiable_run_is_reported(standard: WeakDesign) -> None:
     given = settings(standard, 0)
     with pytest.raises(PvidError, match="smoothing window"):
         weak.identify_weak(np.zeros(10), np.zeros(10), standard, given)

@@ -31,7 +31,7 @@ static void any_row(uint16_t left)
     misfit.least_energy = any_sum();
     misfit.least_part = any_sum();
     misfit.left = left;
-    if (pvid_misfit_take_q31(&misfit, any_i64(0, SQUARE_MAX), any_i64(-INT64_MAX, INT64_MAX - 1))) {
+    if (pvid_misfit_add_q31(&misfit, any_i64(0, SQUARE_MAX), any_i64(-INT64_MAX, INT64_MAX - 1))) {
         misfit.energy = any_sum();
         misfit.signal = any_sum();
         (void)pvid_misfit_judge_q31(&misfit);

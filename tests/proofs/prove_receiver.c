@@ -6,7 +6,7 @@
 #include "receiver.h"
 #include "uart/uart.h"
 
-void pvid_uart_listen(void)
+void pvid_uart_enable_receive(void)
 {
 }
 

@@ -61,7 +61,7 @@ static void any_state(void)
     finish.energy = any_i64(0, PVID_WIDE);
     finish.size = any_i64(0, PVID_WIDE);
     finish.expected = any_scaled(1);
-    finish.ageing = any_i32(0, INT32_MAX);
+    finish.fade_factor = any_i32(0, INT32_MAX);
     finish.gate.limit = any_scaled(0);
 }
 

@@ -63,7 +63,7 @@ def test_friction_is_found() -> None:
     assert choice.chosen.residual_over(choice.default) < 0.5
 
 
-def test_a_survey_that_is_asked_for_friction_leaves_less_to_disturbances() -> None:
+def test_survey_with_friction_leaves_smaller_disturbances() -> None:
     run = RUBBING.run(0)
     without = fitted(RUBBING.rig, run).identifier.disturbance
     asked = fitted(with_identifier(RUBBING.rig, damping=True), run)
@@ -121,7 +121,7 @@ def test_the_written_file_gives_the_answer_again(native: Native) -> None:
         assert again.identified
 
 
-def test_what_is_written_is_explicit_and_short() -> None:
+def test_written_file_is_explicit_and_short() -> None:
     rig = tuned(STANDARD).rig
     own = rig.identifier
     assert not own.survey
@@ -234,7 +234,7 @@ def refused(native: Native, run: Run) -> str:
     return str(caught.value)
 
 
-def test_what_cannot_be_tuned_is_said(native: Native) -> None:
+def test_untunable_run_is_reported(native: Native) -> None:
     still = simulate(drive=(), sensors=standard_sensors(14), duration=15.0).run
     said = refused(native, still)
     assert "nothing is identified" in said and "stands still" in said

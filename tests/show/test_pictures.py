@@ -59,7 +59,7 @@ def photograph(browser: webdriver.Chrome, path: Path) -> None:
     assert 5_000 < path.stat().st_size < 200_000
 
 
-def test_the_terminal_view_fits_80_by_24_whatever_it_has_to_say(
+def test_terminal_view_always_fits_80_by_24(
     sent: list[tuple[int, link.Message]], pictures: Path, tmp_path: Path
 ) -> None:
     def told(message: link.Message) -> link.Message:
@@ -126,7 +126,7 @@ def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Pat
         photograph(browser, pictures / "page.png")
 
 
-def test_the_report_says_what_it_is_and_its_titles_fit(log: Path, pictures: Path) -> None:
+def test_report_has_a_title_and_its_titles_fit(log: Path, pictures: Path) -> None:
     recording = recording_of(log, None)
     misfit = replace(recording, reasons={Reason.MISFIT.text: 190, Reason.UPDATED.text: 10}, state=Reason.MISFIT.text)
     for name, one in (("report.png", recording), ("report-misfit.png", misfit)):

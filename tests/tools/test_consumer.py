@@ -175,7 +175,7 @@ def test_a_header_of_sizes_travels_too(tmp_path: Path) -> None:
     assert Printed.of(printed[0]).taps == 91
 
 
-def test_what_is_installed(prefix: Path) -> None:
+def test_installed_files(prefix: Path) -> None:
     files = {path.relative_to(prefix).as_posix() for path in prefix.rglob("*") if path.is_file()}
     headers = {f"include/{path.as_posix().rpartition('/include/')[2]}" for path in public_headers()}
     assert headers == {name for name in files if name.endswith(".h")}  # public headers only, all of them

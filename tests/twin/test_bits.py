@@ -42,7 +42,7 @@ def variants(config: EstimatorConfig) -> list[EstimatorConfig]:
     return [replace(config, law=law, forgetting_s=tau) for law in Law for tau in (0.0, 2.0)]
 
 
-def test_the_matrix_holds_what_its_names_say(matrix: dict[str, Native]) -> None:
+def test_matrix_cases_match_their_names(matrix: dict[str, Native]) -> None:
     assert set(matrix) == set(BUILDS)
     for name, native in matrix.items():
         compiler, level = name.split("-")
@@ -81,9 +81,9 @@ class Group:
         self.identifiers = [[native.strong(replace(config, estimator=lane)) for native in natives] for lane in whole]
         warming_up = window(config)
         phi, y = (x[first_row - warming_up :] for x in (run.phi, run.y))
-        n, row_y, fate = StrongTwin(config).rows(phi, y)
-        assert (fate[:warming_up] == Reason.WARMING_UP).all()
-        assert (fate[warming_up:] == Reason.ACCUMULATED).all()
+        n, row_y, row_reason = StrongTwin(config).rows(phi, y)
+        assert (row_reason[:warming_up] == Reason.WARMING_UP).all()
+        assert (row_reason[warming_up:] == Reason.ACCUMULATED).all()
         self.n, self.row_y = n[warming_up:], row_y[warming_up:]
         self.phi, self.y = phi[warming_up:], y[warming_up:]
         self.hashes = [self._warm_up(k, phi[:warming_up], y[:warming_up]) for k in range(len(whole))]
@@ -92,8 +92,10 @@ class Group:
         """Feeds identifier k until its next sample makes a row; returns its hash."""
         start = np.asarray(self.lanes[len(self.estimators) + k].start, np.float32)
         p = np.tile(start, (len(phi), 1))
-        told = np.full(len(phi), Reason.WARMING_UP, np.uint8)
-        return self._compare_identifiers(k, phi, y, p, np.zeros((len(phi), model.SUMS), np.float32), told, fnv.START)
+        reported = np.full(len(phi), Reason.WARMING_UP, np.uint8)
+        return self._compare_identifiers(
+            k, phi, y, p, np.zeros((len(phi), model.SUMS), np.float32), reported, fnv.START
+        )
 
     def _compare_identifiers(
         self,

@@ -27,8 +27,8 @@ def against_twin(native: Native, config: EstimatorConfigQ31, n: Rows, y: Rows) -
     for tick in range(len(y)):
         reason = twin.add(n[tick][:, None], y[tick : tick + 1])
         if reason[0] == Reason.ACCUMULATED:
-            for told in twin.solve(ends_group=True):
-                reason = reason if told is None else told
+            for reported in twin.solve(ends_group=True):
+                reason = reason if reported is None else reported
         assert reason[0] == record.reason[tick], tick
         assert np.array_equal(twin.p[:, 0], record.p[tick]), tick
         assert np.array_equal(twin.sums[:, 0], record.sums[tick]), tick

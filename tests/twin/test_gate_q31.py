@@ -65,7 +65,7 @@ def one_lane(value: float) -> Scaled:
     patience=st.sampled_from([0.0, 0.5, 10.0]),
     sigmas=st.sampled_from([2.0, 4.0, 1000.0]),
 )
-def test_it_follows_that_of_float32(squares: list[float], patience: float, sigmas: float) -> None:
+def test_scale_follows_that_of_float32(squares: list[float], patience: float, sigmas: float) -> None:
     config = GateConfig(sigmas, patience)
     single = Gate(config, np.float32(100.0), np.float32(10.0), np.array([1.0], np.float32))
     integer = GateQ31(gate_config_q31(config, 100.0), 10, one_lane(1.0))
@@ -81,7 +81,7 @@ def test_it_follows_that_of_float32(squares: list[float], patience: float, sigma
         assert scale == pytest.approx(float(single.scale[0]), rel=1e-4)  # 60 float32 roundings, and ln 1e4 to 3e-6
 
 
-def test_who_is_not_asked_passes_and_leaves_the_scale_as_it_was() -> None:
+def test_disabled_gate_accepts_and_keeps_scale() -> None:
     gate = GateQ31(GateConfigQ31(4 << 16), 1, one_lane(1.0))
     before = gate.scale
     assert gate.passes(one_lane(1e9), np.zeros(1, np.bool_)).all()
@@ -129,7 +129,7 @@ def test_the_strong_form_equals_its_twin(patience_s: float, matrix: dict[str, Na
     assert gated_like(StrongTwinQ31(config), config, phi, y, matrix)
 
 
-def test_windows_that_were_touched_are_kept_out(native: Native, jolted: Run) -> None:
+def test_disturbed_windows_are_rejected(native: Native, jolted: Run) -> None:
     errors = {}
     for sigmas in (0.0, 4.0):
         rig = rig_with(outlier_gate=sigmas)
@@ -165,7 +165,7 @@ def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
 # ---- settings ----
 
 
-def test_it_is_on_as_in_float32_unless_the_law_is_the_paper_s(jolted: Run) -> None:
+def test_enabled_as_in_float32_except_for_the_papers_law(jolted: Run) -> None:
     for form, sigmas in (("weak", 4), ("strong", 6)):
         assert config_for_run(rig_with(form=form, stride=8), jolted).gate == GateConfigQ31(sigmas << 16, 0)
         paper = rig_with(form=form, stride=8, law="pseudovelocity")
@@ -210,7 +210,7 @@ def test_a_forgetting_that_cannot_be_counted_is_refused_before_the_patience_that
         (GateConfigQ31(4 << 16, 2**30 + 1), Status.BAD_GATE_PATIENCE),
     ],
 )
-def test_what_makes_no_gate_is_refused(form: str, gate: GateConfigQ31, status: Status, native: Native) -> None:
+def test_invalid_gate_is_refused(form: str, gate: GateConfigQ31, status: Status, native: Native) -> None:
     with pytest.raises(PvidError, match=status.name.lower().replace("_", " ")):
         if form == "weak":
             WeakIdentifierQ31(native, replace(weak_config_q31(RIG, 1000.0), gate=gate))

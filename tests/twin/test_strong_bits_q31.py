@@ -91,8 +91,8 @@ def test_twenty_starts_with_both_laws_with_and_without_forgetting_equal_the_twin
     native: Native, standard_20_bits: Simulation
 ) -> None:
     """40 000 rows through eighty estimators and one twin of eighty lanes, compared after every tick."""
-    n, y, fate = StrongTwinQ31(configuration(rig_of())).rows(*counts(standard_20_bits.run))
-    ready = fate == Reason.ACCUMULATED
+    n, y, row_reason = StrongTwinQ31(configuration(rig_of())).rows(*counts(standard_20_bits.run))
+    ready = row_reason == Reason.ACCUMULATED
     assert ready.sum() >= 40_000
     rigs = [rig_of(law=law, tau=tau) for law in LAWS for tau in (0.0, 2.0)]
     lanes = [configuration(rig, seed).estimator for rig in rigs for seed in range(STARTS)]
@@ -178,7 +178,7 @@ def test_hostile_counts_equal_the_twin(native: Native, name: str, differentiator
         assert_equal([native], replace(config, gate=GateConfigQ31(2 << 16, 50)), *hostile(name, config))
 
 
-def test_hostile_counts_are_not_merely_refused_at_the_door(native: Native) -> None:
+def test_hostile_counts_reach_the_arithmetic(native: Native) -> None:
     taken = 0
     for name in HOSTILE:
         config = configuration(rig_of("finite-difference"))
@@ -247,7 +247,7 @@ def test_a_run_in_pieces_is_the_same_run(native: Native, standard_20_bits: Simul
         ({"estimator": {"gain": 2**30 + 1}}, "bad feedback"),
     ],
 )
-def test_what_is_out_of_range_is_refused_by_name(native: Native, changes: dict[str, object], sentence: str) -> None:
+def test_out_of_range_value_is_refused_by_name(native: Native, changes: dict[str, object], sentence: str) -> None:
     config = configuration(rig_of())
     own = {
         name: replace(getattr(config, name), **value) if isinstance(value, dict) else value

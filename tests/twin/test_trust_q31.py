@@ -44,8 +44,8 @@ def played(label: str, seed: int) -> tuple[WeakIdentifierQ31, RecordQ31]:
 
 def verdicts(reason: npt.NDArray[np.uint8]) -> list[Reason]:
     """What became of the windows, in their order; runs of the same told once, for the cores' ticks differ."""
-    told: Iterator[Reason] = (Reason(r) for r in reason if r in VERDICTS)
-    return [key for key, _ in groupby(told)]
+    reported: Iterator[Reason] = (Reason(r) for r in reason if r in VERDICTS)
+    return [key for key, _ in groupby(reported)]
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def verdicts(reason: npt.NDArray[np.uint8]) -> list[Reason]:
         "fast mode only, 12 bits",
     ],
 )
-def test_what_the_data_cannot_carry_is_not_published(label: str) -> None:
+def test_estimate_without_information_is_not_published(label: str) -> None:
     for seed in range(SEEDS):
         core, record = played(label, seed)
         assert not core.is_published
@@ -70,7 +70,7 @@ def test_what_the_data_cannot_carry_is_not_published(label: str) -> None:
 
 
 @pytest.mark.parametrize("label", ["encoder of 14 bits", "encoder of 10 bits", "drive x0.1, 12 bits"])
-def test_what_they_carry_is_published_with_its_errors(label: str) -> None:
+def test_sufficient_data_are_published_with_errors(label: str) -> None:
     one = case(label)
     for seed in range(SEEDS):
         core, _ = played(label, seed)
@@ -105,7 +105,7 @@ def test_the_verdicts_are_those_of_float32(native: Native, truth: str) -> None:
         assert (Reason.UPDATED if truth == "linear" else Reason.MISFIT) in own.reason
 
 
-def test_what_is_published_changes_only_when_it_is_trusted() -> None:
+def test_published_estimate_changes_only_when_trusted() -> None:
     core, record = played("full equations, 0.107 rad, 14 bits", 0)
     changed = 1 + np.flatnonzero((record.published[1:] != record.published[:-1]).any(axis=1))
     trusted = np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT))

@@ -165,7 +165,7 @@ def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
     tables = design(L1, 200.0, NOMINAL, Sizes(window_s=0.3, decimation=1, taps=15, functions=12)).f32
     config = WeakConfig(200.0, L1, tables, with_friction(estimator(0)), full_angle=True, friction=True)
     assert tables.window == 61
-    assert WeakTwin(config).together >= 8
+    assert WeakTwin(config).stages_per_tick >= 8
     record = assert_lanes_equal([native], config, [config.estimator], run.phi, run.y)[0]
     assert (record.reason == Reason.HELD_UNCERTAIN).any()  # windows are worked off, short as they are
 
@@ -246,11 +246,11 @@ def test_a_run_in_two_pieces_has_the_bits_of_one(native: Native, standard_14_bit
 def test_a_gap_keeps_the_sums_and_starts_the_windows_again(native: Native, standard_14_bits: Simulation) -> None:
     run = standard_14_bits.run
     config = configuration()
-    told, seen = native.weak(config), native.weak(config)
-    for core in (told, seen):
+    reported, seen = native.weak(config), native.weak(config)
+    for core in (reported, seen):
         core.run(run.phi[:8000], run.y[:8000])
-    told.gap()
-    told_record = told.run(run.phi[7000:9000], run.y[7000:9000])
+    reported.gap()
+    told_record = reported.run(run.phi[7000:9000], run.y[7000:9000])
     broken = np.concatenate([[np.nan], run.phi[7000:9000]])
     seen_record = seen.run(broken, np.concatenate([[0.0], run.y[7000:9000]]))
     assert np.array_equal(told_record.p, seen_record.p[1:])
@@ -265,7 +265,7 @@ def test_lanes_with_different_schedules_are_refused() -> None:
         WeakTwin(configuration(), lanes)
 
 
-def test_what_the_core_refuses_it_names(native: Native) -> None:
+def test_core_names_its_refusal(native: Native) -> None:
     config = configuration()
     for wrong, name in (
         (replace(config, sample_rate=0.0), "bad sample rate"),

@@ -99,7 +99,7 @@ def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
     settings = replace(RIG.identifier, window_s=0.3, decimation=1, smoothing_s=0.075)
     config = weak_config_q31(replace(RIG, identifier=settings), 200.0, standard_start(0))
     assert config.design.window == 61
-    assert WeakTwinQ31(config).together >= 5
+    assert WeakTwinQ31(config).stages_per_tick >= 5
     twin = assert_lanes_equal([native], config, [config.estimator], *counts_of(RIG, run))
     assert twin.estimator.counters["updates"][0] > 0
 
@@ -239,7 +239,7 @@ def test_a_run_in_pieces_is_the_same_run(native: Native, counts: tuple[Counts, C
         ("divider", 0),
     ],
 )
-def test_what_is_out_of_range_is_refused_by_name(native: Native, field: str, value: int) -> None:
+def test_out_of_range_value_is_refused_by_name(native: Native, field: str, value: int) -> None:
     config = configuration()
     bad = replace(config, estimator=replace(config.estimator, **{field: value}))  # type: ignore[arg-type]
     with pytest.raises(PvidError, match="refused"):

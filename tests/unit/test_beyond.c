@@ -29,10 +29,10 @@ static bool physical(float w, float d1, float d2, float l1, float w_variance, fl
     estimate.covariance[2][2] = d2_variance;
     pvid_kapitza_f32 value = {1.0f, 2.0f, 3.0f};
     pvid_kapitza_f32 se = {4.0f, 5.0f, 6.0f};
-    const bool told = pvid_kapitza_physical_f32(&estimate, l1, &value, &se);
-    assert_true(told == (value.g != 1.0f)); /* left unwritten unless */
-    assert_true(told == (se.rho2 != 6.0f));
-    return told;
+    const bool is_physical = pvid_kapitza_physical_f32(&estimate, l1, &value, &se);
+    assert_true(is_physical == (value.g != 1.0f)); /* left unwritten unless */
+    assert_true(is_physical == (se.rho2 != 6.0f));
+    return is_physical;
 }
 
 static void physical_parameters_are_finite_or_none(void **state)

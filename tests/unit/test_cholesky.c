@@ -108,7 +108,7 @@ static void first_pivot_is_one_minus_r_squared(void **state)
     assert_float_equal(factor.first_pivot, 1.0f - (r * r), 1.0e-6f); /* a few roundings of numbers near 1 */
 }
 
-static void what_is_not_positive_definite_is_refused(void **state)
+static void indefinite_matrix_is_refused(void **state)
 {
     (void)state;
     const float infinity = 3.4e38f * 10.0f;
@@ -189,7 +189,7 @@ int main(void)
         cmocka_unit_test(solving_returns_what_was_multiplied),
         cmocka_unit_test(order_three_has_the_bits_of_the_general_order),
         cmocka_unit_test(first_pivot_is_one_minus_r_squared),
-        cmocka_unit_test(what_is_not_positive_definite_is_refused),
+        cmocka_unit_test(indefinite_matrix_is_refused),
         cmocka_unit_test(scaling_a_parameter_by_a_power_of_two_scales_its_solution_exactly),
         cmocka_unit_test(inverse_times_matrix_is_one),
     };

@@ -70,7 +70,7 @@ static void solving_returns_what_was_multiplied(void **state)
     }
 }
 
-static void what_is_not_positive_says_nothing_of_the_first(void **state)
+static void indefinite_matrix_gives_zero_first_pivot(void **state)
 {
     (void)state;
     for (uint8_t n = 2; n <= PVID_MAX_P; n++) {
@@ -88,7 +88,7 @@ static void what_is_not_positive_says_nothing_of_the_first(void **state)
     }
 }
 
-static void what_was_not_eliminated_is_not_read(void **state)
+static void only_eliminated_columns_are_read(void **state)
 {
     (void)state;
     int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
@@ -145,8 +145,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solving_returns_what_was_multiplied),
-        cmocka_unit_test(what_is_not_positive_says_nothing_of_the_first),
-        cmocka_unit_test(what_was_not_eliminated_is_not_read),
+        cmocka_unit_test(indefinite_matrix_gives_zero_first_pivot),
+        cmocka_unit_test(only_eliminated_columns_are_read),
         cmocka_unit_test(a_block_keeps_its_largest_entry_in_so_many_bits),
         cmocka_unit_test(a_scale_ends_at_the_widest),
     };

@@ -113,7 +113,7 @@ static pvid_status init_own(void)
     return status;
 }
 
-static void an_estimators_fields_end_where_they_say(void **state)
+static void estimator_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     const bound fields[] = {OF_ESTIMATOR(pvid_estimator_config_q31, )};
@@ -262,7 +262,7 @@ static void every_field_of_the_strong_form_is_in_its_fingerprint(void **state)
     assert_int_not_equal(strong_fingerprint(), before);
 }
 
-static void the_strong_forms_fields_end_where_they_say(void **state)
+static void strong_form_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     for (size_t k = 0; k < PVID_ORDERS; k++) { /* what the largest counts make stays far from the limit */
@@ -325,7 +325,7 @@ static const bound weak_fields[] = {
     FIELD(pvid_weak_config_q31, , trust.se_max, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_SE_MAX),
     FIELD(pvid_weak_config_q31, , trust.misfit_max, KIND_UINT32, 65536.0, 4294967295.0, PVID_BAD_MISFIT_MAX),
     FIELD(pvid_weak_config_q31, , trust.groups_min, KIND_UINT16, 0.0, 65535.0, PVID_OK),
-    FIELD(pvid_weak_config_q31, , trust.shut_max, KIND_UINT16, 0.0, 65535.0, PVID_OK),
+    FIELD(pvid_weak_config_q31, , trust.revert_after, KIND_UINT16, 0.0, 65535.0, PVID_OK),
     FIELD(pvid_weak_config_q31, , trust.renewal, KIND_UINT32, 655.0, 65536000.0, PVID_BAD_RENEWAL),
     FIELD(pvid_weak_config_q31, , gate.sigmas, KIND_UINT32, 131072.0, 65536000.0, PVID_BAD_GATE_SIGMAS),
     FIELD(pvid_weak_config_q31, , gate.patience_groups, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_GATE_PATIENCE),
@@ -366,7 +366,7 @@ static const bound design_fields[] = {
     TIGHT(u_max, KIND_INT32, 1.0, 262144.0, PVID_BAD_FULL_SCALE),
 };
 
-static void the_weak_forms_fields_end_where_they_say(void **state)
+static void weak_form_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     check_bounds(weak_fields, LENGTH(weak_fields), &weak_settings, sizeof weak_settings, init_weak);
@@ -465,19 +465,19 @@ static void a_window_that_cannot_be_worked_off_is_refused(void **state)
     assert_int_equal(init_weak(), PVID_OK);
     design.window = 9;
     assert_int_equal(init_weak(), PVID_OK);
-    assert_in_range(weak.together, 2, 8);
+    assert_in_range(weak.stages_per_tick, 2, 8);
     design.decimation = 1;
     assert_int_equal(init_weak(), PVID_BAD_ITERATIONS);
     weak_settings.iterations = 1;
     assert_int_equal(init_weak(), PVID_OK);
-    assert_in_range(weak.together, 9, 32);
+    assert_in_range(weak.stages_per_tick, 9, 32);
     weak_settings.iterations = 5;
     weak_settings.estimator.gain = (1 << 30) - 1; /* the law of g < 1 is a rate: one step a window */
     assert_int_equal(init_weak(), PVID_OK);
     assert_int_equal(weak.iterations, 1);
 }
 
-static void the_weak_form_keeps_what_it_was_told(void **state)
+static void weak_form_keeps_its_settings(void **state)
 {
     (void)state;
     weak_settings.drive_min = 3;
@@ -551,16 +551,16 @@ static void every_entry_of_the_tables_is_in_the_fingerprint(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(an_estimators_fields_end_where_they_say, start_own),
+        cmocka_unit_test_setup(estimator_fields_end_at_their_bounds, start_own),
         cmocka_unit_test(start_and_bounds_agree_or_are_refused),
         cmocka_unit_test(a_model_fits_or_is_refused),
-        cmocka_unit_test_setup(the_strong_forms_fields_end_where_they_say, start_strong),
+        cmocka_unit_test_setup(strong_form_fields_end_at_their_bounds, start_strong),
         cmocka_unit_test_setup(every_field_of_the_strong_form_is_in_its_fingerprint, start_strong),
-        cmocka_unit_test_setup(the_weak_forms_fields_end_where_they_say, start_weak),
+        cmocka_unit_test_setup(weak_form_fields_end_at_their_bounds, start_weak),
         cmocka_unit_test(a_design_without_a_table_is_refused),
         cmocka_unit_test_setup(a_table_that_would_overflow_is_refused, start_weak),
         cmocka_unit_test_setup(a_window_that_cannot_be_worked_off_is_refused, start_weak),
-        cmocka_unit_test_setup(the_weak_form_keeps_what_it_was_told, start_weak),
+        cmocka_unit_test_setup(weak_form_keeps_its_settings, start_weak),
         cmocka_unit_test_setup(every_field_of_the_weak_form_is_in_its_fingerprint, start_weak),
         cmocka_unit_test_setup(every_entry_of_the_tables_is_in_the_fingerprint, start_weak),
     };

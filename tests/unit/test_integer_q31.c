@@ -156,7 +156,7 @@ static void a_product_with_a_fraction_is_exact_before_it_is_rounded(void **unuse
 }
 
 /* 2 x 2 in Q30 with a closed form: S = [[1/2, r/2], [r/2, 1/2]], first pivot over diagonal 1 - r^2. */
-static void a_factor_tells_what_is_left_of_the_first(void **unused)
+static void first_pivot_is_its_remaining_part(void **unused)
 {
     (void)unused;
     const int32_t half = PVID_ONE_Q30 / 2;
@@ -203,7 +203,7 @@ int main(void)
         cmocka_unit_test(a_scaled_root_keeps_thirty_bits),
         cmocka_unit_test(a_reciprocal_is_short_by_less_than_two),
         cmocka_unit_test(a_product_with_a_fraction_is_exact_before_it_is_rounded),
-        cmocka_unit_test(a_factor_tells_what_is_left_of_the_first),
+        cmocka_unit_test(first_pivot_is_its_remaining_part),
         cmocka_unit_test(half_an_exponent_brings_a_diagonal_near_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

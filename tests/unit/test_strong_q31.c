@@ -176,7 +176,7 @@ static pvid_strong_config_q31 settings(void)
     return config;
 }
 
-static void the_edges_of_a_run_are_told(void **state)
+static void limits_of_a_run_are_reported(void **state)
 {
     (void)state;
     pvid_strong_config_q31 config = settings();
@@ -222,7 +222,7 @@ static void a_still_pivot_is_no_drive(void **state)
 }
 
 /* Frozen, it takes no row in but keeps its window filled; then it goes on with the next sample. */
-static void what_is_frozen_takes_no_row_in(void **state)
+static void frozen_form_accepts_no_row(void **state)
 {
     (void)state;
     const pvid_strong_config_q31 config = settings();
@@ -276,7 +276,7 @@ static void a_restored_run_continues_bit_for_bit(void **state)
     assert_memory_equal(&restored, &self, sizeof self);
 }
 
-static void what_is_out_of_range_is_refused_by_name(void **state)
+static void out_of_range_value_is_refused_by_name(void **state)
 {
     (void)state;
     static pvid_strong_q31 self;
@@ -316,11 +316,11 @@ int main(void)
         cmocka_unit_test(shifts_round_half_up),
         cmocka_unit_test(a_row_that_does_not_fit_is_refused),
         cmocka_unit_test(theta_and_its_jacobian_are_those_of_the_model),
-        cmocka_unit_test(the_edges_of_a_run_are_told),
+        cmocka_unit_test(limits_of_a_run_are_reported),
         cmocka_unit_test(a_still_pivot_is_no_drive),
-        cmocka_unit_test(what_is_frozen_takes_no_row_in),
+        cmocka_unit_test(frozen_form_accepts_no_row),
         cmocka_unit_test(a_restored_run_continues_bit_for_bit),
-        cmocka_unit_test(what_is_out_of_range_is_refused_by_name),
+        cmocka_unit_test(out_of_range_value_is_refused_by_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from pvid.base.atomic_write import write_whole
-from pvid.base.console import DIFFERENT, DONE, progress_bar, tell
+from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
@@ -107,7 +107,7 @@ def bench_design_cost(update: bool) -> int:
     mean, longest = design_cost.fit(spreads) if update else weak_cost.coefficients()
     if update:
         write_whole(weak_cost.COEFFICIENTS_FILE, design_cost.as_toml(mean, longest))
-        tell(f"{weak_cost.COEFFICIENTS_FILE.name} written")
+        write_stderr(f"{weak_cost.COEFFICIENTS_FILE.name} written")
     click.echo(markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
     return DONE
 
@@ -309,7 +309,7 @@ def bench_attack(
         tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve())
     for tally in tallies:
         for arguments, wrong, number in tally.defects:
-            tell(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
+            write_stderr(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
     put_table(update, "attack", markdown(HEADER, [tally.cells for tally in tallies]))
     return DIFFERENT if any(tally.defects for tally in tallies) else DONE
 

@@ -358,7 +358,7 @@ static void take(const pvid_link_frame *frame)
     }
 }
 
-static void obey(const pvid_link_frame *frame)
+static void handle_frame(const pvid_link_frame *frame)
 {
     if ((frame->type == IDENTIFIER_CONFIGURE) && (frame->length == IDENTIFIER_CONFIGURE_BYTES)) {
         configure(frame->payload);
@@ -383,7 +383,7 @@ static void obey(const pvid_link_frame *frame)
 }
 
 /* Decodes received bytes up to the end of a frame; returns whether there were any bytes. */
-static bool listen(void)
+static bool receive(void)
 {
     static uint8_t bytes[CHUNK];
     static size_t at;
@@ -401,7 +401,7 @@ static bool listen(void)
     }
     at = next;
     if (whole) {
-        obey(&frame);
+        handle_frame(&frame);
     }
     return any;
 }
@@ -422,12 +422,12 @@ int main(void)
             }
             continue;
         }
-        const bool heard = room && listen();
+        const bool received = room && receive();
         if (sampling()) {
             if (sample_due(room)) {
                 step_field();
             }
-        } else if (!heard && answers_fit(&stream.out, ANSWERS_BYTES)) {
+        } else if (!received && answers_fit(&stream.out, ANSWERS_BYTES)) {
             pvid_receiver_rest(); /* nothing to process or to send */
         } else {
             /* continue at once */

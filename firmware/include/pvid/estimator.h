@@ -143,7 +143,7 @@ void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32
  * true. `estimate` must stay where it is meanwhile. */
 void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
                                          pvid_estimate_f32 *estimate);
-bool pvid_estimator_assess_on_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);
+bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);
 uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self);
 
 #ifdef __cplusplus

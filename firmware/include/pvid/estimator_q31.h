@@ -105,8 +105,8 @@ void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31
 /* The same in stages: begin, then assess_on until it returns true. */
 void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
                                          pvid_estimate_q31 *estimate);
-bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
-                                  pvid_estimate_q31 *estimate);
+bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                       pvid_estimate_q31 *estimate);
 uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self);
 
 #ifdef __cplusplus

@@ -8,10 +8,10 @@
 
 enum { STAGE_FIT, STAGE_SOLVE, STAGE_SWEEP, STAGE_APPLY };
 enum { PHI = 0, U = 1 };
-enum { LACK_Y = 0, LACK_C1 = 1, LACK_C2 = 2 };
+enum { REMAINDER_Y = 0, REMAINDER_C1 = 1, REMAINDER_C2 = 2 };
 
-#define FUNCTIONS_A_STAGE 6u
-#define SAMPLES_A_STAGE 4u
+#define FUNCTIONS_PER_STAGE 6u
+#define SAMPLES_PER_STAGE 4u
 
 /* Below this L2 = (l2 / rho2)^2 is hardly a pendulum's, and 1 / L1 too large to be trusted. */
 #define L2_MIN 0.05f
@@ -32,11 +32,11 @@ void pvid_weak_angle_init_f32(pvid_weak_angle_f32 *self, const pvid_weak_config_
     self->inverse_l1_square = 1.0f / (config->l1 * config->l1);
     self->passes = config->passes;
     self->full_angle = config->full_angle;
-    self->channels = (uint8_t)(config->friction ? PVID_WEAK_LACKS : 1u);
+    self->channels = (uint8_t)(config->friction ? PVID_WEAK_REMAINDERS : 1u);
     self->stage = STAGE_FIT;
 }
 
-void pvid_weak_angle_keep_f32(pvid_weak_angle_f32 *self, float phi, float u)
+void pvid_weak_angle_add_sample_f32(pvid_weak_angle_f32 *self, float phi, float u)
 {
     self->ring[self->head][PHI] = phi;
     self->ring[self->head][U] = u;
@@ -56,9 +56,9 @@ void pvid_weak_angle_begin_f32(pvid_weak_angle_f32 *self, const float p[])
     self->friction[0] = friction ? p[PVID_KAPITZA_C1] : 0.0f;
     self->friction[1] = friction ? p[PVID_KAPITZA_C2] : 0.0f;
     self->l2 = (p[PVID_KAPITZA_D1] - p[PVID_KAPITZA_D2]) - 1.0f;
-    self->sensible = self->l2 > L2_MIN;
-    self->l1 = p[PVID_KAPITZA_D2] / (self->sensible ? self->l2 : 1.0f);
-    memset(self->lack, 0, sizeof self->lack);
+    self->physical = self->l2 > L2_MIN;
+    self->l1 = p[PVID_KAPITZA_D2] / (self->physical ? self->l2 : 1.0f);
+    memset(self->remainder, 0, sizeof self->remainder);
     memset(self->normal, 0, sizeof self->normal);
     self->pass = 0;
     self->index = 0;
@@ -68,7 +68,7 @@ void pvid_weak_angle_begin_f32(pvid_weak_angle_f32 *self, const float p[])
 /* ---- a and b of the window ---- */
 
 /* Adds a function to the normal equations of e = A a + B b. */
-static void fit_function(pvid_weak_angle_f32 *self, const float theta[], const float column[], const float lack[])
+static void fit_function(pvid_weak_angle_f32 *self, const float theta[], const float column[], const float remainder[])
 {
     const float a = column[PVID_WEAK_COLUMN_A];
     const float b = column[PVID_WEAK_COLUMN_B];
@@ -76,9 +76,9 @@ static void fit_function(pvid_weak_angle_f32 *self, const float theta[], const f
     for (size_t i = 0; i < PVID_KAPITZA_WEAK_THETA; i++) {
         e -= column[i] * theta[i];
     }
-    e -= lack[LACK_Y];
-    e -= self->friction[0] * lack[LACK_C1];
-    e -= self->friction[1] * lack[LACK_C2];
+    e -= remainder[REMAINDER_Y];
+    e -= self->friction[0] * remainder[REMAINDER_C1];
+    e -= self->friction[1] * remainder[REMAINDER_C2];
     self->normal[0] += a * a;
     self->normal[1] += a * b;
     self->normal[2] += b * b;
@@ -102,7 +102,7 @@ static void solve(pvid_weak_angle_f32 *self)
 /* ---- the motion, sample by sample ---- */
 
 /* x - sin x and 1 - cos x for |x| < 1: what is left out is below 3e-6 of them. */
-static float sine_lack(float x)
+static float sine_remainder(float x)
 {
     const float x2 = x * x;
     return (x * x2) * ((1.0f / 6.0f) - (x2 * ((1.0f / 120.0f) - (x2 * (1.0f / 5040.0f)))));
@@ -138,7 +138,7 @@ static size_t place_before(const pvid_weak_angle_f32 *self, size_t place)
 
 /* e1 and e2 of the remainder, and of each friction, [channel][2]. */
 typedef struct {
-    float e[PVID_WEAK_LACKS][2];
+    float e[PVID_WEAK_REMAINDERS][2];
     float g;
 } moment;
 
@@ -170,14 +170,14 @@ static moment moment_of(pvid_weak_angle_f32 *self)
         const float v2 = v1 + rate;
         const float acceleration1 = (self->l2 * force) - (g * a1);
         const float acceleration2 = -(d2 * force);
-        const float sine = angle - sine_lack(angle);
+        const float sine = angle - sine_remainder(angle);
         const float lift = versine(angle);
-        now.e[LACK_Y][0] = (g * sine_lack(a1)) + (((lift * acceleration2) + (sine * (v2 * v2))) / self->l1);
-        now.e[LACK_Y][1] = (g * sine_lack(a2)) + ((lift * acceleration1) - (sine * (v1 * v1)));
+        now.e[REMAINDER_Y][0] = (g * sine_remainder(a1)) + (((lift * acceleration2) + (sine * (v2 * v2))) / self->l1);
+        now.e[REMAINDER_Y][1] = (g * sine_remainder(a2)) + ((lift * acceleration1) - (sine * (v1 * v1)));
     }
-    now.e[LACK_C1][0] = -(v1 * self->inverse_l1_square);
-    now.e[LACK_C2][0] = rate * self->inverse_l1_square;
-    now.e[LACK_C2][1] = -(self->l1 * now.e[LACK_C2][0]);
+    now.e[REMAINDER_C1][0] = -(v1 * self->inverse_l1_square);
+    now.e[REMAINDER_C2][0] = rate * self->inverse_l1_square;
+    now.e[REMAINDER_C2][1] = -(self->l1 * now.e[REMAINDER_C2][0]);
     return now;
 }
 
@@ -193,7 +193,7 @@ static void sweep_sample(pvid_weak_angle_f32 *self, const pvid_weak_design_f32 *
     for (size_t j = 0; j < self->channels; j++) {
         const float difference = now.e[j][1] - now.e[j][0];
         const float m1 = ((d1 - 1.0f) * difference) - now.e[j][0];
-        const float row = m1 + (now.g * integrate(&self->remainder[j], self->dt, first, d2 * difference));
+        const float row = m1 + (now.g * integrate(&self->remainder_integral[j], self->dt, first, d2 * difference));
         for (size_t k = 0; (k < functions) && !first; k++) { /* chi'' is 0 at the first sample, and not read */
             self->next[k][j] += chi2[k] * row;
         }
@@ -204,12 +204,12 @@ static void sweep_sample(pvid_weak_angle_f32 *self, const pvid_weak_design_f32 *
 
 /* ---- the result ---- */
 
-static bool lack_is_finite(const pvid_weak_angle_f32 *self, size_t functions)
+static bool remainder_is_finite(const pvid_weak_angle_f32 *self, size_t functions)
 {
     float sum = 0.0f;
     for (size_t k = 0; k < functions; k++) {
-        for (size_t j = 0; j < PVID_WEAK_LACKS; j++) {
-            sum += self->lack[k][j] * self->lack[k][j];
+        for (size_t j = 0; j < PVID_WEAK_REMAINDERS; j++) {
+            sum += self->remainder[k][j] * self->remainder[k][j];
         }
     }
     return pvid_finite_f32(sum);
@@ -217,17 +217,17 @@ static bool lack_is_finite(const pvid_weak_angle_f32 *self, size_t functions)
 
 static void apply(const pvid_weak_angle_f32 *self, size_t functions, float columns[][PVID_WEAK_TERMS])
 {
-    const bool on = self->on && self->sensible && lack_is_finite(self, functions);
+    const bool on = self->on && self->physical && remainder_is_finite(self, functions);
     for (size_t k = 0; k < functions; k++) {
-        columns[k][PVID_WEAK_COLUMN_Y] -= on ? self->lack[k][LACK_Y] : 0.0f;
-        columns[k][PVID_WEAK_COLUMN_C1] = on ? self->lack[k][LACK_C1] : 0.0f;
-        columns[k][PVID_WEAK_COLUMN_C2] = on ? self->lack[k][LACK_C2] : 0.0f;
+        columns[k][PVID_WEAK_COLUMN_Y] -= on ? self->remainder[k][REMAINDER_Y] : 0.0f;
+        columns[k][PVID_WEAK_COLUMN_C1] = on ? self->remainder[k][REMAINDER_C1] : 0.0f;
+        columns[k][PVID_WEAK_COLUMN_C2] = on ? self->remainder[k][REMAINDER_C2] : 0.0f;
     }
 }
 
 static void end_pass(pvid_weak_angle_f32 *self)
 {
-    memcpy(self->lack, self->next, sizeof self->lack);
+    memcpy(self->remainder, self->next, sizeof self->remainder);
     self->place = self->first;
     self->index = 0;
     self->pass++;
@@ -240,8 +240,8 @@ bool pvid_weak_angle_step_f32(pvid_weak_angle_f32 *self, const pvid_weak_design_
     const size_t functions = design->functions;
     switch (self->stage) {
     case STAGE_FIT:
-        for (size_t i = 0; (i < FUNCTIONS_A_STAGE) && (self->index < functions); i++) {
-            fit_function(self, theta, columns[self->index], self->lack[self->index]);
+        for (size_t i = 0; (i < FUNCTIONS_PER_STAGE) && (self->index < functions); i++) {
+            fit_function(self, theta, columns[self->index], self->remainder[self->index]);
             self->index++;
         }
         if (self->index == functions) {
@@ -254,7 +254,7 @@ bool pvid_weak_angle_step_f32(pvid_weak_angle_f32 *self, const pvid_weak_design_
         self->stage = STAGE_SWEEP;
         return false;
     case STAGE_SWEEP:
-        for (size_t i = 0; (i < SAMPLES_A_STAGE) && (self->index < self->window - 1u); i++) {
+        for (size_t i = 0; (i < SAMPLES_PER_STAGE) && (self->index < self->window - 1u); i++) {
             sweep_sample(self, design);
         }
         if (self->index == self->window - 1u) { /* chi'' is 0 at the last sample too */
@@ -269,12 +269,12 @@ bool pvid_weak_angle_step_f32(pvid_weak_angle_f32 *self, const pvid_weak_design_
 
 uint32_t pvid_weak_angle_stages_f32(const pvid_weak_angle_f32 *self, const pvid_weak_design_f32 *design)
 {
-    const uint32_t fit = (design->functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
-    const uint32_t sweep = ((uint32_t)design->window + (SAMPLES_A_STAGE - 2u)) / SAMPLES_A_STAGE;
+    const uint32_t fit = (design->functions + (FUNCTIONS_PER_STAGE - 1u)) / FUNCTIONS_PER_STAGE;
+    const uint32_t sweep = ((uint32_t)design->window + (SAMPLES_PER_STAGE - 2u)) / SAMPLES_PER_STAGE;
     return (self->passes * (fit + 1u + sweep)) + 1u;
 }
 
-bool pvid_weak_angle_settle_f32(pvid_weak_angle_f32 *self, const float p[], float worst, uint16_t groups)
+bool pvid_weak_angle_switch_f32(pvid_weak_angle_f32 *self, const float p[], float worst, uint16_t groups)
 {
     float moved = 0.0f;
     for (size_t i = 0; i < PVID_KAPITZA_P; i++) {

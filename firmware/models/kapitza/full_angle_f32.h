@@ -19,7 +19,7 @@
 #include "pvid/weak.h"
 
 /* Whether there is a correction: never where it is left out, and then nothing refers to the functions below. */
-static inline bool pvid_weak_angle_is_asked_f32(const pvid_weak_angle_f32 *self)
+static inline bool pvid_angle_correction_enabled_f32(const pvid_weak_angle_f32 *self)
 {
     return (PVID_FULL_ANGLE == 1) && (self != NULL);
 }
@@ -28,7 +28,7 @@ static inline bool pvid_weak_angle_is_asked_f32(const pvid_weak_angle_f32 *self)
 void pvid_weak_angle_init_f32(pvid_weak_angle_f32 *self, const pvid_weak_config_f32 *config);
 
 /* Takes a decimated sample in. */
-void pvid_weak_angle_keep_f32(pvid_weak_angle_f32 *self, float phi, float u);
+void pvid_weak_angle_add_sample_f32(pvid_weak_angle_f32 *self, float phi, float u);
 
 /* Starts on the window that the last sample completed, at p. */
 void pvid_weak_angle_begin_f32(pvid_weak_angle_f32 *self, const float p[]);
@@ -45,6 +45,6 @@ uint32_t pvid_weak_angle_stages_f32(const pvid_weak_angle_f32 *self, const pvid_
 /* Switches the correction on once the estimate has settled, off when it is lost: p after the window's steps,
  * `worst` the largest relative standard error, `groups` windows taken in: from the first window on it would
  * diverge. Returns whether it was switched on: what was gathered without it is to be aged then. */
-bool pvid_weak_angle_settle_f32(pvid_weak_angle_f32 *self, const float p[], float worst, uint16_t groups);
+bool pvid_weak_angle_switch_f32(pvid_weak_angle_f32 *self, const float p[], float worst, uint16_t groups);
 
 #endif

@@ -13,7 +13,7 @@ enum { N_A = 0, N_E = 1, N_PHI2 = 2, N_PHI0 = 6 };
 /* ---- the row ---- */
 
 /* *out = x 2^-shift; false where it is beyond the limit of a row. */
-static bool take(int64_t x, uint8_t shift, int32_t *out)
+static bool round_entry(int64_t x, uint8_t shift, int32_t *out)
 {
     const int64_t rounded = pvid_round_shift_q31(x, shift);
     if ((rounded > PVID_ROW_LIMIT_Q31) || (rounded < -PVID_ROW_LIMIT_Q31)) {
@@ -25,12 +25,12 @@ static bool take(int64_t x, uint8_t shift, int32_t *out)
 }
 
 /* out[count - 1], .., out[0] = -x, -u x, -u^2 x .. */
-static bool take_powers(int32_t x, int32_t u, const uint8_t shift[], size_t count, int32_t out[])
+static bool row_powers(int32_t x, int32_t u, const uint8_t shift[], size_t count, int32_t out[])
 {
-    bool fits = take(-(int64_t)x, shift[0], &out[count - 1u]);
+    bool fits = round_entry(-(int64_t)x, shift[0], &out[count - 1u]);
     for (size_t k = 1; k < count; k++) {
         const size_t at = (count - 1u) - k;
-        fits = take(pvid_product_q31(u, out[at + 1u]), shift[k], &out[at]) && fits;
+        fits = round_entry(pvid_product_q31(u, out[at + 1u]), shift[k], &out[at]) && fits;
     }
     return fits;
 }
@@ -43,13 +43,13 @@ bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *shifts, const int32_
     const int64_t bracket = (pvid_product_q31(u[2], phi[2]) + (2 * pvid_product_q31(u[1], phi[3]))) - u0_phi4;
     int32_t a;
     int32_t b;
-    if (!take(bracket, shifts->part, &a) || !take(pvid_product_q31(u[1], phi[2]), shifts->part, &b) ||
-        !take((2 * pvid_product_q31(u[1], b)) - pvid_product_q31(u[0], a), shifts->y, y) ||
-        !take(bracket - u0_phi4, shifts->n_a, &n[N_A]) || !take(-(int64_t)phi[4], shifts->n_e, &n[N_E])) {
+    if (!round_entry(bracket, shifts->part, &a) || !round_entry(pvid_product_q31(u[1], phi[2]), shifts->part, &b) ||
+        !round_entry((2 * pvid_product_q31(u[1], b)) - pvid_product_q31(u[0], a), shifts->y, y) ||
+        !round_entry(bracket - u0_phi4, shifts->n_a, &n[N_A]) || !round_entry(-(int64_t)phi[4], shifts->n_e, &n[N_E])) {
         return false;
     }
-    return take_powers(phi[2], u[0], shifts->n_phi2, 4, &n[N_PHI2]) &&
-           take_powers(phi[0], u[0], shifts->n_phi0, 5, &n[N_PHI0]);
+    return row_powers(phi[2], u[0], shifts->n_phi2, 4, &n[N_PHI2]) &&
+           row_powers(phi[0], u[0], shifts->n_phi0, 5, &n[N_PHI0]);
 }
 
 /* sum k term[k], k < count: each is added as often as there is one above it. */
@@ -64,7 +64,7 @@ static int64_t by_power(const int64_t term[], size_t count)
     return sum;
 }
 
-int64_t pvid_kapitza_strong_told_q31(const int64_t term[PVID_KAPITZA_STRONG_THETA])
+int64_t pvid_kapitza_strong_sensitivity_q31(const int64_t term[PVID_KAPITZA_STRONG_THETA])
 {
     const int64_t alone = term[N_A] + (2 * term[N_E]);
     return alone + by_power(&term[N_PHI2], 4) + by_power(&term[N_PHI0], 5);
@@ -78,7 +78,7 @@ int64_t pvid_kapitza_strong_told_q31(const int64_t term[PVID_KAPITZA_STRONG_THET
 #define DOWN 4
 #define ONE_BITS (30 + UP)
 
-static int64_t lift(int64_t x)
+static int64_t scale_up(int64_t x)
 {
     return x * ((int64_t)1 << UP);
 }
@@ -89,7 +89,7 @@ static int64_t product(int32_t a, int32_t b)
 }
 
 /* powers[k] = x w^k for k = 1..count, from the first. */
-static void go_on(int64_t powers[], size_t count, int32_t w)
+static void extend_powers(int64_t powers[], size_t count, int32_t w)
 {
     for (size_t k = 1; k < count; k++) {
         powers[k] = pvid_times_q31(powers[k - 1u], w);
@@ -101,16 +101,16 @@ static void theta_of(const int32_t p[], int64_t theta[])
     int64_t d1[3];
     int64_t *d2 = &theta[7];
     d1[0] = product(p[D1], p[W]);
-    go_on(d1, 3, p[W]);
+    extend_powers(d1, 3, p[W]);
     d2[0] = product(p[D2], p[W]);
-    go_on(d2, 4, p[W]);
-    theta[0] = lift(p[W]);
+    extend_powers(d2, 4, p[W]);
+    theta[0] = scale_up(p[W]);
     theta[1] = product(p[W], p[W]);
-    theta[2] = lift(p[D1]);
+    theta[2] = scale_up(p[D1]);
     theta[3] = 3 * d1[0];
     theta[4] = 3 * d1[1];
     theta[5] = d1[2];
-    theta[6] = lift(p[D2]);
+    theta[6] = scale_up(p[D2]);
     theta[8] *= 3;
 }
 
@@ -123,19 +123,19 @@ static void jacobian_of(const int32_t p[], int64_t c[])
     int64_t d2[3];
     int64_t *w = &c[15]; /* w^2, w^3, w^4 */
     d1[0] = product(p[D1], p[W]);
-    go_on(d1, 2, p[W]);
+    extend_powers(d1, 2, p[W]);
     d2[0] = product(p[D2], p[W]);
-    go_on(d2, 3, p[W]);
+    extend_powers(d2, 3, p[W]);
     w[0] = product(p[W], p[W]);
-    go_on(w, 3, p[W]);
+    extend_powers(w, 3, p[W]);
     const int64_t one = (int64_t)1 << ONE_BITS;
-    const int64_t first = lift(p[W]);
+    const int64_t first = scale_up(p[W]);
     c[0] = one;
     c[1] = first;
-    c[2] = 3 * lift(p[D1]);
+    c[2] = 3 * scale_up(p[D1]);
     c[3] = 3 * d1[0];
     c[4] = 3 * d1[1];
-    c[5] = lift(p[D2]);
+    c[5] = scale_up(p[D2]);
     c[6] = 3 * d2[0];
     c[7] = 3 * d2[1];
     c[8] = d2[2];

@@ -10,7 +10,7 @@ enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2, C = PVID_
 #define DOWN 16
 #define ONE_BITS (30 + UP)
 
-static int64_t lift(int64_t x)
+static int64_t scale_up(int64_t x)
 {
     return x * ((int64_t)1 << UP);
 }
@@ -22,9 +22,9 @@ static int64_t product(int32_t a, int32_t b)
 
 static void zeroed_theta_of(const int32_t p[], int64_t theta[])
 {
-    theta[0] = lift(p[D1]);
+    theta[0] = scale_up(p[D1]);
     theta[1] = product(p[D1], p[W]);
-    theta[2] = lift(p[D2]);
+    theta[2] = scale_up(p[D2]);
     theta[3] = product(p[D2], p[W]);
     theta[4] = pvid_times_q31(theta[3], p[W]);
 }
@@ -50,11 +50,11 @@ static void jacobian_of(const int32_t p[], int64_t c[])
     c[3] = theta[5];
     c[4] = 2 * theta[6];
     c[5] = (int64_t)1 << ONE_BITS;
-    c[6] = lift(p[W]);
+    c[6] = scale_up(p[W]);
     c[7] = (int64_t)1 << ONE_BITS;
-    c[8] = lift(p[W]);
+    c[8] = scale_up(p[W]);
     c[9] = product(p[W], p[W]);
-    c[10] = lift(p[C]);
+    c[10] = scale_up(p[C]);
     c[11] = product(p[C], p[W]);
     c[12] = pvid_times_q31(c[11], p[W]);
     c[13] = theta[2];
@@ -100,13 +100,13 @@ static const uint8_t zeroed_c_column[8] = {W, W, W, D1, D1, D2, D2, D2};
 
 static void zeroed_jacobian_of(const int32_t p[], int64_t c[])
 {
-    c[0] = lift(p[D1]);
-    c[1] = lift(p[D2]);
+    c[0] = scale_up(p[D1]);
+    c[1] = scale_up(p[D2]);
     c[2] = 2 * product(p[D2], p[W]);
     c[3] = (int64_t)1 << ONE_BITS;
-    c[4] = lift(p[W]);
+    c[4] = scale_up(p[W]);
     c[5] = (int64_t)1 << ONE_BITS;
-    c[6] = lift(p[W]);
+    c[6] = scale_up(p[W]);
     c[7] = product(p[W], p[W]);
 }
 

@@ -42,11 +42,11 @@ bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square)
     if (!(self->limit > 0.0f) || !pvid_finite_f32(square)) {
         return true;
     }
-    const bool learning = self->judged < self->memory;
-    const bool passes = learning || (square <= (self->limit * self->scale));
+    const bool warming_up = self->judged < self->memory;
+    const bool passes = warming_up || (square <= (self->limit * self->scale));
     float scale = self->scale * self->widening;
     if (passes) {
-        self->judged = learning ? (self->judged + 1.0f) : self->judged;
+        self->judged = warming_up ? (self->judged + 1.0f) : self->judged;
         scale = self->scale + ((square - self->scale) / self->judged);
     }
     scale = (scale > self->floor) ? scale : self->floor;

@@ -44,7 +44,7 @@ pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *
 }
 
 /* scale within floor..scale_max. Where exponents are more than one apart they alone decide. */
-static pvid_scaled_q31 held(pvid_scaled_q31 scale, pvid_scaled_q31 floor)
+static pvid_scaled_q31 clamped(pvid_scaled_q31 scale, pvid_scaled_q31 floor)
 {
     if ((scale.e < (floor.e - 1)) || pvid_scaled_exceeds_q31(floor, scale)) {
         return floor;
@@ -65,11 +65,11 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
     if (self->limit.m == 0) {
         return true;
     }
-    const bool learning = self->judged < self->memory;
-    const bool passes = learning || is_usual(self, square);
+    const bool warming_up = self->judged < self->memory;
+    const bool passes = warming_up || is_usual(self, square);
     pvid_scaled_q31 scale = self->scale;
     if (passes) {
-        if (learning) {
+        if (warming_up) {
             self->judged++;
             self->part = pvid_scaled_over_q31(pvid_scaled_of_q31(1, 0), pvid_scaled_of_q31(self->judged, 0));
         }
@@ -77,6 +77,6 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
     } else {
         scale = pvid_scaled_times_q31(scale, self->widening);
     }
-    self->scale = held(scale, self->floor);
+    self->scale = clamped(scale, self->floor);
     return passes;
 }

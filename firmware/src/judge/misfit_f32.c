@@ -44,10 +44,10 @@ bool pvid_misfit_judge_f32(pvid_misfit_f32 *self)
         misfit = true;
     } else if (self->signal > 0.0f) {
         const float part = self->energy / self->signal;
-        const bool taught = self->least_part < UNKNOWN;
-        const bool louder = (self->energy > (PVID_MISFIT_TIMES * self->least_energy)) &&
+        const bool has_reference = self->least_part < UNKNOWN;
+        const bool larger = (self->energy > (PVID_MISFIT_TIMES * self->least_energy)) &&
                             (part > (PVID_MISFIT_TIMES * self->least_part)) && (part > PVID_MISFIT_LEAST);
-        misfit = taught && (louder || (part > PVID_MISFIT_MOST));
+        misfit = has_reference && (larger || (part > PVID_MISFIT_MOST));
         self->least_energy = least_of(self->least_energy, self->growth, self->energy);
         self->least_part = least_of(self->least_part, self->growth, part);
     }

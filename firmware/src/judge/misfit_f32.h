@@ -15,10 +15,10 @@ bool pvid_misfit_judge_f32(pvid_misfit_f32 *self);
 
 /* Takes a row in: its residual e and p[0] times its gradient in p[0]. Returns whether it was the last of a block, which
  * is then to be judged. */
-static inline bool pvid_misfit_take_f32(pvid_misfit_f32 *self, float e, float told)
+static inline bool pvid_misfit_add_f32(pvid_misfit_f32 *self, float e, float sensitivity)
 {
     self->energy += e * e;
-    self->signal += told * told;
+    self->signal += sensitivity * sensitivity;
     self->left--;
     return self->left == 0u;
 }

@@ -6,10 +6,10 @@
 #include "pvid/config.h"
 #include "number/scaled_q31.h"
 
-#define BLOCK_S 4u      /* PVID_MISFIT_BLOCK_S */
-#define ROWS_MAX 65535u /* of a block */
-#define TOLD_DOWN 3u    /* so that what is told of a row, within 2^31, has a square like that of a residual */
-#define TOLD_LIMIT ((int32_t)1 << 28)
+#define BLOCK_S 4u           /* PVID_MISFIT_BLOCK_S */
+#define ROWS_MAX 65535u      /* of a block */
+#define SENSITIVITY_SHIFT 3u /* so that what is told of a row, within 2^31, has a square like that of a residual */
+#define SENSITIVITY_LIMIT ((int32_t)1 << 28)
 
 /* Of q: PVID_MISFIT_MOST, PVID_MISFIT_LEAST; and PVID_MISFIT_TIMES. */
 static const pvid_scaled_q31 most = {549755814, -37};
@@ -48,15 +48,17 @@ void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t 
     begin_block(self);
 }
 
-bool pvid_misfit_take_q31(pvid_misfit_q31 *self, int64_t square, int64_t told)
+bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity)
 {
-    const int32_t held = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(told, TOLD_DOWN), TOLD_LIMIT);
+    const int32_t clamped =
+        (int32_t)pvid_clamp_q31(pvid_round_shift_q31(sensitivity, SENSITIVITY_SHIFT), SENSITIVITY_LIMIT);
     self->few_energy += square;
-    self->few_signal += pvid_square_q31(held);
+    self->few_signal += pvid_square_q31(clamped);
     self->left--;
     if ((self->left % PVID_MISFIT_FEW) == 0u) {
         self->energy = pvid_scaled_plus_q31(self->energy, pvid_scaled_of_q31(self->few_energy, 0));
-        self->signal = pvid_scaled_plus_q31(self->signal, pvid_scaled_of_q31(self->few_signal, 2 * (int32_t)TOLD_DOWN));
+        self->signal =
+            pvid_scaled_plus_q31(self->signal, pvid_scaled_of_q31(self->few_signal, 2 * (int32_t)SENSITIVITY_SHIFT));
         self->few_energy = 0;
         self->few_signal = 0;
     }
@@ -71,7 +73,7 @@ static pvid_scaled_q31 least_of(pvid_scaled_q31 so_far, pvid_scaled_q31 growth, 
     return pvid_scaled_exceeds_q31(risen, now) ? now : risen;
 }
 
-static bool is_louder(const pvid_misfit_q31 *self, pvid_scaled_q31 part)
+static bool is_larger(const pvid_misfit_q31 *self, pvid_scaled_q31 part)
 {
     return pvid_scaled_exceeds_q31(self->energy, pvid_scaled_times_q31(times, self->least_energy)) &&
            pvid_scaled_exceeds_q31(part, pvid_scaled_times_q31(times, self->least_part)) &&
@@ -84,8 +86,8 @@ bool pvid_misfit_judge_q31(pvid_misfit_q31 *self)
     bool misfit = false;
     if (self->signal.m > 0) {
         const pvid_scaled_q31 part = pvid_scaled_over_q31(self->energy, self->signal);
-        const bool taught = pvid_scaled_exceeds_q31(unknown, self->least_part);
-        misfit = taught && (is_louder(self, part) || pvid_scaled_exceeds_q31(part, most));
+        const bool has_reference = pvid_scaled_exceeds_q31(unknown, self->least_part);
+        misfit = has_reference && (is_larger(self, part) || pvid_scaled_exceeds_q31(part, most));
         self->least_energy = least_of(self->least_energy, self->growth, self->energy);
         self->least_part = least_of(self->least_part, self->growth, part);
     }

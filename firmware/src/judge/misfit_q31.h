@@ -17,7 +17,7 @@ void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t 
 /* Takes a row in: the square of its residual, at most 2^56, and p[0] times its gradient in p[0], of which what is
  * beyond
  * +-2^31 counts as that. Returns whether it was the last of a block, which is then to be judged. */
-bool pvid_misfit_take_q31(pvid_misfit_q31 *self, int64_t square, int64_t told);
+bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity);
 
 /* Ends a block: whether it is a misfit. */
 bool pvid_misfit_judge_q31(pvid_misfit_q31 *self);

@@ -17,7 +17,7 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .se_max = 0.05f,
     .misfit_max = 4.0f,
     .groups_min = 3,
-    .shut_max = 16,
+    .revert_after = 16,
     .renewal = 0.2f,
 };
 
@@ -32,14 +32,14 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
 #define NEAR 0.1f
 
 /* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
-#define AGEING 0.3f
-#define AGEING_GROUPS 4u
+#define FADE 0.3f
+#define FADE_GROUPS 4u
 
 /* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
 #define LONG_MEMORY 4096.0f
 
 /* One group that the model cannot explain at all must not outweigh thousands. */
-#define SURPLUS_MAX 1.0e6f
+#define VARIANCE_RATIO_MAX 1.0e6f
 
 static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
 {
@@ -100,17 +100,19 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
     return PVID_OK;
 }
 
-const float *pvid_trust_refuge_f32(const pvid_trust_f32 *self)
+const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self)
 {
-    return ((self->config.shut_max > 0u) && (self->shut >= self->config.shut_max)) ? self->estimate.p : NULL;
+    return ((self->config.revert_after > 0u) && (self->uninformative >= self->config.revert_after)) ? self->estimate.p
+                                                                                                    : NULL;
 }
 
 /* ---- the alarm ---- */
 
 /* Returns whether the windows alone raise it. */
-static bool take_surplus(pvid_trust_f32 *self, float surplus)
+static bool add_variance_ratio(pvid_trust_f32 *self, float variance_ratio)
 {
-    const float x = (surplus <= SURPLUS_MAX) ? surplus : SURPLUS_MAX; /* NaN becomes the limit */
+    const float x =
+        (variance_ratio <= VARIANCE_RATIO_MAX) ? variance_ratio : VARIANCE_RATIO_MAX; /* NaN becomes the limit */
     if (self->judged < self->long_memory) {
         self->judged++;
     }
@@ -122,9 +124,9 @@ static bool take_surplus(pvid_trust_f32 *self, float surplus)
         sum += self->recent[i];
     }
     const float limit = self->config.misfit_max;
-    const bool lately = (self->judged >= PVID_TRUST_SHORT) && (sum > (1.5f * (limit * (float)PVID_TRUST_SHORT)));
-    const bool at_length = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
-    return lately || at_length;
+    const bool short_exceeds = (self->judged >= PVID_TRUST_SHORT) && (sum > (1.5f * (limit * (float)PVID_TRUST_SHORT)));
+    const bool long_exceeds = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
+    return short_exceeds || long_exceeds;
 }
 
 static void restart_alarm(pvid_trust_f32 *self)
@@ -136,42 +138,42 @@ static void restart_alarm(pvid_trust_f32 *self)
 }
 
 /* Whether the residuals of all rows are within what chance makes of the limit. */
-static bool all_agree(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
-                      const pvid_estimate_f32 *candidate)
+static bool all_rows_agree(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
+                           const pvid_estimate_f32 *candidate)
 {
     const float freedom = candidate->weight - (float)estimator->model->n_p;
     const float chance = sqrtf(2.0f / ((freedom >= 1.0f) ? freedom : 1.0f));
     return candidate->misfit <= (self->config.misfit_max * (1.0f + (3.0f * chance)));
 }
 
-float pvid_trust_widest_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
+float pvid_trust_largest_error_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
 {
-    float widest = 0.0f;
+    float largest_error = 0.0f;
     for (size_t a = 0; a < estimator->model->n_p; a++) {
         if (pvid_is_positive_f32(estimator->model, a)) {
             const float relative = candidate->se[a] / candidate->p[a];
-            widest = (relative <= widest) ? widest : relative;
+            largest_error = (relative <= largest_error) ? largest_error : relative;
         }
     }
-    return widest;
+    return largest_error;
 }
 
 /* ---- renewal ---- */
 
-void pvid_trust_age_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
-    self->ageing = AGEING_GROUPS;
+    self->groups_to_fade = FADE_GROUPS;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
     restart_alarm(self);
 }
 
-float pvid_trust_ageing_f32(pvid_trust_f32 *self)
+float pvid_trust_fade_factor_f32(pvid_trust_f32 *self)
 {
-    if ((self->ageing == 0u) || !self->known) {
+    if ((self->groups_to_fade == 0u) || !self->errors_small) {
         return 1.0f;
     }
-    self->ageing--;
-    return AGEING;
+    self->groups_to_fade--;
+    return FADE;
 }
 
 /* Whether p is so far from where the rows came in. */
@@ -189,12 +191,12 @@ static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *esti
 
 /* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
  * come in there; and a p that noise may have moved so far has not arrived anywhere. */
-static void settle(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool known, bool agrees)
+static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool errors_small, bool agrees)
 {
-    const bool stale = known && !agrees && has_moved(self, estimator);
+    const bool stale = errors_small && !agrees && has_moved(self, estimator);
     if (stale || pvid_estimator_is_rounded_f32(estimator)) {
-        pvid_trust_age_f32(self, estimator);
-    } else if (known && agrees) {
+        pvid_trust_renew_f32(self, estimator);
+    } else if (errors_small && agrees) {
         memcpy(self->anchor, estimator->p, sizeof self->anchor);
     } else {
         /* p is on its way yet, or about where it was */
@@ -202,40 +204,40 @@ static void settle(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bo
 }
 
 /* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
-static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled, float surplus,
+static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled, float variance_ratio,
                         const pvid_estimate_f32 *candidate)
 {
-    const bool agrees = all_agree(self, estimator, candidate);
-    const bool known = pvid_trust_widest_f32(estimator, candidate) <= NEAR;
-    const bool renewing = self->ageing > 0u;
-    self->known = known;
-    bool lately = false;
+    const bool agrees = all_rows_agree(self, estimator, candidate);
+    const bool errors_small = pvid_trust_largest_error_f32(estimator, candidate) <= NEAR;
+    const bool renewing = self->groups_to_fade > 0u;
+    self->errors_small = errors_small;
+    bool short_exceeds = false;
     if (renewing) {
         restart_alarm(self);
-    } else if (self->near) {
-        lately = take_surplus(self, surplus);
+    } else if (self->converged) {
+        short_exceeds = add_variance_ratio(self, variance_ratio);
     } else {
-        self->near = settled && known && (self->groups >= self->config.groups_min);
+        self->converged = settled && errors_small && (self->groups >= self->config.groups_min);
     }
-    self->misfit = (self->config.misfit_max > 0.0f) && (!agrees || lately);
+    self->misfit = (self->config.misfit_max > 0.0f) && (!agrees || short_exceeds);
     if (settled && !renewing && (self->config.renewal > 0.0f)) {
-        settle(self, estimator, known, agrees);
+        renew_if_stale(self, estimator, errors_small, agrees);
     }
 }
 
 static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
-                           float size, bool informed, const pvid_estimate_f32 *candidate)
+                           float size, bool above_noise, const pvid_estimate_f32 *candidate)
 {
     if (reason != PVID_UPDATED) {
         return reason;
     }
-    if (!informed || !(candidate->kappa >= self->config.kappa_min) ||
+    if (!above_noise || !(candidate->kappa >= self->config.kappa_min) ||
         !(candidate->least_pivot >= self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    const float error = pvid_trust_widest_f32(estimator, candidate);
-    const float near = ARRIVED * error;
-    const bool arrived = size <= ((near > SMALL_STEP) ? near : SMALL_STEP);
+    const float error = pvid_trust_largest_error_f32(estimator, candidate);
+    const float small_enough = ARRIVED * error;
+    const bool arrived = size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
     if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !arrived) {
         return PVID_HELD_UNCERTAIN;
     }
@@ -243,20 +245,20 @@ static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 
 }
 
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
-                                 bool informed, float surplus, const pvid_estimate_f32 *candidate)
+                                 bool above_noise, float variance_ratio, const pvid_estimate_f32 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
         return reason;
     }
-    pvid_trust_count_shut(&self->shut, reason, pvid_trust_refuge_f32(self) != NULL);
-    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), surplus, candidate);
-    const pvid_reason judged = verdict(self, estimator, reason, size, informed, candidate);
+    pvid_trust_count_uninformative(&self->uninformative, reason, pvid_trust_fallback_f32(self) != NULL);
+    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, candidate);
+    const pvid_reason judged = verdict(self, estimator, reason, size, above_noise, candidate);
     if (judged == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }
-    return pvid_trust_tell(&estimator->counters, judged, reason, self->misfit);
+    return pvid_trust_report(&estimator->counters, judged, reason, self->misfit);
 }

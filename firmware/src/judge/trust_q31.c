@@ -18,8 +18,8 @@
 #define NEAR (((int64_t)1 << ERROR_BITS) / 10)
 
 /* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
-#define AGEING 644245094 /* 0.3, Q31 */
-#define AGEING_GROUPS 4u
+#define FADE 644245094 /* 0.3, Q31 */
+#define FADE_GROUPS 4u
 
 #define CHANCE_MAX 92682 /* sqrt(2), Q16: of one degree of freedom */
 
@@ -30,7 +30,7 @@
 #define LONG_MEMORY 4096u
 
 /* One group that the model cannot explain at all must not outweigh thousands. */
-#define SURPLUS_MAX ((int64_t)1000000 << PVID_SURPLUS_BITS)
+#define VARIANCE_RATIO_MAX ((int64_t)1000000 << PVID_VARIANCE_RATIO_BITS)
 
 #define ERROR_BITS 24 /* of se_max */
 
@@ -73,8 +73,8 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
     self->config = *config;
     const uint64_t fading = ((uint64_t)1 << 31) - (uint64_t)estimator->information.retention;
     const uint64_t groups = ((uint64_t)estimator->information.block << 31) / fading; /* of memory; all but never ends */
-    const uint64_t held = (groups < LONG_MEMORY) ? groups : LONG_MEMORY;
-    self->long_memory = (uint16_t)((held < PVID_TRUST_LONG) ? PVID_TRUST_LONG : held);
+    const uint64_t clamped = (groups < LONG_MEMORY) ? groups : LONG_MEMORY;
+    self->long_memory = (uint16_t)((clamped < PVID_TRUST_LONG) ? PVID_TRUST_LONG : clamped);
     pvid_trust_place_q31(self, estimator);
     for (size_t a = 0; a < estimator->model->n_p; a++) {
         self->estimate.se[a] = estimator->start_sd[a];
@@ -84,31 +84,34 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
     return PVID_OK;
 }
 
-const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self)
+const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self)
 {
-    return ((self->config.shut_max > 0u) && (self->shut >= self->config.shut_max)) ? self->estimate.p : NULL;
+    return ((self->config.revert_after > 0u) && (self->uninformative >= self->config.revert_after)) ? self->estimate.p
+                                                                                                    : NULL;
 }
 
 /* ---- the alarm ---- */
 
 /* Returns whether the windows alone raise it. */
-static bool take_surplus(pvid_trust_q31 *self, int64_t surplus)
+static bool add_variance_ratio(pvid_trust_q31 *self, int64_t variance_ratio)
 {
-    const int64_t x = pvid_clamp_q31(surplus, SURPLUS_MAX);
+    const int64_t x = pvid_clamp_q31(variance_ratio, VARIANCE_RATIO_MAX);
     if (self->judged < self->long_memory) {
         self->judged++;
     }
-    self->long_mean = pvid_clamp_q31(self->long_mean + ((x - self->long_mean) / (int64_t)self->judged), SURPLUS_MAX);
+    self->long_mean =
+        pvid_clamp_q31(self->long_mean + ((x - self->long_mean) / (int64_t)self->judged), VARIANCE_RATIO_MAX);
     self->recent[self->next] = x;
     self->next = (uint8_t)((self->next + 1u == PVID_TRUST_SHORT) ? 0u : (self->next + 1u));
     int64_t sum = 0;
     for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
         sum += self->recent[i];
     }
-    const int64_t limit = (int64_t)self->config.misfit_max << (PVID_SURPLUS_BITS - 16);
-    const bool lately = (self->judged >= PVID_TRUST_SHORT) && ((2 * sum) > (3 * (limit * (int64_t)PVID_TRUST_SHORT)));
-    const bool at_length = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
-    return lately || at_length;
+    const int64_t limit = (int64_t)self->config.misfit_max << (PVID_VARIANCE_RATIO_BITS - 16);
+    const bool short_exceeds =
+        (self->judged >= PVID_TRUST_SHORT) && ((2 * sum) > (3 * (limit * (int64_t)PVID_TRUST_SHORT)));
+    const bool long_exceeds = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
+    return short_exceeds || long_exceeds;
 }
 
 static void restart_alarm(pvid_trust_q31 *self)
@@ -120,8 +123,8 @@ static void restart_alarm(pvid_trust_q31 *self)
 }
 
 /* Whether the residuals of all rows are within what chance makes of the limit. */
-static bool all_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
-                      const pvid_estimate_q31 *candidate)
+static bool all_rows_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
+                           const pvid_estimate_q31 *candidate)
 {
     const uint32_t n_p = estimator->model->n_p;
     const uint32_t freedom = (candidate->weight > n_p) ? (candidate->weight - n_p) : 1u;
@@ -134,7 +137,7 @@ static bool all_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 *esti
 /* ---- the gate ---- */
 
 /* Largest standard error of the positive parameters, relative to them, Q24. */
-static int64_t widest(const pvid_estimator_q31 *estimator, const pvid_estimate_q31 *candidate)
+static int64_t largest_error(const pvid_estimator_q31 *estimator, const pvid_estimate_q31 *candidate)
 {
     int64_t most = 0;
     for (size_t a = 0; a < estimator->model->n_p; a++) {
@@ -148,13 +151,13 @@ static int64_t widest(const pvid_estimator_q31 *estimator, const pvid_estimate_q
 
 /* ---- renewal ---- */
 
-int32_t pvid_trust_ageing_q31(pvid_trust_q31 *self)
+int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self)
 {
-    if ((self->ageing == 0u) || !self->known) {
+    if ((self->groups_to_fade == 0u) || !self->errors_small) {
         return 0;
     }
-    self->ageing--;
-    return AGEING;
+    self->groups_to_fade--;
+    return FADE;
 }
 
 /* Whether p is so far from where the rows came in. */
@@ -172,10 +175,10 @@ static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *esti
 
 /* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
  * come in there; and a p that noise may have moved so far has not arrived anywhere. */
-static void settle(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool agrees)
+static void renew_if_stale(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool agrees)
 {
     if (!agrees && has_moved(self, estimator)) {
-        self->ageing = AGEING_GROUPS;
+        self->groups_to_fade = FADE_GROUPS;
         restart_alarm(self);
         memcpy(self->anchor, estimator->p, sizeof self->anchor);
     }
@@ -185,40 +188,41 @@ static void settle(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bo
 }
 
 /* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
-static void raise_alarm(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool settled, int64_t surplus,
+static void raise_alarm(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool settled, int64_t variance_ratio,
                         const pvid_estimate_q31 *candidate)
 {
-    const bool agrees = all_agree(self, estimator, candidate);
-    const bool known = widest(estimator, candidate) <= NEAR;
-    const bool renewing = self->ageing > 0u;
-    self->known = known;
-    bool lately = false;
+    const bool agrees = all_rows_agree(self, estimator, candidate);
+    const bool errors_small = largest_error(estimator, candidate) <= NEAR;
+    const bool renewing = self->groups_to_fade > 0u;
+    self->errors_small = errors_small;
+    bool short_exceeds = false;
     if (renewing) {
         restart_alarm(self);
-    } else if (self->near) {
-        lately = take_surplus(self, surplus);
+    } else if (self->converged) {
+        short_exceeds = add_variance_ratio(self, variance_ratio);
     } else {
-        self->near = settled && known && (self->groups >= self->config.groups_min);
+        self->converged = settled && errors_small && (self->groups >= self->config.groups_min);
     }
-    self->misfit = (self->config.misfit_max > 0u) && (!agrees || lately);
-    if (settled && known && !renewing && (self->config.renewal > 0u)) {
-        settle(self, estimator, agrees);
+    self->misfit = (self->config.misfit_max > 0u) && (!agrees || short_exceeds);
+    if (settled && errors_small && !renewing && (self->config.renewal > 0u)) {
+        renew_if_stale(self, estimator, agrees);
     }
 }
 
 static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
-                           int64_t size, bool informed, const pvid_estimate_q31 *candidate)
+                           int64_t size, bool above_noise, const pvid_estimate_q31 *candidate)
 {
     if (reason != PVID_UPDATED) {
         return reason;
     }
-    if (!informed || (candidate->kappa < self->config.kappa_min) || (candidate->least_pivot < self->config.kappa_min)) {
+    if (!above_noise || (candidate->kappa < self->config.kappa_min) ||
+        (candidate->least_pivot < self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    const int64_t error = widest(estimator, candidate);
-    const int64_t held = pvid_clamp_q31(error, (int64_t)1 << 44);
-    const int64_t near = pvid_round_shift_q31(held * ARRIVED, 16u + (ERROR_BITS - PVID_SIZE_BITS));
-    const bool arrived = size <= ((near > SMALL_STEP) ? near : SMALL_STEP);
+    const int64_t error = largest_error(estimator, candidate);
+    const int64_t clamped = pvid_clamp_q31(error, (int64_t)1 << 44);
+    const int64_t small_enough = pvid_round_shift_q31(clamped * ARRIVED, 16u + (ERROR_BITS - PVID_SIZE_BITS));
+    const bool arrived = size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
     if ((self->groups < self->config.groups_min) || (error > self->config.se_max) || !arrived) {
         return PVID_HELD_UNCERTAIN;
     }
@@ -226,20 +230,20 @@ static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 
 }
 
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
-                                 bool informed, int64_t surplus, const pvid_estimate_q31 *candidate)
+                                 bool above_noise, int64_t variance_ratio, const pvid_estimate_q31 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
         return reason;
     }
-    pvid_trust_count_shut(&self->shut, reason, pvid_trust_refuge_q31(self) != NULL);
-    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), surplus, candidate);
-    const pvid_reason judged = verdict(self, estimator, reason, size, informed, candidate);
+    pvid_trust_count_uninformative(&self->uninformative, reason, pvid_trust_fallback_q31(self) != NULL);
+    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, candidate);
+    const pvid_reason judged = verdict(self, estimator, reason, size, above_noise, candidate);
     if (judged == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }
-    return pvid_trust_tell(&estimator->counters, judged, reason, self->misfit);
+    return pvid_trust_report(&estimator->counters, judged, reason, self->misfit);
 }

@@ -80,7 +80,7 @@ static uint32_t trust_of(uint32_t hash, const pvid_trust_config_f32 *config)
     running = one(running, config->se_max);
     running = one(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
-    running = pvid_fnv_word(running, config->shut_max);
+    running = pvid_fnv_word(running, config->revert_after);
     return one(running, config->renewal);
 }
 

@@ -102,7 +102,7 @@ static uint32_t trust_of(uint32_t hash, const pvid_trust_config_q31 *config)
     uint32_t running = words(hash, limits, sizeof limits / sizeof limits[0]);
     running = pvid_fnv_word(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
-    running = pvid_fnv_word(running, config->shut_max);
+    running = pvid_fnv_word(running, config->revert_after);
     return pvid_fnv_word(running, config->renewal);
 }
 

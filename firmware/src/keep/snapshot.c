@@ -22,14 +22,14 @@ static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
     if ((image == NULL) || (length < PVID_SNAPSHOT_HEADER + CRC_BYTES) || (pvid_get_u32(&image[AT_MAGIC]) != MAGIC)) {
         return PVID_SNAPSHOT_NONE;
     }
-    const uint32_t said = pvid_get_u32(&image[AT_LENGTH]);
-    if (said > length) {
+    const uint32_t stated = pvid_get_u32(&image[AT_LENGTH]);
+    if (stated > length) {
         return PVID_SNAPSHOT_CUT_SHORT;
     }
-    if (said < PVID_SNAPSHOT_HEADER + CRC_BYTES) {
+    if (stated < PVID_SNAPSHOT_HEADER + CRC_BYTES) {
         return PVID_SNAPSHOT_DAMAGED;
     }
-    const size_t sealed = (size_t)said - CRC_BYTES;
+    const size_t sealed = (size_t)stated - CRC_BYTES;
     return (pvid_crc32(0u, image, sealed) == pvid_get_u32(&image[sealed])) ? PVID_SNAPSHOT_RESTORED
                                                                            : PVID_SNAPSHOT_DAMAGED;
 }
@@ -133,9 +133,9 @@ bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place)
 
 uint32_t pvid_snapshot_layout(const uint32_t words[], size_t n)
 {
-    const uint32_t probe = BYTE_ORDER;
-    uint8_t bytes[sizeof probe];
-    memcpy(bytes, &probe, sizeof probe);
+    const uint32_t word = BYTE_ORDER;
+    uint8_t bytes[sizeof word];
+    memcpy(bytes, &word, sizeof word);
     uint32_t hash = pvid_fnv_word(PVID_FNV_START, pvid_get_u32(bytes));
     for (size_t i = 0; i < n; i++) {
         hash = pvid_fnv_word(hash, words[i]);

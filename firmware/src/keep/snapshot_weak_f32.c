@@ -17,7 +17,7 @@ static const uint32_t layout[] = {
     PLACE(phi),
     PLACE(front),
     PLACE(front.ring),
-    PLACE(bend),
+    PLACE(curvature),
     PLACE(window),
     PLACE(finish),
     PLACE(finish.whiten),
@@ -36,7 +36,7 @@ static const uint32_t layout[] = {
     PLACE(trust.groups),
     PLACE(trust.estimate),
     PLACE(trust.copy),
-    (uint32_t)offsetof(pvid_weak_angle_f32, lack),
+    (uint32_t)offsetof(pvid_weak_angle_f32, remainder),
     (uint32_t)offsetof(pvid_weak_angle_f32, ring),
     PVID_MAX_P,
     PVID_MAX_THETA,
@@ -59,7 +59,7 @@ static const uint32_t pointers[] = {
     PLACE(front.smooth),
     PLACE(front.second),
     PLACE(finish.angle),
-    PLACE(finish.solve.refuge),
+    PLACE(finish.solve.fallback),
     PLACE(finish.solve.estimate),
     PLACE(estimator.model),
 };
@@ -108,8 +108,8 @@ pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const p
     if (status == PVID_SNAPSHOT_RESTORED) { /* what pointed into the object points into it again */
         pvid_weak_finish_f32 *finish = &self->finish;
         finish->angle = pvid_snapshot_had_pointer(image, PLACE(finish.angle)) ? self->angle : NULL;
-        finish->solve.refuge =
-            pvid_snapshot_had_pointer(image, PLACE(finish.solve.refuge)) ? self->trust.estimate.p : NULL;
+        finish->solve.fallback =
+            pvid_snapshot_had_pointer(image, PLACE(finish.solve.fallback)) ? self->trust.estimate.p : NULL;
         finish->solve.estimate =
             pvid_snapshot_had_pointer(image, PLACE(finish.solve.estimate)) ? &finish->candidate : NULL;
     }

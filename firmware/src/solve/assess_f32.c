@@ -22,20 +22,20 @@ float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float su
     if (!(freedom >= 1.0f)) {
         return self->row_variance;
     }
-    const float floor = pvid_relative_f32(model) ? (self->expected * freedom) : (RESIDUAL_FLOOR * yy);
+    const float floor = pvid_is_relative_f32(model) ? (self->expected * freedom) : (RESIDUAL_FLOOR * yy);
     const float sum = (yy + energy) + self->information.rounding;
     const float residual = (sum <= PVID_RESIDUAL_MAX) ? sum : PVID_RESIDUAL_MAX;
     return ((residual > floor) ? residual : floor) / freedom;
 }
 
-void pvid_estimator_expect_f32(pvid_estimator_f32 *self, float variance)
+void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance)
 {
     float tail[2];
     pvid_information_tail_f32(&self->information, tail);
-    const float share = (self->taken < tail[1]) ? (self->taken / tail[1]) : 1.0f;
-    const float held = (variance <= PVID_RESIDUAL_MAX) ? variance : PVID_RESIDUAL_MAX;
-    if (self->taken > 0.0f) {
-        self->expected += (held - self->expected) * share;
+    const float share = (self->group_weight < tail[1]) ? (self->group_weight / tail[1]) : 1.0f;
+    const float clamped = (variance <= PVID_RESIDUAL_MAX) ? variance : PVID_RESIDUAL_MAX;
+    if (self->group_weight > 0.0f) {
+        self->expected += (clamped - self->expected) * share;
     }
 }
 
@@ -58,15 +58,15 @@ bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self)
     return self->information.rounding > tail[0];
 }
 
-bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
-                                    float weight)
+bool pvid_estimator_is_above_noise_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
+                                       float weight)
 {
     const pvid_model_f32 *model = self->model;
     if ((model->noise == NULL) || !(self->noise_margin > 0.0f)) {
         return true;
     }
     float rest[PVID_MAX_P][PVID_MAX_P];
-    const uint8_t n = pvid_gated_f32(model);
+    const uint8_t n = pvid_excited_parameters_f32(model);
     const float much = (self->noise_margin * variance) * weight;
     model->noise(self->p, self->noise, rest);
     for (size_t a = 0; a < n; a++) {
@@ -81,7 +81,7 @@ bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float 
 void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],
                                    pvid_estimate_f32 *estimate)
 {
-    const uint8_t n = pvid_gated_f32(self->model);
+    const uint8_t n = pvid_excited_parameters_f32(self->model);
     pvid_cholesky_f32 factor;
     estimate->kappa = 0.0f;
     estimate->least_pivot = 0.0f;
@@ -92,8 +92,8 @@ void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s
     float most = 1.0f;
     for (size_t j = 0; j < n; j++) {
         const float scaled = factor.u[j][j] * factor.scale[j];
-        const float imitated = (scaled * scaled) * s[j][j];
-        most = (imitated > most) ? imitated : most;
+        const float inflation = (scaled * scaled) * s[j][j];
+        most = (inflation > most) ? inflation : most;
     }
     estimate->kappa = factor.first_pivot;
     estimate->least_pivot = 1.0f / most;
@@ -109,8 +109,8 @@ bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PV
     return pvid_cholesky_factor_f32(factor, n_p, (const float (*)[PVID_MAX_P])s);
 }
 
-bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor, const float force[],
-                                   float variance)
+bool pvid_estimator_is_in_dead_zone_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
+                                        const float force[], float variance)
 {
     float x[PVID_MAX_P];
     float square = 0.0f;
@@ -155,7 +155,7 @@ static void assess_in_stages(const pvid_estimator_f32 *self, pvid_estimate_f32 *
     pvid_estimator_begin_assessment_f32(self, &solve, estimate);
     bool done = false;
     for (uint16_t left = pvid_estimator_assessment_stages_f32(self); (left > 0u) && !done; left--) {
-        done = pvid_estimator_assess_on_f32(self, &solve);
+        done = pvid_estimator_assess_advance_f32(self, &solve);
     }
 }
 
@@ -191,7 +191,7 @@ void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32
         memset(estimate, 0, sizeof *estimate);
         return;
     }
-    if (pvid_relative_f32(self->model)) {
+    if (pvid_is_relative_f32(self->model)) {
         assess_in_stages(self, estimate);
     } else {
         assess_at_once(self, estimate);

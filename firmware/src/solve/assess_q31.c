@@ -42,14 +42,14 @@ pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self)
     return pvid_scaled_exceeds_q31(explained, found) ? explained : found;
 }
 
-void pvid_estimator_expect_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance)
+void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance)
 {
     const int64_t weight = self->information.sums[self->information.n_sums - 1u];
-    if ((self->taken <= 0) || (weight < self->taken)) {
+    if ((self->group_weight <= 0) || (weight < self->group_weight)) {
         return;
     }
     const pvid_scaled_q31 share =
-        pvid_scaled_over_q31(pvid_scaled_of_q31(self->taken, 0), pvid_scaled_of_q31(weight, 0));
+        pvid_scaled_over_q31(pvid_scaled_of_q31(self->group_weight, 0), pvid_scaled_of_q31(weight, 0));
     const pvid_scaled_q31 change = pvid_scaled_times_q31(share, pvid_scaled_minus_q31(variance, self->expected));
     const pvid_scaled_q31 mean = pvid_scaled_plus_q31(self->expected, change);
     self->expected.m = (mean.m > 0) ? mean.m : 0;
@@ -111,8 +111,8 @@ void pvid_estimator_invert_q31(pvid_estimator_solve_q31 *solve, size_t a)
 static int32_t part_of(int64_t x, int32_t a, int32_t b)
 {
     const uint64_t part = ((pvid_magnitude_q31(x) / (uint64_t)a) << 30) / (uint64_t)b;
-    const int64_t held = (part > (uint64_t)PVID_ONE_Q30) ? PVID_ONE_Q30 : (int64_t)part;
-    return (int32_t)((x < 0) ? -held : held);
+    const int64_t clamped = (part > (uint64_t)PVID_ONE_Q30) ? PVID_ONE_Q30 : (int64_t)part;
+    return (int32_t)((x < 0) ? -clamped : clamped);
 }
 
 void pvid_estimator_errors_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, size_t a,
@@ -150,6 +150,6 @@ void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31
     pvid_estimator_begin_assessment_q31(self, &solve, estimate);
     bool done = false;
     for (uint16_t left = pvid_estimator_assessment_stages_q31(self); (left > 0u) && !done; left--) {
-        done = pvid_estimator_assess_on_q31(self, &solve, estimate);
+        done = pvid_estimator_assess_advance_q31(self, &solve, estimate);
     }
 }

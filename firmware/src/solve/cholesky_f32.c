@@ -21,7 +21,7 @@ static bool factor_any(pvid_cholesky_f32 *self, size_t n, const float s[][PVID_M
         for (size_t k = j + 1u; k < n; k++) {
             pivot -= self->u[j][k] * self->u[j][k];
         }
-        if (!pvid_pivot_is_data_f32(pivot, diagonal)) {
+        if (!pvid_pivot_is_significant_f32(pivot, diagonal)) {
             return false;
         }
         if (j == 0u) {

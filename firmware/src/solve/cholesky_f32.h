@@ -46,7 +46,7 @@ static inline bool pvid_positive_normal_f32(float x)
     return (pvid_bits_f32(x) - 0x00800000u) < 0x7F000000u;
 }
 
-static inline bool pvid_pivot_is_data_f32(float pivot, float diagonal)
+static inline bool pvid_pivot_is_significant_f32(float pivot, float diagonal)
 {
     return pivot >= (PVID_PIVOT_MIN * diagonal); /* false for NaN */
 }
@@ -73,7 +73,7 @@ static inline bool pvid_cholesky_factor_three_f32(pvid_cholesky_f32 *self, const
 
     const float diagonal1 = (s[1][1] * d1) * d1;
     const float pivot1 = diagonal1 - (u12 * u12);
-    if (!pvid_pivot_is_data_f32(pivot1, diagonal1)) {
+    if (!pvid_pivot_is_significant_f32(pivot1, diagonal1)) {
         return false;
     }
     const float inverse1 = 1.0f / sqrtf(pivot1);
@@ -81,7 +81,7 @@ static inline bool pvid_cholesky_factor_three_f32(pvid_cholesky_f32 *self, const
 
     const float diagonal0 = (s[0][0] * d0) * d0;
     const float pivot0 = (diagonal0 - (u01 * u01)) - (u02 * u02);
-    if (!pvid_pivot_is_data_f32(pivot0, diagonal0)) {
+    if (!pvid_pivot_is_significant_f32(pivot0, diagonal0)) {
         return false;
     }
     self->first_pivot = pivot0 / diagonal0;

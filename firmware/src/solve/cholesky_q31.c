@@ -8,7 +8,7 @@ int32_t pvid_half_exponent_q31(int64_t diagonal)
     return (int32_t)pvid_floor_shift_q31((int64_t)length - 29, 1);
 }
 
-bool pvid_pivot_is_data_q31(int64_t pivot, int32_t diagonal)
+bool pvid_pivot_is_significant_q31(int64_t pivot, int32_t diagonal)
 {
     return (diagonal >= (PVID_ONE_Q30 / 4)) && (pivot >= ((int64_t)diagonal * (PVID_ONE_Q30 >> PVID_PIVOT_SHIFT)));
 }
@@ -43,7 +43,7 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     for (size_t k = j + 1u; k < n; k++) {
         pivot -= pvid_square_q31(self->u[j][k]);
     }
-    if (!pvid_pivot_is_data_q31(pivot, diagonal)) {
+    if (!pvid_pivot_is_significant_q31(pivot, diagonal)) {
         self->positive = false;
         return;
     }
@@ -72,16 +72,16 @@ int32_t pvid_cholesky_least_pivot_q31(const pvid_cholesky_q31 *self, const int32
 bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P])
 {
     pvid_cholesky_begin_q31(self, n);
-    for (size_t turn = 1; turn <= n; turn++) {
-        pvid_cholesky_eliminate_q31(self, s, n - turn);
+    for (size_t eliminated = 1; eliminated <= n; eliminated++) {
+        pvid_cholesky_eliminate_q31(self, s, n - eliminated);
     }
     return self->positive;
 }
 
 void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[], int32_t x[])
 {
-    for (size_t turn = 1; turn <= self->n; turn++) {
-        const size_t i = self->n - turn;
+    for (size_t eliminated = 1; eliminated <= self->n; eliminated++) {
+        const size_t i = self->n - eliminated;
         int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
         for (size_t k = i + 1u; k < self->n; k++) {
             sum -= pvid_product_q31(self->u[i][k], x[k]);

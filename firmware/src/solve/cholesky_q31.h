@@ -19,7 +19,7 @@
 int32_t pvid_half_exponent_q31(int64_t diagonal);
 
 /* The pivot's test: diagonal in Q30, pivot in Q60. */
-bool pvid_pivot_is_data_q31(int64_t pivot, int32_t diagonal);
+bool pvid_pivot_is_significant_q31(int64_t pivot, int32_t diagonal);
 
 /* total 2^-30 times the reciprocal in Q30, within +-limit, limit < 2^31. */
 int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limit);

@@ -84,7 +84,7 @@ static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
         return PVID_BAD_CORRELATION;
     }
     if (!pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ||
-        (!pvid_relative_f32(config->model) && (config->row_weight < 1.0f))) {
+        (!pvid_is_relative_f32(config->model) && (config->row_weight < 1.0f))) {
         return PVID_BAD_ROW_WEIGHT;
     }
     if (!pvid_within_f32(config->step_limit, 1.0e-6f, 0.9f)) {
@@ -167,7 +167,7 @@ static inline float sum_of_squares(size_t n_theta, const float n[], float y)
 }
 
 /* The same for the strong form's 11 entries, at every tick. */
-static inline float sum_of_eleven_squares(const float n[], float y)
+static inline float sum_of_squares_strong(const float n[], float y)
 {
     float squares = y * y;
     PVID_UNROLL
@@ -179,11 +179,11 @@ static inline float sum_of_eleven_squares(const float n[], float y)
 
 /* Counts a row that is refused. The sum of squares of a row is within its limit only if every entry is a number of
  * reasonable size: one comparison for all of them. Which it was that broke the rule is asked only afterwards. */
-static inline pvid_reason admit(pvid_estimator_f32 *self, const float n[], float y)
+static inline pvid_reason accept_row(pvid_estimator_f32 *self, const float n[], float y)
 {
     const size_t n_theta = self->model->n_theta;
     const float squares =
-        (n_theta == (size_t)PVID_KAPITZA_STRONG_THETA) ? sum_of_eleven_squares(n, y) : sum_of_squares(n_theta, n, y);
+        (n_theta == (size_t)PVID_KAPITZA_STRONG_THETA) ? sum_of_squares_strong(n, y) : sum_of_squares(n_theta, n, y);
     if (squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {
         return PVID_ACCUMULATED;
     }
@@ -212,7 +212,7 @@ static inline float innovate(const pvid_estimator_f32 *self, const float n[], fl
 }
 
 /* innovation += C^T N e */
-static inline void listen(pvid_estimator_f32 *self, const float gradient[], float e)
+static inline void accumulate_innovation(pvid_estimator_f32 *self, const float gradient[], float e)
 {
     for (size_t a = 0; a < self->model->n_p; a++) {
         self->innovation[a] += gradient[a] * e;
@@ -222,7 +222,7 @@ static inline void listen(pvid_estimator_f32 *self, const float gradient[], floa
 /* Takes a row of a model without functions of its own in. */
 static inline pvid_reason add_relative_row(pvid_estimator_f32 *self, const float n[], float y)
 {
-    const pvid_reason reason = admit(self, n, y);
+    const pvid_reason reason = accept_row(self, n, y);
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
@@ -233,10 +233,10 @@ static inline pvid_reason add_relative_row(pvid_estimator_f32 *self, const float
         return PVID_REJECTED_SATURATED;
     }
     if (self->gain < 1.0f) {
-        listen(self, gradient, e);
+        accumulate_innovation(self, gradient, e);
     }
     self->energy += e * e;
-    self->taken += self->information.row_weight;
+    self->group_weight += self->information.row_weight;
     pvid_information_add_f32(&self->information, self->model, n, e, NULL);
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;
@@ -245,19 +245,19 @@ static inline pvid_reason add_relative_row(pvid_estimator_f32 *self, const float
 /* What comes before a row of a model with functions of its own is added to the sums. */
 static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y, float e, const float gradient[])
 {
-    const pvid_reason reason = admit(self, n, y);
+    const pvid_reason reason = accept_row(self, n, y);
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
     if (self->gain < 1.0f) {
-        listen(self, gradient, e);
+        accumulate_innovation(self, gradient, e);
     }
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;
 }
 
 /* innovate's answers for begin_row, which listens to them only while g < 1. */
-static inline float heard(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
+static inline float innovation_if_needed(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
 {
     return (self->gain < 1.0f) ? self->model->innovate(self->p, n, y, gradient) : 0.0f;
 }
@@ -267,11 +267,11 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    if (pvid_relative_f32(self->model)) {
+    if (pvid_is_relative_f32(self->model)) {
         return add_relative_row(self, n, y);
     }
     float gradient[PVID_MAX_P] = {0};
-    const float e = heard(self, n, y, gradient);
+    const float e = innovation_if_needed(self, n, y, gradient);
     const pvid_reason reason = begin_row(self, n, y, e, gradient);
     if (reason == PVID_ACCUMULATED) {
         float sums[PVID_MAX_SUMS];
@@ -283,7 +283,7 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
 /* ---- the solve ---- */
 
 /* Counts why p stays where it is. */
-static pvid_reason hold(uint32_t *counter, pvid_reason reason)
+static pvid_reason count_reason(uint32_t *counter, pvid_reason reason)
 {
     pvid_count_up(counter);
     return reason;
@@ -298,18 +298,18 @@ static inline void complete_system(pvid_estimator_f32 *self, size_t a, float gai
 }
 
 /* For a model that projects its sums by itself. */
-static bool is_at_rest(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor)
+static bool sums_in_dead_zone(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor)
 {
     float sums[PVID_MAX_SUMS];
     float s[PVID_MAX_P][PVID_MAX_P];
     float force[PVID_MAX_P];
     pvid_information_read_f32(&self->information, sums);
     const float energy = self->model->project(self->p, sums, &sums[self->model->n_moments], s, force);
-    return pvid_estimator_is_at_rest_f32(self, factor, force, pvid_estimator_variance_f32(self, sums, energy));
+    return pvid_estimator_is_in_dead_zone_f32(self, factor, force, pvid_estimator_variance_f32(self, sums, energy));
 }
 
 /* One step of p from S and F, for a model that projects its sums by itself. */
-static pvid_reason step_of_any(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+static pvid_reason dense_step(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
 {
     const uint8_t n_p = self->model->n_p;
     float dp[PVID_MAX_P];
@@ -318,48 +318,48 @@ static pvid_reason step_of_any(pvid_estimator_f32 *self, float gain, float s[][P
         complete_system(self, a, gain, s, rhs);
     }
     if (!pvid_cholesky_factor_f32(&factor, n_p, (const float (*)[PVID_MAX_P])s)) {
-        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
+        return count_reason(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
     if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
-        return hold(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
+        return count_reason(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
     }
-    if ((self->dead_zone > 0.0f) && is_at_rest(self, &factor)) {
-        return hold(&self->counters.at_rest, PVID_UPDATED);
+    if ((self->dead_zone > 0.0f) && sums_in_dead_zone(self, &factor)) {
+        return count_reason(&self->counters.at_rest, PVID_UPDATED);
     }
     pvid_cholesky_solve_f32(&factor, rhs, dp);
-    const float size = pvid_estimator_size_f32(self, dp);
+    const float size = pvid_estimator_step_size_f32(self, dp);
     if (!pvid_finite_f32(size)) {
-        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
+        return count_reason(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
-    pvid_estimator_take_step_f32(self, dp, size, self->p);
+    pvid_estimator_apply_step_f32(self, dp, size, self->p);
     pvid_count_up(&self->counters.updates);
     return PVID_UPDATED;
 }
 
-static inline float size_of_three(const pvid_estimator_f32 *self, const float dp[])
+static inline float step_size_three(const pvid_estimator_f32 *self, const float dp[])
 {
-    const uint32_t first = pvid_estimator_reach_f32(self, 0, dp[0]);
-    const uint32_t second = pvid_estimator_reach_f32(self, 1, dp[1]);
-    const uint32_t third = pvid_estimator_reach_f32(self, 2, dp[2]);
+    const uint32_t first = pvid_estimator_relative_step_f32(self, 0, dp[0]);
+    const uint32_t second = pvid_estimator_relative_step_f32(self, 1, dp[1]);
+    const uint32_t third = pvid_estimator_relative_step_f32(self, 2, dp[2]);
     const uint32_t larger = (second > first) ? second : first;
     return pvid_from_bits_f32((third > larger) ? third : larger);
 }
 
-static inline void take_step_of_three(pvid_estimator_f32 *self, const float dp[], float size)
+static inline void apply_step_three(pvid_estimator_f32 *self, const float dp[], float size)
 {
-    const float part = pvid_estimator_part_f32(self, size);
+    const float part = pvid_estimator_step_factor_f32(self, size);
     bool bounded = false;
-    self->p[0] = pvid_estimator_moved_f32(self, 0, part * dp[0], &bounded);
-    self->p[1] = pvid_estimator_moved_f32(self, 1, part * dp[1], &bounded);
-    self->p[2] = pvid_estimator_moved_f32(self, 2, part * dp[2], &bounded);
+    self->p[0] = pvid_estimator_bounded_f32(self, 0, part * dp[0], &bounded);
+    self->p[1] = pvid_estimator_bounded_f32(self, 1, part * dp[1], &bounded);
+    self->p[2] = pvid_estimator_bounded_f32(self, 2, part * dp[2], &bounded);
     if (bounded) {
         pvid_count_up(&self->counters.bounded);
     }
 }
 
-/* step_of_any for three parameters, the paper's number, and no dead zone: the same, written out, so that S, its factor
+/* dense_step for three parameters, the paper's number, and no dead zone: the same, written out, so that S, its factor
  * and dp stay in registers. */
-static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+static pvid_reason dense_step_three(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
 {
     float dp[PVID_MAX_P];
     pvid_cholesky_f32 factor;
@@ -367,17 +367,17 @@ static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[]
     complete_system(self, 1, gain, s, rhs);
     complete_system(self, 2, gain, s, rhs);
     if (!pvid_cholesky_factor_three_f32(&factor, (const float (*)[PVID_MAX_P])s)) {
-        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
+        return count_reason(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
     if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
-        return hold(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
+        return count_reason(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
     }
     pvid_cholesky_solve_three_f32(&factor, rhs, dp);
-    const float size = size_of_three(self, dp);
+    const float size = step_size_three(self, dp);
     if (!pvid_finite_f32(size)) {
-        return hold(&self->counters.held_pivot, PVID_HELD_PIVOT);
+        return count_reason(&self->counters.held_pivot, PVID_HELD_PIVOT);
     }
-    take_step_of_three(self, dp, size);
+    apply_step_three(self, dp, size);
     pvid_count_up(&self->counters.updates);
     return PVID_UPDATED;
 }
@@ -385,7 +385,7 @@ static pvid_reason step_of_three(pvid_estimator_f32 *self, float gain, float s[]
 static inline pvid_reason step_of(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
 {
     const bool plain = (self->model->n_p == 3u) && !(self->dead_zone > 0.0f);
-    return plain ? step_of_three(self, gain, s, rhs) : step_of_any(self, gain, s, rhs);
+    return plain ? dense_step_three(self, gain, s, rhs) : dense_step(self, gain, s, rhs);
 }
 
 static pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, const float sums[])
@@ -425,8 +425,8 @@ static inline pvid_reason add_and_solve(pvid_estimator_f32 *self, const float n[
 }
 
 /* As pvid_estimator_add_f32 and the end of a group, without reading the sums back in between. */
-pvid_reason pvid_estimator_step_known_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
-                                          const float gradient[])
+pvid_reason pvid_estimator_step_innovation_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                               const float gradient[])
 {
     pvid_reason reason = begin_row(self, n, y, e, gradient);
     if (reason != PVID_ACCUMULATED) {
@@ -447,10 +447,10 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    if (!pvid_relative_f32(self->model)) {
+    if (!pvid_is_relative_f32(self->model)) {
         float gradient[PVID_MAX_P] = {0};
-        const float e = heard(self, n, y, gradient);
-        return pvid_estimator_step_known_f32(self, n, y, e, gradient);
+        const float e = innovation_if_needed(self, n, y, gradient);
+        return pvid_estimator_step_innovation_f32(self, n, y, e, gradient);
     }
     const pvid_reason added = add_relative_row(self, n, y);
     return (added == PVID_ACCUMULATED) ? pvid_estimator_update_f32(self) : added;

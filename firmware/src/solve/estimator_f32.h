@@ -18,38 +18,38 @@ static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
 }
 
 /* Whether B and yy are kept relative to the estimate; see estimator.h. */
-static inline bool pvid_relative_f32(const pvid_model_f32 *model)
+static inline bool pvid_is_relative_f32(const pvid_model_f32 *model)
 {
     return model->project == NULL;
 }
 
 /* Leading parameters that the gates look at. */
-static inline uint8_t pvid_gated_f32(const pvid_model_f32 *model)
+static inline uint8_t pvid_excited_parameters_f32(const pvid_model_f32 *model)
 {
     return (model->n_gated > 0u) ? model->n_gated : model->n_p;
 }
 
 /* How far a step goes in parameter a, as a part of what it is measured by: its own value where it is positive, else the
  * standard deviation of its start. As bits: those of |x| order as |x| does, infinity and NaN last. */
-static inline uint32_t pvid_estimator_reach_f32(const pvid_estimator_f32 *self, size_t a, float step)
+static inline uint32_t pvid_estimator_relative_step_f32(const pvid_estimator_f32 *self, size_t a, float step)
 {
     const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
     return pvid_bits_f32(step / reference[a]) & 0x7FFFFFFFu;
 }
 
 /* The farthest of all parameters; not finite if dp is not. */
-static inline float pvid_estimator_size_f32(const pvid_estimator_f32 *self, const float dp[])
+static inline float pvid_estimator_step_size_f32(const pvid_estimator_f32 *self, const float dp[])
 {
     uint32_t largest = 0;
     for (size_t a = 0; a < self->model->n_p; a++) {
-        const uint32_t reach = pvid_estimator_reach_f32(self, a, dp[a]);
-        largest = (reach > largest) ? reach : largest;
+        const uint32_t relative_step = pvid_estimator_relative_step_f32(self, a, dp[a]);
+        largest = (relative_step > largest) ? relative_step : largest;
     }
     return pvid_from_bits_f32(largest);
 }
 
 /* Where a step leads in parameter a, within its bounds. */
-static inline float pvid_estimator_moved_f32(const pvid_estimator_f32 *self, size_t a, float step, bool *bounded)
+static inline float pvid_estimator_bounded_f32(const pvid_estimator_f32 *self, size_t a, float step, bool *bounded)
 {
     float x = self->p[a] + step;
     if (x > self->upper[a]) {
@@ -64,7 +64,7 @@ static inline float pvid_estimator_moved_f32(const pvid_estimator_f32 *self, siz
 }
 
 /* Part of a step of this size that is taken. */
-static inline float pvid_estimator_part_f32(pvid_estimator_f32 *self, float size)
+static inline float pvid_estimator_step_factor_f32(pvid_estimator_f32 *self, float size)
 {
     if (size > self->step_limit) {
         pvid_count_up(&self->counters.limited);
@@ -74,12 +74,12 @@ static inline float pvid_estimator_part_f32(pvid_estimator_f32 *self, float size
 }
 
 /* p[n_p] = where the step dp leads: shortened to the step limit, within the bounds. */
-static inline void pvid_estimator_take_step_f32(pvid_estimator_f32 *self, const float dp[], float size, float p[])
+static inline void pvid_estimator_apply_step_f32(pvid_estimator_f32 *self, const float dp[], float size, float p[])
 {
-    const float part = pvid_estimator_part_f32(self, size);
+    const float part = pvid_estimator_step_factor_f32(self, size);
     bool bounded = false;
     for (size_t a = 0; a < self->model->n_p; a++) {
-        p[a] = pvid_estimator_moved_f32(self, a, part * dp[a], &bounded);
+        p[a] = pvid_estimator_bounded_f32(self, a, part * dp[a], &bounded);
     }
     if (bounded) {
         pvid_count_up(&self->counters.bounded);
@@ -107,8 +107,8 @@ static inline bool pvid_estimator_is_due_f32(pvid_estimator_f32 *self)
 
 /* pvid_estimator_step_f32 for a model with functions of its own, of which innovate's answers at p are known (they are
  * asked for while g < 1). */
-pvid_reason pvid_estimator_step_known_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
-                                          const float gradient[]);
+pvid_reason pvid_estimator_step_innovation_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                               const float gradient[]);
 
 /* A solve of a model that projects its sums by itself: at the end of a group, or once more. */
 pvid_reason pvid_estimator_solve_sums_f32(pvid_estimator_f32 *self, bool ends_group);
@@ -116,13 +116,13 @@ pvid_reason pvid_estimator_solve_sums_f32(pvid_estimator_f32 *self, bool ends_gr
 /* Whether S - margin Sn, Sn the information that noise of the given variance alone would make, is still
  * positive: what the data say goes beyond what noise says. True where the model does not know Sn.
  * s: upper triangle of C^T M C [n_p][n_p]. Cost: a factorisation. */
-bool pvid_estimator_is_informed_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
-                                    float weight);
+bool pvid_estimator_is_above_noise_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
+                                       float weight);
 
 /* Whether p is within the dead zone of estimator.h: force is F [n_p], factor that of S + H0, variance that of the
  * residuals. False for what is no number. Cost: a solve. */
-bool pvid_estimator_is_at_rest_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor, const float force[],
-                                   float variance);
+bool pvid_estimator_is_in_dead_zone_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
+                                        const float force[], float variance);
 
 /* Where p is absurd a residual sum overflows or is no number; so far up no standard error made of it does. */
 #define PVID_RESIDUAL_MAX 1.0e30f
@@ -133,7 +133,7 @@ float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float su
 
 /* Takes note of the variance that the sensors' noise gives the rows taken in since the last group's end; call it when
  * all of a group are, and before its solve begins. For models without functions of their own, as the next two. */
-void pvid_estimator_expect_f32(pvid_estimator_f32 *self, float variance);
+void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance);
 
 /* Residual variance of all rows in these sums over the variance that was told for them; 0 while there are no degrees of
  * freedom, or where no digit of the residuals is left. */

@@ -111,13 +111,13 @@ int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, in
     return (2 * ((31 + up) - exponent)) - 31;
 }
 
-void pvid_estimator_take_theta_q31(pvid_estimator_q31 *self, const int64_t theta[])
+void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[])
 {
     for (size_t i = 0; i < self->model->n_theta; i++) {
-        const pvid_scaled_q31 held = pvid_scaled_of_q31(theta[i], 0);
+        const pvid_scaled_q31 clamped = pvid_scaled_of_q31(theta[i], 0);
         self->theta[i] = theta[i];
-        self->mantissa[i] = held.m;
-        self->shift[i] = (int16_t)(self->align[i] - held.e);
+        self->mantissa[i] = clamped.m;
+        self->shift[i] = (int16_t)(self->align[i] - clamped.e);
     }
 }
 
@@ -157,7 +157,7 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
     }
     int64_t theta[PVID_MAX_THETA_Q31];
     config->model->theta(self->p, theta);
-    pvid_estimator_take_theta_q31(self, theta);
+    pvid_estimator_set_theta_q31(self, theta);
     self->row_sd = config->row_sd;
     self->gain = config->gain;
     self->correlation = config->correlation;
@@ -189,7 +189,7 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
     const int64_t above = (value < self->lower[index]) ? self->lower[index] : value;
     self->p[index] = (int32_t)((above > self->upper[index]) ? self->upper[index] : above);
     self->model->theta(self->p, theta);
-    pvid_estimator_take_theta_q31(self, theta);
+    pvid_estimator_set_theta_q31(self, theta);
 }
 
 /* ---- rows ---- */
@@ -208,8 +208,8 @@ bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[],
     for (size_t i = 0; i < self->model->n_theta; i++) {
         fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
         const int32_t below = (n[i] > PVID_ROW_LIMIT_Q31) ? PVID_ROW_LIMIT_Q31 : n[i];
-        const int32_t held = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
-        term[i] = term_of(pvid_product_q31(held, self->mantissa[i]), self->shift[i]);
+        const int32_t clamped = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
+        term[i] = term_of(pvid_product_q31(clamped, self->mantissa[i]), self->shift[i]);
         rest -= term[i];
     }
     *e = rest;
@@ -222,10 +222,10 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
     return pvid_estimator_terms_q31(self, n, y, term, e);
 }
 
-void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
+void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
 {
     self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
-    self->taken = pvid_clamp_q31(self->taken + self->information.row_weight, PVID_WIDE);
+    self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
     pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);
 }
@@ -240,7 +240,7 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
-    pvid_estimator_take_row_q31(self, n, (int32_t)e, pvid_square_q31((int32_t)e));
+    pvid_estimator_add_row_q31(self, n, (int32_t)e, pvid_square_q31((int32_t)e));
     return PVID_ACCUMULATED;
 }
 

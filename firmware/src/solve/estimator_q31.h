@@ -12,21 +12,21 @@
 #include "number/integer_q31.h"
 #include "pvid/estimator_q31.h"
 
-#define PVID_HELD_LIMIT (2 * PVID_SUM_LIMIT) /* of |b|, rr and what a step may add to them */
-#define PVID_ROW_SD_BITS 8                   /* format of row_sd beyond Y's */
-#define PVID_SIZE_BITS 22                    /* of the size of a step: |dp| in it still is an int64 */
-#define PVID_S_BITS 32                       /* of the unit of s; see pvid_estimator_solve_q31 */
-#define PVID_NOTHING_Q31 (-200)              /* exponent of 0: never the largest */
+#define PVID_CLAMP_LIMIT (2 * PVID_SUM_LIMIT) /* of |b|, rr and what a step may add to them */
+#define PVID_ROW_SD_BITS 8                    /* format of row_sd beyond Y's */
+#define PVID_SIZE_BITS 22                     /* of the size of a step: |dp| in it still is an int64 */
+#define PVID_S_BITS 32                        /* of the unit of s; see pvid_estimator_solve_q31 */
+#define PVID_ZERO_EXPONENT_Q31 (-200)         /* exponent of 0: never the largest */
 
 static inline bool pvid_is_positive_q31(const pvid_model_q31 *model, size_t i)
 {
     return ((model->positive >> i) & 1u) != 0u;
 }
 
-/* Bits of |x|, or PVID_NOTHING_Q31. */
+/* Bits of |x|, or PVID_ZERO_EXPONENT_Q31. */
 static inline int32_t pvid_length_q31(int64_t x)
 {
-    return (x == 0) ? PVID_NOTHING_Q31 : (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(x));
+    return (x == 0) ? PVID_ZERO_EXPONENT_Q31 : (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(x));
 }
 
 /* One past the last non-zero of the column of C that starts at `start`. */
@@ -54,10 +54,10 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
 bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e);
 
 /* Takes a row in that fits, with its innovation e and e^2. */
-void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
+void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
 
 /* Sets theta = f(p), and what rows are multiplied with. */
-void pvid_estimator_take_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
+void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
 
 /* s^2 of a row: residual sum of squares over degrees of freedom, no less than the sensors' noise explains, row_sd^2
  * while there are none; divided by 4^exponent as the sums are. */
@@ -65,7 +65,7 @@ pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self);
 
 /* Takes note of the variance >= 0 that the sensors' noise gives the rows taken in since the last group's end [units of
  * Y's integer squared]; call it when all of a group are, and before its solve begins. */
-void pvid_estimator_expect_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
+void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
 
 /* row_sd^2 as that. */
 pvid_scaled_q31 pvid_estimator_expected_variance_q31(const pvid_estimator_q31 *self);

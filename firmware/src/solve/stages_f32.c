@@ -12,16 +12,16 @@
 #include "pvid/estimator.h"
 
 enum {
-    STAGE_READ,    /* the sums and C */
-    STAGE_PROJECT, /* n_p times: M c_a, a few non-zeros of c_a at a time, then row a of S and F */
-    STAGE_INFORM,  /* is there more in S than noise puts there? */
+    STAGE_READ,        /* the sums and C */
+    STAGE_PROJECT,     /* n_p times: M c_a, a few non-zeros of c_a at a time, then row a of S and F */
+    STAGE_ABOVE_NOISE, /* is there more in S than noise puts there? */
     STAGE_FACTOR,
     STAGE_STEP,   /* dp, and where p and theta go with it */
-    STAGE_FOLLOW, /* a few rows of M dtheta at a time */
+    STAGE_MOVE_B, /* a few rows of M dtheta at a time */
     STAGE_COMMIT,
     STAGE_FOLD,
     STAGE_DONE,
-    STAGE_KAPPA, /* of an assessment, after STAGE_INFORM */
+    STAGE_KAPPA, /* of an assessment, after STAGE_ABOVE_NOISE */
     STAGE_WIDEN,
     STAGE_INVERT, /* n_p times: a column */
     STAGE_SCALE
@@ -30,10 +30,10 @@ enum {
 /* What a step leaves wrong in rr, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
 #define ROUNDING 2.4e-7f
 
-#define ROWS_A_STAGE 4u
-#define COLUMNS_A_STAGE 3u
+#define ROWS_PER_STAGE 4u
+#define COLUMNS_PER_STAGE 3u
 
-static void hold(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, pvid_reason reason)
+static void hold_solve(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, pvid_reason reason)
 {
     pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
     solve->reason = reason;
@@ -56,7 +56,7 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
         memset(solve->column, 0, sizeof solve->column);
     }
     if (next < end) {
-        const size_t last = ((end - next) > COLUMNS_A_STAGE) ? (next + COLUMNS_A_STAGE) : end;
+        const size_t last = ((end - next) > COLUMNS_PER_STAGE) ? (next + COLUMNS_PER_STAGE) : end;
         pvid_pattern_add_columns_f32(model, solve->c, next, last, solve->sums, solve->column);
         solve->next = (uint8_t)last;
         return true;
@@ -70,19 +70,19 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
 
 /* What the noise is taken to be: what it was said to be while p may still be far off, which makes residuals of its
  * own; what it was found to be once the result is judged. */
-static void inform_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const float weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
     const bool judging = solve->estimate != NULL;
     solve->variance = judging ? pvid_estimator_variance_f32(self, solve->sums, 0.0f) : self->row_variance;
-    solve->informed =
-        pvid_estimator_is_informed_f32(self, (const float (*)[PVID_MAX_P])solve->s, solve->variance, weight);
+    solve->above_noise =
+        pvid_estimator_is_above_noise_f32(self, (const float (*)[PVID_MAX_P])solve->s, solve->variance, weight);
 }
 
 static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
-    const uint8_t gated = pvid_gated_f32(model);
+    const uint8_t gated = pvid_excited_parameters_f32(model);
     const float (*s)[PVID_MAX_P] = (const float (*)[PVID_MAX_P])solve->s;
     for (size_t a = 0; a < model->n_p; a++) {
         solve->s[a][a] += self->prior[a];
@@ -94,17 +94,17 @@ static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
         solvable = pvid_cholesky_factor_f32(&solve->factor, model->n_p, s) && solvable;
     }
     if (!solvable) {
-        hold(self, solve, PVID_HELD_PIVOT);
-    } else if (!solve->informed || !pvid_estimator_is_excited_f32(self, kappa, solve->s[0][0])) {
-        hold(self, solve, PVID_HELD_NOT_EXCITED);
+        hold_solve(self, solve, PVID_HELD_PIVOT);
+    } else if (!solve->above_noise || !pvid_estimator_is_excited_f32(self, kappa, solve->s[0][0])) {
+        hold_solve(self, solve, PVID_HELD_NOT_EXCITED);
     }
 }
 
-static bool is_at_rest(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
+static bool solve_in_dead_zone(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
 {
     return (self->dead_zone > 0.0f) &&
-           pvid_estimator_is_at_rest_f32(self, &solve->factor, solve->force,
-                                         pvid_estimator_variance_f32(self, solve->sums, 0.0f));
+           pvid_estimator_is_in_dead_zone_f32(self, &solve->factor, solve->force,
+                                              pvid_estimator_variance_f32(self, solve->sums, 0.0f));
 }
 
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
@@ -116,22 +116,22 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
         self->innovation[a] = 0.0f;
     }
     memcpy(solve->p, self->p, sizeof solve->p);
-    if ((solve->reason == PVID_UPDATED) && is_at_rest(self, solve)) {
+    if ((solve->reason == PVID_UPDATED) && solve_in_dead_zone(self, solve)) {
         pvid_count_up(&self->counters.at_rest);
-        solve->rests = true;
+        solve->in_dead_zone = true;
     } else if (solve->reason == PVID_UPDATED) {
         float dp[PVID_MAX_P];
         pvid_cholesky_solve_f32(&solve->factor, rhs, dp);
-        const float size = pvid_estimator_size_f32(self, dp);
+        const float size = pvid_estimator_step_size_f32(self, dp);
         if (pvid_finite_f32(size)) {
             solve->size = size;
-            pvid_estimator_take_step_f32(self, dp, size, solve->p);
+            pvid_estimator_apply_step_f32(self, dp, size, solve->p);
         } else {
-            hold(self, solve, PVID_HELD_PIVOT);
+            hold_solve(self, solve, PVID_HELD_PIVOT);
         }
     }
-    if ((solve->reason != PVID_UPDATED) && (solve->refuge != NULL)) {
-        memcpy(solve->p, solve->refuge, sizeof solve->p);
+    if ((solve->reason != PVID_UPDATED) && (solve->fallback != NULL)) {
+        memcpy(solve->p, solve->fallback, sizeof solve->p);
     }
     model->theta(solve->p, solve->theta);
     for (size_t i = 0; i < model->n_theta; i++) {
@@ -142,11 +142,11 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
 }
 
 /* Rows first.. of M dtheta, and of the fall of rr by dtheta^T (b_old + b_new); returns the next row. */
-static size_t follow_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, size_t first)
+static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, size_t first)
 {
     const size_t n = self->model->n_theta;
     const float *b = &solve->sums[self->model->n_moments];
-    const size_t last = ((n - first) > ROWS_A_STAGE) ? (first + ROWS_A_STAGE) : n;
+    const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
     for (size_t i = first; i < last; i++) {
         const float moved = pvid_pattern_times_f32(n, solve->sums, i, solve->theta_step);
         solve->moved[i] = moved;
@@ -160,14 +160,14 @@ static size_t follow_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
 static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const bool steps = solve->reason == PVID_UPDATED;
-    if (solve->rests || (!steps && (solve->refuge == NULL))) {
+    if (solve->in_dead_zone || (!steps && (solve->fallback == NULL))) {
         return;
     }
     const size_t n = self->model->n_theta;
     float *low = &self->information.low[self->model->n_moments];
     if (!pvid_finite_f32(solve->fall) || !pvid_finite_f32(low[n] - solve->fall)) {
         if (steps) {
-            hold(self, solve, PVID_HELD_PIVOT);
+            hold_solve(self, solve, PVID_HELD_PIVOT);
         }
         return;
     }
@@ -185,10 +185,10 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
 }
 
 /* What follows once a stage that is not repeated is over. */
-static uint8_t after(const pvid_estimator_solve_f32 *solve)
+static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
 {
     switch (solve->stage) {
-    case STAGE_INFORM:
+    case STAGE_ABOVE_NOISE:
         return (solve->estimate == NULL) ? (uint8_t)STAGE_FACTOR : (uint8_t)STAGE_KAPPA;
     case STAGE_COMMIT:
         return solve->ends_group ? (uint8_t)STAGE_FOLD : (uint8_t)STAGE_DONE;
@@ -199,7 +199,7 @@ static uint8_t after(const pvid_estimator_solve_f32 *solve)
     }
 }
 
-static void begin(pvid_estimator_solve_f32 *solve)
+static void reset_solve(pvid_estimator_solve_f32 *solve)
 {
     solve->reason = PVID_ACCUMULATED;
     solve->index = 0;
@@ -210,22 +210,22 @@ static void begin(pvid_estimator_solve_f32 *solve)
     solve->variance = 0.0f;
     solve->size = 0.0f;
     solve->ends_group = false;
-    solve->rests = false;
-    solve->refuge = NULL;
+    solve->in_dead_zone = false;
+    solve->fallback = NULL;
     solve->estimate = NULL;
 }
 
 void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
 {
-    begin(solve);
+    reset_solve(solve);
     solve->ends_group = ends_group;
-    if (!pvid_relative_f32(self->model)) {
+    if (!pvid_is_relative_f32(self->model)) {
         return;
     }
     if (ends_group) {
         solve->energy = self->energy;
         self->energy = 0.0f;
-        self->taken = 0.0f;
+        self->group_weight = 0.0f;
         solve->gain = self->gain;
         solve->stage = (uint8_t)(pvid_estimator_is_due_f32(self) ? STAGE_READ : STAGE_FOLD);
     } else if (self->gain < 1.0f) {
@@ -236,7 +236,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
 void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
                                          pvid_estimate_f32 *estimate)
 {
-    begin(solve);
+    reset_solve(solve);
     memset(estimate, 0, sizeof *estimate);
     memcpy(estimate->p, self->p, sizeof estimate->p);
     solve->estimate = estimate;
@@ -252,7 +252,7 @@ static void kappa_stage(const pvid_estimator_f32 *self, const pvid_estimator_sol
 }
 
 /* The stages that a solve and an assessment share; returns whether the stage is to be repeated. */
-static bool look(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+static bool advance_shared(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     switch (solve->stage) {
     case STAGE_READ:
@@ -261,16 +261,16 @@ static bool look(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
     case STAGE_PROJECT:
         return project_stage(self, solve);
     default:
-        inform_stage(self, solve);
+        above_noise_stage(self, solve);
         return false;
     }
 }
 
-static bool proceed(pvid_estimator_solve_f32 *solve, bool repeat)
+static bool finish_stage(pvid_estimator_solve_f32 *solve, bool repeat)
 {
     if (!repeat) {
         solve->index = 0;
-        solve->stage = after(solve);
+        solve->stage = next_stage(solve);
     }
     return solve->stage == STAGE_DONE;
 }
@@ -279,15 +279,15 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
 {
     const pvid_model_f32 *model = self->model;
     bool repeat = false;
-    if (!pvid_relative_f32(model) && (solve->stage != STAGE_DONE)) {
+    if (!pvid_is_relative_f32(model) && (solve->stage != STAGE_DONE)) {
         solve->reason = pvid_estimator_solve_sums_f32(self, solve->ends_group);
         solve->stage = STAGE_DONE;
     }
     switch (solve->stage) {
     case STAGE_READ:
     case STAGE_PROJECT:
-    case STAGE_INFORM:
-        repeat = look(self, solve);
+    case STAGE_ABOVE_NOISE:
+        repeat = advance_shared(self, solve);
         break;
     case STAGE_FACTOR:
         factor_stage(self, solve);
@@ -295,8 +295,8 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
     case STAGE_STEP:
         step_stage(self, solve);
         break;
-    case STAGE_FOLLOW:
-        solve->index = (uint8_t)follow_stage(self, solve, solve->index);
+    case STAGE_MOVE_B:
+        solve->index = (uint8_t)move_b_stage(self, solve, solve->index);
         repeat = solve->index < model->n_theta;
         break;
     case STAGE_COMMIT:
@@ -308,18 +308,18 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
     default:
         return true;
     }
-    return proceed(solve, repeat);
+    return finish_stage(solve, repeat);
 }
 
-bool pvid_estimator_assess_on_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const float wide = solve->variance * self->correlation;
     bool repeat = false;
     switch (solve->stage) {
     case STAGE_READ:
     case STAGE_PROJECT:
-    case STAGE_INFORM:
-        repeat = look(self, solve);
+    case STAGE_ABOVE_NOISE:
+        repeat = advance_shared(self, solve);
         break;
     case STAGE_KAPPA:
         kappa_stage(self, solve);
@@ -340,7 +340,7 @@ bool pvid_estimator_assess_on_f32(const pvid_estimator_f32 *self, pvid_estimator
     default:
         return true;
     }
-    return proceed(solve, repeat);
+    return finish_stage(solve, repeat);
 }
 
 /* READ and PROJECT. */
@@ -352,7 +352,7 @@ static size_t projection_stages(const pvid_model_f32 *model)
         const bool first = (k == 0u) || (model->c_column[k] != model->c_column[k - 1u]);
         place = first ? 0u : (place + 1u);
         stages += first ? 1u : 0u;
-        stages += ((place % COLUMNS_A_STAGE) == 0u) ? 1u : 0u;
+        stages += ((place % COLUMNS_PER_STAGE) == 0u) ? 1u : 0u;
     }
     return stages;
 }
@@ -360,10 +360,10 @@ static size_t projection_stages(const pvid_model_f32 *model)
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
 {
     const pvid_model_f32 *model = self->model;
-    if (!pvid_relative_f32(model)) {
+    if (!pvid_is_relative_f32(model)) {
         return 1;
     }
-    const size_t follow = (model->n_theta + (ROWS_A_STAGE - 1u)) / ROWS_A_STAGE;
+    const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
     return (uint16_t)(projection_stages(model) + 4u + follow + (ends_group ? 1u : 0u));
 }
 

@@ -9,28 +9,28 @@ enum {
     STAGE_MATRIX,   /* a few rows of M at a time, scaled */
     STAGE_JACOBIAN, /* C at p, scaled */
     STAGE_FORCE,
-    STAGE_PROJECT, /* n_p times: a row of S */
-    STAGE_INFORM,  /* is there more in S than noise puts there? In parts: less that, then a few pivots at a time */
-    STAGE_FACTOR,  /* S + H0 and its factor, likewise */
-    STAGE_SOLVE,   /* dp */
-    STAGE_STEP,    /* where p and theta go with it */
-    STAGE_FOLLOW,  /* a few rows of M dtheta at a time */
+    STAGE_PROJECT,     /* n_p times: a row of S */
+    STAGE_ABOVE_NOISE, /* is there more in S than noise puts there? In parts: less that, then a few pivots at a time */
+    STAGE_FACTOR,      /* S + H0 and its factor, likewise */
+    STAGE_SOLVE,       /* dp */
+    STAGE_STEP,        /* where p and theta go with it */
+    STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
     STAGE_COMMIT,
     STAGE_FOLD, /* in parts */
     STAGE_DONE,
-    STAGE_RESIDUAL, /* of an assessment, before STAGE_INFORM */
+    STAGE_RESIDUAL, /* of an assessment, before STAGE_ABOVE_NOISE */
     STAGE_KAPPA,    /* and after it: S, its factor, and what that says */
     STAGE_WIDEN,    /* S with what the start said, and its factor */
     STAGE_INVERT,   /* n_p times: a column */
     STAGE_ERRORS    /* likewise */
 };
 
-#define ROWS_A_STAGE 8u
+#define ROWS_PER_STAGE 8u
 #define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
-#define PIVOTS_A_STAGE 2u
+#define PIVOTS_PER_STAGE 2u
 #define REST_BITS 28 /* of F: products with a solution of 30 bits add up in 62 */
 
-static void hold(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
+static void hold_solve(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
 {
     pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
     solve->reason = reason;
@@ -82,28 +82,28 @@ static void begin_factor(pvid_estimator_solve_q31 *solve, uint8_t n_p, const int
  * time. */
 static size_t factor_parts(size_t n_p)
 {
-    return 1u + ((n_p + (PIVOTS_A_STAGE - 1u)) / PIVOTS_A_STAGE);
+    return 1u + ((n_p + (PIVOTS_PER_STAGE - 1u)) / PIVOTS_PER_STAGE);
 }
 
 static void eliminate_part(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part)
 {
-    const size_t first = (part - 1u) * PIVOTS_A_STAGE;
-    const size_t end = ((n_p - first) > PIVOTS_A_STAGE) ? (first + PIVOTS_A_STAGE) : n_p;
-    for (size_t turn = first; turn < end; turn++) {
-        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q, (n_p - 1u) - turn);
+    const size_t first = (part - 1u) * PIVOTS_PER_STAGE;
+    const size_t end = ((n_p - first) > PIVOTS_PER_STAGE) ? (first + PIVOTS_PER_STAGE) : n_p;
+    for (size_t eliminated = first; eliminated < end; eliminated++) {
+        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q, (n_p - 1u) - eliminated);
     }
 }
 
-static bool asks_for_noise(const pvid_estimator_q31 *self)
+static bool checks_noise(const pvid_estimator_q31 *self)
 {
     return (self->noise_margin > 0u) && (self->model->noisy[1] > 0u);
 }
 
-static void inform_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
+static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
 {
     const uint8_t n_p = self->model->n_p;
-    solve->informed = true;
-    if (!asks_for_noise(self)) {
+    solve->above_noise = true;
+    if (!checks_noise(self)) {
         return;
     }
     if (part == 0u) {
@@ -113,7 +113,7 @@ static void inform_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q3
         return;
     }
     eliminate_part(solve, n_p, part);
-    solve->informed = solve->factor.positive;
+    solve->above_noise = solve->factor.positive;
 }
 
 static void add_prior(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
@@ -150,9 +150,9 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     }
     solve->reason = PVID_UPDATED;
     if (!solve->factor.positive) {
-        hold(self, solve, PVID_HELD_PIVOT);
-    } else if (!solve->informed || !is_excited(self, solve)) {
-        hold(self, solve, PVID_HELD_NOT_EXCITED);
+        hold_solve(self, solve, PVID_HELD_PIVOT);
+    } else if (!solve->above_noise || !is_excited(self, solve)) {
+        hold_solve(self, solve, PVID_HELD_NOT_EXCITED);
     }
 }
 
@@ -171,7 +171,7 @@ static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve
 }
 
 /* F^T (S + H0)^-1 F, F of all data, in the unit of the sums of squares. */
-static pvid_scaled_q31 asked_of(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+static pvid_scaled_q31 newton_decrement_square(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
 {
     const size_t n = self->model->n_theta;
     const int64_t *b = pvid_b_of_q31(&self->information);
@@ -194,17 +194,17 @@ static pvid_scaled_q31 asked_of(const pvid_estimator_q31 *self, const pvid_estim
 }
 
 /* Whether p is within the dead zone of estimator.h. */
-static bool is_at_rest(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+static bool solve_in_dead_zone(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
 {
     if (self->dead_zone == 0u) {
         return false;
     }
     const pvid_scaled_q31 found = pvid_estimator_variance_q31(self);
-    const pvid_scaled_q31 told = pvid_estimator_expected_variance_q31(self);
-    const pvid_scaled_q31 noise = pvid_scaled_exceeds_q31(found, told) ? told : found;
+    const pvid_scaled_q31 expected = pvid_estimator_expected_variance_q31(self);
+    const pvid_scaled_q31 noise = pvid_scaled_exceeds_q31(found, expected) ? expected : found;
     const pvid_scaled_q31 wide = pvid_scaled_times_q31(noise, pvid_scaled_of_q31(self->correlation, -16));
     const pvid_scaled_q31 zone = pvid_scaled_of_q31((int64_t)self->dead_zone * self->dead_zone, -32);
-    return !pvid_scaled_exceeds_q31(asked_of(self, solve), pvid_scaled_times_q31(zone, wide));
+    return !pvid_scaled_exceeds_q31(newton_decrement_square(self, solve), pvid_scaled_times_q31(zone, wide));
 }
 
 static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
@@ -213,7 +213,7 @@ static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     if (solve->reason != PVID_UPDATED) {
         return;
     }
-    solve->rests = is_at_rest(self, solve);
+    solve->in_dead_zone = solve_in_dead_zone(self, solve);
     int64_t rhs[PVID_MAX_P];
     int32_t x[PVID_MAX_P];
     const int32_t exponent = solve_for(model, solve, solve->force, rhs, x) + solve->force_exponent;
@@ -284,23 +284,23 @@ static void scale_theta_step(const pvid_estimator_q31 *self, pvid_estimator_solv
 static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     memcpy(solve->p, self->p, sizeof solve->p);
-    if (solve->rests) {
+    if (solve->in_dead_zone) {
         pvid_count_up(&self->counters.at_rest);
     } else if (solve->reason == PVID_UPDATED) {
         solve->size = size_of(self, solve->dp);
         take_step(self, solve, solve->size, solve->p);
-    } else if (solve->has_refuge) {
-        memcpy(solve->p, solve->refuge, sizeof solve->p);
+    } else if (solve->has_fallback) {
+        memcpy(solve->p, solve->fallback, sizeof solve->p);
     }
     self->model->theta(solve->p, solve->theta);
     scale_theta_step(self, solve);
 }
 
 /* Rows first.. of M dtheta; returns the next row. */
-static size_t follow_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t first)
+static size_t move_b_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t first)
 {
     const size_t n = self->model->n_theta;
-    const size_t last = ((n - first) > ROWS_A_STAGE) ? (first + ROWS_A_STAGE) : n;
+    const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
     for (size_t i = first; i < last; i++) {
         size_t at = i;
         int64_t sum = 0;
@@ -312,7 +312,7 @@ static size_t follow_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
             sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
             at++;
         }
-        solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_HELD_LIMIT);
+        solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_CLAMP_LIMIT);
     }
     return last;
 }
@@ -325,21 +325,21 @@ static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solv
     int32_t mantissa[PVID_MAX_THETA_Q31];
     const int64_t *b = pvid_b_of_q31(&self->information);
     for (size_t j = 0; j < n; j++) {
-        both[j] = pvid_scale_q31((2 * pvid_clamp_q31(b[j], PVID_HELD_LIMIT)) - solve->moved[j], solve->h[j]);
+        both[j] = pvid_scale_q31((2 * pvid_clamp_q31(b[j], PVID_CLAMP_LIMIT)) - solve->moved[j], solve->h[j]);
     }
     const int32_t exponent = pvid_to_block_q31((uint32_t)n, both, 30, mantissa);
     int64_t fall = 0;
     for (size_t j = 0; j < n; j++) {
         fall += pvid_product_q31(solve->theta_step[j], mantissa[j]);
     }
-    return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->step_exponent + exponent)), PVID_HELD_LIMIT);
+    return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->step_exponent + exponent)), PVID_CLAMP_LIMIT);
 }
 
 /* Moves p, theta, b and rr together: b -= M dtheta. */
 static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const bool steps = solve->reason == PVID_UPDATED;
-    if (solve->rests || (!steps && !solve->has_refuge)) {
+    if (solve->in_dead_zone || (!steps && !solve->has_fallback)) {
         return;
     }
     const size_t n = self->model->n_theta;
@@ -348,13 +348,13 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     int64_t b[PVID_MAX_THETA_Q31];
     bool fits = true;
     for (size_t i = 0; i < n; i++) {
-        b[i] = pvid_clamp_q31(sums[i], PVID_HELD_LIMIT);
-        fits = fits && (pvid_magnitude_q31(b[i] - solve->moved[i]) <= (uint64_t)PVID_HELD_LIMIT);
+        b[i] = pvid_clamp_q31(sums[i], PVID_CLAMP_LIMIT);
+        fits = fits && (pvid_magnitude_q31(b[i] - solve->moved[i]) <= (uint64_t)PVID_CLAMP_LIMIT);
     }
     const int64_t residual = sums[n] - fall_of(self, solve);
-    if (!fits || (residual > PVID_HELD_LIMIT)) {
+    if (!fits || (residual > PVID_CLAMP_LIMIT)) {
         if (steps) {
-            hold(self, solve, PVID_HELD_PIVOT);
+            hold_solve(self, solve, PVID_HELD_PIVOT);
         }
         return;
     }
@@ -362,7 +362,7 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
         sums[i] = b[i] - solve->moved[i];
     }
     sums[n] = (residual > 0) ? residual : 0;
-    pvid_estimator_take_theta_q31(self, solve->theta);
+    pvid_estimator_set_theta_q31(self, solve->theta);
     memcpy(self->p, solve->p, sizeof self->p);
     if (steps) {
         pvid_count_up(&self->counters.updates);
@@ -380,7 +380,7 @@ static bool is_due(pvid_estimator_q31 *self)
     return true;
 }
 
-static void begin(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+static void reset_solve(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     solve->reason = PVID_ACCUMULATED;
     solve->stage = STAGE_MATRIX;
@@ -388,9 +388,9 @@ static void begin(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solv
     solve->start = 0;
     solve->ends_group = false;
     solve->judging = false;
-    solve->informed = true;
-    solve->has_refuge = false;
-    solve->rests = false;
+    solve->above_noise = true;
+    solve->has_fallback = false;
+    solve->in_dead_zone = false;
     solve->gain = PVID_ONE_Q30;
     solve->size = 0;
     solve->variance = pvid_estimator_expected_variance_q31(self); /* while p may still be far off */
@@ -398,12 +398,12 @@ static void begin(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solv
 
 void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group)
 {
-    begin(self, solve);
+    reset_solve(self, solve);
     solve->ends_group = ends_group;
     if (ends_group) {
         solve->energy = self->energy;
         self->energy = 0;
-        self->taken = 0;
+        self->group_weight = 0;
         solve->gain = self->gain;
         solve->stage = (uint8_t)(is_due(self) ? STAGE_MATRIX : STAGE_FOLD);
     } else if (self->gain < PVID_ONE_Q30) {
@@ -414,23 +414,23 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
 void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
                                          pvid_estimate_q31 *estimate)
 {
-    begin(self, solve);
+    reset_solve(self, solve);
     solve->judging = true;
     memset(estimate, 0, sizeof *estimate);
     memcpy(estimate->p, self->p, sizeof estimate->p);
 }
 
 /* What follows once a stage is over. */
-static uint8_t after(const pvid_estimator_solve_q31 *solve)
+static uint8_t next_stage(const pvid_estimator_solve_q31 *solve)
 {
     switch (solve->stage) {
     case STAGE_JACOBIAN:
         return solve->judging ? (uint8_t)STAGE_PROJECT : (uint8_t)STAGE_FORCE;
     case STAGE_PROJECT:
-        return solve->judging ? (uint8_t)STAGE_RESIDUAL : (uint8_t)STAGE_INFORM;
+        return solve->judging ? (uint8_t)STAGE_RESIDUAL : (uint8_t)STAGE_ABOVE_NOISE;
     case STAGE_RESIDUAL:
-        return STAGE_INFORM;
-    case STAGE_INFORM:
+        return STAGE_ABOVE_NOISE;
+    case STAGE_ABOVE_NOISE:
         return solve->judging ? (uint8_t)STAGE_KAPPA : (uint8_t)STAGE_FACTOR;
     case STAGE_COMMIT:
         return solve->ends_group ? (uint8_t)STAGE_FOLD : (uint8_t)STAGE_DONE;
@@ -442,18 +442,18 @@ static uint8_t after(const pvid_estimator_solve_q31 *solve)
 }
 
 /* Takes the index after a stage, and says where the stage is over; returns whether nothing is left. */
-static bool proceed(pvid_estimator_solve_q31 *solve, size_t next, size_t all)
+static bool finish_stage(pvid_estimator_solve_q31 *solve, size_t next, size_t all)
 {
     solve->index = (uint8_t)next;
     if (next >= all) {
         solve->index = 0;
-        solve->stage = after(solve);
+        solve->stage = next_stage(solve);
     }
     return solve->stage == STAGE_DONE;
 }
 
 /* The stages that a solve and an assessment share. */
-static bool look(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+static bool advance_shared(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const size_t index = solve->index;
     size_t next = index + 1u;
@@ -470,12 +470,12 @@ static bool look(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve
         project_stage(self, solve);
         all = self->model->n_p;
         break;
-    default: /* STAGE_INFORM */
-        inform_stage(self, solve, index);
+    default: /* STAGE_ABOVE_NOISE */
+        above_noise_stage(self, solve, index);
         all = factor_parts(self->model->n_p);
         break;
     }
-    return proceed(solve, next, all);
+    return finish_stage(solve, next, all);
 }
 
 bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
@@ -497,8 +497,8 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
     case STAGE_STEP:
         step_stage(self, solve);
         break;
-    case STAGE_FOLLOW:
-        next = follow_stage(self, solve, index);
+    case STAGE_MOVE_B:
+        next = move_b_stage(self, solve, index);
         all = self->model->n_theta;
         break;
     case STAGE_COMMIT:
@@ -511,9 +511,9 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
     case STAGE_DONE:
         return true;
     default:
-        return look(self, solve);
+        return advance_shared(self, solve);
     }
-    return proceed(solve, next, all);
+    return finish_stage(solve, next, all);
 }
 
 static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
@@ -541,8 +541,8 @@ static void widen_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     }
 }
 
-bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
-                                  pvid_estimate_q31 *estimate)
+bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                       pvid_estimate_q31 *estimate)
 {
     const size_t n_p = self->model->n_p;
     const size_t index = solve->index;
@@ -569,13 +569,13 @@ bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator
     case STAGE_DONE:
         return true;
     default:
-        return look(self, solve);
+        return advance_shared(self, solve);
     }
-    return proceed(solve, index + 1u, all);
+    return finish_stage(solve, index + 1u, all);
 }
 
 /* M, C, S, and whether there is more in it than noise. */
-static size_t looking_stages(const pvid_model_q31 *model)
+static size_t shared_stages(const pvid_model_q31 *model)
 {
     return pvid_system_row_stages_q31(model->n_theta) + 1u + model->n_p + factor_parts(model->n_p);
 }
@@ -583,14 +583,14 @@ static size_t looking_stages(const pvid_model_q31 *model)
 uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_group)
 {
     const pvid_model_q31 *model = self->model;
-    const size_t follow = (model->n_theta + (ROWS_A_STAGE - 1u)) / ROWS_A_STAGE;
+    const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
     const size_t fold = ends_group ? PVID_INFORMATION_END_PARTS : 0u;
     /* and four that come once: force, solve, step, commit */
-    return (uint16_t)(looking_stages(model) + factor_parts(model->n_p) + follow + fold + 4u);
+    return (uint16_t)(shared_stages(model) + factor_parts(model->n_p) + follow + fold + 4u);
 }
 
 uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self)
 {
     const pvid_model_q31 *model = self->model;
-    return (uint16_t)(looking_stages(model) + 2u + (2u * factor_parts(model->n_p)) + (2u * model->n_p));
+    return (uint16_t)(shared_stages(model) + 2u + (2u * factor_parts(model->n_p)) + (2u * model->n_p));
 }

@@ -3,7 +3,7 @@
 #include "number/scaled_q31.h"
 
 /* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
-#define ENTRIES_A_STAGE 18u
+#define ENTRIES_PER_STAGE 18u
 
 void pvid_system_exponents_q31(const pvid_information_q31 *information, int16_t h[])
 {
@@ -18,7 +18,7 @@ static size_t rows_end(size_t n_theta, size_t row)
 {
     size_t entries = 0;
     size_t end = row;
-    while ((end < n_theta) && (entries < ENTRIES_A_STAGE)) {
+    while ((end < n_theta) && (entries < ENTRIES_PER_STAGE)) {
         entries += n_theta - end;
         end++;
     }
@@ -56,7 +56,7 @@ void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[],
     int32_t largest[PVID_MAX_P];
     model->jacobian(self->p, value);
     for (size_t a = 0; a < model->n_p; a++) {
-        largest[a] = PVID_NOTHING_Q31;
+        largest[a] = PVID_ZERO_EXPONENT_Q31;
     }
     for (size_t k = 0; k < model->n_c; k++) {
         exponent[k] = (int32_t)self->c_exponent[k] + h[model->c_row[k]];

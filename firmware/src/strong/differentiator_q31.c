@@ -22,7 +22,7 @@ static bool is_even(size_t order)
 }
 
 /* What a weight of an order is multiplied with at most: q = (x - c) + (x' - c), d = x - x'. */
-static uint64_t reach_of(size_t order, int32_t full_scale)
+static uint64_t derivative_range(size_t order, int32_t full_scale)
 {
     return (uint64_t)full_scale * (is_even(order) ? 4u : 2u);
 }
@@ -31,9 +31,9 @@ static uint64_t reach_of(size_t order, int32_t full_scale)
 static bool products_fit(const pvid_fir_bank_q31 *bank, size_t order, int32_t full_scale)
 {
     const PVID_TABLE int32_t *weight = &bank->weights[order * bank->half];
-    const uint64_t reach = reach_of(order, full_scale);
+    const uint64_t range = derivative_range(order, full_scale);
     for (size_t i = 0; i < bank->half; i++) {
-        if ((pvid_magnitude_q31(weight[i]) * reach) > (uint64_t)INT32_MAX) {
+        if ((pvid_magnitude_q31(weight[i]) * range) > (uint64_t)INT32_MAX) {
             return false;
         }
     }

@@ -122,14 +122,14 @@ static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAP
     pvid_estimator_f32 *estimator = &self->estimator;
     float gradient[PVID_MAX_P];
     const float e = estimator->model->innovate(estimator->p, n, y, gradient);
-    if (pvid_misfit_take_f32(&self->misfit, e, gradient[PVID_KAPITZA_W] * estimator->p[PVID_KAPITZA_W])) {
+    if (pvid_misfit_add_f32(&self->misfit, e, gradient[PVID_KAPITZA_W] * estimator->p[PVID_KAPITZA_W])) {
         self->alarm = pvid_misfit_judge_f32(&self->misfit);
     }
     if (!pvid_gate_passes_f32(&self->gate, e * e)) {
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    const pvid_reason reason = pvid_estimator_step_known_f32(estimator, n, y, e, gradient);
+    const pvid_reason reason = pvid_estimator_step_innovation_f32(estimator, n, y, e, gradient);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;
     }

@@ -157,14 +157,14 @@ static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_
     }
     const int32_t innovation = (int32_t)e;
     const int64_t square = pvid_square_q31(innovation);
-    if (pvid_misfit_take_q31(&self->misfit, square, pvid_kapitza_strong_told_q31(term))) {
+    if (pvid_misfit_add_q31(&self->misfit, square, pvid_kapitza_strong_sensitivity_q31(term))) {
         self->alarm = pvid_misfit_judge_q31(&self->misfit);
     }
     if (!passes(self, square)) {
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    pvid_estimator_take_row_q31(estimator, n, innovation, square);
+    pvid_estimator_add_row_q31(estimator, n, innovation, square);
     const pvid_reason reason = pvid_estimator_update_q31(estimator);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;

@@ -16,11 +16,11 @@
 #include "weak/window_f32.h"
 
 enum {
-    STAGE_COMBINE, /* K times: a row of the Gram matrix at p, the columns of a function */
-    STAGE_LACK,    /* what linear rows lack, where that is asked for: stages of its own */
-    STAGE_FACTOR,  /* K times: a row of its Cholesky factor */
-    STAGE_TRACE,   /* 4 K times: a row of its inverse, then what noise is in it, in three sums */
-    STAGE_WHITEN,  /* K times: a row of L^-1 (Y, N, a, b) */
+    STAGE_COMBINE,   /* K times: a row of the Gram matrix at p, the columns of a function */
+    STAGE_REMAINDER, /* what linear rows lack, where that is asked for: stages of its own */
+    STAGE_FACTOR,    /* K times: a row of its Cholesky factor */
+    STAGE_TRACE,     /* 4 K times: a row of its inverse, then what noise is in it, in three sums */
+    STAGE_WHITEN,    /* K times: a row of L^-1 (Y, N, a, b) */
     STAGE_DIRECTION_A,
     STAGE_ALONG_A,  /* a few functions at a time */
     STAGE_REMOVE_A, /* likewise */
@@ -37,7 +37,7 @@ enum {
 #define TRACE_STAGES (1u + PVID_NOISE_TRACES)
 
 /* Functions whose columns one stage of the projection takes. */
-#define FUNCTIONS_A_STAGE 6u
+#define FUNCTIONS_PER_STAGE 6u
 
 void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self)
 {
@@ -125,7 +125,7 @@ void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator
 {
     pvid_weak_whiten_begin_f32(&self->whiten, estimator->p);
     self->angle = angle;
-    if (pvid_weak_angle_is_asked_f32(angle)) {
+    if (pvid_angle_correction_enabled_f32(angle)) {
         pvid_weak_angle_begin_f32(angle, estimator->p);
     }
     self->expected = expected;
@@ -159,7 +159,7 @@ static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *est
     if (self->whiten.whitened) {
         memcpy(estimator->noise, self->whiten.trace, sizeof estimator->noise);
     }
-    pvid_information_fade_f32(&estimator->information, pvid_trust_ageing_f32(trust));
+    pvid_information_fade_f32(&estimator->information, pvid_trust_fade_factor_f32(trust));
 }
 
 /* A row to the estimator; its reason is told if it was refused. */
@@ -177,13 +177,13 @@ static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *est
 
 static void begin_solves(pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator, const pvid_trust_f32 *trust)
 {
-    pvid_estimator_expect_f32(estimator, self->expected);
+    pvid_estimator_set_expected_f32(estimator, self->expected);
     pvid_estimator_begin_f32(estimator, &self->solve, true);
-    self->solve.refuge = pvid_trust_refuge_f32(trust);
+    self->solve.fallback = pvid_trust_fallback_f32(trust);
 }
 
 /* A stage of a solve; true once the last one of the window is complete. */
-static bool solve_on(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_estimator_f32 *estimator)
+static bool advance_solve(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_estimator_f32 *estimator)
 {
     if (!pvid_estimator_advance_f32(estimator, &self->solve)) {
         return false;
@@ -200,21 +200,21 @@ static bool solve_on(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_estima
 }
 
 /* A stage of the assessment; true once the estimate is judged. */
-static bool assess_on(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, pvid_estimator_f32 *estimator,
-                      pvid_trust_f32 *trust)
+static bool advance_assessment(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design,
+                               pvid_estimator_f32 *estimator, pvid_trust_f32 *trust)
 {
-    if (!pvid_estimator_assess_on_f32(estimator, &self->solve)) {
+    if (!pvid_estimator_assess_advance_f32(estimator, &self->solve)) {
         return false;
     }
     const float freedom = (float)design->functions - 2.0f;
-    const float surplus = self->solve.energy / (freedom * self->expected);
+    const float variance_ratio = self->solve.energy / (freedom * self->expected);
     const bool stepped = self->reason == PVID_UPDATED;
-    self->reason = pvid_trust_judge_f32(trust, estimator, self->reason, self->size, self->solve.informed, surplus,
-                                        &self->candidate);
-    if (pvid_weak_angle_is_asked_f32(self->angle) && stepped) {
-        const float worst = pvid_trust_widest_f32(estimator, &self->candidate);
-        if (pvid_weak_angle_settle_f32(self->angle, estimator->p, worst, trust->groups)) {
-            pvid_trust_age_f32(trust, estimator); /* the uncorrected rows, and where they have led p */
+    self->reason = pvid_trust_judge_f32(trust, estimator, self->reason, self->size, self->solve.above_noise,
+                                        variance_ratio, &self->candidate);
+    if (pvid_angle_correction_enabled_f32(self->angle) && stepped) {
+        const float worst = pvid_trust_largest_error_f32(estimator, &self->candidate);
+        if (pvid_weak_angle_switch_f32(self->angle, estimator->p, worst, trust->groups)) {
+            pvid_trust_renew_f32(trust, estimator); /* the uncorrected rows, and where they have led p */
         }
     }
     return true;
@@ -227,7 +227,7 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
     const size_t functions = design->functions;
     const float (*fixed)[PVID_WEAK_TERMS] = (const float (*)[PVID_WEAK_TERMS])sums;
     const size_t row = self->index;
-    const size_t few = ((row + FUNCTIONS_A_STAGE) < functions) ? (row + FUNCTIONS_A_STAGE) : functions;
+    const size_t few = ((row + FUNCTIONS_PER_STAGE) < functions) ? (row + FUNCTIONS_PER_STAGE) : functions;
     size_t done = row + 1u; /* functions, after this stage */
     size_t all = functions; /* of them end it */
     switch (self->stage) {
@@ -235,8 +235,8 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         pvid_weak_whiten_combine_f32(&self->whiten, design, row);
         assemble(sums[row]);
         break;
-    case STAGE_LACK:
-        if (pvid_weak_angle_is_asked_f32(self->angle) &&
+    case STAGE_REMAINDER:
+        if (pvid_angle_correction_enabled_f32(self->angle) &&
             !pvid_weak_angle_step_f32(self->angle, design, estimator->theta, sums)) {
             return;
         }
@@ -285,13 +285,13 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         add_row(sums[row], estimator, reason);
         break;
     case STAGE_SOLVE:
-        if (!solve_on(self, iterations, estimator)) {
+        if (!advance_solve(self, iterations, estimator)) {
             return;
         }
         done = functions;
         break;
     case STAGE_ASSESS:
-        if (!assess_on(self, design, estimator, trust)) {
+        if (!advance_assessment(self, design, estimator, trust)) {
             return;
         }
         *reason = self->reason;
@@ -325,9 +325,10 @@ uint32_t pvid_weak_finish_stages_f32(const pvid_weak_design_f32 *design, uint8_t
                                      const pvid_estimator_f32 *estimator, const pvid_weak_angle_f32 *angle)
 {
     const uint32_t functions = design->functions;
-    const uint32_t lack = pvid_weak_angle_is_asked_f32(angle) ? pvid_weak_angle_stages_f32(angle, design) : 1u;
-    const uint32_t parts = (functions + (FUNCTIONS_A_STAGE - 1u)) / FUNCTIONS_A_STAGE;
-    const uint32_t rows = ((4u + TRACE_STAGES) * functions) + 2u + (5u * parts) + lack;
+    const uint32_t remainder =
+        pvid_angle_correction_enabled_f32(angle) ? pvid_weak_angle_stages_f32(angle, design) : 1u;
+    const uint32_t parts = (functions + (FUNCTIONS_PER_STAGE - 1u)) / FUNCTIONS_PER_STAGE;
+    const uint32_t rows = ((4u + TRACE_STAGES) * functions) + 2u + (5u * parts) + remainder;
     const uint32_t first = pvid_estimator_stages_f32(estimator, true);
     const uint32_t more = pvid_estimator_stages_f32(estimator, false);
     return rows + first + ((iterations - 1u) * more) + pvid_estimator_assessment_stages_f32(estimator);

@@ -38,10 +38,10 @@ enum {
 };
 
 /* Functions whose columns one stage takes that assembles them, looks along a direction, removes it, takes residuals. */
-#define ASSEMBLED_A_STAGE 3u
-#define ALONG_A_STAGE 6u
-#define REMOVED_A_STAGE 3u
-#define FITTED_A_STAGE 3u
+#define ASSEMBLED_PER_STAGE 3u
+#define ALONG_PER_STAGE 6u
+#define REMOVED_PER_STAGE 3u
+#define FITTED_PER_STAGE 3u
 
 /* Parts of a long row. WHITEN_PARTS divides PVID_WEAK_COLUMNS_Q31. */
 #define FACTOR_PARTS 2u
@@ -229,7 +229,7 @@ static void factor_diagonal(pvid_weak_finish_q31 *self, size_t row)
     for (size_t j = 0; j < row; j++) {
         pivot = (pivot < 0) ? pivot : (pivot - pvid_square_q31(l[j]));
     }
-    if (pvid_pivot_is_data_q31(pivot, l[row])) {
+    if (pvid_pivot_is_significant_q31(pivot, l[row])) {
         self->inverse[row] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
     } else {
         self->whitened = false;
@@ -253,8 +253,8 @@ static void factor_part(pvid_weak_finish_q31 *self, row_part part)
 /* r L = e_row^T, from the last entry back: entries first..last-1 of r. */
 static void invert_entries(pvid_weak_finish_q31 *self, size_t row, size_t first, size_t last)
 {
-    for (size_t turn = 0; turn < last - first; turn++) {
-        const size_t j = (last - 1u) - turn;
+    for (size_t step = 0; step < last - first; step++) {
+        const size_t j = (last - 1u) - step;
         int64_t sum = (j == row) ? ((int64_t)PVID_ONE_Q30 << INVERSE_BITS) : 0;
         size_t at = row_start(j + 1u) + j;
         for (size_t k = j + 1u; k < row + 1u; k++) {
@@ -268,7 +268,7 @@ static void invert_entries(pvid_weak_finish_q31 *self, size_t row, size_t first,
 /* The row of L^-1 with the exponents of R0's rows, as a block of ROW_BITS. */
 static void weigh_row(pvid_weak_finish_q31 *self, size_t row)
 {
-    int32_t largest = PVID_NOTHING_Q31;
+    int32_t largest = PVID_ZERO_EXPONENT_Q31;
     for (size_t j = 0; j < row + 1u; j++) {
         const int32_t length = pvid_length_q31(self->inverted[j]) - self->exponent[j];
         largest = (length > largest) ? length : largest;
@@ -331,7 +331,7 @@ static void trace_part(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *d
 }
 
 /* x held within COLUMN_LIMIT, and noted if it was not. */
-static int32_t held(pvid_weak_finish_q31 *self, int64_t x)
+static int32_t clamped(pvid_weak_finish_q31 *self, int64_t x)
 {
     self->saturated = self->saturated || (x >= COLUMN_LIMIT) || (x <= -COLUMN_LIMIT);
     return (int32_t)pvid_clamp_q31(x, COLUMN_LIMIT);
@@ -348,14 +348,14 @@ static void whiten_part(pvid_weak_finish_q31 *self, row_part part, int32_t sums[
     int32_t *x = sums[row];
     for (size_t i = first; i < first + columns; i++) {
         if (!self->whitened) {
-            x[i] = held(self, x[i]);
+            x[i] = clamped(self, x[i]);
             continue;
         }
-        int64_t sum = (int64_t)held(self, pvid_scale_q31(x[i], shift)) * PVID_ONE_Q30;
+        int64_t sum = (int64_t)clamped(self, pvid_scale_q31(x[i], shift)) * PVID_ONE_Q30;
         for (size_t j = 0; j < row; j++) {
             sum -= pvid_product_q31(l[j], sums[j][i]);
         }
-        x[i] = held(self, pvid_divide_q31(sum, self->inverse[row], COLUMN_LIMIT));
+        x[i] = clamped(self, pvid_divide_q31(sum, self->inverse[row], COLUMN_LIMIT));
     }
 }
 
@@ -405,7 +405,7 @@ static void remove_components(pvid_weak_finish_q31 *self, size_t first, size_t l
     for (size_t i = 0; i < PVID_WEAK_COLUMNS_Q31; i++) {
         const int64_t along = pvid_round_shift_q31(self->along[i], 30);
         for (size_t k = first; k < last; k++) {
-            sums[k][i] = held(self, sums[k][i] - pvid_round_shift_q31(self->direction[k] * along, 30));
+            sums[k][i] = clamped(self, sums[k][i] - pvid_round_shift_q31(self->direction[k] * along, 30));
         }
     }
 }
@@ -427,7 +427,7 @@ static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *
 }
 
 /* Variance of the window's residuals over what is expected of it. */
-static pvid_scaled_q31 surplus_of(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
+static pvid_scaled_q31 variance_ratio_of(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
 {
     const pvid_scaled_q31 freedom = pvid_scaled_of_q31((int64_t)design->functions - 2, 0);
     return pvid_scaled_over_q31(pvid_scaled_of_q31(self->energy, 0), pvid_scaled_times_q31(freedom, self->expected));
@@ -436,13 +436,14 @@ static pvid_scaled_q31 surplus_of(const pvid_weak_finish_q31 *self, const pvid_w
 /* Whether the window's rows are to be taken in. Those that do not fit are asked no more: they are refused as such. */
 static bool passes(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
 {
-    return (self->gate.limit.m == 0) || self->saturated || pvid_gate_passes_q31(&self->gate, surplus_of(self, design));
+    return (self->gate.limit.m == 0) || self->saturated ||
+           pvid_gate_passes_q31(&self->gate, variance_ratio_of(self, design));
 }
 
 /* Before the rows: what noise there is in the entries of N, in their formats; the last that is known where the window
  * keeps the whitening of its design. */
-static void tell_noise(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
-                       pvid_estimator_q31 *estimator)
+static void set_noise(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
+                      pvid_estimator_q31 *estimator)
 {
     if (!self->whitened) {
         return;
@@ -472,18 +473,18 @@ static void add_row(const pvid_weak_finish_q31 *self, const int32_t column[PVID_
 
 static void begin_solves(pvid_weak_finish_q31 *self, pvid_estimator_q31 *estimator, const pvid_trust_q31 *trust)
 {
-    const int32_t *refuge = pvid_trust_refuge_q31(trust);
-    pvid_estimator_expect_q31(estimator, self->expected);
+    const int32_t *fallback = pvid_trust_fallback_q31(trust);
+    pvid_estimator_set_expected_q31(estimator, self->expected);
     pvid_estimator_begin_q31(estimator, &self->solve, true);
     self->energy = self->solve.energy;
-    if (refuge != NULL) {
-        self->solve.has_refuge = true;
-        memcpy(self->solve.refuge, refuge, sizeof self->solve.refuge);
+    if (fallback != NULL) {
+        self->solve.has_fallback = true;
+        memcpy(self->solve.fallback, fallback, sizeof self->solve.fallback);
     }
 }
 
 /* A stage of a solve; true once the last one of the window is complete. */
-static bool solve_on(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estimator_q31 *estimator)
+static bool advance_solve(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estimator_q31 *estimator)
 {
     if (!pvid_estimator_advance_q31(estimator, &self->solve)) {
         return false;
@@ -502,9 +503,9 @@ static bool solve_on(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estima
 static void judge(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, pvid_estimator_q31 *estimator,
                   pvid_trust_q31 *trust)
 {
-    const int64_t surplus = pvid_scaled_fixed_q31(surplus_of(self, design), PVID_SURPLUS_BITS);
-    self->reason = pvid_trust_judge_q31(trust, estimator, self->reason, self->size, self->solve.informed, surplus,
-                                        &self->candidate);
+    const int64_t variance_ratio = pvid_scaled_fixed_q31(variance_ratio_of(self, design), PVID_VARIANCE_RATIO_BITS);
+    self->reason = pvid_trust_judge_q31(trust, estimator, self->reason, self->size, self->solve.above_noise,
+                                        variance_ratio, &self->candidate);
 }
 
 static size_t at_most(size_t first, size_t few, size_t all)
@@ -526,7 +527,7 @@ static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
         combine_row(self, design, index);
         break;
     case STAGE_ASSEMBLE:
-        next = at_most(index, ASSEMBLED_A_STAGE, functions);
+        next = at_most(index, ASSEMBLED_PER_STAGE, functions);
         for (size_t k = index; k < next; k++) {
             assemble(design, sums[k]);
         }
@@ -555,16 +556,16 @@ static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
         break;
     case STAGE_ALONG_A:
     case STAGE_ALONG_B:
-        next = at_most(index, ALONG_A_STAGE, functions);
+        next = at_most(index, ALONG_PER_STAGE, functions);
         find_components(self, index, next, sums);
         break;
     case STAGE_REMOVE_A:
     case STAGE_REMOVE_B:
-        next = at_most(index, REMOVED_A_STAGE, functions);
+        next = at_most(index, REMOVED_PER_STAGE, functions);
         remove_components(self, index, next, sums);
         break;
     default: /* STAGE_FIT */
-        next = at_most(index, FITTED_A_STAGE, functions);
+        next = at_most(index, FITTED_PER_STAGE, functions);
         if (self->gate.limit.m > 0) {
             add_residuals(self, estimator, index, next, sums);
         }
@@ -597,14 +598,14 @@ void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_desig
             self->stage = STAGE_IDLE;
             return;
         }
-        tell_noise(self, design, estimator);
+        set_noise(self, design, estimator);
         break;
     case STAGE_FADE:
         if (self->index == 0u) {
-            self->ageing = pvid_trust_ageing_q31(trust);
+            self->fade_factor = pvid_trust_fade_factor_q31(trust);
         }
-        if (self->ageing > 0) {
-            pvid_information_fade_q31(&estimator->information, self->index, self->ageing);
+        if (self->fade_factor > 0) {
+            pvid_information_fade_q31(&estimator->information, self->index, self->fade_factor);
         }
         all = PVID_INFORMATION_END_PARTS;
         break;
@@ -613,12 +614,12 @@ void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_desig
         all = design->functions;
         break;
     case STAGE_SOLVE:
-        if (!solve_on(self, iterations, estimator)) {
+        if (!advance_solve(self, iterations, estimator)) {
             return;
         }
         break;
     case STAGE_ASSESS:
-        if (!pvid_estimator_assess_on_q31(estimator, &self->solve, &self->candidate)) {
+        if (!pvid_estimator_assess_advance_q31(estimator, &self->solve, &self->candidate)) {
             return;
         }
         break;
@@ -644,10 +645,10 @@ uint32_t pvid_weak_finish_stages_q31(uint8_t functions, uint8_t iterations, cons
 {
     const size_t triangles = parts_of_triangle(functions, FACTOR_PARTS) + parts_of_triangle(functions, TRACE_PARTS) +
                              parts_of_triangle(functions, WHITEN_PARTS);
-    const uint32_t along = (functions + (ALONG_A_STAGE - 1u)) / ALONG_A_STAGE;
-    const uint32_t removed = (functions + (REMOVED_A_STAGE - 1u)) / REMOVED_A_STAGE;
-    const uint32_t assembled = (functions + (ASSEMBLED_A_STAGE - 1u)) / ASSEMBLED_A_STAGE;
-    const uint32_t fitted = (functions + (FITTED_A_STAGE - 1u)) / FITTED_A_STAGE;
+    const uint32_t along = (functions + (ALONG_PER_STAGE - 1u)) / ALONG_PER_STAGE;
+    const uint32_t removed = (functions + (REMOVED_PER_STAGE - 1u)) / REMOVED_PER_STAGE;
+    const uint32_t assembled = (functions + (ASSEMBLED_PER_STAGE - 1u)) / ASSEMBLED_PER_STAGE;
+    const uint32_t fitted = (functions + (FITTED_PER_STAGE - 1u)) / FITTED_PER_STAGE;
     const uint32_t once = (2u * (uint32_t)functions) + assembled + (uint32_t)triangles + fitted;
     const uint32_t rows = once + (2u * (2u + along + removed));
     const uint32_t first = pvid_estimator_stages_q31(estimator, true);

@@ -17,7 +17,7 @@
 /* Most stages of a complete window that a tick may take. One is the rule; more only where a hop has fewer free ticks
  * than a window has stages: short windows, low decimation, the correction's sweeps. The longest tick grows with them.
  */
-#define PVID_STAGES_TOGETHER 32u
+#define PVID_STAGES_PER_TICK_MAX 32u
 
 static inline bool pvid_is_odd_within(uint16_t n, uint16_t low, uint16_t high)
 {
@@ -51,7 +51,7 @@ static inline uint16_t pvid_weak_hop(uint16_t window)
 
 /* Functions of a window that a tick adds the present sample to: the second half of a block is shared by two windows.
  * At D = 2 one tick has to do for both, at D = 1 that of the front end. */
-static inline uint8_t pvid_weak_functions_a_tick(uint32_t decimation, uint32_t functions)
+static inline uint8_t pvid_weak_functions_per_tick(uint32_t decimation, uint32_t functions)
 {
     const uint32_t second_half = decimation - (decimation / 2u);
     const uint32_t ticks = (second_half > 1u) ? (second_half / 2u) : 1u;
@@ -64,17 +64,17 @@ static inline uint32_t pvid_weak_free_ticks(uint32_t decimation, uint32_t functi
     if (decimation <= 2u) {
         return 1u;
     }
-    const uint32_t slice = pvid_weak_functions_a_tick(decimation, functions);
-    return decimation - (2u * ((functions + (slice - 1u)) / slice));
+    const uint32_t functions_per_tick = pvid_weak_functions_per_tick(decimation, functions);
+    return decimation - (2u * ((functions + (functions_per_tick - 1u)) / functions_per_tick));
 }
 
 /* Stages a tick that work a window off before the next one is complete; 0: more than are allowed. */
-static inline uint8_t pvid_weak_stages_together(uint32_t stages, uint16_t window, uint32_t decimation,
+static inline uint8_t pvid_weak_stages_per_tick(uint32_t stages, uint16_t window, uint32_t decimation,
                                                 uint32_t functions)
 {
     const uint32_t free = pvid_weak_hop(window) * pvid_weak_free_ticks(decimation, functions);
-    const uint32_t together = (stages + (free - 1u)) / free;
-    return (uint8_t)((together <= PVID_STAGES_TOGETHER) ? together : 0u);
+    const uint32_t stages_per_tick = (stages + (free - 1u)) / free;
+    return (uint8_t)((stages_per_tick <= PVID_STAGES_PER_TICK_MAX) ? stages_per_tick : 0u);
 }
 
 /* ---- the front end's job ---- */
@@ -93,7 +93,7 @@ static inline void pvid_weak_job_init(pvid_weak_job *self, uint16_t taps, uint16
     self->length = (uint16_t)((taps + decimation) - 1u);
     self->decimation = decimation;
     const uint32_t ticks = (decimation > 1u) ? (decimation / 2u) : 1u;
-    self->slice = (uint16_t)((self->half + (ticks - 1u)) / ticks);
+    self->pairs_per_tick = (uint16_t)((self->half + (ticks - 1u)) / ticks);
     self->newer = 0;
     self->older = 0;
     pvid_weak_job_reset(self);
@@ -102,7 +102,7 @@ static inline void pvid_weak_job_init(pvid_weak_job *self, uint16_t taps, uint16
 /* Ticks that a job takes. */
 static inline uint16_t pvid_weak_job_ticks(const pvid_weak_job *self)
 {
-    return (uint16_t)((self->half + (self->slice - 1u)) / self->slice);
+    return (uint16_t)((self->half + (self->pairs_per_tick - 1u)) / self->pairs_per_tick);
 }
 
 /* Counts the sample that was put in the place `head`. Returns whether it completes a block: then a job begins, and
@@ -129,7 +129,7 @@ static inline bool pvid_weak_job_begins(pvid_weak_job *self)
 static inline size_t pvid_weak_job_end(const pvid_weak_job *self)
 {
     const size_t left = (size_t)self->half - self->pair;
-    return self->pair + ((left < self->slice) ? left : self->slice);
+    return self->pair + ((left < self->pairs_per_tick) ? left : self->pairs_per_tick);
 }
 
 /* Most stretches of a job between which a place crosses an end of the ring: the ring is longer than the two halves of a

@@ -56,7 +56,7 @@ static bool angle_is_valid(const pvid_weak_config_f32 *config)
         return true;
     }
     const bool room = !config->friction || (config->zero_unknown && PVID_KAPITZA_HAS_FRICTION);
-    return room && pvid_weak_angle_is_asked_f32(config->angle) && (config->passes >= 1u) &&
+    return room && pvid_angle_correction_enabled_f32(config->angle) && (config->passes >= 1u) &&
            (config->passes <= PVID_MAX_PASSES);
 }
 
@@ -106,11 +106,11 @@ static void restart(pvid_weak_f32 *self)
     pvid_weak_front_reset_f32(&self->front);
     restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
     restart_window(&self->window[1], (uint16_t)(hop - 1u));
-    self->turn = 2;
+    self->active = 2;
     self->warm = false;
-    self->bend.wait = 1;
-    self->bend.known = 0;
-    self->bend.due = false;
+    self->curvature.wait = 1;
+    self->curvature.known = 0;
+    self->curvature.due = false;
 }
 
 static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
@@ -164,15 +164,15 @@ static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *conf
     self->row_variance = config->estimator.row_sd * config->estimator.row_sd;
     self->pivot_noise = config->pivot_noise / ((lag * lag) * (lag * lag));
     self->angle_limit = config->angle_limit;
-    self->slice = pvid_weak_functions_a_tick(design->decimation, design->functions);
+    self->functions_per_tick = pvid_weak_functions_per_tick(design->decimation, design->functions);
     self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
     self->angle = (config->full_angle || config->friction) ? config->angle : NULL;
-    if (pvid_weak_angle_is_asked_f32(self->angle)) {
+    if (pvid_angle_correction_enabled_f32(self->angle)) {
         pvid_weak_angle_init_f32(self->angle, config);
     }
     const uint32_t stages = pvid_weak_finish_stages_f32(design, self->iterations, &self->estimator, self->angle);
-    self->together = pvid_weak_stages_together(stages, design->window, design->decimation, design->functions);
-    if (self->together == 0u) {
+    self->stages_per_tick = pvid_weak_stages_per_tick(stages, design->window, design->decimation, design->functions);
+    if (self->stages_per_tick == 0u) {
         return PVID_BAD_ITERATIONS;
     }
     pvid_weak_finish_init_f32(&self->finish);
@@ -208,7 +208,7 @@ void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen)
     }
 }
 
-static void next_bend(pvid_weak_bend_f32 *self, uint8_t lag, float phi)
+static void next_curvature(pvid_weak_curvature_f32 *self, uint8_t lag, float phi)
 {
     self->due = false;
     self->wait--;
@@ -219,8 +219,8 @@ static void next_bend(pvid_weak_bend_f32 *self, uint8_t lag, float phi)
     if (self->known < 2u) {
         self->known++;
     } else {
-        const float bend = (phi - self->before[0]) - (self->before[0] - self->before[1]);
-        self->square = bend * bend;
+        const float curvature = (phi - self->before[0]) - (self->before[0] - self->before[1]);
+        self->square = curvature * curvature;
         self->due = true;
     }
     self->before[1] = self->before[0];
@@ -228,7 +228,7 @@ static void next_bend(pvid_weak_bend_f32 *self, uint8_t lag, float phi)
 }
 
 /* An encoder's zero may be anywhere: before the first row c goes to the mean of phi. */
-static void place_zero(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
+static void place_offset(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
 {
     float p[PVID_MAX_P];
     memcpy(p, self->estimator.p, sizeof p);
@@ -238,7 +238,7 @@ static void place_zero(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
 }
 
 /* Why a window that is complete cannot be used; PVID_ACCUMULATED if it can. */
-static pvid_reason objection(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
+static pvid_reason drop_reason(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
 {
     if (self->frozen) {
         return PVID_HELD_FROZEN;
@@ -249,10 +249,10 @@ static pvid_reason objection(pvid_weak_f32 *self, const pvid_weak_window_f32 *wi
     }
     const bool zeroed = self->estimator.model->n_p <= (uint8_t)PVID_KAPITZA_C;
     if (!zeroed && (self->estimator.counters.rows == 0u)) {
-        place_zero(self, window);
+        place_offset(self, window);
     }
     const float zero = zeroed ? 0.0f : self->estimator.p[PVID_KAPITZA_C];
-    if ((self->angle_limit > 0.0f) && (pvid_weak_window_reach_f32(window, zero) > self->angle_limit)) {
+    if ((self->angle_limit > 0.0f) && (pvid_weak_window_max_deviation_f32(window, zero) > self->angle_limit)) {
         pvid_count_up(&self->estimator.counters.held_out_of_range);
         return PVID_HELD_OUT_OF_RANGE;
     }
@@ -262,9 +262,9 @@ static pvid_reason objection(pvid_weak_f32 *self, const pvid_weak_window_f32 *wi
 /* A window that has come round hands its sums over and goes on in the buffer that is free. Its last
  * sample, which has no weight, is the first one of the next. A window that is dropped leaves its sums where
  * they are, to be cleared. */
-static pvid_reason turn_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
+static pvid_reason hand_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
 {
-    const pvid_reason reason = objection(self, window);
+    const pvid_reason reason = drop_reason(self, window);
     self->warm = true;
     if (reason != PVID_ACCUMULATED) {
         return reason;
@@ -272,7 +272,7 @@ static pvid_reason turn_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
     const uint8_t full = window->buffer;
     window->buffer = self->finish.buffer;
     self->finish.buffer = full;
-    const float expected = self->row_variance + (self->pivot_noise * pvid_weak_window_bend_f32(window));
+    const float expected = self->row_variance + (self->pivot_noise * pvid_weak_window_curvature_f32(window));
     pvid_weak_finish_begin_f32(&self->finish, &self->estimator, self->angle, expected);
     return PVID_ACCUMULATED;
 }
@@ -281,9 +281,9 @@ static pvid_reason turn_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
 static pvid_reason next_sample(pvid_weak_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
-    next_bend(&self->bend, self->design->lag, self->phi);
-    if (pvid_weak_angle_is_asked_f32(self->angle)) {
-        pvid_weak_angle_keep_f32(self->angle, self->phi, self->u);
+    next_curvature(&self->curvature, self->design->lag, self->phi);
+    if (pvid_angle_correction_enabled_f32(self->angle)) {
+        pvid_weak_angle_add_sample_f32(self->angle, self->phi, self->u);
     }
     for (size_t i = 0; i < 2u; i++) {
         pvid_weak_window_f32 *window = &self->window[i];
@@ -291,12 +291,12 @@ static pvid_reason next_sample(pvid_weak_f32 *self)
         if (window->index == self->design->window - 1u) {
             window->index = 0;
             if (window->whole) {
-                reason = turn_over(self, window);
+                reason = hand_over(self, window);
             }
             window->whole = true;
         }
     }
-    self->turn = 0;
+    self->active = 0;
     self->function = 0;
     return reason;
 }
@@ -305,26 +305,26 @@ static pvid_reason next_sample(pvid_weak_f32 *self)
 static inline void add_slice(pvid_weak_f32 *self)
 {
     const pvid_weak_design_f32 *design = self->design;
-    pvid_weak_window_f32 *window = &self->window[self->turn];
+    pvid_weak_window_f32 *window = &self->window[self->active];
     const size_t first = self->function;
-    const size_t end = first + self->slice;
+    const size_t end = first + self->functions_per_tick;
     const size_t last = (end < design->functions) ? end : design->functions;
     if (first == 0u) {
-        pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, &self->bend,
-                                   self->term[self->turn][window->index % 2u]);
+        pvid_weak_window_terms_f32(window, design->window, self->dt, self->phi, self->u, &self->curvature,
+                                   self->term[self->active][window->index % 2u]);
     }
-    pvid_weak_window_add_f32(window, design, (const float (*)[PVID_WEAK_SAMPLE_TERMS])self->term[self->turn], first,
+    pvid_weak_window_add_f32(window, design, (const float (*)[PVID_WEAK_SAMPLE_TERMS])self->term[self->active], first,
                              last, self->sums[window->buffer]);
     self->function = (uint8_t)last;
     if (last == design->functions) {
         self->function = 0;
-        self->turn++;
+        self->active++;
     }
 }
 
-static void work_on(pvid_weak_f32 *self, pvid_reason *reason)
+static void advance_finish(pvid_weak_f32 *self, pvid_reason *reason)
 {
-    for (uint8_t i = 0; (i < self->together) && pvid_weak_finish_is_busy_f32(&self->finish); i++) {
+    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_weak_finish_is_busy_f32(&self->finish); i++) {
         pvid_weak_finish_step_f32(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
                                   &self->estimator, &self->trust, reason);
     }
@@ -349,7 +349,7 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
             add_slice(self);
             add_slice(self);
         }
-    } else if (self->turn < 2u) {
+    } else if (self->active < 2u) {
         adding = true;
         add_slice(self);
         if (decimation == 2u) {
@@ -360,7 +360,7 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
     if (dropped != PVID_ACCUMULATED) {
         reason = dropped;
     } else if (!adding) {
-        work_on(self, &reason);
+        advance_finish(self, &reason);
     }
     return reason;
 }

@@ -119,7 +119,7 @@ static inline bool is_ready(const pvid_weak_q31 *self)
     return ready;
 }
 
-static void restart_bend(pvid_weak_bend_q31 *self)
+static void restart_curvature(pvid_weak_curvature_q31 *self)
 {
     self->wait = 1;
     self->known = 0;
@@ -138,8 +138,8 @@ static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
     window->f_sum = 0;
     window->u_sum = 0;
     window->u_square_sum = 0;
-    window->bend_square_sum = 0;
-    window->bends = 0;
+    window->curvature_square_sum = 0;
+    window->curvatures = 0;
 }
 
 /* The first window begins with the next decimated sample. The second is then in its middle: what it sums until
@@ -148,11 +148,11 @@ static void restart(pvid_weak_q31 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);
     pvid_weak_front_reset_q31(&self->front);
-    restart_bend(&self->bend);
+    restart_curvature(&self->curvature);
     restart_window(&self->window[0], (uint16_t)((2u * hop) - 1u));
     restart_window(&self->window[1], (uint16_t)(hop - 1u));
     memset(self->sums[self->window[1].buffer], 0, sizeof self->sums[0]);
-    self->turn = 2;
+    self->active = 2;
     self->warm = false;
 }
 
@@ -196,11 +196,11 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     pvid_weak_front_init_q31(&self->front, design);
     const int64_t drive_min = (int64_t)config->drive_min * (design->window - 1);
     self->drive_min = drive_min * drive_min;
-    self->slice = pvid_weak_functions_a_tick(design->decimation, design->functions);
+    self->functions_per_tick = pvid_weak_functions_per_tick(design->decimation, design->functions);
     self->iterations = (uint8_t)((self->estimator.gain < PVID_ONE_Q30) ? 1u : config->iterations);
     const uint32_t stages = pvid_weak_finish_stages_q31(design->functions, self->iterations, &self->estimator);
-    self->together = pvid_weak_stages_together(stages, design->window, design->decimation, design->functions);
-    if (self->together == 0u) {
+    self->stages_per_tick = pvid_weak_stages_per_tick(stages, design->window, design->decimation, design->functions);
+    if (self->stages_per_tick == 0u) {
         return PVID_BAD_ITERATIONS;
     }
     pvid_weak_finish_init_q31(&self->finish);
@@ -222,7 +222,7 @@ pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *
     return status;
 }
 
-static void next_bend(pvid_weak_bend_q31 *self, uint8_t lag, int32_t f)
+static void next_curvature(pvid_weak_curvature_q31 *self, uint8_t lag, int32_t f)
 {
     self->due = false;
     self->wait--;
@@ -233,8 +233,8 @@ static void next_bend(pvid_weak_bend_q31 *self, uint8_t lag, int32_t f)
     if (self->known < 2u) {
         self->known++;
     } else {
-        const int32_t bend = (f - self->before[0]) - (self->before[0] - self->before[1]);
-        self->square = (int64_t)bend * bend;
+        const int32_t curvature = (f - self->before[0]) - (self->before[0] - self->before[1]);
+        self->square = (int64_t)curvature * curvature;
         self->due = true;
     }
     self->before[1] = self->before[0];
@@ -249,7 +249,7 @@ void pvid_weak_gap_q31(pvid_weak_q31 *self)
 }
 
 /* The first window's mean angle is a better start of c than none: the pendulum swings about its rest. */
-static void place_zero(pvid_weak_q31 *self, const pvid_weak_window_q31 *window)
+static void place_offset(pvid_weak_q31 *self, const pvid_weak_window_q31 *window)
 {
     if (!self->zero_unknown || (self->estimator.counters.rows > 0u)) {
         return;
@@ -270,7 +270,7 @@ void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen)
 /* A window that has come round hands its sums over and goes on in the buffer that is free. Its last sample, which has
  * no weight, is the first one of the next. Returns why the window is dropped, if it is, or PVID_ACCUMULATED: its sums
  * are cleared where they are. */
-static pvid_reason turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
+static pvid_reason hand_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 {
     self->warm = true;
     if (self->frozen) {
@@ -283,8 +283,8 @@ static pvid_reason turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
     const uint8_t full = window->buffer;
     window->buffer = self->finish.buffer;
     self->finish.buffer = full;
-    place_zero(self, window);
-    const pvid_scaled_q31 pivot = pvid_scaled_times_q31(self->pivot_noise, pvid_weak_window_bend_q31(window));
+    place_offset(self, window);
+    const pvid_scaled_q31 pivot = pvid_scaled_times_q31(self->pivot_noise, pvid_weak_window_curvature_q31(window));
     pvid_weak_finish_begin_q31(&self->finish, self->design, &self->estimator, pivot);
     return PVID_ACCUMULATED;
 }
@@ -293,19 +293,19 @@ static pvid_reason turn_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 static pvid_reason next_sample(pvid_weak_q31 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
-    next_bend(&self->bend, self->design->lag, self->f);
+    next_curvature(&self->curvature, self->design->lag, self->f);
     for (size_t i = 0; i < 2u; i++) {
         pvid_weak_window_q31 *window = &self->window[i];
         window->index++;
         if (window->index == self->design->window - 1u) {
             window->index = 0;
             if (window->whole) {
-                reason = turn_over(self, window);
+                reason = hand_over(self, window);
             }
             window->whole = true;
         }
     }
-    self->turn = 0;
+    self->active = 0;
     self->function = 0;
     return reason;
 }
@@ -314,18 +314,18 @@ static pvid_reason next_sample(pvid_weak_q31 *self)
 static inline void add_slice(pvid_weak_q31 *self)
 {
     const pvid_weak_design_q31 *design = self->design;
-    pvid_weak_window_q31 *window = &self->window[self->turn];
+    pvid_weak_window_q31 *window = &self->window[self->active];
     const size_t first = self->function;
-    const size_t end = first + self->slice;
+    const size_t end = first + self->functions_per_tick;
     const size_t last = (end < design->functions) ? end : design->functions;
     if (first == 0u) {
-        pvid_weak_window_terms_q31(window, design, self->f, self->u, &self->bend, self->term);
+        pvid_weak_window_terms_q31(window, design, self->f, self->u, &self->curvature, self->term);
     }
     pvid_weak_window_add_q31(window, design, self->term, first, last, self->sums[window->buffer]);
     self->function = (uint8_t)last;
     if (last == design->functions) {
         self->function = 0;
-        self->turn++;
+        self->active++;
     }
 }
 
@@ -336,9 +336,9 @@ static pvid_reason reject(pvid_weak_q31 *self)
     return PVID_REJECTED_SATURATED;
 }
 
-static void work_on(pvid_weak_q31 *self, pvid_reason *reason)
+static void advance_finish(pvid_weak_q31 *self, pvid_reason *reason)
 {
-    for (uint8_t i = 0; (i < self->together) && pvid_weak_finish_is_busy_q31(&self->finish); i++) {
+    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_weak_finish_is_busy_q31(&self->finish); i++) {
         pvid_weak_finish_step_q31(&self->finish, self->design, self->iterations, self->sums[self->finish.buffer],
                                   &self->estimator, &self->trust, reason);
     }
@@ -373,7 +373,7 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
             add_slice(self);
             add_slice(self);
         }
-    } else if (self->turn < 2u) {
+    } else if (self->active < 2u) {
         adding = true;
         add_slice(self);
         if (design->decimation == 2u) {
@@ -384,7 +384,7 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, int32_t phi, int32_t y)
     if (dropped != PVID_ACCUMULATED) {
         reason = dropped;
     } else if (!adding) {
-        work_on(self, &reason);
+        advance_finish(self, &reason);
     }
     return reason;
 }

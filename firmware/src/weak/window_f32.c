@@ -9,17 +9,17 @@
 enum { UF = 0, F = 1, U = 2 }; /* integrands */
 
 /* What is known of the window as a whole: drive, zero, range, curvature. */
-static inline void observe(pvid_weak_window_f32 *self, float phi, float u, const pvid_weak_bend_f32 *bend)
+static inline void observe(pvid_weak_window_f32 *self, float phi, float u, const pvid_weak_curvature_f32 *curvature)
 {
     const bool first = self->index == 0u;
-    const float bend_square = bend->due ? bend->square : 0.0f;
+    const float curvature_square = curvature->due ? curvature->square : 0.0f;
     self->u_sum = (first ? 0.0f : self->u_sum) + u;
     self->u_square_sum = (first ? 0.0f : self->u_square_sum) + (u * u);
     self->phi_sum = (first ? 0.0f : self->phi_sum) + phi;
     self->lowest = (first || (phi < self->lowest)) ? phi : self->lowest;
     self->highest = (first || (phi > self->highest)) ? phi : self->highest;
-    self->bend_square_sum = (first ? 0.0f : self->bend_square_sum) + bend_square;
-    self->bends = (uint16_t)((first ? 0u : self->bends) + (bend->due ? 1u : 0u));
+    self->curvature_square_sum = (first ? 0.0f : self->curvature_square_sum) + curvature_square;
+    self->curvatures = (uint16_t)((first ? 0u : self->curvatures) + (curvature->due ? 1u : 0u));
 }
 
 /* The double integral of integrand i up to now, less the trapezoid rule's error. */
@@ -35,7 +35,7 @@ static inline float integrate(pvid_weak_window_f32 *self, size_t i, float now, f
 }
 
 void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, float dt, float phi, float u,
-                                const pvid_weak_bend_f32 *bend, float term[PVID_WEAK_SAMPLE_TERMS])
+                                const pvid_weak_curvature_f32 *curvature, float term[PVID_WEAK_SAMPLE_TERMS])
 {
     const float half_dt = 0.5f * dt;
     const float correction = (dt * dt) / 6.0f;
@@ -43,7 +43,7 @@ void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, fl
     const float i2_uf = integrate(self, UF, u_phi, half_dt, correction);
     const float i2_f = integrate(self, F, phi, half_dt, correction);
     const float i2_u = integrate(self, U, u, half_dt, correction);
-    observe(self, phi, u, bend);
+    observe(self, phi, u, curvature);
     if (self->index == 0u) { /* no weight, and 0 times what is infinite would not be 0 */
         memset(term, 0, PVID_WEAK_SAMPLE_TERMS * sizeof term[0]);
         return;
@@ -74,16 +74,16 @@ float pvid_weak_window_mean_f32(const pvid_weak_window_f32 *self, uint16_t sampl
     return self->phi_sum / (float)(samples - 1u);
 }
 
-float pvid_weak_window_reach_f32(const pvid_weak_window_f32 *self, float zero)
+float pvid_weak_window_max_deviation_f32(const pvid_weak_window_f32 *self, float zero)
 {
     const float up = self->highest - zero;
     const float down = zero - self->lowest;
     return (up > down) ? up : down;
 }
 
-float pvid_weak_window_bend_f32(const pvid_weak_window_f32 *self)
+float pvid_weak_window_curvature_f32(const pvid_weak_window_f32 *self)
 {
-    return (self->bends > 0u) ? (self->bend_square_sum / (float)self->bends) : 0.0f;
+    return (self->curvatures > 0u) ? (self->curvature_square_sum / (float)self->curvatures) : 0.0f;
 }
 
 /* chi, chi'' and chi'''' of a function at a sample. */

@@ -29,7 +29,7 @@ enum {
  * I2 is the double integral from the window's first sample, by the trapezoid rule less dt^2/6 times
  * the integrand; t is the time from the window's middle. Cost: 40 operations. */
 void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, float dt, float phi, float u,
-                                const pvid_weak_bend_f32 *bend, float term[PVID_WEAK_SAMPLE_TERMS]);
+                                const pvid_weak_curvature_f32 *curvature, float term[PVID_WEAK_SAMPLE_TERMS]);
 
 /* Variance of u [1/s^4] over the samples so far; call it where the window is complete, as the next two. */
 float pvid_weak_window_drive_f32(const pvid_weak_window_f32 *self, uint16_t samples);
@@ -38,10 +38,10 @@ float pvid_weak_window_drive_f32(const pvid_weak_window_f32 *self, uint16_t samp
 float pvid_weak_window_mean_f32(const pvid_weak_window_f32 *self, uint16_t samples);
 
 /* Largest |phi - zero| [rad]. */
-float pvid_weak_window_reach_f32(const pvid_weak_window_f32 *self, float zero);
+float pvid_weak_window_max_deviation_f32(const pvid_weak_window_f32 *self, float zero);
 
 /* Mean square of the second differences of phi [rad^2]; 0 where there were none. */
-float pvid_weak_window_bend_f32(const pvid_weak_window_f32 *self);
+float pvid_weak_window_curvature_f32(const pvid_weak_window_f32 *self);
 
 /* Adds the terms of the last two samples to the sums of functions first..last-1; clears these at the window's first
  * sample. term[0] is that of an even index in the window, term[1] that of the odd one after it: only odd ones add, so

@@ -43,7 +43,7 @@ static int32_t shifted(int64_t product, uint8_t shift)
 }
 
 void pvid_weak_window_terms_q31(pvid_weak_window_q31 *self, const pvid_weak_design_q31 *design, int32_t f, int32_t u,
-                                const pvid_weak_bend_q31 *bend, int32_t term[PVID_WEAK_TERMS_Q31])
+                                const pvid_weak_curvature_q31 *curvature, int32_t term[PVID_WEAK_TERMS_Q31])
 {
     const int64_t now[PVID_WEAK_INTEGRALS_Q31] = {(int64_t)u * f, f, u};
     int64_t integral[PVID_WEAK_INTEGRALS_Q31];
@@ -52,8 +52,8 @@ void pvid_weak_window_terms_q31(pvid_weak_window_q31 *self, const pvid_weak_desi
     self->f_sum = (first ? 0 : self->f_sum) + f;
     self->u_sum = (first ? 0 : self->u_sum) + u;
     self->u_square_sum = (first ? 0 : self->u_square_sum) + ((int64_t)u * u);
-    self->bend_square_sum = (first ? 0 : self->bend_square_sum) + (bend->due ? bend->square : 0);
-    self->bends = (uint16_t)((first ? 0u : self->bends) + (bend->due ? 1u : 0u));
+    self->curvature_square_sum = (first ? 0 : self->curvature_square_sum) + (curvature->due ? curvature->square : 0);
+    self->curvatures = (uint16_t)((first ? 0u : self->curvatures) + (curvature->due ? 1u : 0u));
     const int64_t steps = self->index;
     const uint8_t *shift = design->product_shift;
     for (size_t i = 0; i < ON_CHI2_HIGH; i++) { /* i: U F, F */
@@ -81,13 +81,14 @@ int64_t pvid_weak_window_drive_q31(const pvid_weak_window_q31 *self, uint16_t sa
     return ((int64_t)(samples - 1u) * self->u_square_sum) - (self->u_sum * self->u_sum);
 }
 
-pvid_scaled_q31 pvid_weak_window_bend_q31(const pvid_weak_window_q31 *self)
+pvid_scaled_q31 pvid_weak_window_curvature_q31(const pvid_weak_window_q31 *self)
 {
     const pvid_scaled_q31 none = {0, 0};
-    if (self->bends == 0u) {
+    if (self->curvatures == 0u) {
         return none;
     }
-    return pvid_scaled_over_q31(pvid_scaled_of_q31(self->bend_square_sum, 0), pvid_scaled_of_q31(self->bends, 0));
+    return pvid_scaled_over_q31(pvid_scaled_of_q31(self->curvature_square_sum, 0),
+                                pvid_scaled_of_q31(self->curvatures, 0));
 }
 
 /* The inner loop: a 32-bit product, a shift that rounds half up, an addition. */

@@ -30,13 +30,13 @@ enum {
 
 /* Integrates up to the decimated sample F, U at self->index and writes the terms. */
 void pvid_weak_window_terms_q31(pvid_weak_window_q31 *self, const pvid_weak_design_q31 *design, int32_t f, int32_t u,
-                                const pvid_weak_bend_q31 *bend, int32_t term[PVID_WEAK_TERMS_Q31]);
+                                const pvid_weak_curvature_q31 *curvature, int32_t term[PVID_WEAK_TERMS_Q31]);
 
 /* (W - 1)^2 times the variance of U over the samples so far; call it where the window is complete. */
 int64_t pvid_weak_window_drive_q31(const pvid_weak_window_q31 *self, uint16_t samples);
 
 /* Mean square of the second differences of F that fell into the window, 0 if none did. */
-pvid_scaled_q31 pvid_weak_window_bend_q31(const pvid_weak_window_q31 *self);
+pvid_scaled_q31 pvid_weak_window_curvature_q31(const pvid_weak_window_q31 *self);
 
 /* Adds the terms to the sums of functions first..last-1, or clears them at the window's first sample. */
 void pvid_weak_window_add_q31(const pvid_weak_window_q31 *self, const pvid_weak_design_q31 *design,

@@ -24,7 +24,7 @@ struct pvid_estimator_f32 {
     float dead_zone;                /* squared */
     float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; written by the module that makes the rows */
     float energy;                   /* sum of e^2 of the rows since the last group's end, at the p they met */
-    float taken;                    /* their weight; these two only for models without functions of their own */
+    float group_weight;             /* their weight; these two only for models without functions of their own */
     float expected;                 /* mean over the rows in the sums of the variance that the sensors' noise gives them
                                        [units of Y^2]: no residual variance is taken for smaller. 0: nobody has said */
     uint16_t divider;
@@ -42,22 +42,22 @@ typedef struct {
 } pvid_cholesky_f32;
 
 /* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be
- * read when it is complete, refuge may be set after begin. */
+ * read when it is complete, fallback may be set after begin. */
 struct pvid_estimator_solve_f32 {
     pvid_reason reason;
-    const float *refuge;         /* [n_p] where p goes if it may not step; NULL: it stays */
+    const float *fallback;       /* [n_p] where p goes if it may not step; NULL: it stays */
     pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
     float size;                  /* largest |dp/p| of the step before its limit; 0 while p is held */
     float energy;                /* sum of e^2 of the group's rows at the p they met */
     float variance;              /* of a row's noise */
-    bool informed;               /* the data say more than noise does */
+    bool above_noise;            /* the data say more than noise does */
     bool solvable;
     uint8_t stage;
     uint8_t index; /* of the row within the stage */
     uint8_t start; /* of the column of C in work among its non-zeros */
     uint8_t next;  /* non-zero to be multiplied next */
     bool ends_group;
-    bool rests; /* within the dead zone: no step is taken */
+    bool in_dead_zone; /* within the dead zone: no step is taken */
     float gain;
     float fall;  /* of rr */
     float scale; /* sum of M_ii dtheta_i^2: the size of the terms that cancel to it */

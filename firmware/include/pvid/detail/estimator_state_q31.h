@@ -54,8 +54,8 @@ struct pvid_estimator_q31 {
     uint32_t noise_margin;
     uint32_t dead_zone;
     pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by the module that makes the rows */
-    int64_t energy; /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
-    int64_t taken;  /* their weight, Q16 */
+    int64_t energy;       /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
+    int64_t group_weight; /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them
                                  [units of Y's integer squared]: residual variances are at least this. 0: not set */
     uint16_t divider;
@@ -81,18 +81,18 @@ typedef struct {
 } pvid_cholesky_q31;
 
 /* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be read when it is
- * complete, refuge may be set after begin. */
+ * complete, fallback may be set after begin. */
 struct pvid_estimator_solve_q31 {
     pvid_reason reason;
     uint8_t stage;
     uint8_t index; /* of the row within the stage */
     uint8_t start; /* of the column of C in work among its non-zeros */
     bool ends_group;
-    bool judging;  /* an assessment */
-    bool informed; /* the data say more than noise does */
-    bool has_refuge;
-    bool rests;                             /* within the dead zone: no step is taken */
-    int32_t refuge[PVID_MAX_P];             /* where p goes if it may not step */
+    bool judging;     /* an assessment */
+    bool above_noise; /* the data say more than noise does */
+    bool has_fallback;
+    bool in_dead_zone;                      /* within the dead zone: no step is taken */
+    int32_t fallback[PVID_MAX_P];           /* where p goes if it may not step */
     int64_t size;                           /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
     int64_t energy;                         /* sum of e^2 of the group's rows at the p they met */
     pvid_scaled_q31 variance;               /* of a row's noise, divided by 4^exponent as the sums are */

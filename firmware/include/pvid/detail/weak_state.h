@@ -38,8 +38,8 @@ typedef struct {
     float phi_sum;
     float lowest; /* phi */
     float highest;
-    float bend_square_sum; /* of the second differences of phi that fell into the window */
-    uint16_t bends;        /* how many did */
+    float curvature_square_sum; /* of the second differences of phi that fell into the window */
+    uint16_t curvatures;        /* how many did */
 } pvid_weak_window_f32;
 
 /* Second differences phi(t) - 2 phi(t - lag) + phi(t - 2 lag), one every `lag` decimated samples. */
@@ -49,7 +49,7 @@ typedef struct {
     bool due;        /* the present sample ends one */
     float before[2]; /* phi one lag and two lags ago */
     float square;    /* of the one that is due */
-} pvid_weak_bend_f32;
+} pvid_weak_curvature_f32;
 
 #define PVID_WEAK_FACTOR ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 
@@ -100,16 +100,16 @@ struct pvid_weak_f32 {
     float pivot_noise;          /* that the pivot's gives it, for each mean square of a second difference */
     float angle_limit;          /* [rad]; 0: none */
     uint8_t iterations;
-    uint8_t slice;    /* functions a tick */
-    uint8_t together; /* stages of a complete window a tick */
-    uint8_t turn;     /* the window that takes the present decimated sample in; 2: both have */
-    uint8_t function; /* functions of that window that have, 0..K-1 */
-    bool warm;        /* a window has been completed since the restart */
-    bool frozen;      /* windows are gathered and dropped */
-    float phi;        /* the present decimated sample [rad] */
-    float u;          /* [1/s^2] */
+    uint8_t functions_per_tick; /* functions a tick */
+    uint8_t stages_per_tick;    /* stages of a complete window a tick */
+    uint8_t active;             /* the window that takes the present decimated sample in; 2: both have */
+    uint8_t function;           /* functions of that window that have, 0..K-1 */
+    bool warm;                  /* a window has been completed since the restart */
+    bool frozen;                /* windows are gathered and dropped */
+    float phi;                  /* the present decimated sample [rad] */
+    float u;                    /* [1/s^2] */
     pvid_weak_front_f32 front;
-    pvid_weak_bend_f32 bend;
+    pvid_weak_curvature_f32 curvature;
     pvid_weak_window_f32 window[2];
     pvid_weak_finish_f32 finish;
     float term[2][2][PVID_WEAK_SAMPLE_TERMS]; /* of each window: of its last even and of its last odd sample */

@@ -26,8 +26,8 @@ typedef struct {
     int64_t f_sum;
     int64_t u_sum;
     int64_t u_square_sum;
-    int64_t bend_square_sum; /* of the second differences of F that fell into the window */
-    uint16_t bends;          /* how many did */
+    int64_t curvature_square_sum; /* of the second differences of F that fell into the window */
+    uint16_t curvatures;          /* how many did */
 } pvid_weak_window_q31;
 
 /* Second differences F(t) - 2 F(t - lag) + F(t - 2 lag), one every `lag` decimated samples. */
@@ -37,7 +37,7 @@ typedef struct {
     bool due;          /* the present sample ends one */
     int32_t before[2]; /* F one lag and two lags ago */
     int64_t square;    /* of the one that is due */
-} pvid_weak_bend_q31;
+} pvid_weak_curvature_q31;
 
 #define PVID_WEAK_FACTOR_Q31 ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 
@@ -65,7 +65,7 @@ typedef struct {
     int64_t energy; /* of the window's rows: before they are added where the gate looks at it, then since */
     pvid_gate_q31 gate;
     pvid_scaled_q31 expected; /* variance of a row's noise */
-    int32_t ageing;           /* factor on the past before this window's rows, Q31; 0: none */
+    int32_t fade_factor;      /* factor on the past before this window's rows, Q31; 0: none */
     pvid_estimator_solve_q31 solve;
     pvid_estimate_q31 candidate; /* for publication */
 } pvid_weak_finish_q31;
@@ -79,17 +79,17 @@ struct pvid_weak_q31 {
     int8_t zero_bits;  /* format of c */
     bool zero_unknown;
     uint8_t iterations;
-    uint8_t slice;    /* functions a tick */
-    uint8_t together; /* stages of a complete window a tick */
-    uint8_t turn;     /* the window that takes the present decimated sample in; 2: both have */
-    uint8_t function; /* functions of that window that have, 0..K-1 */
-    bool warm;        /* a window has been completed since the restart */
-    bool frozen;      /* windows are gathered and dropped */
-    int32_t f;        /* the present decimated sample */
+    uint8_t functions_per_tick; /* functions a tick */
+    uint8_t stages_per_tick;    /* stages of a complete window a tick */
+    uint8_t active;             /* the window that takes the present decimated sample in; 2: both have */
+    uint8_t function;           /* functions of that window that have, 0..K-1 */
+    bool warm;                  /* a window has been completed since the restart */
+    bool frozen;                /* windows are gathered and dropped */
+    int32_t f;                  /* the present decimated sample */
     int32_t u;
     pvid_scaled_q31 pivot_noise;
     pvid_weak_front_q31 front;
-    pvid_weak_bend_q31 bend;
+    pvid_weak_curvature_q31 curvature;
     pvid_weak_window_q31 window[2];
     pvid_weak_finish_q31 finish;
     int32_t term[PVID_WEAK_TERMS_Q31]; /* of the window in work */

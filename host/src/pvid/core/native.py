@@ -164,7 +164,7 @@ class TrustConfigStruct(ctypes.Structure):
         ("se_max", ctypes.c_float),
         ("misfit_max", ctypes.c_float),
         ("groups_min", ctypes.c_uint16),
-        ("shut_max", ctypes.c_uint16),
+        ("revert_after", ctypes.c_uint16),
         ("renewal", ctypes.c_float),
     ]
 
@@ -377,7 +377,7 @@ class TrustConfig:
     se_max: float = 0.05
     misfit_max: float = 4.0
     groups_min: int = 3
-    shut_max: int = 16
+    revert_after: int = 16
     renewal: float = 0.2
 
 

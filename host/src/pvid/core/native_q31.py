@@ -66,7 +66,7 @@ class TrustConfigQ31:
     se_max: int = 838861
     misfit_max: int = 262144
     groups_min: int = 3
-    shut_max: int = 16
+    revert_after: int = 16
     renewal: int = 13107
 
 
@@ -151,7 +151,7 @@ class TrustConfigStruct(ctypes.Structure):
         ("se_max", ctypes.c_int32),
         ("misfit_max", ctypes.c_uint32),
         ("groups_min", ctypes.c_uint16),
-        ("shut_max", ctypes.c_uint16),
+        ("revert_after", ctypes.c_uint16),
         ("renewal", ctypes.c_uint32),
     ]
 

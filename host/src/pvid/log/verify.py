@@ -237,7 +237,9 @@ class Verifier:
         opened = self._open
         if opened is None or record.tick != opened.next or not opened.is_of(raw.session):
             yield from self._close()
-            opened = self._open = _Open(Stretch(record.segment, record.tick, 0), self._lacking(record), raw.session)
+            opened = self._open = _Open(
+                Stretch(record.segment, record.tick, 0), self._missing_note(record), raw.session
+            )
             if (configuration := self._configurations.get(raw.session)) is not None:
                 opened.begin_with(configuration)
         self._before = record.segment, record.tick + raw.count
@@ -255,7 +257,7 @@ class Verifier:
             opened.checks.append((tick, check))
             opened.harmed = False
 
-    def _lacking(self, record: Record) -> str:
+    def _missing_note(self, record: Record) -> str:
         """A sentence about the samples missing before this record."""
         if self._before is None or self._before[0] != record.segment:
             return f"its session began before this segment did, and the samples before tick {record.tick} are not in it"

@@ -318,7 +318,7 @@ def _in_float32(
     counters = identifier.counters
     last = identifier.estimate if isinstance(identifier, WeakIdentifier) else identifier.assess()
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
-    told = len(trusted) > 0
+    any_trusted = len(trusted) > 0
     publishes = isinstance(identifier, WeakIdentifier)
     estimates = record.estimate
     trajectory = _trajectory(
@@ -344,11 +344,11 @@ def _in_float32(
         friction=tuple(map(float, last["p"][NAMED : record.p.shape[1]])),
         covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
         kappa=float(last["kappa"]),
-        trusted_s=float(run.t[trusted[-1]]) if told and publishes else None,
-        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        trusted_s=float(run.t[trusted[-1]]) if any_trusted and publishes else None,
+        first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
         reasons=_counted(record.reason),
         chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifier) else None,
-        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        alarm=any_trusted and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],
@@ -508,7 +508,7 @@ def _in_q31(
             trusted, status = trusted[:0], Reason.HELD_OUT_OF_RANGE.text
         else:
             linear = found
-    told = len(trusted) > 0
+    any_trusted = len(trusted) > 0
     counters = identifier.counters
     publications = Publications.none()
     if isinstance(identifier, WeakIdentifierQ31):
@@ -527,13 +527,13 @@ def _in_q31(
         p=p,
         covariance=_with_linear_error(covariance_of(config, last), p, linear),
         kappa=float(last["kappa"]) / 2**30,
-        trusted_s=float(run.t[trusted[-1]]) if told and isinstance(identifier, WeakIdentifierQ31) else None,
-        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        trusted_s=float(run.t[trusted[-1]]) if any_trusted and isinstance(identifier, WeakIdentifierQ31) else None,
+        first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
         reasons=_counted(record.reason),
         beyond=beyond,
         beyond_words=beyond.words(rig.sensor),
         chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifierQ31) else None,
-        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        alarm=any_trusted and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=status,
         ticks=len(run.t),
         updates=counters["updates"],

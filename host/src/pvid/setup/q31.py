@@ -247,7 +247,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
             se_max=round(float_config.trust.se_max * 2**24),
             misfit_max=round(float_config.trust.misfit_max * 2**16),
             groups_min=float_config.trust.groups_min,
-            shut_max=float_config.trust.shut_max,
+            revert_after=float_config.trust.revert_after,
             renewal=round(float_config.trust.renewal * 2**16),
         ),
         gate=gate_config_q31(float_config.gate, windows_hz),

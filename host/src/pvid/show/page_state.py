@@ -74,12 +74,12 @@ class LiveState(threading.Thread):
                 try:
                     if self._stream.rig != self._rig:
                         self._rig = self._stream.rig
-                        self._know_rig()
+                        self._load_rig()
                     self._history.take(record)
                 except Exception:  # whatever a board sends, the page shows what comes after it
                     self._failed += 1
 
-    def _know_rig(self) -> None:
+    def _load_rig(self) -> None:
         if self._rig is not None:
             try:
                 self._history.know(RigFile.parse(self._rig).l1)
@@ -119,8 +119,10 @@ class LiveState(threading.Thread):
         for name, (symbol, meaning, unit) in PARAMETERS.items():
             value = self._history.newest.get(name, math.nan)
             if not math.isnan(value):
-                told, spread = with_error(value, self._history.newest[f"{name}_se"])
-                rows.append({"symbol": symbol, "meaning": meaning, "unit": unit, "value": told, "error": f"± {spread}"})
+                shown, spread = with_error(value, self._history.newest[f"{name}_se"])
+                rows.append(
+                    {"symbol": symbol, "meaning": meaning, "unit": unit, "value": shown, "error": f"± {spread}"}
+                )
         if not self._history.is_physical:
             meaning = "outside the physical region"
             rows.append({"symbol": "g*, l2, rho2", "meaning": meaning, "unit": "", "value": "", "error": ""})

@@ -120,8 +120,8 @@ class LiveView:
             if math.isnan(value):
                 continue
             relative = f"{100 * error / abs(value):.2g} %" if name != "c" and value else ""
-            told, spread = with_error(value, error)
-            table.add_row(symbol, meaning, told, f"± {spread} {unit}", relative)
+            shown, spread = with_error(value, error)
+            table.add_row(symbol, meaning, shown, f"± {spread} {unit}", relative)
         if not self.history.newest:
             table.add_row("none yet", "the first estimate comes when a window of samples is full")
         elif not self.history.is_physical:

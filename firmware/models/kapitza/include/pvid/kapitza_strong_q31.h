@@ -42,7 +42,7 @@ bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *shifts, const int32_
                                  const int32_t u[PVID_Y_ORDERS_Q31], int32_t *y, int32_t n[PVID_KAPITZA_STRONG_THETA]);
 
 /* w times the gradient in w of N^T theta, from term[i] = N_i theta_i: each as often as w is a factor of theta_i. */
-int64_t pvid_kapitza_strong_told_q31(const int64_t term[PVID_KAPITZA_STRONG_THETA]);
+int64_t pvid_kapitza_strong_sensitivity_q31(const int64_t term[PVID_KAPITZA_STRONG_THETA]);
 
 /* The strong form as a model: 11 entries of theta, p = (w, d1, d2). */
 extern const pvid_model_q31 pvid_kapitza_strong_q31;

@@ -30,7 +30,7 @@ def angle_sums(f: Int, design: WeakTablesQ31) -> Int:
     return np.asarray(np.sum(f[index], axis=1, dtype=np.int64))
 
 
-def bends(f: Int, design: WeakTablesQ31) -> Scaled:
+def curvatures(f: Int, design: WeakTablesQ31) -> Scaled:
     """Mean square of the second differences of F that fell into each window [windows]."""
     hop = (design.window - 1) // 2
     squares, due = np.zeros(len(f), np.int64), np.zeros(len(f), np.int64)
@@ -48,7 +48,7 @@ class Window:
 
     sums: Int
     angle_sum: int
-    bend: Scaled
+    curvature: Scaled
 
 
 def _terms(index: int, now: Int, twice: Int, design: WeakTablesQ31) -> Int:

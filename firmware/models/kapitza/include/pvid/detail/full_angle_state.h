@@ -12,7 +12,7 @@ typedef struct {
 } pvid_weak_integral_f32;
 
 /* What the rows lack: the remainder of Y, and the columns of c1 and c2. */
-#define PVID_WEAK_LACKS 3
+#define PVID_WEAK_REMAINDERS 3
 
 /* The samples of the window in work, and what its rows lack. Only the identifier writes to it. */
 struct pvid_weak_angle_f32 {
@@ -28,7 +28,7 @@ struct pvid_weak_angle_f32 {
     uint8_t channels; /* 1, or 3 with friction */
     bool full_angle;
     bool on;       /* the estimate has settled: rows are corrected */
-    bool sensible; /* p is that of a pendulum */
+    bool physical; /* p is that of a pendulum */
     float dt;
     float inverse_l1_square; /* of rod 1 [1/m^2] */
     float p[PVID_KAPITZA_P];
@@ -40,9 +40,9 @@ struct pvid_weak_angle_f32 {
     float b;
     float normal[5]; /* A^T A, A^T B, B^T B, A^T e, B^T e */
     pvid_weak_integral_f32 motion;
-    pvid_weak_integral_f32 remainder[PVID_WEAK_LACKS];
-    float lack[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS];                        /* by the last pass */
-    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS];                        /* by this one */
+    pvid_weak_integral_f32 remainder_integral[PVID_WEAK_REMAINDERS];
+    float remainder[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];              /* by the last pass */
+    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];                   /* by this one */
     float ring[PVID_MAX_WEAK_WINDOW + ((PVID_MAX_WEAK_WINDOW + 1) / 2)][2]; /* phi [rad], u [1/s^2] */
 };
 
