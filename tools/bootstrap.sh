@@ -99,6 +99,7 @@ missing_packages() {
         need clang command -v clang
         need clang-tidy command -v clang-tidy
         need cppcheck command -v cppcheck
+        need doxygen command -v doxygen
         need frama-c-base command -v frama-c
         need g++ command -v g++
         need gcovr command -v gcovr

@@ -19,10 +19,6 @@ typedef struct {
     uint32_t estimate_every;
 } pvid_record_f32;
 
-/* Sizes and offsets of every struct that Python mirrors, in the order of native.py. */
-extern const uint32_t pvid_native_layout[];
-extern const uint32_t pvid_native_layout_length;
-
 /* Compiler and flags this library was built with. */
 const char *pvid_native_build(void);
 

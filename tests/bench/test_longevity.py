@@ -43,10 +43,11 @@ from bench.longevity_signals import (
 from pvid.base.errors import PvidError
 from pvid.board import replay_image
 from pvid.board.boards import board
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.core.native import Native
 from pvid.run import compare_q31
 from pvid.run.compare import first_difference
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import counts_of_samples
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Sensors, simulate
@@ -89,7 +90,7 @@ def test_nothing_of_ours_is_ever_silently_wrong(scenario: str, outcomes: Outcome
 
 
 # A mechanism that is held, or an encoder that sticks, looks like d2 = 0 where the strong form's sensors have noise (see
-# host/README.md); and the end of the drift is only two time constants ago in so short a run.
+# host/docs/benchmarks/longevity.md); and the end of the drift is only two time constants ago in so short a run.
 KNOWN_SILENT = {
     "absent": {"strong q31, 10 s", "strong q31, none"},
     "constant": {"strong q31, 10 s", "strong q31, none"},
@@ -196,7 +197,7 @@ def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: c
     except PvidError:  # their gates let different windows in: one by one
         expected = [(WeakTwin(config, [alone]).run(phi, y), 0) for alone in lanes]
     for estimator, (twin, lane) in zip(lanes, expected, strict=True):
-        record = native.weak(replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
         theirs = (twin.p[:, :, lane], twin.sums[:, :, lane], twin.reason[:, lane])
         assert first_difference(record, *theirs, twin.published[:, :, lane]) is None
 
@@ -211,7 +212,7 @@ def test_the_strong_form_equals_its_twin(scenario: str, ticks: int, native: Nati
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in STRONG_FORGETTING_S]
     expected = StrongTwin(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
-        record = native.strong(replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
         theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
         assert first_difference(record, *theirs) is None
 
@@ -225,7 +226,7 @@ def test_the_weak_form_equals_its_twin_in_fixed_point(scenario: str, native: Nat
         twin = WeakTwinQ31(cast(WeakConfigQ31, alike[0]), [config.estimator for config in alike])
         expected = twin.run(phi, y)
         for lane, config in enumerate(alike):
-            record = compare_q31.identifier_q31(native, config).run(phi, y, hashes=False)
+            record = native.identifier(config).run(phi, y, hashes=False)
             assert compare_q31.first_difference(record, expected, lane) is None
 
 
@@ -236,7 +237,7 @@ def test_the_strong_form_equals_its_twin_in_fixed_point(scenario: str, native: N
     lanes = [config.estimator, replace(config.estimator, forgetting_groups=10_000)]
     expected = StrongTwinQ31(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
-        record = compare_q31.identifier_q31(native, replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
         assert compare_q31.first_difference(record, expected, lane) is None
 
 

@@ -72,7 +72,7 @@ def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target, 
     rig = standard_rig("weak")
     record = collect(host_target, TICKS, begin=rig)
     tick = max(record.estimates)
-    identifier = native.weak(rig.config)  # type: ignore[arg-type]
+    identifier = native.identifier(rig.config)
     identifier.run(*record.samples(0, tick))
     last, estimate = identifier.assess(), record.estimates[tick]
     assert np.array_equal(np.array(estimate.p, np.float32), last["p"])

@@ -21,11 +21,12 @@ from pvid.base.errors import PvidError
 from pvid.board.replay_image import SAMPLE_RATE, ReplayRun, native_hashes, standard_run
 from pvid.board.stream_rig import StreamRig, played_samples, stream_rig
 from pvid.board.target import HOST_TARGET, Playback, Target, judge, open_target, play, verify
-from pvid.core.native import Native, WeakConfig
-from pvid.core.native_q31 import WeakConfigQ31
+from pvid.core.native import Native
 from pvid.link.frames import Estimate
 from pvid.link.port import Port
 from pvid.rig.file import RigFile
+from pvid.settings.f32 import WeakConfig
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 TICKS = 5000
@@ -114,7 +115,7 @@ def test_a_long_run_stays_equal_on_two_boards_at_once(form: str, core: str, nati
 def test_the_last_estimate_is_that_of_the_core(native: Native) -> None:
     run = standard_run("weak", TICKS)
     assert isinstance(run.config, WeakConfig)
-    identifier = native.weak(run.config)
+    identifier = native.identifier(run.config)
     identifier.run(run.phi, run.y)
     last = identifier.assess()
     estimate = play_standard(open_target(HOST_TARGET, rig_of(run)), "weak").estimates[TICKS]

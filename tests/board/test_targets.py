@@ -73,7 +73,7 @@ def test_long_runs_end_with_the_bits_of_the_host(name: str, form: str, native: N
 
 
 def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> None:
-    """A product of the port, not of the core: the figures that firmware/README.md gives for the AVR are from here."""
+    """A product of the port, not of the core: the figures that benchmarks/cost.md gives for the AVR are from here."""
     replay = standard_run("strong", 1000)
     image, _ = build_image(BOARDS["atmega2560"], replay)
     report = play(BOARDS["atmega2560"], image, TIMEOUT_S)
@@ -86,12 +86,14 @@ def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> No
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:
     footprints = {configuration: footprint for configuration, (footprint, _) in measured.items()}
     over = sizes.over_budget(ROOT / "tests" / "budget.toml", footprints)
-    assert not over, "if it has to be so: ./tools/pvid sizes --budget tests/budget.toml --update firmware/README.md"
+    assert not over, (
+        "if it has to be so: ./tools/pvid sizes --budget tests/budget.toml --update host/docs/benchmarks/cost.md"
+    )
 
 
 def test_the_readme_shows_what_is_measured(measured: Measured) -> None:
-    readme = (ROOT / "firmware" / "README.md").read_text(encoding="utf-8").splitlines()
-    rows = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in readme if line.startswith("| ")}
+    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8").splitlines()
+    rows = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in page if line.startswith("| ")}
     shown = {row[:2]: row[2:] for row in rows}
     for row in sizes.table_rows({configuration: footprint for configuration, (footprint, _) in measured.items()}):
         figures = [int(cell) for cell in shown[row[:2]]]

@@ -17,7 +17,6 @@ from linear_rig import LINEAR_RIG
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.core.native import Native
-from pvid.core.native_q31 import WeakIdentifierQ31
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, source
 from pvid.design.weak_q31 import weak_tables_q31
 from pvid.rig.file import RigFile
@@ -188,7 +187,7 @@ def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: 
     lines = "\n".join(f"{a} {b}" for a, b in zip(phi, y, strict=True))
     done = subprocess.run([program], input=lines, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    core = WeakIdentifierQ31(native, weak_config_q31(rig, 1000.0))
+    core = native.identifier(weak_config_q31(rig, 1000.0))
     core.run(phi, y)
     assert done.stdout == f"{core.running_hash:08x}"
 

@@ -68,7 +68,7 @@ def test_predicted_errors_are_the_spread_of_twenty_runs(
     errors = []
     for seed in range(20):
         run = simulate(pendulum, tones, sensors_of(rig), duration=duration, seed=seed).run
-        identifier = native.weak(weak_config(rig, 1000.0))
+        identifier = native.identifier(weak_config(rig, 1000.0))
         identifier.run(run.phi, run.y, sums=False, hashes=False)
         p = identifier.assess()["p"][:4].astype(np.float64)
         errors.append([*p, *oracle.physical(p[:3], rig.l1)] - truth)

@@ -15,11 +15,11 @@ from bench.campaign.population import shipped
 from bench.campaign.truth import simulate_rig
 from pvid.cli.main import commands
 from pvid.core.native import Native
-from pvid.core.native_q31 import WeakConfigQ31
 from pvid.rig.file import RigFile, Sensor
 from pvid.rig.run import Run, write_run
 from pvid.run.identify import identify
 from pvid.run.survey import fitted
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.q31 import config_for_run
 from pvid.setup.ranges_q31 import DEFAULT_PHI_RANGE, beyond_ranges, pivot_acceleration, with_ranges_of
 from pvid.sim.pendulum import Pendulum, Tone, simulate, standard_sensors

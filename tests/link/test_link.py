@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import re
 import struct
 import zlib
@@ -17,10 +16,11 @@ from hypothesis import strategies as st
 from bench.codec import corrupt
 from bench.fuzz import fuzz_link
 from pvid.base.errors import PvidError
-from pvid.core.native import Native, default_library
+from pvid.core.native import Native
 from pvid.link import frames as link
 
-C = ctypes.CDLL(str(default_library()))
+NATIVE = Native()
+C, FFI = NATIVE.library, NATIVE.headers.ffi
 HEAD = struct.Struct("<BHIH")
 
 payloads = st.integers(0, link.MAX_PAYLOAD).flatmap(lambda n: st.binary(min_size=n, max_size=n))
@@ -36,23 +36,21 @@ CORRUPTED_FRAMES = 100_000
 
 
 def c_encode(number: int, sequence: int, tick: int, payload: bytes) -> bytes:
-    out = ctypes.create_string_buffer(2 * link.MAX_PAYLOAD)
-    n = C.pvid_native_link_encode(
-        number, sequence, ctypes.c_uint32(tick), payload, len(payload), out, ctypes.c_uint32(len(out))
-    )
-    return out.raw[:n]
+    out = FFI.new("uint8_t[]", 2 * link.MAX_PAYLOAD)
+    n = C.pvid_native_link_encode(number, sequence, tick, payload, len(payload), out, len(out))
+    return bytes(FFI.buffer(out, n))
 
 
 def c_decode(data: bytes) -> tuple[list[tuple[int, int, int, bytes]], list[int]]:
     """Frames (type, sequence, tick, payload) and counters (frames, missing, malformed, crc, foreign)."""
-    out = ctypes.create_string_buffer(2 * len(data) + 64)
-    counters = (ctypes.c_uint32 * 5)()
+    out, counters = FFI.new("uint8_t[]", 2 * len(data) + 64), FFI.new("uint32_t[5]")
     n = C.pvid_native_link_decode(data, len(data), out, counters)
+    raw = bytes(FFI.buffer(out, n))
     found, at = [], 0
     while at < n:
-        number, sequence, tick, length = HEAD.unpack_from(out, at)
+        number, sequence, tick, length = HEAD.unpack_from(raw, at)
         at += HEAD.size
-        found.append((number, sequence, tick, out.raw[at : at + length]))
+        found.append((number, sequence, tick, raw[at : at + length]))
         at += length
     return found, list(counters)
 

@@ -21,7 +21,7 @@ import pytest
 from mcap.reader import make_reader
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.export import FORMATS, export_log
 from pvid.log.file import LogWriter
@@ -30,6 +30,7 @@ from pvid.log.reader import LogReader, LogStream
 from pvid.log.rig import run_of_log
 from pvid.log.values import TABLES, Values
 from pvid.rig.run import read_run
+from pvid.settings.enums import Reason
 
 TICKS = 4000
 L1 = 0.3

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pvid.core.native import EstimatorConfig, Law, Native, Reason
+from pvid.core.native import Native
 from pvid.oracle import strong as oracle
 from pvid.rig.file import Core, RigFile
 from pvid.run.identify import identify
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import EstimatorConfig
 from pvid.setup.f32 import bank_of, estimator_config, strong_config
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
 from pvid.twin.strong import StrongTwin
@@ -47,7 +49,7 @@ def test_exact_derivatives_stationary_law_reaches_a_hundredth_of_a_percent_from_
 def test_exact_derivatives_pseudovelocity_law_stops_short_of_it(
     native: Native, exact_rows: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    """MATH.md 4: (5) alone leaves F where the early steps put it; `pvid bench laws` prints the whole table."""
+    """theory.md 4: (5) alone leaves F where the early steps put it; `pvid bench laws` prints the whole table."""
     n, y = exact_rows
     reached = 0
     for seed in range(40):
@@ -79,7 +81,7 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
     n = n * oracle.BINOMIAL
     m, b = n.T @ n, n.T @ y
     reference = oracle.constrained_least_squares(m, b, TRUTH)
-    identifier = native.strong(config)
+    identifier = native.identifier(config)
     record = identifier.run(run.phi, run.y, sums=False, hashes=False)
     jacobian = oracle.jacobian(reference)
     s = jacobian.T @ m @ jacobian
@@ -92,7 +94,7 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
 def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standard_20_bits: Simulation) -> None:
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0)
-    identifier = native.strong(config)
+    identifier = native.identifier(config)
     identifier.run(run.phi, run.y, sums=False, hashes=False)
     last = identifier.assess()
     n32, y32, row_reason = StrongTwin(config).rows(run.phi, run.y)

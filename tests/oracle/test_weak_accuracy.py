@@ -14,9 +14,10 @@ import pytest
 from linear_rig import LINEAR_RIG
 
 from bench.weak import LSB_14, Case, Outcome, cramer_rao, run_case
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.run.identify import Identification, identify
+from pvid.settings.enums import Reason
 from pvid.setup.f32 import weak_config
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
@@ -141,7 +142,7 @@ def test_an_hour_without_a_drive_changes_no_bit_of_the_estimate(native: Native) 
     swing = 0.06 * np.cos(slow * t) + 0.03 * np.cos(fast * t + 1.0)
     noise = np.random.default_rng(4).normal(0.0, 0.5, len(t))
     swing = LSB_14 * np.rint(swing / LSB_14 + noise)
-    identifier = native.weak(weak_config(LINEAR_RIG, 1000.0, standard_start(2)))
+    identifier = native.identifier(weak_config(LINEAR_RIG, 1000.0, standard_start(2)))
     identifier.run(first.phi, first.y, sums=False, hashes=False)
     before = identifier.estimate
     hour = identifier.run(swing, np.full(len(t), first.y[-1]), sums=False, hashes=False)

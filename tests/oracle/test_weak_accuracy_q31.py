@@ -9,8 +9,9 @@ import numpy.typing as npt
 import pytest
 from linear_rig import LINEAR_RIG
 
-from pvid.core.native import EstimatorConfig, Native
-from pvid.core.native_q31 import WeakConfigQ31, WeakIdentifierQ31
+from pvid.core.native import Native
+from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.f32 import weak_config
 from pvid.setup.q31 import p_of, se_of, units_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
@@ -34,11 +35,11 @@ def outcomes(native: Native, bits: int, seeds: int, zero: float = 0.0) -> tuple[
         phi, y = counts_of(run.phi, rig.sensor.phi_lsb), counts_of(run.y, rig.sensor.y_lsb)
         start = standard_start(seed)
         settings = weak_config(rig, RATE, start)
-        reference = native.weak(settings)
+        reference = native.identifier(settings)
         reference.run(phi * rig.sensor.phi_lsb, y * rig.sensor.y_lsb, sums=False, hashes=False)
         f32.append(reference.assess()["p"][:3] / TRUTH - 1)
         config = started(nominal, settings.estimator)
-        core = WeakIdentifierQ31(native, config)
+        core = native.identifier(config)
         core.run(phi, y, sums=False, hashes=False)
         last = core.assess()
         q31.append(p_of(config, last["p"][:4])[:3] / TRUTH - 1)

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.core.native import EstimatorConfig, Native, Reason, TrustConfig, WeakConfig
+from pvid.core.native import Native
 from pvid.design.weak import WeakDesign, design
 from pvid.design.weak_sizing import Bounds, Sizes
 from pvid.oracle import strong as oracle
 from pvid.oracle import weak
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import EstimatorConfig, TrustConfig, WeakConfig
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
     STANDARD_PENDULUM,
@@ -226,7 +228,7 @@ def test_predicted_errors_are_the_measured_ones(standard: WeakDesign, bits: int)
     measured = np.sqrt(np.mean(relative**2, axis=0))
     # 40 seeds know an RMS to 11 %; R0 leaves out u, worth another 10 %
     np.testing.assert_allclose(predicted.relative, measured, rtol=0.35)
-    assert predicted.kappa == pytest.approx(8e-3, rel=0.5)  # "good" in MATH.md 4
+    assert predicted.kappa == pytest.approx(8e-3, rel=0.5)  # "good" in theory.md 4
 
 
 def test_prediction_from_rough_parameters(standard: WeakDesign) -> None:
@@ -261,7 +263,7 @@ def test_the_core_gives_the_oracles_answer(native: Native, standard: WeakDesign,
         row_sd=given.row_sd,
         kappa_min=given.kappa_min,
     )
-    identifier = native.weak(WeakConfig(1000.0, 0.3, standard.f32, config, zero, trust=TrustConfig(renewal=0.0)))
+    identifier = native.identifier(WeakConfig(1000.0, 0.3, standard.f32, config, zero, trust=TrustConfig(renewal=0.0)))
     record = identifier.run(run.phi, run.y, sums=False, hashes=False)
     answer = identifier.assess()
     result = weak.identify_weak(run.phi, run.y, standard, given)

@@ -14,13 +14,14 @@ from click.testing import CliRunner
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run, write_run
 from pvid.rig.sensor_steps import resolved
 from pvid.run.advice import advice, advice_on_refusal
 from pvid.run.excitation import excitation_of
 from pvid.run.identify import Identification, identify
+from pvid.settings.enums import Reason
 from pvid.sim.pendulum import STANDARD_DRIVE, Pendulum, Tone, simulate, standard_sensors
 
 LSB = 2 * np.pi / 2**12

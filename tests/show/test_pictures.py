@@ -16,10 +16,11 @@ from browser import chromium
 from rich.console import Console
 from selenium import webdriver
 
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
+from pvid.settings.enums import Reason
 from pvid.show.page import page
 from pvid.show.report import recording_of, write_report
 from pvid.show.view import LiveView

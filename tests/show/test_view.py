@@ -24,12 +24,13 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from pvid.base.rounding import with_error
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.history import NUMBERS, History, Thinned, envelope
 from pvid.log.reader import Account, LogReader, LogStream, Record
 from pvid.log.values import Rows, Values
 from pvid.log.words import kappa_share, kappa_words, reason_words
+from pvid.settings.enums import Reason
 from pvid.show.view import LiveView, sparkline
 
 TICKS = 12_000

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import EstimatorConfig, Law, Native, Reason, StrongConfig
+from pvid.core.native import Native
 from pvid.rig.file import Differentiator, RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import compare_run, first_difference
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import EstimatorConfig, StrongConfig
 from pvid.setup.f32 import strong_config
 from pvid.sim.pendulum import STANDARD_DRIVE, Drive, Simulation, simulate, standard_sensors, standard_start
 from pvid.twin import fnv
@@ -78,7 +80,9 @@ class Group:
         self.lanes = fed_rows + whole
         self.is_whole = [False] * len(fed_rows) + [True] * len(whole)
         self.estimators = [[native.estimator(lane, RATE) for native in natives] for lane in fed_rows]
-        self.identifiers = [[native.strong(replace(config, estimator=lane)) for native in natives] for lane in whole]
+        self.identifiers = [
+            [native.identifier(replace(config, estimator=lane)) for native in natives] for lane in whole
+        ]
         warming_up = window(config)
         phi, y = (x[first_row - warming_up :] for x in (run.phi, run.y))
         n, row_y, row_reason = StrongTwin(config).rows(phi, y)
@@ -158,7 +162,7 @@ def test_a_changed_bit_is_found_and_named(native: Native, standard_20_bits: Simu
     phi = run.phi[:500].copy()
     twin = StrongTwin(config).run(phi, run.y[:500])
     phi[300] = np.nextafter(np.float32(phi[300]), np.float32(1))
-    record = native.strong(config).run(phi, run.y[:500])
+    record = native.identifier(config).run(phi, run.y[:500])
     difference = first_difference(record, twin.p[:, :, 0], twin.sums[:, :, 0], twin.reason[:, 0])
     assert difference is not None
     assert difference.tick == 300  # five points: the newest sample enters at once
@@ -182,7 +186,7 @@ def test_hostile_samples_equal_the_twin(native: Native, standard_20_bits: Simula
         config = replace(config, estimator=replace(config.estimator, law=law))
         outcome = compare_run(native, config, phi, y)
         assert outcome.equal, outcome.difference
-        record = native.strong(config).run(phi, y)
+        record = native.identifier(config).run(phi, y)
         assert np.isfinite(record.p).all()
         assert np.isfinite(record.sums).all()
 
@@ -193,7 +197,7 @@ def test_a_drive_that_comes_and_goes_equals_the_twin(native: Native) -> None:
     config = replace(configuration("savitzky-golay"), drive_min=2.0)
     outcome = compare_run(native, config, run.phi, run.y)
     assert outcome.equal, outcome.difference
-    reasons = native.strong(config).run(run.phi, run.y).reason
+    reasons = native.identifier(config).run(run.phi, run.y).reason
     assert set(reasons[:2000]) == {Reason.WARMING_UP, Reason.HELD_NOT_EXCITED}
     assert (reasons[4000:5000] == Reason.UPDATED).all()
     assert (reasons[10000:11000] == Reason.HELD_NOT_EXCITED).all()
@@ -203,9 +207,9 @@ def test_a_drive_that_comes_and_goes_equals_the_twin(native: Native) -> None:
 def test_a_run_in_two_pieces_has_the_bits_of_one(native: Native, standard_20_bits: Simulation) -> None:
     run = standard_20_bits.run
     config = configuration("savitzky-golay")
-    whole = native.strong(config)
+    whole = native.identifier(config)
     whole.run(run.phi[:5000], run.y[:5000])
-    pieces = native.strong(config)
+    pieces = native.identifier(config)
     pieces.run(run.phi[:1234], run.y[:1234])
     pieces.run(run.phi[1234:5000], run.y[1234:5000])
     assert pieces.running_hash == whole.running_hash
@@ -215,7 +219,7 @@ def test_published_estimates_equal_the_twin(native: Native, standard_20_bits: Si
     run = standard_20_bits.run
     config = configuration("savitzky-golay")
     for ticks in (0, 100, 400, 2000):
-        identifier = native.strong(config)
+        identifier = native.identifier(config)
         identifier.run(run.phi[:ticks], run.y[:ticks])
         twin = StrongTwin(config)
         twin.run(run.phi[:ticks], run.y[:ticks])

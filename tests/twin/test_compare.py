@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from pvid.core.native import SIZES
 from pvid.core.sources import INCLUDES, core_sources, source
+from pvid.settings.bounds import SIZES
 
 MUTANTS = {
     "estimator_f32.c": (

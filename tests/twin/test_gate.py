@@ -13,10 +13,12 @@ from linear_rig import LINEAR_RIG
 from strong_lanes import strong_lanes
 
 from pvid.base.errors import PvidError
-from pvid.core.native import GateConfig, Native, Reason, Status
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import first_difference
+from pvid.settings.enums import Reason, Status
+from pvid.settings.f32 import GateConfig
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.twin.f32.gate import Gate
@@ -118,7 +120,7 @@ def test_the_weak_form_equals_its_twin(
     twin = WeakTwin(config)
     expected = twin.run(jolted.phi, jolted.y)
     for native in matrix.values():
-        core = native.weak(config)
+        core = native.identifier(config)
         record = core.run(jolted.phi, jolted.y, hashes=False)
         theirs = (expected.p[:, :, 0], expected.sums[:, :, 0], expected.reason[:, 0], expected.published[:, :, 0])
         assert first_difference(record, *theirs) is None, native.build
@@ -139,7 +141,7 @@ def test_the_strong_form_equals_its_twin_in_every_lane(matrix: dict[str, Native]
 def test_disturbed_windows_are_rejected(native: Native, jolted: Run) -> None:
     errors = {}
     for sigmas in (0.0, 4.0):
-        core = native.weak(weak_config(rig_with(outlier_gate=sigmas), 1000.0))
+        core = native.identifier(weak_config(rig_with(outlier_gate=sigmas), 1000.0))
         record = core.run(jolted.phi, jolted.y, sums=False)
         errors[sigmas] = np.abs(record.published[-1, :3] / STANDARD_PENDULUM.linear - 1).max()
         refused = np.flatnonzero(record.reason == OUTLIER)
@@ -150,7 +152,7 @@ def test_disturbed_windows_are_rejected(native: Native, jolted: Run) -> None:
 
 
 def test_a_refused_window_changes_nothing_but_its_counter(native: Native, jolted: Run) -> None:
-    core = native.weak(weak_config(rig_with(outlier_gate=4.0), 1000.0))
+    core = native.identifier(weak_config(rig_with(outlier_gate=4.0), 1000.0))
     record = core.run(jolted.phi, jolted.y)
     for tick in np.flatnonzero(record.reason == OUTLIER):
         assert np.array_equal(record.p[tick - 300], record.p[tick])
@@ -163,8 +165,8 @@ def test_gate_is_enabled_in_the_stationary_law_and_can_be_disabled(native: Nativ
         assert of(rig_with(form=form, stride=8), 1000.0).gate == GateConfig(sigmas, 0.0)
         assert of(rig_with(form=form, stride=8, law="pseudovelocity"), 1000.0).gate == GateConfig(0.0, 0.0)
         assert of(rig_with(form=form, stride=8, outlier_gate=0.0), 1000.0).gate == GateConfig(0.0, 0.0)
-    assert (native.weak(weak_config(RIG, 1000.0)).run(jolted.phi, jolted.y).reason == OUTLIER).any()
-    off = native.weak(weak_config(rig_with(outlier_gate=0.0), 1000.0))
+    assert (native.identifier(weak_config(RIG, 1000.0)).run(jolted.phi, jolted.y).reason == OUTLIER).any()
+    off = native.identifier(weak_config(rig_with(outlier_gate=0.0), 1000.0))
     assert not (off.run(jolted.phi, jolted.y).reason == OUTLIER).any()
 
 
@@ -174,7 +176,7 @@ def test_gate_rejects_nothing_of_a_regular_run(seed: int, native: Native) -> Non
     run = simulate(sensors=standard_sensors(14), truth="linear", duration=40.0, seed=seed).run
     hashes = []
     for sigmas in (0.0, 4.0):
-        core = native.weak(weak_config(rig_with(outlier_gate=sigmas), 1000.0, standard_start(seed)))
+        core = native.identifier(weak_config(rig_with(outlier_gate=sigmas), 1000.0, standard_start(seed)))
         core.run(run.phi, run.y, sums=False)
         assert core.counters["rejected_outlier"] == 0
         hashes.append(core.running_hash)
@@ -196,6 +198,6 @@ def test_gate_rejects_nothing_of_a_regular_run(seed: int, native: Native) -> Non
 def test_invalid_gate_is_refused(form: str, gate_config: GateConfig, status: Status, native: Native) -> None:
     with pytest.raises(PvidError, match=status.name.lower().replace("_", " ")):
         if form == "weak":
-            native.weak(replace(weak_config(RIG, 1000.0), gate=gate_config))
+            native.identifier(replace(weak_config(RIG, 1000.0), gate=gate_config))
         else:
-            native.strong(replace(strong_config(rig_with(form="strong", stride=8), 1000.0), gate=gate_config))
+            native.identifier(replace(strong_config(rig_with(form="strong", stride=8), 1000.0), gate=gate_config))

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import StrongIdentifierQ31
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare_q31 import first_difference
 from pvid.run.identify import identify
+from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start, strong_config
 from pvid.setup.q31 import counts_of, p_of, strong_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
@@ -36,7 +36,7 @@ def rig_of(bits: int, **identifier: Any) -> RigFile:
 
 
 def reasons_of(native: Native, rig: RigFile, run: Run) -> npt.NDArray[np.uint8]:
-    core = StrongIdentifierQ31(native, strong_config_q31(rig, run.sample_rate))
+    core = native.identifier(strong_config_q31(rig, run.sample_rate))
     return core.run(*counts_of(rig, run), sums=False).reason
 
 
@@ -67,7 +67,7 @@ def test_the_core_equals_its_twin_under_the_alarm(
     expected = twin.run(phi, y)
     assert twin.estimator.counters["misfits"][0] > 0
     for native in matrix.values():
-        core = StrongIdentifierQ31(native, config)
+        core = native.identifier(config)
         assert first_difference(core.run(phi, y, hashes=False), expected) is None, native.build
         assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
 
@@ -82,7 +82,7 @@ def test_change_that_sums_cannot_follow_raises_the_alarm(native: Native, changed
 def test_alarm_of_a_followed_change_ends_with_its_block(native: Native, changed: Run) -> None:
     rig = rig_of(FINE_BITS, forgetting_s=0.5)
     config = strong_config_q31(rig, SLOW_HZ)
-    core = StrongIdentifierQ31(native, config)
+    core = native.identifier(config)
     reason = core.run(*counts_of(rig, changed), sums=False).reason
     assert (reason == Reason.MISFIT).any()
     assert (reason[-1000:] == Reason.UPDATED).all()
@@ -96,7 +96,7 @@ def test_too_coarse_encoder_is_reported_in_fixed_point_too(bits: int, alarm: boo
     rig = rig_of(bits)
     reasons = reasons_of(native, rig, run)[8_500:]  # the second block is the first that is judged
     assert np.isin(reasons, DOUBTED).all() if alarm else not (reasons == Reason.MISFIT).any()
-    single = native.strong(strong_config(rig, run.sample_rate))
+    single = native.identifier(strong_config(rig, run.sample_rate))
     theirs = single.run(run.phi, run.y, sums=False).reason[8_500:]
     assert np.array_equal(reasons == Reason.MISFIT, theirs == Reason.MISFIT) or alarm
 
@@ -105,9 +105,9 @@ def test_standard_rig_raises_no_alarm_from_any_start(native: Native, standard_20
     rig = rig_of(20)
     counts = [c[:14_000] for c in counts_of(rig, standard_20_bits.run)]
     for seed in range(20):
-        core = StrongIdentifierQ31(native, strong_config_q31(rig, 1000.0, standard_start(seed)))
+        core = native.identifier(strong_config_q31(rig, 1000.0, standard_start(seed)))
         assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any(), seed
-    core = StrongIdentifierQ31(native, strong_config_q31(rig_of(20, law="pseudovelocity"), 1000.0))
+    core = native.identifier(strong_config_q31(rig_of(20, law="pseudovelocity"), 1000.0))
     assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any()
 
 

@@ -13,10 +13,11 @@ import pytest
 from linear_rig import LINEAR_RIG
 
 from bench.hard import CASES, Case
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import RecordQ31, WeakIdentifierQ31
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.run.compare_q31 import compare_run_q31
+from pvid.settings.enums import Reason
+from pvid.settings.record import Record
 from pvid.setup.f32 import weak_config
 from pvid.setup.q31 import config_for_run, counts_of, p_of, se_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
@@ -35,10 +36,10 @@ def case(label: str) -> Case:
 
 
 @lru_cache
-def played(label: str, seed: int) -> tuple[WeakIdentifierQ31, RecordQ31]:
+def played(label: str, seed: int) -> tuple[Identifier, Record]:
     one = case(label)
     run = one.run(seed, duration=DURATION_S)
-    core = WeakIdentifierQ31(Native(), weak_config_q31(one.rig, run.sample_rate, standard_start(seed)))
+    core = Native().identifier(weak_config_q31(one.rig, run.sample_rate, standard_start(seed)))
     return core, core.run(*counts_of(one.rig, run), sums=False, hashes=False)
 
 
@@ -97,8 +98,8 @@ def test_the_verdicts_are_those_of_float32(native: Native, truth: str) -> None:
     for seed in range(SEEDS):
         run = simulate(sensors=standard_sensors(14), truth=truth, duration=DURATION_S, seed=seed).run  # type: ignore[arg-type]
         start = standard_start(seed)
-        reference = native.weak(weak_config(rig, 1000.0, start)).run(run.phi, run.y, sums=False, hashes=False)
-        core = WeakIdentifierQ31(native, config_for_run(rig, run, start))  # type: ignore[arg-type]
+        reference = native.identifier(weak_config(rig, 1000.0, start)).run(run.phi, run.y, sums=False, hashes=False)
+        core = native.identifier(config_for_run(rig, run, start))
         own = core.run(*counts_of(rig, run), sums=False, hashes=False)
         assert verdicts(own.reason) == verdicts(reference.reason)
         # large angles in linear rows are alarmed from the first publication on

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from linear_rig import LINEAR_RIG
 
-from pvid.core.native import EstimatorConfig, Law, Native, WeakConfig
+from pvid.core.native import Native
 from pvid.run.compare import first_difference
+from pvid.settings.enums import Law
+from pvid.settings.f32 import EstimatorConfig, WeakConfig
 from pvid.setup.f32 import weak_config
 from pvid.sim.pendulum import Simulation, simulate, standard_sensors, standard_start
 from pvid.twin import fnv
@@ -52,9 +54,9 @@ def test_twenty_starts_equal_the_twin_in_every_build(
         p, sums = (np.ascontiguousarray(x[:, :, lane]) for x in (twin.p, twin.sums))
         reason = twin.reason[:, lane]
         for name, native in matrix.items():
-            record = native.weak(replace(config, estimator=estimator)).run(phi, y, hashes=False)
+            record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
             assert first_difference(record, p, sums, reason) is None, (name, lane)
         if lane == 0:
-            identifier = matrix["gcc-O2"].weak(replace(config, estimator=estimator))
+            identifier = matrix["gcc-O2"].identifier(replace(config, estimator=estimator))
             hashes = identifier.run(phi, y).hash
             assert np.array_equal(hashes, fnv.running_hashes(p, sums, reason))

@@ -18,7 +18,7 @@ from pvid.core.native import Native
 
 @click.group()
 def bench() -> None:
-    """Measures what the README and host/README.md claim and prints it as tables."""
+    """Measures what the README and the benchmark pages claim and prints it as tables."""
 
 
 @bench.command(name="demo")

@@ -1,4 +1,4 @@
-"""Results of the longevity bench that stay, and the tables of them in host/README.md."""
+"""Results of the longevity bench that stay, and the tables of them in host/docs/benchmarks/longevity.md."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ from bench.longevity import (
 from bench.longevity_signals import BEFORE, HELD_OUT, SCENARIOS, Disturbance
 from pvid.base.errors import PvidError
 from pvid.board.boards import ROOT, one_at_a_time
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.core.sources import FOLDERS, core_sources
+from pvid.settings.enums import Reason
 
 RESULTS = ROOT / "build" / "longevity" / "results.json"
 TICKS = 10_000_000

@@ -1,6 +1,6 @@
 /* pvid/snapshot_slots.h - what snapshots of every identifier share: their answers, their size, the choice of a slot.
  *
- * snapshot.h says how to use them. */
+ * snapshot.h explains their use. */
 #ifndef PVID_SNAPSHOT_SLOTS_H
 #define PVID_SNAPSHOT_SLOTS_H
 

@@ -1,5 +1,4 @@
-/* pvid/status.h - what the library answers, in either arithmetic: the status of an init, the reason code of a tick, the
- * counters; and the laws to choose from. */
+/* pvid/status.h - the status of an init, the reason code of a tick, counters and laws, in either arithmetic. */
 #ifndef PVID_STATUS_H
 #define PVID_STATUS_H
 

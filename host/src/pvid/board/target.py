@@ -24,7 +24,7 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.stream_image import build_image, settings_number
 from pvid.board.stream_rig import StreamRig
-from pvid.core.native import Native, Status
+from pvid.core.native import Native
 from pvid.link.frames import (
     Code,
     Counters,
@@ -40,6 +40,7 @@ from pvid.link.frames import (
 )
 from pvid.link.frames import Status as BoardStatus
 from pvid.link.port import Port, open_port
+from pvid.settings.enums import Status
 
 SAMPLES_A_FRAME = 64
 HOST_TARGET = "stream-host"

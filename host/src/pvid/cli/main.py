@@ -32,7 +32,6 @@ from pvid.cli.input import FigurePath, columns_option, print_notes, read_input, 
 from pvid.cli.log import COMMANDS as LOG_COMMANDS
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
-from pvid.core.native_q31 import WeakConfigQ31
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import to_c_header
@@ -46,6 +45,7 @@ from pvid.run import answer
 from pvid.run.compare import Comparison
 from pvid.run.identify import UNITS, ZERO, Identification, identify
 from pvid.run.survey import fitted
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.f32 import weak_design_of
 from pvid.setup.q31 import config_for_run, strong_config_q31, weak_config_q31
 from pvid.setup.strong_header_q31 import strong_header_q31

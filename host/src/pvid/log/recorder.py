@@ -24,7 +24,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import printable, reason
 from pvid.board.target import Target, refusal
 from pvid.link.frames import Code, Configuration, Credit, Hello, Message, Status, encode
-from pvid.link.port import Port, open_port, loss_cause
+from pvid.link.port import Port, loss_cause, open_port
 from pvid.log.file import LogWriter, Segment
 from pvid.log.reader import Account, LogStream, Observer, Record
 from pvid.log.tail import LogTail

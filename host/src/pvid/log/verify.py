@@ -24,8 +24,6 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import FixedConfig, FloatConfig, stream_rig
-from pvid.core.native import Law, Reason, StrongConfig, WeakConfig
-from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.link.frames import (
     MAX_P,
     Configuration,
@@ -43,6 +41,9 @@ from pvid.link.frames import (
 from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
 from pvid.run.compare import P_NAMES, Difference
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.twin import fnv
 from pvid.twin.q31.estimator import EstimatorQ31
 from pvid.twin.strong import StrongTwin

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import EstimatorConfig, Reason, StrongConfig
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import EstimatorConfig, StrongConfig
 from pvid.twin.f32.differentiator import derivatives
 from pvid.twin.f32.estimator import Estimator
 from pvid.twin.f32.gate import Gate

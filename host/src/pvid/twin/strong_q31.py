@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason
-from pvid.core.native_q31 import EstimatorConfigQ31, StrongConfigQ31
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31, StrongConfigQ31
 from pvid.twin.kapitza import strong_q31 as model
 from pvid.twin.q31.differentiator import derivatives
 from pvid.twin.q31.estimator import EstimatorQ31

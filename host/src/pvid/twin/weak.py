@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import EstimatorConfig, Reason, WeakConfig
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import EstimatorConfig, WeakConfig
 from pvid.twin.f32 import weak_finish, weak_front, weak_window
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.f32.estimator import RelativeEstimator

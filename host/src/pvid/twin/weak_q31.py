@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Reason
-from pvid.core.native_q31 import EstimatorConfigQ31, WeakConfigQ31
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31, WeakConfigQ31
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.kapitza import weak_q31 as kapitza_weak_q31
 from pvid.twin.q31 import weak_finish as weak_finish_q31

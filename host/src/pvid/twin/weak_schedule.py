@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Reason
+from pvid.settings.enums import Reason
 
 Mask = npt.NDArray[np.bool_]
 Reasons = npt.NDArray[np.uint8]

@@ -1,6 +1,6 @@
 /* pvid/kapitza_parameters.h - the pendulum's parameters by index, and how many there are, in either arithmetic.
  *
- * kapitza.h says what they mean, kapitza_weak.h what the weak form adds. */
+ * kapitza.h explains them, kapitza_weak.h those of the weak form. */
 #ifndef PVID_KAPITZA_PARAMETERS_H
 #define PVID_KAPITZA_PARAMETERS_H
 

@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import ESTIMATE_DTYPE, EstimatorConfig, Law, Reason
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import EstimatorConfig
+from pvid.twin import estimates
 from pvid.twin.f32 import cholesky
 from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.information import Information
@@ -234,7 +236,7 @@ class Estimator:
         return s, np.where(residual > floor, residual, floor)
 
     def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimator_assess_f32 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        """pvid_estimator_assess_f32 of every lane, dtype estimates.F32 [lanes]."""
         with np.errstate(all="ignore"):
             sums = self.information.read()
             s, residual = self._assessed(sums)
@@ -265,7 +267,7 @@ class Estimator:
         covariance = cholesky.inverse(f) * wide
         se = np.sqrt(np.stack([covariance[a, a] for a in range(n_p)]))
         known = f.ok & np.isfinite(covariance).all(axis=(0, 1)) & np.isfinite(se).all(axis=0)
-        out = np.zeros(self.p.shape[1], ESTIMATE_DTYPE)
+        out = np.zeros(self.p.shape[1], estimates.F32)
         out["p"][:, :n_p] = self.p.T
         out["kappa"] = np.where(kappa.ok, kappa.first_pivot, np.float32(0))
         out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))

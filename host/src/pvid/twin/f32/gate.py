@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import GateConfig
+from pvid.settings.f32 import GateConfig
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]

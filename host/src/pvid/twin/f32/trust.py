@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import ESTIMATE_DTYPE, Reason, TrustConfig
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import TrustConfig
+from pvid.twin import estimates
 from pvid.twin.f32.estimator import RelativeEstimator
 
 Float32 = npt.NDArray[np.float32]
@@ -45,7 +47,7 @@ def report(
 
 
 class Trust:
-    """pvid_trust_f32 of every lane of an estimator; `estimate` is what is published, ESTIMATE_DTYPE [lanes]."""
+    """pvid_trust_f32 of every lane of an estimator; `estimate` is what is published, estimates.F32 [lanes]."""
 
     def __init__(self, config: TrustConfig, estimator: RelativeEstimator) -> None:
         self.config = replace(config)
@@ -67,7 +69,7 @@ class Trust:
         self.misfit = np.zeros(lanes, np.bool_)
         self.long_mean = np.zeros(lanes, np.float32)
         self.recent = np.zeros((_SHORT, lanes), np.float32)
-        self.estimate = np.zeros(lanes, ESTIMATE_DTYPE)
+        self.estimate = np.zeros(lanes, estimates.F32)
         self.place()
         for a, sd in enumerate(estimator.start_sd):
             self.estimate["se"][:, a] = sd

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason, WeakTables
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import WeakTables
 from pvid.twin.f32 import weak_whiten
 from pvid.twin.f32.estimator import RelativeEstimator
 from pvid.twin.f32.gate import Gate

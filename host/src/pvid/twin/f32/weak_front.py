@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import WeakTables
+from pvid.settings.f32 import WeakTables
 from pvid.twin.weak_schedule import Schedule
 
 Float32 = npt.NDArray[np.float32]

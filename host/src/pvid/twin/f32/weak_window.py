@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import WeakTables
+from pvid.settings.f32 import WeakTables
 
 Float32 = npt.NDArray[np.float32]
 

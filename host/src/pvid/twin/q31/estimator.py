@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason
-from pvid.core.native_q31 import ESTIMATE_DTYPE, EstimatorConfigQ31
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.twin import estimates
 from pvid.twin.kapitza.weak_q31 import ModelQ31
 from pvid.twin.q31 import cholesky
 from pvid.twin.q31.integer import (
@@ -512,13 +513,13 @@ class EstimatorQ31:
         return np.where(known, clamp(misfit.fixed(16), 2**31 - 1), 0)
 
     def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimator_assess_q31 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        """pvid_estimator_assess_q31 of every lane, dtype estimates.Q31 [lanes]."""
         return self.judged()[0]
 
     def judged(self) -> tuple[npt.NDArray[np.void], Mask]:
         """The assessment, and where the data say more than noise of the variance found would [lanes]."""
         n_p = self.model.n_p
-        out = np.zeros(self.lanes, ESTIMATE_DTYPE)
+        out = np.zeros(self.lanes, estimates.Q31)
         out["p"][:, :n_p] = self.p.T
         out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
         out["misfit"] = self._misfit()

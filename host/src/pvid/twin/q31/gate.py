@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native_q31 import GateConfigQ31
+from pvid.settings.q31 import GateConfigQ31
 from pvid.twin.q31.integer import integers
 from pvid.twin.q31.scaled import Scaled, pick, scaled
 

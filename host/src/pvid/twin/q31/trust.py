@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Reason
-from pvid.core.native_q31 import ESTIMATE_DTYPE, TrustConfigQ31
-from pvid.twin.f32.trust import uninformative_groups, report
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import TrustConfigQ31
+from pvid.twin import estimates
+from pvid.twin.f32.trust import report, uninformative_groups
 from pvid.twin.q31.estimator import ONE, SIZE_BITS, EstimatorQ31
 from pvid.twin.q31.integer import Int, clamp, round_shift, square_root
 
@@ -27,7 +28,7 @@ _FADE, _FADE_GROUPS = 644245094, 4  # 0.3 in Q31
 
 
 class TrustQ31:
-    """pvid_trust_q31 of every lane of an estimator; `estimate` is what is published, ESTIMATE_DTYPE [lanes]."""
+    """pvid_trust_q31 of every lane of an estimator; `estimate` is what is published, estimates.Q31 [lanes]."""
 
     def __init__(self, config: TrustConfigQ31, estimator: EstimatorQ31) -> None:
         self.config = config
@@ -45,7 +46,7 @@ class TrustQ31:
         self.misfit = np.zeros(lanes, np.bool_)
         self.long_mean = np.zeros(lanes, np.int64)
         self.recent = np.zeros((_SHORT, lanes), np.int64)
-        self.estimate = np.zeros(lanes, ESTIMATE_DTYPE)
+        self.estimate = np.zeros(lanes, estimates.Q31)
         self.place()
         for a, sd in enumerate(estimator.start_sd):
             self.estimate["se"][:, a] = sd

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason
-from pvid.design.weak_q31 import COLUMN_TERMS, WeakTablesQ31
+from pvid.design.weak_q31 import COLUMN_TERMS
+from pvid.settings.enums import Reason
+from pvid.settings.tables import WeakTablesQ31
 from pvid.twin.q31 import cholesky
 from pvid.twin.q31.estimator import EstimatorQ31, length
 from pvid.twin.q31.gate import GateQ31

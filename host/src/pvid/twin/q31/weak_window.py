@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pvid.design.weak_q31 import HIGH_TERMS, TERM_BITS, TERMS, WeakTablesQ31
+from pvid.design.weak_q31 import HIGH_TERMS, TERM_BITS, TERMS
+from pvid.settings.tables import WeakTablesQ31
 from pvid.twin.f32.weak_window import window_count
 from pvid.twin.q31.integer import Int, round_shift
 from pvid.twin.q31.scaled import Scaled, scaled
