@@ -1,4 +1,4 @@
-"""Where a tick's instructions go: functions' counts are the whole, and the table in host/docs/benchmarks/cost.md is theirs."""
+"""Instructions of a tick by function: their sum is the whole, and host/docs/benchmarks/cost.md has them as measured."""
 
 from __future__ import annotations
 

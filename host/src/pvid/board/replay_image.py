@@ -43,7 +43,7 @@ MANY_TICKS = 100_000
 # Both fit 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20.
 ENCODER_BITS = {"strong": 20, "weak": 14}
 
-# The strong form's five points want 20 ms between samples (benchmarks/accuracy.md); its window then is five samples long.
+# The strong form's five points need 20 ms between samples (benchmarks/accuracy.md); its window is five samples long.
 SAMPLE_RATE = {"strong": 50.0, "weak": 1000.0}
 
 STRONG_SETTLED = 500  # ticks by which windows are full and the drive is noticed: from there all ticks are alike

@@ -59,7 +59,7 @@ def rows(shifts: RowShiftsQ31, phi: Int, u: Int) -> tuple[Int, Int, Mask]:
     return n, y, taker.fits
 
 
-def reported(terms: Int) -> Int:
+def sensitivity(terms: Int) -> Int:
     """w times the gradient in w of N^T theta, from N_i theta_i [11, lanes]."""
     return np.asarray(_POWERS_OF_W @ terms)
 
