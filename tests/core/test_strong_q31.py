@@ -179,7 +179,7 @@ def test_unsupported_size_is_reported(sensor: dict[str, float], sentence: str) -
 
 PROGRAM = """
 #include <stdio.h>
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "table.h"
 int main(void)
 {

@@ -29,15 +29,8 @@ typedef struct {
     float patience_s; /* until a changed mechanism is believed [s], 0..1e12; 0: never */
 } pvid_gate_config_f32;
 
-/* State; only the functions below write to it. */
-typedef struct {
-    float limit;    /* sigmas^2; 0: no gate */
-    float memory;   /* residuals that the scale remembers */
-    float floor;    /* least scale */
-    float widening; /* factor on the scale at an outlier */
-    float judged;   /* residuals taken in; stops at memory */
-    float scale;    /* mean square of what passed */
-} pvid_gate_f32;
+/* State: detail/gate_state.h. Only the functions below write to it. */
+typedef struct pvid_gate_f32 pvid_gate_f32;
 
 /* Prepares `self` for residuals that come at rate_hz, of which the scale remembers `memory` (at least 1) and whose mean
  * square is never taken to be below `floor` (> 0). Fails iff a field of config is not as described there; the status
@@ -52,5 +45,7 @@ bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square);
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/gate_state.h"
 
 #endif

@@ -25,15 +25,9 @@
 #define PVID_MISFIT_TIMES 3.0f    /* blocks of white noise differ by a quarter */
 #define PVID_MISFIT_BLOCK_S 4.0f  /* three swings of the slow mode */
 
-/* State; only the strong form writes to it. */
-typedef struct {
-    float growth;       /* of the quietest ones, a block, >= 1: forgetting */
-    float energy;       /* of the block so far: sum of e^2 */
-    float signal;       /* likewise: sum of (p[0] dY/dp[0])^2 */
-    float least_energy; /* of a block */
-    float least_part;   /* q of a block */
-    uint16_t block;     /* rows of a block, 1.. */
-    uint16_t left;      /* rows until it is judged, 1.. */
-} pvid_misfit_f32;
+/* State: detail/misfit_state.h. Only the strong form writes to it. */
+typedef struct pvid_misfit_f32 pvid_misfit_f32;
+
+#include "pvid/detail/misfit_state.h"
 
 #endif

@@ -25,9 +25,6 @@
 extern "C" {
 #endif
 
-/* What the noise inside the rows is described by; see `noise` below. */
-#define PVID_NOISE_TRACES 3
-
 typedef struct pvid_model_f32 pvid_model_f32;
 
 struct pvid_model_f32 {

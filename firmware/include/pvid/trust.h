@@ -27,7 +27,7 @@
 #include <stdint.h>
 
 #include "pvid/estimator.h"
-#include "pvid/publication.h"
+#include "pvid/detail/publication_mark.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -52,29 +52,8 @@ typedef struct {
 /* kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %. */
 extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 
-#define PVID_TRUST_SHORT 8
-#define PVID_TRUST_LONG 16
-
-/* State; only the functions below write to it. */
-typedef struct {
-    pvid_trust_config_f32 config;
-    uint16_t groups;        /* taken in; stops at its end */
-    uint16_t uninformative; /* groups in a row that said too little */
-    uint16_t judged;        /* residuals in long_mean; stops at long_memory; none before p is near */
-    uint16_t long_memory;
-    uint8_t next;      /* place of the next residual in recent */
-    bool errors_small; /* whether p's standard errors are small at present: while they are not nothing fades */
-    bool converged;    /* whether p has settled with small standard errors yet */
-    bool published;    /* whether an estimate has been trusted yet */
-    bool misfit;
-    uint8_t groups_to_fade;   /* groups before which the past is still to fade */
-    float anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
-    float long_mean;          /* of residual variances relative to what is expected */
-    float recent[PVID_TRUST_SHORT];
-    pvid_publication_mark mark;
-    pvid_estimate_f32 estimate; /* the published one, for the context that calls step */
-    pvid_estimate_f32 copy;     /* its second copy, for other contexts: see publication.h */
-} pvid_trust_f32;
+/* State: detail/trust_state.h. Only the functions below write to it. */
+typedef struct pvid_trust_f32 pvid_trust_f32;
 
 /* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as
  * described there; the status names it. */
@@ -107,5 +86,7 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/trust_state.h"
 
 #endif
