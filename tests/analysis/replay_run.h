@@ -4,6 +4,7 @@
 #define REPLAY_RUN_H
 
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 #define REPLAY_Q31 (STREAM_CORE == 1)
 #define REPLAY_WEAK (STREAM_FORM == 1)

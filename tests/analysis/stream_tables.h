@@ -3,6 +3,7 @@
 #define STREAM_TABLES_H
 
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 #if (STREAM_CORE == 1) && (STREAM_FORM == 1)
 extern const pvid_weak_config_q31 stream_config;

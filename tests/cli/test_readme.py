@@ -49,7 +49,7 @@ def test_program_identifies_the_standard_rig(program: str, tmp_path: Path) -> No
     page, truth = PROGRAMS[program]
     (tmp_path / "example.c").write_text(blocks(page)[0], encoding="utf-8")
     RigFile.standard().write(tmp_path / "rig.toml")
-    command = [sys.executable, "-P", "-m", "pvid", "weak-table", "--rig", str(tmp_path / "rig.toml")]
+    command = [sys.executable, "-P", "-m", "pvid", "tables", "--rig", str(tmp_path / "rig.toml")]
     header = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     (tmp_path / "tables.h").write_text(header, encoding="utf-8")
     binary = tmp_path / "example"

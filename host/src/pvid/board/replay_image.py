@@ -162,7 +162,7 @@ def header(run: ReplayRun, samples: Path | None = None) -> str:
             "",
             "#include <stddef.h>",
             "",
-            '#include "pvid/pvid.h"',
+            f'#include "pvid/pvid{"_q31" if run.core == "q31" else ""}.h"',
             "",
             "#if defined(__AVR__)",
             "#include <avr/pgmspace.h>",
