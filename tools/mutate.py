@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Mutation check: one operator, sign or constant of the core is changed at a time, and the quick tests have to notice.
 
-    build/venv/bin/python tools/mutate.py                  240 mutants; writes tests/MUTANTS.md; a quarter of an hour
+    build/venv/bin/python tools/mutate.py                  240 mutants; writes build/mutants.md; a quarter of an hour
     build/venv/bin/python tools/mutate.py --count 10       ten of them; writes nothing
 
 The quick tests are two: what tests/playback.py plays through the shared library, under every setting of every form
@@ -44,7 +44,7 @@ from pvid.settings.bounds import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "mutate"
 MEMORY = ROOT / "build" / "mutants.json"
-PAGE = ROOT / "tests" / "MUTANTS.md"
+REPORT = ROOT / "build" / "mutants.md"
 REASONS = ROOT / "tests" / "mutants.toml"
 FIRMWARE = sources.FIRMWARE
 INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}"]
@@ -486,7 +486,7 @@ def campaign(
     return [(mutant, by or second.get(mutant)) for mutant, by in results]
 
 
-# ---- reasons and the page ----
+# ---- reasons and the report ----
 
 
 @dataclass(frozen=True)
@@ -558,13 +558,12 @@ def table(rows: list[str]) -> str:
     return "\n".join(["| where | line | change | why |", "|---|---|---|---|", *rows]) if rows else "None."
 
 
-def page_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
-    """tests/MUTANTS.md."""
+def report_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
+    """Rates and survivors."""
     told = tally(results)
     files = len({mutant.file for mutant, _ in results})
     could = told.mutants - len(told.equivalent)
-    return f"""<!-- Written by tools/mutate.py; the reasons are those of tests/mutants.toml. -->
-# Mutation check
+    return f"""# Mutation check
 
 {told.mutants} mutants of the {files} files of `firmware/src` and `firmware/models`, drawn with seed {seed}, by each
 file's number of them: one operator, sign or constant changed. {told.killed} were killed:
@@ -587,16 +586,16 @@ No input within what the headers allow shows a difference:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=0, help=f"mutants; without it {COUNT}, and the page is written")
+    parser.add_argument("--count", type=int, default=0, help=f"mutants; without it {COUNT}, and the report is written")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--anew", action="store_true", help="ask those again, too, that were killed before")
+    parser.add_argument("--restart", action="store_true", help="ask those again, too, that were killed before")
     given = parser.parse_args()
-    if given.anew:
+    if given.restart:
         MEMORY.unlink(missing_ok=True)
     results = campaign(given.count or COUNT, given.seed, memory=MEMORY)
     told = tally(results)
     if not given.count:
-        PAGE.write_text(page_of(results, given.seed), encoding="utf-8")
+        REPORT.write_text(report_of(results, given.seed), encoding="utf-8")
     print(
         f"{told.killed} of {told.mutants} mutants killed, {len(told.equivalent)} equivalent: "
         f"{100 * told.rate:.1f} % of those that could be"

@@ -3,7 +3,7 @@
 
     tools/prove.py            all of them; exits 1 when one leaves an alarm that is not explained
     tools/prove.py link       one of them
-    tools/prove.py --update   writes the table of firmware/README.md, too
+    tools/prove.py --update   writes the table of host/docs/proofs.md as well
 
 A program feeds the functions of one module every input that their header allows. That Eva raises no alarm proves, for
 all of these inputs: no overflow of signed arithmetic, no value lost in a conversion to a smaller signed type, no access
@@ -38,7 +38,7 @@ INCLUDES = " ".join(
         *("firmware/link", "firmware/ports", "tests/proofs", "tests/unit"),
     )
 )
-PAGE = ROOT / "firmware" / "README.md"
+PAGE = ROOT / "host" / "docs" / "proofs.md"
 LONGEST = 3600  # seconds: many times what the slowest needs on a machine that is busy
 
 
@@ -395,7 +395,7 @@ def prove(proof: Proof) -> Result:
 
 
 def table(results: list[tuple[Proof, Result]]) -> str:
-    """As firmware/README.md has it."""
+    """The table of host/docs/proofs.md."""
     rows = [
         f"| `{proof.name}` | {proof.covers} | {result.statements}{' goals' if proof.deduced else ''} | "
         f"{f'{len(proof.left)}: {proof.why}' if proof.left else 'none'} |"
@@ -419,7 +419,7 @@ def write_table(results: list[tuple[Proof, Result]]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(proof.name for proof in PROOFS))
-    parser.add_argument("--update", action="store_true", help="write the table of firmware/README.md")
+    parser.add_argument("--update", action="store_true", help="write the table of host/docs/proofs.md")
     given = parser.parse_args()
     if given.update and given.names:
         parser.error("--update is for all of them")

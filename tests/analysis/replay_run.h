@@ -4,6 +4,7 @@
 #define REPLAY_RUN_H
 
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "stream_rig.h"
 
 #define REPLAY_TYPE STREAM_TYPE

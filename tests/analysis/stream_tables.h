@@ -3,6 +3,7 @@
 #define STREAM_TABLES_H
 
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "stream_rig.h"
 
 extern const STREAM_CONFIG stream_config;

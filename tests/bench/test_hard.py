@@ -68,7 +68,7 @@ def test_estimate_without_information_is_not_published(label: str) -> None:
     [
         "friction of 0.0001 m^2/s, 14 bits",
         "full equations, 0.107 rad, 14 bits",
-        "14 bits, noise of 64 LSB, phi_lsb says 0.58",
+        "14 bits, noise of 64 LSB, phi_lsb set for 0.58",
     ],
 )
 def test_unmodelled_effects_raise_the_alarm(label: str) -> None:
@@ -101,7 +101,7 @@ def test_the_twin_has_the_same_bits_where_it_is_hard(native: Native, label: str)
 
 
 def test_the_modes_are_modes() -> None:
-    """Released in a mode without a drive, phi is one cosine: at 0.742 and 2.56 Hz (MATH.md 6)."""
+    """Released in a mode without a drive, phi is one cosine: at 0.742 and 2.56 Hz (theory.md 6)."""
     for shape, frequency in zip(modes(), (0.742, 2.56), strict=True):
         run = simulate(drive=(), sensors=Sensors(), release=(0.1 * shape[0], 0.1 * shape[1]), duration=10.0).run
         spectrum = np.abs(np.fft.rfft(run.phi * np.hanning(len(run.phi))))

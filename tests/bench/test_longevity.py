@@ -89,7 +89,7 @@ def test_nothing_of_ours_is_ever_silently_wrong(scenario: str, outcomes: Outcome
 
 
 # A mechanism that is held, or an encoder that sticks, looks like d2 = 0 where the strong form's sensors have noise (see
-# host/README.md); and the end of the drift is only two time constants ago in so short a run.
+# host/docs/benchmarks/longevity.md); and the end of the drift is only two time constants ago in so short a run.
 KNOWN_SILENT = {
     "absent": {"strong q31, 10 s", "strong q31, none"},
     "constant": {"strong q31, 10 s", "strong q31, none"},

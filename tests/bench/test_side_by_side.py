@@ -46,7 +46,7 @@ def weak() -> Outcome:
 
 
 def test_the_strong_form_fails_with_a_14_bit_encoder(native: Native) -> None:
-    """MATH.md 6: 14 to 58 % with differences, 2.8 % with the best smoother; no run is within 1 % of all three."""
+    """theory.md 6: 14 to 58 % with differences, 2.8 % with the best smoother; no run is within 1 % of all three."""
     differences = accuracy(
         through_core(native, form="strong", differentiator="finite-difference", stride=40), SENSORS, SEEDS
     )

@@ -49,7 +49,7 @@ def test_exact_derivatives_stationary_law_reaches_a_hundredth_of_a_percent_from_
 def test_exact_derivatives_pseudovelocity_law_stops_short_of_it(
     native: Native, exact_rows: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    """MATH.md 4: (5) alone leaves F where the early steps put it; `pvid bench laws` prints the whole table."""
+    """theory.md 4: (5) alone leaves F where the early steps put it; `pvid bench laws` prints the whole table."""
     n, y = exact_rows
     reached = 0
     for seed in range(40):

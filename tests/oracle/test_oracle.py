@@ -52,7 +52,7 @@ def around(start: Float, **changes: object) -> oracle.Settings:
 
 
 def test_linear_parameters_of_the_standard_rig() -> None:
-    """MATH.md 6 states them."""
+    """theory.md 6 states them."""
     p = oracle.linear(9.5, 0.12, 0.08, 0.3)
     np.testing.assert_allclose(p, [9.5 / 0.3, 8.875, 5.625], rtol=1e-15)
 
@@ -114,7 +114,7 @@ def test_rows_of_a_true_motion_satisfy_the_model(rows: tuple[Float, Float]) -> N
 
 
 def test_one_row_by_hand() -> None:
-    """MATH.md 2 with phi = (2, 0, 3, 5, 7), u = (1, 2, 4) and small whole numbers throughout."""
+    """theory.md 2 with phi = (2, 0, 3, 5, 7), u = (1, 2, 4) and small whole numbers throughout."""
     n, y = oracle.strong_rows([[2.0, 99.0, 3.0, 5.0, 7.0]], [[1.0, 2.0, 4.0]])
     assert y[0] == 7 - 2 * 2 * 5 + (2 * 4 - 4) * 3
     assert n[0].tolist() == [-14 + 20 + 12, -7, -3, -9, -9, -3, -2, -8, -12, -8, -2]
@@ -219,7 +219,7 @@ def test_the_divider_solves_every_so_many_rows(rows: tuple[Float, Float]) -> Non
 
 
 def test_without_a_drive_the_estimate_is_held_at_its_start() -> None:
-    """u = 0: the rows cannot tell w from d1, d2 (MATH.md 4: kappa near 1e-16)."""
+    """u = 0: the rows cannot tell w from d1, d2 (theory.md 4: kappa near 1e-16)."""
     exact = simulate(drive=(), truth="linear", duration=10.0).exact
     assert exact is not None
     n, y = oracle.strong_rows(exact.phi, exact.u)
@@ -245,7 +245,7 @@ def test_kappa_is_the_schur_complement() -> None:
 
 def test_kappa_separates_a_driven_rig_from_a_resting_one(sums: tuple[Float, Float, float]) -> None:
     c = oracle.jacobian(TRUTH)
-    assert oracle.kappa_of(c.T @ sums[0] @ c) > 1e-3  # MATH.md 4: weak 1e-4, good 1e-2
+    assert oracle.kappa_of(c.T @ sums[0] @ c) > 1e-3  # theory.md 4: weak 1e-4, good 1e-2
 
 
 def test_standard_errors_cover_the_truth(rows: tuple[Float, Float]) -> None:

@@ -228,7 +228,7 @@ def test_predicted_errors_are_the_measured_ones(standard: WeakDesign, bits: int)
     measured = np.sqrt(np.mean(relative**2, axis=0))
     # 40 seeds know an RMS to 11 %; R0 leaves out u, worth another 10 %
     np.testing.assert_allclose(predicted.relative, measured, rtol=0.35)
-    assert predicted.kappa == pytest.approx(8e-3, rel=0.5)  # "good" in MATH.md 4
+    assert predicted.kappa == pytest.approx(8e-3, rel=0.5)  # "good" in theory.md 4
 
 
 def test_prediction_from_rough_parameters(standard: WeakDesign) -> None:

@@ -85,7 +85,7 @@ def test_linear_equations_are_no_alternative_at_large_angles(native: Native) -> 
 
 
 def test_bad_sizes_are_replaced(native: Native) -> None:
-    """A window of half a slow period, where MATH.md 5 says that the weak form collapses."""
+    """A window of half a slow period, where theory.md 5 says that the weak form collapses."""
     bad = with_identifier(STANDARD.rig, window_s=0.6, test_functions=8)
     run = STANDARD.run(0)
     choice = tune(run, bad, native)

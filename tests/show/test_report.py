@@ -110,7 +110,7 @@ def test_residuals_of_the_strong_form() -> None:
 
 
 def test_modes_of_the_standard_rig() -> None:
-    assert modes_hz(P) == pytest.approx((0.742, 2.56), rel=2e-3)  # MATH.md section 6
+    assert modes_hz(P) == pytest.approx((0.742, 2.56), rel=2e-3)  # theory.md 6
 
 
 def test_parameters_outside_the_physical_region_have_no_modes_hz() -> None:

@@ -134,7 +134,7 @@ def stage_costs(binary: Path) -> list[StageCost]:
 
 
 def as_markdown(by_level: dict[str, list[StageCost]], state: dict[str, int]) -> str:
-    """The table in firmware/README.md from the costs at each level of optimisation."""
+    """The table in host/docs/benchmarks/cost.md from the costs at each level of optimisation."""
     levels = list(by_level)
     lines = ["| stage | " + " | ".join(f"gcc {level}" for level in levels) + " | what it does |"]
     lines.append("|---|" + "---:|" * len(levels) + "---|")

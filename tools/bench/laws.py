@@ -1,4 +1,4 @@
-"""The two laws and their limits, on exact derivatives: MATH.md 4's table, measured again in the C core."""
+"""The two laws and their limits, on exact derivatives: theory.md 4, measured in the C core."""
 
 from __future__ import annotations
 

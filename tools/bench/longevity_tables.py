@@ -1,4 +1,4 @@
-"""Results of the longevity bench that stay, and the tables of them in host/README.md."""
+"""Results of the longevity bench that stay, and the tables of them in host/docs/benchmarks/longevity.md."""
 
 from __future__ import annotations
 

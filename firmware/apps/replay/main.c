@@ -7,7 +7,6 @@
  */
 #include "port.h"
 #include "pvid/little_endian.h"
-#include "pvid/pvid.h"
 #include "replay_run.h"
 #include "report.h"
 

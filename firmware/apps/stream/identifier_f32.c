@@ -2,6 +2,7 @@
 
 #include "identifier.h"
 #include "pvid/little_endian.h"
+#include "pvid/pvid.h"
 #include "stream_tables.h"
 
 static STREAM_TYPE identifier;

@@ -67,6 +67,7 @@ class Case(ABC):
     sample_type: ClassVar[type[np.generic]]  # of the samples that the core takes
     frame: ClassVar[Any]  # of samples to the board
     configure_frame: ClassVar[Any]
+    umbrella: ClassVar[str]  # the header of the whole core
     matrix: ClassVar[str]  # in an estimate: covariance, or correlation beside standard errors
     linear_rows_only: ClassVar[bool]  # whether its weak form has no correction for large angles
     _single: ClassVar[tuple[str, ...]]  # fields of the estimator's settings in a Configure frame, besides
@@ -215,6 +216,7 @@ class _Float(Case):
     sample_type = np.float32
     frame = frames.Sample
     configure_frame = frames.Configure
+    umbrella = "pvid/pvid.h"
     matrix = "covariance"
     linear_rows_only = False
     _single = ("row_sd", "forgetting_s", "feedback_hz", "law")
@@ -272,6 +274,7 @@ class _Fixed(Case):
     sample_type = np.int32
     frame = frames.Count
     configure_frame = frames.ConfigureQ31
+    umbrella = "pvid/pvid_q31.h"
     matrix = "correlation"
     linear_rows_only = True
     _single = ("row_sd", "forgetting_groups", "gain")

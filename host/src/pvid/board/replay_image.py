@@ -40,8 +40,8 @@ class Sampling(NamedTuple):
     bits: int
 
 
-# Both fit 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20. The strong form's five points want 20 ms between samples
-# (host/README.md); its window then is five samples long.
+# Both fit 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20. The strong form's five points need 20 ms between samples
+# (benchmarks/accuracy.md); its window is five samples long.
 SAMPLING: dict[Form, Sampling] = {"strong": Sampling(50.0, 20), "weak": Sampling(1000.0, 14)}
 
 
@@ -138,7 +138,7 @@ def header(run: ReplayRun, samples: Path | None = None) -> str:
             "",
             "#include <stddef.h>",
             "",
-            '#include "pvid/pvid.h"',
+            f'#include "{case.umbrella}"',
             "",
             "#if defined(__AVR__)",
             "#include <avr/pgmspace.h>",

@@ -8,7 +8,7 @@ last 8900 years at 1 kHz. `Frame.tick` and `encode` combine them. The ticks of a
 session number in the same frames distinguishes a restart from a wrapped counter.
 
 The classes below with a `TYPE` are the only definition of the payloads: the schema text that a board sends, its hash in
-every header and firmware/link/schema.h are generated from them (`pvid link-schema`).
+every header and firmware/link/schema.h are generated from them (`pvid schema`).
 
     decoder = Decoder()
     for item in decoder.feed(port.read(...)):
@@ -776,7 +776,7 @@ def c_header() -> str:
     """firmware/link/schema.h."""
     text = SCHEMA_TEXT.split("\n")
     lines = [
-        "/* Made by `pvid link-schema`: do not edit. The fields are explained in host/src/pvid/link/frames.py. */",
+        "/* Made by `pvid schema`: do not edit. The fields are explained in host/src/pvid/link/frames.py. */",
         "#ifndef PVID_SCHEMA_H",
         "#define PVID_SCHEMA_H",
         "",

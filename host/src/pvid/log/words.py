@@ -37,7 +37,7 @@ _REASONS = {
     "another mechanism",
 }
 
-# What the core publishes (trust.h), and what a good drive reaches (MATH.md 4).
+# What the core publishes (trust.h), and what a good drive reaches (theory.md 4).
 KAPPA_MIN, KAPPA_WEAK, KAPPA_GOOD = 3e-5, 1e-3, 5e-3
 _KAPPA_SHOWN = (1e-6, 1.0)
 

@@ -1,4 +1,4 @@
-"""The weak form in float64, straight from MATH.md section 5, to be read beside it.
+"""The weak form in float64, straight from theory.md 5, to be read beside it.
 
 Nothing here is fast or bit-exact; it is what the twin and the C core are measured against, and where what the
 core does not have yet is tried: the full-angle correction and the two damping regressors.
@@ -647,7 +647,7 @@ def identify_weak(
 
 # ---- prediction
 
-# Without a drive kappa is 1e-16 and S cannot be inverted; the weakest useful drives leave 1e-5 (MATH.md 4).
+# Without a drive kappa is 1e-16 and S cannot be inverted; the weakest useful drives leave 1e-5 (theory.md 4).
 _UNDRIVEN_KAPPA = 1e-10
 
 

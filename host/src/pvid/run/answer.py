@@ -14,7 +14,7 @@ NAMES = (*PHYSICAL, *LINEAR, ZERO)
 
 
 def as_json(result: Identification) -> dict[str, Any]:
-    """The object of `identify --json` (MODELS.md 5): null where nothing is identified or judged."""
+    """The object of `identify --json` (host/docs/index.md): null where nothing is identified or judged."""
     parameters = {name: _parameter(result, name) for name in NAMES}
     beyond = result.beyond
     return {
