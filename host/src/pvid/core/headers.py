@@ -81,7 +81,8 @@ class Headers:
 
     def __init__(self, text: str) -> None:
         self.ffi = FFI()
-        self.ffi.cdef(text)
+        # without const, which is for cffi a constant that has no address
+        self.ffi.cdef(text.replace("extern const ", "extern "))
 
     @staticmethod
     def of(library: Path) -> Headers:
