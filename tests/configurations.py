@@ -343,14 +343,46 @@ def subjects(native: Native) -> dict[str, Subject]:
     return {name: Subject(name, stepper) for name, stepper in made.items()}
 
 
+# Fields that contradict each other, or the flags: for the identifiers that have them.
+TOGETHER: tuple[dict[str, Any], ...] = (
+    {"zero_unknown": False},
+    {"zero_unknown": False, "estimator.start_sd[3]": 0},
+    {"friction": True},
+    {"full_angle": False, "friction": False, "passes": 0},
+    {"design.window": 9, "design.decimation": 1, "iterations": 10},
+    {"design.window": 9, "design.decimation": 64, "iterations": 10},
+    {"gate.sigmas": 4.0, "gate.patience_s": 2.0},
+    {"estimator.feedback_hz": 0.01},
+    {"estimator.gain": 2**29},
+)
+
+
 def digest(native: Native) -> str:
-    """What init answers to all edges of all fields, and the states that it makes."""
+    """What init answers to all edges of all fields and tables, and the states that it makes."""
     told = hashlib.sha256()
+
+    def tell(subject: Subject, what: object, status: Status) -> None:
+        told.update(f"{what} {status}\n".encode())
+        if status is Status.OK and isinstance(subject.identifier, Identifier):
+            told.update(snapshot.save(subject.identifier))
+
     for subject in subjects(native).values():
         subject.empty_tables()
         for name, value, _ in subject.edges():
-            status = subject.status_with({name: value})
-            told.update(f"{name} {value} {status}\n".encode())
-            if status is Status.OK and isinstance(subject.identifier, Identifier):
-                told.update(snapshot.save(subject.identifier))
+            tell(subject, (name, value), subject.status_with({name: value}))
+        for values in TOGETHER:
+            if values.keys() <= subject.fields.keys():
+                tell(subject, values, subject.status_with(values))
+        subject.restore()
+        for name, table in subject.tables.items():
+            kind = HEADERS.dtype(subject.fields[name].kind.item)
+            extremes = [math.nan] if kind.kind == "f" else [np.iinfo(kind).min, np.iinfo(kind).max]
+            for place in (0, subject.entries[name] - 1, subject.entries[name]):
+                for value in extremes:
+                    table[place] = value
+                    tell(subject, (name, place, value), subject.identifier.initialise())
+                table[place] = 0
+        if subject.design is not None:
+            subject.identifier.config_struct.design = HEADERS.ffi.NULL
+            tell(subject, "no design", subject.identifier.initialise())
     return told.hexdigest()[:16]
