@@ -20,6 +20,7 @@ from pvid.core.native import Native, Reason
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
+from pvid.rig.file import RigFile
 from pvid.show.page import page
 from pvid.show.report import recording_of, write_report
 from pvid.show.view import LiveView
@@ -70,7 +71,8 @@ def test_the_terminal_view_fits_80_by_24_whatever_it_has_to_say(
     for worst in (False, True):
         frames = [link.encode(told(message), i & 0xFFFF, tick) for i, (tick, message) in enumerate(sent)]
         console = Console(width=80, height=24, force_terminal=True, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-        view, stream = LiveView(console, "/dev/ttyACM0 -> run.pvlog", 0.3, "http://127.0.0.1:8765/"), LogStream()
+        mechanism, stream = RigFile.standard().mechanism, LogStream()
+        view = LiveView(console, "/dev/ttyACM0 -> run.pvlog", mechanism, "http://127.0.0.1:8765/")
         writer = LogWriter(tmp_path / f"{worst}.pvlog")
         writer.begin("/dev/ttyACM0", None)
         writer.take(b"".join(frames[:300] + frames[305 if worst else 300 :]))

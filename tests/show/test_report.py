@@ -80,7 +80,7 @@ def test_residuals_at_wrong_parameters_or_of_another_mechanism_are_larger() -> N
 def test_residuals_are_those_that_the_board_reports(log: Path) -> None:
     recording = recording_of(log, None)
     residuals = residuals_of(recording.run, recording.rig, recording.p)
-    values, told = Values(0.3), 0.0
+    values, told = Values(STANDARD.mechanism), 0.0
     for record in LogReader(log):
         for rows in values.rows(record):
             if rows.table == "estimates":
@@ -196,7 +196,9 @@ def test_a_report_of_an_estimate_outside_the_physical_region(log: Path, tmp_path
     wild = replace(recording, physical=nowhere, physical_se=nowhere, p=p, estimate=estimate)
     write_report(wild, tmp_path / "wild.svg")
     text = shown(tmp_path / "wild.svg")
-    assert "estimate: outside the physical region: w = 11.560 ± 0.010, d1 = 0.250 ± 0.010, d2 = 0.200 ± 0.010" in text
+    assert (
+        "estimate: outside the physical region: w = 11.560 ± 0.010 1/s², d1 = 0.250 ± 0.010, d2 = 0.200 ± 0.010" in text
+    )
     assert "no pendulum has these parameters" in text
     assert "mode at" not in text and "nan" not in text
 

@@ -107,7 +107,7 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
     source = RehearsedSource(behaviour)
     console = Console(file=screen, force_terminal=True, width=100)
     views: list[Observer] = [
-        LiveView(console, "title", rig().l1),
+        LiveView(console, "title", rig().mechanism),
         StatusLine(line),
         Tee("udp://127.0.0.1:9"),
         Tee("teleplot://[::1]:9"),

@@ -24,6 +24,8 @@ from pvid.log.recorder import EmulatorSource, Logger, PortSource
 from pvid.log.rig import refuse_to_append, rig_of_log
 from pvid.log.rig_settings import rig_for
 from pvid.log.status import StatusLine
+from pvid.log.values import UNKNOWN_RIG
+from pvid.models.model import Mechanism
 from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile, load
 from pvid.show.page import DEFAULT as LIVE_PAGE
@@ -95,12 +97,12 @@ def log_command(
     board = None if rig is None else _board(rig)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)
-    l1 = None if rig is None else rig.l1
+    mechanism = UNKNOWN_RIG if rig is None else rig.mechanism
     title = f"{port} -> {out}"
     with page(web, out, title) if web is not None else nullcontext("") as address:
-        observers: list[Observer] = [Tee(one, l1) for one in tees]
+        observers: list[Observer] = [Tee(one, mechanism) for one in tees]
         if not quiet:
-            observers.append(_view(title, l1, address))
+            observers.append(_view(title, mechanism, address))
         logger = Logger(
             source=EmulatorSource(port, lambda: open_target(port, board)) if emulated and board else PortSource(port),
             out=out,
@@ -121,17 +123,17 @@ def log_command(
     return print_account(account, allow_loss, logger.failures)
 
 
-def _view(title: str, l1: float | None, address: str) -> Observer:
+def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
     if address and not is_local(address):
         tell(f"every computer that can reach this machine can open {address}")
     console = Console()
     if sys.stdout.isatty() and not console.is_dumb_terminal:
-        return LiveView(console, title, l1, address)
+        return LiveView(console, title, mechanism, address)
     tell(f"{title}; Ctrl-C ends the recording")
     if address:
         tell(f"live page: {address}")
-    return StatusLine(sys.stderr)
+    return StatusLine(sys.stderr, mechanism.model)
 
 
 def _board(rig: RigFile) -> StreamRig:
@@ -243,7 +245,7 @@ def export_command(log: Path, rig_path: Path | None, form: str, out: Path | None
     from pvid.log.export import export_log
 
     rig = load(rig_path) if rig_path is not None else rig_of_log(log)
-    for path in export_log(log, form, out or log.with_suffix(""), None if rig is None else rig.l1):
+    for path in export_log(log, form, out or log.with_suffix(""), UNKNOWN_RIG if rig is None else rig.mechanism):
         click.echo(path)
     return DONE
 

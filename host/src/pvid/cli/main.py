@@ -44,7 +44,7 @@ from pvid.rig.run import Run, write_run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.compare import Comparison
-from pvid.run.identify import UNITS, ZERO, Identification, identify
+from pvid.run.identify import Identification, identify
 from pvid.run.survey import fitted
 from pvid.setup.f32 import weak_design_of
 from pvid.setup.q31 import config_for_run, strong_config_q31, weak_config_q31
@@ -147,7 +147,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
         f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
         f"start {', '.join(f'{100 * (s / p - 1):+.0f} %' for s, p in zip(start, simulation.p, strict=True))} off"
     )
-    truths = _truths(simulation.pendulum)
+    truths = simulation.pendulum.truths
     with progress_bar(f"streaming to {on.target}, comparing with the twins", len(rigs) * len(run.t)) as advance:
         parts = play_demo(on, rigs, run, Native(), start, advance)
     for played in parts:
@@ -170,16 +170,11 @@ def _write_figure(result: Identification, path: Path, truths: dict[str, float] |
     click.echo(f"figure: {path}")
 
 
-def _truths(pendulum: Pendulum) -> dict[str, float]:
-    w, d1, d2 = pendulum.linear
-    return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2, "c": 0.0}
-
-
 def _print_result(result: Identification, rig: RigFile, truths: dict[str, float] | None = None) -> None:
     table = answer.table(result, truths)
     if table is not None:
         Console().print(table)
-    for line in (answer.error_line(result, rig.sensor.y_gain_sd, rig.l1_sd), answer.status_line(result)):
+    for line in (answer.error_line(result, rig), answer.status_line(result)):
         if line is not None:
             click.echo(line)
 
@@ -601,9 +596,10 @@ def design_command(
         click.echo(json.dumps(report.as_json()))
         return DONE
     table = Table("parameter", "predicted at", "standard error", "%", title=f"a run of {report.duration:g} s")
+    model = rig.mechanism.model
     for name, value in report.value.items():
-        share = f"{100 * report.se[name] / abs(value):.2g}" if name != ZERO else ""
-        label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
+        share = f"{100 * report.se[name] / abs(value):.2g}" if name != model.offset_name else ""
+        label = escape(model.answer(name).name_and_unit)
         table.add_row(label, *with_error(value, report.se[name]), share)
     Console().print(table)
     click.echo(f"kappa {report.kappa:.2g}; noise of a row {report.row_sd:.2g} rad")

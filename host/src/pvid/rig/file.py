@@ -8,6 +8,8 @@
     l2 = 0.1                  # m
     [identifier]
     law = "stationary"
+    [model]
+    name = "kapitza"
 
 Every key is a field of the dataclasses below, which hold its unit, range and default. A wrong key or value
 becomes a PvidError that names it.
@@ -18,12 +20,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import MOST_BYTES, TOO_LONG, toml_document
+from pvid.models.model import Mechanism
+from pvid.models.registry import DEFAULT, MODELS
 
 _Parsed = TypeVar("_Parsed")
 
@@ -198,13 +203,28 @@ class Identifier:
 
 
 @dataclass(frozen=True)
+class ModelTable:
+    """Which mechanism the rig is.
+
+    Attributes
+    ----------
+    name : of the model, one of pvid.models
+    """
+
+    name: str = field(default=DEFAULT, metadata={"choices": tuple(MODELS)})
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[model] ")
+
+
+@dataclass(frozen=True)
 class RigFile:
     """A rig and the way to identify it.
 
     Attributes
     ----------
     l1 : length of rod 1 [m]
-    nominal, sensor, identifier : the file's tables
+    nominal, sensor, identifier, model : the file's tables
     sample_rate : [Hz]; None: whatever the run says
     l1_sd : standard deviation of l1, relative: enters the standard errors, since no run shows it
     """
@@ -215,9 +235,21 @@ class RigFile:
     identifier: Identifier = field(default_factory=Identifier)
     sample_rate: float | None = _number(None, "Hz", 1e-3, 1e6)
     l1_sd: float = _number(0.001, "relative", 0.0, 1.0)
+    model: ModelTable = field(default_factory=ModelTable)
 
     def __post_init__(self) -> None:
         _check_fields(self, "")
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The model with the rig's known constants."""
+        model = MODELS[self.model.name]
+        return Mechanism(model, {one.name: getattr(self, one.name) for one in model.constants})
+
+    @property
+    def scale_sd(self) -> dict[str, float]:
+        """Standard deviations of the model's scales by their names, relative."""
+        return {one.name: attrgetter(one.sd_key)(self) for one in self.mechanism.model.scales}
 
     @classmethod
     def standard(cls) -> RigFile:
@@ -236,8 +268,10 @@ class RigFile:
             Keys and tables that come before those of the text.
         """
         top = _known(cls, _merged(toml_document(text), settings or {}), "")
-        if "l1" not in top:
-            raise PvidError("l1 is missing: the length of rod 1 [m]")
+        model = ModelTable(**_table(top.pop("model", {}), "model"))
+        for one in MODELS[model.name].constants:
+            if one.name not in top:
+                raise PvidError(f"{one.name} is missing: the {one.meaning} [{one.unit}]")
         tables = {name: _table(top.pop(name, {}), name) for name in _TABLES}
         top = _without_integers(cls, top)
         _check_value(_field(cls, "l1"), top["l1"], "")
@@ -247,13 +281,14 @@ class RigFile:
             nominal=Nominal(**guess),
             sensor=Sensor(**tables["sensor"]),
             identifier=Identifier(**tables["identifier"]),
+            model=model,
             **top,
         )
 
     def text(self) -> str:
         """TOML text with every key and its unit; `parse` gives the same rig back."""
         lines = _lines(self)
-        for name in ("sensor", "nominal", "identifier"):
+        for name in _TABLES:
             lines += ["", f"[{name}]", *_lines(getattr(self, name))]
         return "\n".join(lines) + "\n"
 
@@ -312,7 +347,12 @@ def check_setting(table: str, key: str, value: Any) -> Any:
     return value
 
 
-_TABLES: dict[str, type] = {"sensor": Sensor, "nominal": Nominal, "identifier": Identifier}
+_TABLES: dict[str, type] = {
+    "sensor": Sensor,
+    "nominal": Nominal,
+    "identifier": Identifier,
+    "model": ModelTable,
+}
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:

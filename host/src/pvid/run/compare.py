@@ -16,11 +16,12 @@ from pvid.core.native import (
     WeakConfig,
     WeakIdentifier,
 )
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
-P_NAMES = ("w", "d1", "d2", "c", "c1", "c2")
+P_NAMES = MODELS[DEFAULT].p_names  # the library holds one mechanism
 
 # Moments and entries of B by the number of sums: strong form, weak form with and without the encoder's zero, and with
 # friction.

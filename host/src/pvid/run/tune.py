@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from pvid.rig.file import Identifier, Nominal, RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.held_back import HeldBack, sigmas
-from pvid.run.identify import LINEAR, Identification, identify, largest_angle
+from pvid.run.identify import Identification, identify, largest_angle
 from pvid.run.survey import fitted, sized_for
 from pvid.setup.f32 import weak_design_of
 
@@ -86,11 +86,11 @@ class Judged:
 
     @property
     def error(self) -> float:
-        """Expected relative error, RMS over w, d1, d2: standard errors, and the bias of linear equations; infinite
-        where nothing is identified."""
+        """Expected relative error, RMS over the mapped parameters: standard errors, and the bias of linear equations;
+        infinite where nothing is identified."""
         if self.answer is None or not self.answer.identified:
             return math.inf
-        relative = [self.answer.se[name] / self.answer.value[name] for name in LINEAR]
+        relative = [self.answer.se[name] / self.answer.value[name] for name in self.answer.model.mapped_names]
         bias = 0.0 if self.rig.identifier.full_angle else _LINEAR_BIAS * self.answer.largest_angle**2
         return math.hypot(math.sqrt(sum(one**2 for one in relative) / len(relative)), bias)
 
@@ -98,7 +98,8 @@ class Judged:
         """Whether both answers are the same but for rounding: within a standard error, and as good."""
         if self.answer is None or other.answer is None or self.identified != other.identified:
             return False
-        near = [abs(self.answer.value[x] - other.answer.value[x]) <= other.answer.se[x] for x in LINEAR]
+        names = self.answer.model.mapped_names
+        near = [abs(self.answer.value[x] - other.answer.value[x]) <= other.answer.se[x] for x in names]
         return not self.identified or (all(near) and self.warned == other.warned)
 
     @property
@@ -244,8 +245,7 @@ def _decimations(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
 
 def _written(rig: RigFile, sample_rate: float, digits: int) -> RigFile:
     """The rig file with all that it leaves open, rounded to so many digits."""
-    guess = rig.nominal
-    nominal = Nominal(*(_rounded(x, digits) for x in (guess.l2, guess.rho2, guess.g)))
+    nominal = Nominal(**{name: _rounded(x, digits) for name, x in asdict(rig.nominal).items()})
     rig = replace(rig, nominal=nominal)
     design = weak_design_of(rig, sample_rate)
     return _with(
