@@ -21,10 +21,12 @@ from linear_rig import LINEAR_RIG
 
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import stream_rig
-from pvid.core.native import Native, Reason, WeakConfig
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import WeakConfig
 from pvid.sim.pendulum import simulate, standard_sensors, standard_start
 from pvid.twin import fnv
 
@@ -81,7 +83,7 @@ def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[i
         p_unit=board.p_unit,
         board="field",
     )
-    identifier = native.weak(board.config)
+    identifier = native.identifier(board.config)
     phi, y = run.phi.astype(np.float32)[: field.ticks], run.y.astype(np.float32)[: field.ticks]
     verdict = int(Reason.WARMING_UP)
     sample_hash = fnv.START

@@ -17,23 +17,16 @@ import numpy as np
 import numpy.typing as npt
 from linear_rig import LINEAR_RIG
 
-from pvid.core.native import Law, Native, StrongConfig, StrongIdentifier, TrustConfig, WeakConfig, WeakIdentifier
-from pvid.core.native_q31 import (
-    StrongConfigQ31,
-    StrongIdentifierQ31,
-    TrustConfigQ31,
-    WeakConfigQ31,
-    WeakIdentifierQ31,
-    physical_q31,
-)
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare_q31 import identifier_q31
+from pvid.settings.enums import Law
+from pvid.settings.f32 import StrongConfig, TrustConfig, WeakConfig
+from pvid.settings.q31 import StrongConfigQ31, TrustConfigQ31, WeakConfigQ31
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import counts_of, scale_of, strong_config_q31, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
-Identifier = WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdentifierQ31
 Config = WeakConfig | StrongConfig | WeakConfigQ31 | StrongConfigQ31
 Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
@@ -159,7 +152,7 @@ def weak_variants() -> list[Variant]:
     ungated: dict[str, Any] = {"kappa_min": 0, "noise_margin": 0}
     add("no gates", samples, estimator=ungated, estimator_q31=ungated)
     add("short steps", samples, estimator={"step_limit": 0.02}, estimator_q31={"step_limit": 1311})
-    hasty: dict[str, Any] = {"groups_min": 0, "shut_max": 1, "misfit_max": 0}
+    hasty: dict[str, Any] = {"groups_min": 0, "revert_after": 1, "misfit_max": 0}
     open_door = {"trust": TrustConfig(**hasty), "drive_min": 0.0}, {"trust": TrustConfigQ31(**hasty), "drive_min": 0}
     add("hostile", hostile_samples(), others=open_door[0], others_q31=open_door[1])
     add("shut at once", samples, others=open_door[0], others_q31=open_door[1])
@@ -167,8 +160,8 @@ def weak_variants() -> list[Variant]:
         "never shut",
         samples,
         with_settings(forgetting_s=1e5),
-        others={"trust": TrustConfig(shut_max=0)},
-        others_q31={"trust": TrustConfigQ31(shut_max=0)},
+        others={"trust": TrustConfig(revert_after=0)},
+        others_q31={"trust": TrustConfigQ31(revert_after=0)},
     )
     add("gate", samples, with_settings(outlier_gate=4.0, outlier_patience_s=3.0))
     add("dead zone", samples, with_settings(dead_zone=1.0))
@@ -251,8 +244,8 @@ def unit_tests() -> list[Path]:
 def started(native: Native, config: Config) -> Identifier:
     """The identifier of a configuration."""
     if isinstance(config, WeakConfig):
-        return native.weak(config)
-    return native.strong(config) if isinstance(config, StrongConfig) else identifier_q31(native, config)
+        return native.identifier(config)
+    return native.identifier(config)
 
 
 # ---- what they show ----
@@ -263,11 +256,11 @@ def look(core: Identifier, native: Native, config: Config, into: Any) -> None:
     estimate = core.assess()
     into.update(estimate.tobytes())
     into.update(repr(sorted(core.counters.items())).encode())
-    if isinstance(core, WeakIdentifier | WeakIdentifierQ31):
+    if core.publishes:
         into.update(core.estimate.tobytes())
         into.update(repr(core.misfit).encode())
     if isinstance(config, WeakConfigQ31 | StrongConfigQ31):
-        in_counts = physical_q31(native, estimate, scale_of(config, RIG.l1))
+        in_counts = native.physical_q31(estimate, scale_of(config, RIG.l1))
         into.update(b"" if in_counts is None else b"".join(x.tobytes() for x in in_counts))
     else:
         physical = native.physical(estimate, RIG.l1)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import EstimatorConfig, Native, StrongConfig
+from pvid.core.native import Native
 from pvid.run.compare import first_difference
+from pvid.settings.f32 import EstimatorConfig, StrongConfig
 from pvid.twin.strong import StrongTwin
 
 
@@ -28,7 +29,7 @@ def strong_lanes(
     for lane, estimator in enumerate(lanes):
         counters = {name: int(of[lane]) for name, of in twin.estimator.counters.items()}
         for native in matrix.values():
-            core = native.strong(replace(config, estimator=estimator))
+            core = native.identifier(replace(config, estimator=estimator))
             record = core.run(phi, y, hashes=False)
             theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
             assert first_difference(record, *theirs) is None, native.build

@@ -3,11 +3,11 @@
 
     tools/analyse.py            every finding, but for those that firmware/analysis.toml deviates from; exits 1 on one
     tools/analyse.py FILE...    of these sources alone
-    tools/analyse.py --update   writes firmware/MISRA.md too: the deviations, their reasons and how often each is used
+    tools/analyse.py --update   writes the numbers of findings into firmware/analysis.toml, too
 
 A deviation names a tool, a rule, a reason, and what it covers: files and a regular expression that the line of the
-finding has to match. One that covers nothing any more is an error; so is a required rule that is deviated from more
-often than MISRA.md says, until a person has looked and written it anew.
+finding has to match. One that covers nothing any more is an error. So is one of a required rule with more findings than
+its `most`, until a person has looked and run --update. build/analysis/deviations.md is the list with all counts.
 
 Ports are read as their processor's compilers read them, the applications as for this machine; Debian's avr-gcc is too
 old to have -fanalyzer.
@@ -29,10 +29,10 @@ from dataclasses import dataclass
 from units import FIRMWARE, PORTS, ROOT, Unit, applications, chosen, core, demand, ports, take_files
 
 DEVIATIONS = ROOT / "firmware" / "analysis.toml"
-PAGE = ROOT / "firmware" / "MISRA.md"
-FOLDERS = [FIRMWARE / name for name in ("src", "link", "ports", "apps")]
+FOLDERS = [FIRMWARE / name for name in ("src", "models", "link", "ports", "apps")]
 ASSERT = ["-include", "assert.h", "-DPVID_ASSERT(condition)=assert(condition)"]  # tells a tool what a caller owes
 BUILD = ROOT / "build" / "analysis"
+REPORT = BUILD / "deviations.md"
 GCC = {  # by family: the compiler, and what it needs to be told of the processor
     "host": ("gcc",),
     "cortex_m": ("arm-none-eabi-gcc", "-mcpu=cortex-m4"),
@@ -76,6 +76,7 @@ class Deviation:
     category: str = "required"  # MISRA's: an advisory rule's findings are counted but not limited
     files: tuple[str, ...] = ("firmware/*",)
     line: str = ""  # a regular expression, searched in the finding's line
+    most: int = 0  # findings of a required rule
 
     def covers(self, finding: Finding) -> bool:
         return (
@@ -192,23 +193,18 @@ def row_of(deviation: Deviation, count: int) -> str:
     return f"| {deviation.tool} {deviation.rule}{kind} | {count} | {scope} | {reason} |"
 
 
-def limits() -> dict[str, int]:
-    """How often each deviation is used according to MISRA.md, by the row without its count and reason."""
-    if not PAGE.exists():
-        return {}
-    rows = re.findall(
-        r"^\| (\S+ \S+(?: \(\w+\))?) \| (\d+) \| (.+?(?<!\\)) \| .*\|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE
-    )
-    return {f"{rule} | {scope}": int(count) for rule, count, scope in rows}
+def with_counts(text: str, counts: list[int | None]) -> str:
+    """analysis.toml with `most` of each deviation set to its count; None: without one."""
+    head, *blocks = text.split("[[deviation]]\n")
+    for number, (block, count) in enumerate(zip(blocks, counts, strict=True)):
+        block = re.sub(r"(?m)^most = \d+\n", "", block)
+        if count is not None:
+            block = re.sub(r"(?m)^(rule = .*\n)", rf"\g<1>most = {count}\n", block, count=1)
+        blocks[number] = block
+    return "[[deviation]]\n".join([head, *blocks])
 
 
-def limit_key(row: str) -> str:
-    match = re.match(r"\| (\S+ \S+(?: \(\w+\))?) \| \d+ \| (.+?(?<!\\)) \| ", row)
-    assert match is not None
-    return f"{match[1]} | {match[2]}"
-
-
-def page_of(used: list[tuple[Deviation, int]]) -> str:
+def report_of(used: list[tuple[Deviation, int]]) -> str:
     order = sorted(used, key=lambda pair: (pair[0].tool != "misra", pair[0].tool, natural(pair[0].rule)))
     in_place = run(["grep", "-rnE", "MISRA deviation|cppcheck-suppress|NOLINT", *map(str, FOLDERS)]).splitlines()
     in_place = [line.replace(f"{ROOT}/", "") for line in in_place]
@@ -217,8 +213,7 @@ def page_of(used: list[tuple[Deviation, int]]) -> str:
     )
     required = sum(count for entry, count in used if entry.tool == "misra" and entry.category == "required")
     advisory = sum(count for entry, count in used if entry.tool == "misra" and entry.category == "advisory")
-    head = f"""<!-- Written by tools/analyse.py --update; the reasons are those of firmware/analysis.toml. -->
-# Static analysis: what is deviated from, and why
+    head = f"""# Static analysis: what is deviated from, and why
 
 `tools/analyse.py`, a layer of `./tools/test`, runs gcc's -fanalyzer, clang-tidy (the checks of `.clang-tidy`) and
 cppcheck with its MISRA C:2012 add-on over the core, the link, the ports and the applications of `firmware`. Whatever is
@@ -241,7 +236,9 @@ def natural(rule: str) -> tuple[float, float, str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--update", action="store_true", help="write firmware/MISRA.md")
+    parser.add_argument(
+        "--update", action="store_true", help="write the numbers of findings into firmware/analysis.toml"
+    )
     take_files(parser)
     given = parser.parse_args()
     update, files = given.update, set(given.files)
@@ -260,22 +257,21 @@ def main() -> int:
         if count == 0 and (not files or set(entry.files) <= files)
     ]
     if update:
-        PAGE.write_text(page_of(counted), encoding="utf-8")
-    else:
-        written = limits()
-        for entry, count in counted:
-            limit = written.get(limit_key(row_of(entry, count)), 0)
-            if entry.category != "advisory" and count > limit:
-                found = "\n".join(f"  {finding}" for finding in findings if entry.covers(finding))
-                faults.append(
-                    f"{entry.key()}: {count} findings, {PAGE.name} says {limit}; mend it, or look and --update\n{found}"
-                )
+        counts = [None if entry.category == "advisory" else count for entry, count in counted]
+        DEVIATIONS.write_text(with_counts(DEVIATIONS.read_text(encoding="utf-8"), counts), encoding="utf-8")
+    for entry, count in counted:
+        if not update and entry.category != "advisory" and count > entry.most:
+            found = "\n".join(f"  {finding}" for finding in findings if entry.covers(finding))
+            says = f"{DEVIATIONS.name} says {entry.most}; fix it, or look and --update"
+            faults.append(f"{entry.key()}: {count} findings, {says}\n{found}")
+    if not files:
+        REPORT.write_text(report_of(counted), encoding="utf-8")
     print("\n".join(faults))
     covered = sum(count for _, count in counted)
     print(
         f"Found {len(faults)} faults"
         if faults
-        else f"All checks passed! {covered} findings deviated from, see {PAGE.name}"
+        else f"All checks passed! {covered} findings deviated from, see {DEVIATIONS.name}"
     )
     return 1 if faults else 0
 

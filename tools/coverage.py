@@ -2,17 +2,15 @@
 """Branch coverage of the C core and the link by the quick tests: the CMocka programs, and what tests/playback.py
 plays through the shared library.
 
-    build/venv/bin/python tools/coverage.py            measures, prints a table by file and what was missed
-    build/venv/bin/python tools/coverage.py --update   and writes tests/COVERAGE.md
+    build/venv/bin/python tools/coverage.py
 
-A minute of one core. Exits 1 below 95 % of the branches. PVID_ASSERT is compiled out: its other branch is misuse, and
-ends the program. Every branch that was missed stands in tests/COVERAGE.md, with its reason of
-tests/coverage.toml.
+Prints a table by file and the missed branches with their reasons of tests/coverage.toml, and writes the latter to
+build/coverage.md. A minute of one core. Exits 1 below 95 % of the branches. PVID_ASSERT is compiled out: its other
+branch is misuse, and ends the program.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import shutil
@@ -29,13 +27,14 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import playback  # noqa: E402 - of tests
 
-from pvid.core.native import SIZES  # noqa: E402
+from pvid.core import sources  # noqa: E402
+from pvid.settings.bounds import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "coverage"
-PAGE = ROOT / "tests" / "COVERAGE.md"
+REPORT = ROOT / "build" / "coverage.md"
 REASONS = ROOT / "tests" / "coverage.toml"
 FIRMWARE = ROOT / "firmware"
-INCLUDES = [f"-I{FIRMWARE / name}" for name in ("include", "src", "link")]
+INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
@@ -73,7 +72,7 @@ def run(*command: str | Path, **environment: str) -> str:
 def build() -> list[Path]:
     """The core with counters, as the CMocka programs and the shared library have it; returns the programs."""
     shutil.rmtree(BUILD, ignore_errors=True)
-    core = [*sorted((FIRMWARE / "src").glob("*.c")), FIRMWARE / "link" / "link.c"]
+    core = [*sources.core_sources(), FIRMWARE / "link" / "link.c"]
     tests = playback.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))
     jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, "--coverage"]) for path in core]
@@ -96,7 +95,10 @@ def build() -> list[Path]:
 
 def measured() -> list[File]:
     """What the counters of all runs say."""
-    filters = ["--filter", "firmware/src", "--filter", "firmware/link", "--exclude-unreachable-branches"]
+    filters = [
+        *("--filter", "firmware/src", "--filter", "firmware/models", "--filter", "firmware/link"),
+        "--exclude-unreachable-branches",
+    ]
     run("gcovr", "-r", ".", "--object-directory", BUILD, *filters, "--json", BUILD / "coverage.json", BUILD)
     with (BUILD / "coverage.json").open(encoding="utf-8") as file:
         found: dict[str, Any] = json.load(file)
@@ -130,17 +132,17 @@ def explained(files: list[File]) -> list[tuple[str, str, int, str]]:
     return rows
 
 
-def page_of(files: list[File]) -> str:
-    """tests/COVERAGE.md."""
+def report_of(files: list[File]) -> str:
+    """The missed branches as a table."""
     rows = [f"| {place} | `{line}` | {times} | {why} |" for place, line, times, why in explained(files)]
     missed = "\n".join(row.replace("||", "\\|\\|") for row in rows)
     taken, branches = sum(file.taken for file in files), sum(file.branches for file in files)
-    return f"""<!-- Written by tools/coverage.py --update; the reasons are those of tests/coverage.toml. -->
-# Branch coverage
+    return f"""# Branch coverage
 
-{taken} of the {branches} branches of `firmware/src` and `firmware/link` ({share(files):.1f} %) are taken by the CMocka
-programs and by what `tests/playback.py` plays, as gcov counts them at -O0: every operand of a `&&` or `||` has
-two. The slower tests were not asked. PVID_ASSERT, which ends the program, was compiled out. Missed:
+{taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
+are taken by the CMocka programs and by what `tests/playback.py` plays, as gcov counts them at -O0: every
+operand of a `&&` or `||` has two. The slower tests were not asked. PVID_ASSERT, which ends the program,
+was compiled out. Missed:
 
 | where | line | branches | why |
 |---|---|---:|---|
@@ -149,9 +151,6 @@ two. The slower tests were not asked. PVID_ASSERT, which ends the program, was c
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--update", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
-    given = parser.parse_args()
     if shutil.which("gcovr") is None:
         raise SystemExit("missing: gcovr (Debian's name); ./tools/test installs it")
     for program in build():
@@ -164,11 +163,9 @@ def main() -> int:
         print(f"| {file.name} | {file.taken} | {file.branches} |")
     for place, line, times, why in explained(files):
         print(f"{place} ({times}): {line} - {why}")
-    if given.update:
-        PAGE.write_text(page_of(files), encoding="utf-8")
-    print(
-        f"{sum(file.taken for file in files)} of {sum(file.branches for file in files)} branches: {share(files):.1f} %"
-    )
+    REPORT.write_text(report_of(files), encoding="utf-8")
+    taken, branches = sum(file.taken for file in files), sum(file.branches for file in files)
+    print(f"{taken} of {branches} branches: {share(files):.1f} %; {REPORT.relative_to(ROOT)}")
     return 0 if share(files) >= WANTED else 1
 
 

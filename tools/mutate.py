@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Mutation check: one operator, sign or constant of the core is changed at a time, and the quick tests have to notice.
 
-    build/venv/bin/python tools/mutate.py                  240 mutants; writes tests/MUTANTS.md; a quarter of an hour
+    build/venv/bin/python tools/mutate.py                  240 mutants; writes build/mutants.md; a quarter of an hour
     build/venv/bin/python tools/mutate.py --count 10       ten of them; writes nothing
 
 The quick tests are two: what tests/playback.py plays through the shared library, under every setting of every form
@@ -38,17 +38,20 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import playback  # noqa: E402 - of tests
 
-from pvid.core.native import SIZES, Native  # noqa: E402
+from pvid.core import sources  # noqa: E402
+from pvid.core.native import Native  # noqa: E402
+from pvid.settings.bounds import SIZES  # noqa: E402
 
 BUILD = ROOT / "build" / "mutate"
 MEMORY = ROOT / "build" / "mutants.json"
-PAGE = ROOT / "tests" / "MUTANTS.md"
+REPORT = ROOT / "build" / "mutants.md"
 REASONS = ROOT / "tests" / "mutants.toml"
-SOURCES = ROOT / "firmware" / "src"
-INCLUDES = [f"-I{ROOT / 'firmware' / name}" for name in ("include", "link")]
+FIRMWARE = sources.FIRMWARE
+INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}"]
+PRIVATE = [path.relative_to(FIRMWARE) for path in (sources.SRC, sources.MODEL)]
 BESIDES = (  # of the shared library, beside the core
     *(ROOT / "host" / "native").glob("[lr]*.c"),
-    ROOT / "firmware" / "link" / "link.c",
+    FIRMWARE / "link" / "link.c",
 )
 COUNT = 240
 LONGEST = 60  # seconds of processor time for what takes one
@@ -83,6 +86,18 @@ TOKEN = re.compile(
 # ---- mutants ----
 
 
+def files_of_core() -> list[Path]:
+    """Sources and private headers."""
+    found = [*sources.SRC.glob("*/*.[ch]"), *sources.MODEL.glob("*.[ch]")]
+    return sorted(found, key=lambda path: path.name)
+
+
+def place(name: str) -> Path:
+    """The file of this name: no two have the same."""
+    (found,) = (path for path in files_of_core() if path.name == name)
+    return found
+
+
 @dataclass(frozen=True, order=True)
 class Mutant:
     """`old` at an offset of a file becomes `new`; the `place`-th such token of its line."""
@@ -95,12 +110,12 @@ class Mutant:
 
     def text(self) -> str:
         """The file with the change."""
-        code = (SOURCES / self.file).read_text(encoding="utf-8")
+        code = place(self.file).read_text(encoding="utf-8")
         return code[: self.offset] + self.new + code[self.offset + len(self.old) :]
 
     def line(self) -> tuple[int, str]:
         """Number and text of its line as it is."""
-        code = (SOURCES / self.file).read_text(encoding="utf-8")
+        code = place(self.file).read_text(encoding="utf-8")
         number = code.count("\n", 0, self.offset)
         return number + 1, code.splitlines()[number].strip()
 
@@ -109,7 +124,7 @@ class Mutant:
         told = f"{seed} {self.file} {self.line()[1]} {self.old} {self.new} {self.place}"
         return hashlib.sha256(told.encode()).hexdigest()
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """The change in words."""
         return f"{self.file}:{self.line()[0]} {self.old.strip()} -> {self.new.strip()}: {self.line()[1]}"
 
@@ -150,7 +165,7 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
 
 def ranked(seed: int) -> dict[str, list[Mutant]]:
     """The mutants of every file in the order of a draw."""
-    files = sorted(path for path in SOURCES.iterdir() if path.suffix in (".c", ".h"))
+    files = files_of_core()
     found = {path.name: sorted(mutants_of(path), key=lambda mutant: mutant.rank(seed)) for path in files}
     return {name: mutants for name, mutants in found.items() if mutants}
 
@@ -178,10 +193,10 @@ class Kit:
     options: tuple[str, ...]
     checks: tuple[str, ...] = ()  # options of the linker as well
 
-    def compiles(self, target: Path, source: Path, headers: Path = SOURCES) -> bool:
-        """Compiles a file whose private headers stand beside it, or in `headers`."""
+    def compiles(self, target: Path, source: Path, top: Path = FIRMWARE) -> bool:
+        """Compiles a file whose private headers are those under `top`."""
         target.parent.mkdir(parents=True, exist_ok=True)
-        includes = [*INCLUDES, f"-I{headers}", f"-I{SOURCES}"]
+        includes = [*INCLUDES, *(f"-I{top / folder}" for folder in PRIVATE)]
         return ran([self.compiler, *COMMON, *self.options, *self.checks, *includes, "-c", source, "-o", target])
 
     def links(self, target: Path, objects: list[Path]) -> Path:
@@ -223,7 +238,7 @@ def made(kit: Kit, sources: list[Path]) -> list[Path]:
 def tests_of(kit: Kit) -> dict[str, float]:
     """Builds the core and the CMocka programs with a kit and runs these; seconds that each takes."""
     folder = BUILD / kit.name
-    kit.links(folder / "libpvidcore.so", made(kit, [*sorted(SOURCES.glob("*.c")), BESIDES[-1]]))
+    kit.links(folder / "libpvidcore.so", made(kit, [*sources.core_sources(), BESIDES[-1]]))
     seconds = {}
     for test in made(Kit(f"{kit.name}/tests", kit.compiler, kit.options, kit.checks), playback.unit_tests()):
         before = time.monotonic()
@@ -256,15 +271,16 @@ class Baseline:
 
 def headers_of(source: Path) -> set[str]:
     """The private headers that a source includes, also by way of others."""
-    command = ["gcc", *INCLUDES, f"-I{SOURCES}", "-MM", str(source)]
+    command = ["gcc", *INCLUDES, *(f"-I{FIRMWARE / folder}" for folder in PRIVATE), "-MM", str(source)]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return {Path(word).name for word in told.split() if word.endswith(".h") and Path(word).parent == SOURCES}
+    private = {str(path) for path in files_of_core()}
+    return {Path(word).name for word in told.split() if word in private and word.endswith(".h")}
 
 
 def baseline() -> Baseline:
     """Builds the core as it is and the CMocka programs; runs them once."""
     shutil.rmtree(BUILD, ignore_errors=True)
-    core = sorted(SOURCES.glob("*.c"))
+    core = sources.core_sources()
     library = NATIVE.links(BUILD / "libbaseline.so", made(NATIVE, [*core, *BESIDES]))
     including: dict[str, set[str]] = defaultdict(set)
     for path in (*core, *playback.unit_tests()):
@@ -336,10 +352,13 @@ def workshop(mutant: Mutant) -> Iterator[Path]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     try:
-        for path in SOURCES.iterdir():
-            (folder / path.name).symlink_to(path)
-        (folder / mutant.file).unlink()
-        (folder / mutant.file).write_text(mutant.text(), encoding="utf-8")
+        for path in files_of_core():
+            target = folder / path.relative_to(FIRMWARE)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if path.name == mutant.file:
+                target.write_text(mutant.text(), encoding="utf-8")
+            else:
+                target.symlink_to(path)
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -347,12 +366,13 @@ def workshop(mutant: Mutant) -> Iterator[Path]:
 
 def changed_library(kit: Kit, mutant: Mutant, base: Baseline, folder: Path, name: str) -> tuple[Path, bool] | None:
     """The core's library with the mutant in it, and whether its code is another; None if it does not compile."""
-    sources, _ = base.dependents(mutant.file)
-    replaced = [folder / kit.name / f"{stem}.o" for stem in sources]
-    if not all(kit.compiles(target, folder / f"{target.stem}.c") for target in replaced):
+    stems, _ = base.dependents(mutant.file)
+    replaced = [folder / kit.name / f"{stem}.o" for stem in stems]
+    changed = [folder / place(f"{stem}.c").relative_to(FIRMWARE) for stem in stems]
+    if not all(kit.compiles(*pair, folder) for pair in zip(replaced, changed, strict=True)):
         return None
     differs = any(code_of(path) != code_of(BUILD / kit.name / path.name) for path in replaced)
-    kept = [path for path in (BUILD / kit.name).glob("*.o") if path.stem not in sources]
+    kept = [path for path in (BUILD / kit.name).glob("*.o") if path.stem not in stems]
     return kit.links(folder / kit.name / name, sorted(kept) + replaced), differs
 
 
@@ -360,7 +380,7 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
     """The first CMocka program that fails; those that include a changed header are built anew."""
     library = changed_library(kit, mutant, base, folder, "libpvidcore.so")
     if library is None:
-        raise SystemExit(f"does not compile with {kit.name}: {mutant.told()}")
+        raise SystemExit(f"does not compile with {kit.name}: {mutant.describe()}")
     _, anew = base.dependents(mutant.file)
     for test in base.nearest_first(mutant.file):
         if kit is not PLAIN and base.seconds[test] > QUICK:
@@ -371,7 +391,7 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
             source = playback.UNIT / f"{test}.c"
             built = kit.compiles(program.with_suffix(".o"), source, folder)
             if not built or not kit.links_test(program, library[0].parent):
-                raise SystemExit(f"{test} does not compile with {kit.name}: {mutant.told()}")
+                raise SystemExit(f"{test} does not compile with {kit.name}: {mutant.describe()}")
         if not passes(program, library[0].parent):
             return test if kit is PLAIN else f"{test} ({kit.name})"
     return None
@@ -454,7 +474,7 @@ def campaign(
                 if by != "no mutant":
                     wanted[mutant.file] -= 1
                     results.append((mutant, by))
-                    print(f"{by or 'lives so far':40} {mutant.told()}", flush=True)
+                    print(f"{by or 'lives so far':40} {mutant.describe()}", flush=True)
         alive = [mutant for mutant, by in results if by is None]
         if not alive or not sanitizers:
             return results
@@ -462,11 +482,11 @@ def campaign(
             tests_of(kit)
         second = dict(zip(alive, judge(verdict_under_sanitizers, alive), strict=True))
     for mutant, by in second.items():
-        print(f"{by or 'LIVES':40} {mutant.told()}", flush=True)
+        print(f"{by or 'LIVES':40} {mutant.describe()}", flush=True)
     return [(mutant, by or second.get(mutant)) for mutant, by in results]
 
 
-# ---- reasons and the page ----
+# ---- reasons and the report ----
 
 
 @dataclass(frozen=True)
@@ -538,19 +558,19 @@ def table(rows: list[str]) -> str:
     return "\n".join(["| where | line | change | why |", "|---|---|---|---|", *rows]) if rows else "None."
 
 
-def page_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
-    """tests/MUTANTS.md."""
+def report_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
+    """Rates and survivors."""
     told = tally(results)
     files = len({mutant.file for mutant, _ in results})
     could = told.mutants - len(told.equivalent)
-    return f"""<!-- Written by tools/mutate.py; the reasons are those of tests/mutants.toml. -->
-# Mutation check
+    return f"""# Mutation check
 
-{told.mutants} mutants of the {files} files of `firmware/src`, drawn with seed {seed}, by each file's number of them:
-one operator, sign or constant changed. {told.killed} were killed: {100 * told.killed / told.mutants:.1f} % of all, and
-{100 * told.rate:.1f} % of the {could} that are not equivalent. {told.by_bits} of them by the bits of a few seconds of
-data (`tests/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over
-40 000 ticks, oracles, accuracy) were not asked.
+{told.mutants} mutants of the {files} files of `firmware/src` and `firmware/models`, drawn with seed {seed}, by each
+file's number of them: one operator, sign or constant changed. {told.killed} were killed:
+{100 * told.killed / told.mutants:.1f} % of all, and {100 * told.rate:.1f} % of the {could} that are not
+equivalent. {told.by_bits} of them by the bits of a few seconds of data
+(`tests/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over 40 000
+ticks, oracles, accuracy) were not asked.
 
 ## Survivors that a test could kill
 
@@ -566,7 +586,7 @@ No input within what the headers allow shows a difference:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=0, help=f"mutants; without it {COUNT}, and the page is written")
+    parser.add_argument("--count", type=int, default=0, help=f"mutants; without it {COUNT}, and the report is written")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--anew", action="store_true", help="ask those again, too, that were killed before")
     given = parser.parse_args()
@@ -575,14 +595,14 @@ def main() -> int:
     results = campaign(given.count or COUNT, given.seed, memory=MEMORY)
     told = tally(results)
     if not given.count:
-        PAGE.write_text(page_of(results, given.seed), encoding="utf-8")
+        REPORT.write_text(report_of(results, given.seed), encoding="utf-8")
     print(
         f"{told.killed} of {told.mutants} mutants killed, {len(told.equivalent)} equivalent: "
         f"{100 * told.rate:.1f} % of those that could be"
     )
     unexplained = [mutant for mutant, reason in told.others if reason is None]
     for mutant in unexplained:
-        print(f"no reason in {REASONS.name}: {mutant.told()}")
+        print(f"no reason in {REASONS.name}: {mutant.describe()}")
     return 1 if unexplained or told.rate < WANTED else 0
 
 

@@ -3,7 +3,7 @@
 
     tools/prove.py            all of them; exits 1 when one leaves an alarm that is not explained
     tools/prove.py link       one of them
-    tools/prove.py --update   writes the table of firmware/README.md, too
+    tools/prove.py --update   writes the table of host/docs/proofs.md as well
 
 A program feeds the functions of one module every input that their header allows. That Eva raises no alarm proves, for
 all of these inputs: no overflow of signed arithmetic, no value lost in a conversion to a smaller signed type, no access
@@ -33,9 +33,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 INCLUDES = " ".join(
     f"-I'{ROOT / name}'"
-    for name in ("firmware/include", "firmware/src", "firmware/link", "firmware/ports", "tests/proofs", "tests/unit")
+    for name in (
+        *("firmware/include", "firmware/src", "firmware/models/kapitza", "firmware/models/kapitza/include"),
+        *("firmware/link", "firmware/ports", "tests/proofs", "tests/unit"),
+    )
 )
-PAGE = ROOT / "firmware" / "README.md"
+PAGE = ROOT / "host" / "docs" / "proofs.md"
 LONGEST = 3600  # seconds: many times what the slowest needs on a machine that is busy
 
 
@@ -54,9 +57,14 @@ class Proof:
 
 
 ESTIMATOR = (
-    *("src/estimator_q31.c", "src/estimator_stages_q31.c", "src/estimator_system_q31.c"),
-    *("src/estimator_assess_q31.c", "src/information_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
-    *("src/cholesky_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+    *("src/solve/estimator_q31.c", "src/solve/stages_q31.c", "src/solve/system_q31.c"),
+    *(
+        "src/solve/assess_q31.c",
+        "src/solve/information_q31.c",
+        "models/kapitza/kapitza_weak_q31.c",
+        "models/kapitza/kapitza_strong_q31.c",
+    ),
+    *("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
 )
 
 
@@ -65,8 +73,8 @@ def in_stages(program: str) -> tuple[str, ...]:
     return (
         *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
         "-eva-slevel-function",
-        "main:200,asks_for_noise:5,eliminate_part:30,inform_stage:30,factor_stage:60,look:60,solve_stage:30,"
-        "pvid_estimator_advance_q31:100,pvid_estimator_assess_on_q31:100,kappa_stage:60,widen_stage:60,"
+        "main:200,checks_noise:5,eliminate_part:30,above_noise_stage:30,factor_stage:60,advance_shared:60,solve_stage:30,"
+        "pvid_estimator_advance_q31:100,pvid_estimator_assess_advance_q31:100,kappa_stage:60,widen_stage:60,"
         f"pvid_estimator_invert_q31:20,pvid_cholesky_eliminate_q31:20,{program}:5000",
     )
 
@@ -83,32 +91,32 @@ PROOFS = (
     Proof(
         "integer_q31",
         "every function, every argument, an octave of magnitudes at a time",
-        ("src/integer_q31.c",),
+        ("src/number/integer_q31.c",),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "33"),
     ),
     Proof(
         "scaled_of_q31",
         "`pvid_scaled_of_q31`, every number, an octave at a time",
-        ("src/scaled_q31.c", "src/integer_q31.c"),
+        ("src/number/scaled_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "66"),
     ),
     Proof(
         "scaled_q31",
         "sums at every distance of the exponents, products, quotients of any two numbers",
-        ("src/scaled_q31.c", "src/integer_q31.c"),
+        ("src/number/scaled_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "66"),
         taken=("pvid_scaled_of_q31",),
     ),
     Proof(
         "differentiator_q31",
         "the five-point bank at strides 1 to 3, from empty to three times round, any counts within 2^22",
-        ("src/differentiator_q31.c", "src/integer_q31.c"),
+        ("src/strong/differentiator_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "60", "-eva-min-loop-unroll", "40"),
     ),
     Proof(
         "differentiator_banks_q31",
         "any weights, shifts and full scales, any half and stride of windows up to 41 samples and the longest of each",
-        ("src/differentiator_q31.c", "src/integer_q31.c"),
+        ("src/strong/differentiator_q31.c", "src/number/integer_q31.c"),
         (
             *("-eva-min-loop-unroll", "161", "-eva-split-return", "full"),
             *("-eva-slevel-function", "any_bank:10,prepare:10,pvid_differentiator_init_q31:10"),
@@ -126,13 +134,13 @@ PROOFS = (
     Proof(
         "kapitza_q31",
         "theta and Jacobian of the three models within 2^60 for any p; their formats; the strong form's rows",
-        ("src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c", "src/integer_q31.c"),
+        ("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200"),
     ),
     Proof(
         "block_q31",
         "`pvid_to_block_q31`, any entries, the longest of each length, first or last",
-        ("src/cholesky_q31.c", "src/integer_q31.c"),
+        ("src/solve/cholesky_q31.c", "src/number/integer_q31.c"),
         (
             *("-eva-min-loop-unroll", "66", "-eva-slevel-function"),
             "pvid_bit_length_q31:20,pvid_scale_q31:20,pvid_magnitude_q31:5,pvid_to_block_q31:20",
@@ -141,10 +149,10 @@ PROOFS = (
     Proof(
         "cholesky_q31",
         "factor, its pivots and solutions, n = 1..4, any matrix within 30 bits, any right-hand side",
-        ("src/cholesky_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+        ("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
         (
             *("-eva-auto-loop-unroll", "200", "-eva-slevel", "100", "-eva-subdivide-non-linear", "4"),
-            *("-inline-calls", "pvid_pivot_is_data_q31", "-eva-domains", "equality,symbolic-locations"),
+            *("-inline-calls", "pvid_pivot_is_significant_q31", "-eva-domains", "equality,symbolic-locations"),
             *("-eva-split-return", "full"),
         ),
         taken=(
@@ -182,7 +190,7 @@ PROOFS = (
     Proof(
         "strong_q31",
         "any configuration; any tick on top of any state, whatever the bank's derivatives",
-        ("src/strong_q31.c", "src/gate_q31.c", "src/differentiator_q31.c", *ESTIMATOR),
+        ("src/strong/strong_q31.c", "src/judge/gate_q31.c", "src/strong/differentiator_q31.c", *ESTIMATOR),
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             *("-inline-calls", "is_within", "-eva-domains", "equality", "-eva-slevel-function"),
@@ -194,28 +202,28 @@ PROOFS = (
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
             *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31"),
-            *("pvid_estimator_init_q31", "pvid_estimator_take_row_q31", "pvid_estimator_update_q31"),
-            *("pvid_misfit_init_q31", "pvid_misfit_take_q31", "pvid_misfit_judge_q31"),
+            *("pvid_estimator_init_q31", "pvid_estimator_add_row_q31", "pvid_estimator_update_q31"),
+            *("pvid_misfit_init_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
         ),
     ),
     Proof(
         "kapitza_physical_q31",
         "any estimate in any scale",
-        ("src/kapitza_q31.c", "src/cholesky_q31.c", "src/integer_q31.c"),
+        ("models/kapitza/kapitza_physical_q31.c", "src/solve/cholesky_q31.c", "src/number/integer_q31.c"),
         ("-eva-slevel", "100", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
         taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_root_of_q31", "pvid_to_block_q31"),
     ),
     Proof(
         "gate_q31",
         "any configuration and floor; any residual on top of any scale that a residual leaves",
-        ("src/gate_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+        ("src/judge/gate_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
         ("-eva-slevel", "100", "-eva-split-return", "full"),
         taken=SCALED,
     ),
     Proof(
         "misfit_q31",
         "any configuration; any row and verdict on top of sums within 2^1000 (those of a block lie within 2^78)",
-        ("src/misfit_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+        ("src/judge/misfit_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
         (
             *("-eva-slevel", "200", "-eva-auto-loop-unroll", "100", "-eva-split-return", "full"),
             *("-eva-subdivide-non-linear", "4"),
@@ -226,8 +234,8 @@ PROOFS = (
         "trust_q31",
         "any configuration of the three models; any group on top of any state that a group leaves",
         (
-            *("src/trust_q31.c", "src/publication.c"),
-            *("src/integer_q31.c", "src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
+            *("src/judge/trust_q31.c", "src/judge/publication.c"),
+            *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
         ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
     ),
@@ -235,58 +243,69 @@ PROOFS = (
         "fingerprint_q31",
         "any configuration of both forms, tables of any extent that fits; `pvid_fnv_estimator_q31`, any state",
         (
-            *("src/fingerprint_q31.c", "src/fnv_q31.c", "src/fnv.c"),
-            *("src/kapitza_weak_q31.c", "src/kapitza_strong_q31.c"),
+            *("src/keep/fingerprint_q31.c", "src/keep/fnv_q31.c", "src/keep/fnv.c"),
+            *("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
         ),
         ("-eva-auto-loop-unroll", "20"),
     ),
     Proof(
         "information_q31",
         "a group of rows within their limit on top of any sums within 2^60",
-        ("src/information_q31.c", "src/integer_q31.c"),
+        ("src/solve/information_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "1100", "-eva-min-loop-unroll", "13"),
     ),
     Proof(
         "weak_front_q31",
         "the weights of the tests' design: any samples within full scale, the ring's head in any place",
-        ("src/weak_front_q31.c", "src/integer_q31.c"),
+        ("src/weak/front_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "100"),
     ),
     Proof(
         "weak_window_q31",
         "the tests' design: any F and U that the front lets through, from a window's start and from a gap on",
-        ("src/weak_window_q31.c", "src/scaled_q31.c", "src/integer_q31.c"),
+        ("src/weak/window_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "70"),
         taken=("pvid_scaled_of_q31", "pvid_scaled_over_q31"),
     ),
     Proof(
         "weak_finish_q31",
         "every stage on any state, with 4 and with 16 functions, any Gram tables that init takes, the tests' columns",
-        ("src/cholesky_q31.c", "src/scaled_q31.c", "src/integer_q31.c", "src/kapitza_weak_q31.c"),
+        (
+            "src/solve/cholesky_q31.c",
+            "src/number/scaled_q31.c",
+            "src/number/integer_q31.c",
+            "models/kapitza/kapitza_weak_q31.c",
+        ),
         (
             *("-eva-min-loop-unroll", "17", "-eva-auto-loop-unroll", "300", "-eva-split-return", "full"),
             *("-eva-slevel-function", "factor_diagonal:400,find_length:10", "-eva-subdivide-non-linear", "4"),
-            *("-inline-calls", "pvid_pivot_is_data_q31", "-eva-domains", "equality"),
+            *("-inline-calls", "pvid_pivot_is_significant_q31", "-eva-domains", "equality"),
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
             *("pvid_to_block_q31", "pvid_half_exponent_q31", *SCALED),
             *("pvid_estimator_innovation_q31", "pvid_estimator_add_q31", "pvid_estimator_begin_q31"),
-            *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_on_q31"),
-            *("pvid_gate_passes_q31", "pvid_trust_refuge_q31", "pvid_trust_judge_q31"),
-            *("pvid_estimator_expect_q31", "pvid_information_fade_q31", "pvid_trust_ageing_q31"),
+            *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_advance_q31"),
+            *("pvid_gate_passes_q31", "pvid_trust_fallback_q31", "pvid_trust_judge_q31"),
+            *("pvid_estimator_set_expected_q31", "pvid_information_fade_q31", "pvid_trust_fade_factor_q31"),
         ),
     ),
     Proof(
         "snapshot",
         "two slots with any bytes in them, any lengths and identities; sealing one",
-        ("src/snapshot.c", "src/crc32.c", "src/fnv.c"),
+        ("src/keep/snapshot.c", "src/keep/crc32.c", "src/keep/fnv.c"),
         ("-eva-auto-loop-unroll", "10"),
     ),
     Proof(
         "snapshot_q31",
         "states of both forms saved into any room, any bytes of any length restored; their pointers stay",
-        ("src/snapshot_strong_q31.c", "src/snapshot_weak_q31.c", "src/snapshot.c", "src/crc32.c", "src/fnv.c"),
+        (
+            "src/keep/snapshot_strong_q31.c",
+            "src/keep/snapshot_weak_q31.c",
+            "src/keep/snapshot.c",
+            "src/keep/crc32.c",
+            "src/keep/fnv.c",
+        ),
         ("-eva-min-loop-unroll", "3", "-eva-auto-loop-unroll", "50"),
         taken=("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31"),
     ),
@@ -299,7 +318,7 @@ PROOFS = (
     Proof(
         "link",
         "the decoder, any number of any bytes",
-        ("link/link.c", "src/crc32.c"),
+        ("link/link.c", "src/keep/crc32.c"),
         (
             *("-eva-split-return", "full"),
             *("-eva-slevel-function", "one_byte:20,pvid_link_decode:40,accept:40"),
@@ -376,7 +395,7 @@ def prove(proof: Proof) -> Result:
 
 
 def table(results: list[tuple[Proof, Result]]) -> str:
-    """As firmware/README.md has it."""
+    """The table of host/docs/proofs.md."""
     rows = [
         f"| `{proof.name}` | {proof.covers} | {result.statements}{' goals' if proof.deduced else ''} | "
         f"{f'{len(proof.left)}: {proof.why}' if proof.left else 'none'} |"
@@ -400,7 +419,7 @@ def write_table(results: list[tuple[Proof, Result]]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(proof.name for proof in PROOFS))
-    parser.add_argument("--update", action="store_true", help="write the table of firmware/README.md")
+    parser.add_argument("--update", action="store_true", help="write the table of host/docs/proofs.md")
     given = parser.parse_args()
     if given.update and given.names:
         parser.error("--update is for all of them")

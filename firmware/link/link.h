@@ -56,19 +56,19 @@ typedef struct {
     uint32_t missing;   /* frames that the sequence says were sent and did not arrive */
     uint32_t malformed; /* no COBS, too short, too long */
     uint32_t bad_crc;
-    uint32_t foreign;   /* of another version or schema */
+    uint32_t foreign; /* of another version or schema */
 } pvid_link_counters;
 
 /* Only the functions below write to it. */
 typedef struct {
     pvid_link_counters counters;
-    size_t filled;        /* bytes of raw */
-    uint16_t sequence;    /* expected next */
-    bool synchronised;    /* a frame has come in: sequence is known */
-    bool bad;             /* this frame is too long: drop all up to the next 0 */
-    bool started;         /* a byte has come in since the last 0 */
-    bool zero_due;        /* the COBS group that ended stands for a 0, if another one follows */
-    uint8_t left;         /* bytes left in the COBS group */
+    size_t filled;     /* bytes of raw */
+    uint16_t sequence; /* expected next */
+    bool synchronised; /* a frame has come in: sequence is known */
+    bool bad;          /* this frame is too long: drop all up to the next 0 */
+    bool started;      /* a byte has come in since the last 0 */
+    bool zero_due;     /* the COBS group that ended stands for a 0, if another one follows */
+    uint8_t left;      /* bytes left in the COBS group */
     uint8_t raw[PVID_LINK_RAW_BYTES(PVID_LINK_MAX_PAYLOAD)];
 } pvid_link_decoder;
 

@@ -1,14 +1,11 @@
-/* The link's C side for the tests of pvid.link: bytes in, frames and counters out, flat. Host only. */
+/* Declared in native.h. Host only. */
 #include <string.h>
 
 #include "link.h"
+#include "native.h"
 #include "pvid/little_endian.h"
 
 #define FRAME_HEAD 9u /* type u8, sequence u16, tick u32, length u16 */
-
-uint32_t pvid_native_link_encode(uint8_t type, uint16_t sequence, uint32_t tick, const uint8_t payload[],
-                                 uint32_t length, uint8_t out[], uint32_t room);
-uint32_t pvid_native_link_decode(const uint8_t bytes[], uint32_t n, uint8_t out[], uint32_t counters[5]);
 
 uint32_t pvid_native_link_encode(uint8_t type, uint16_t sequence, uint32_t tick, const uint8_t payload[],
                                  uint32_t length, uint8_t out[], uint32_t room)
@@ -17,7 +14,6 @@ uint32_t pvid_native_link_encode(uint8_t type, uint16_t sequence, uint32_t tick,
     return (uint32_t)pvid_link_encode(&frame, out, room);
 }
 
-/* out [2 n]: each good frame as its head and payload, one after the other; returns the bytes used. */
 uint32_t pvid_native_link_decode(const uint8_t bytes[], uint32_t n, uint8_t out[], uint32_t counters[5])
 {
     static pvid_link_decoder decoder;

@@ -7,12 +7,12 @@
 
 /* Torques are per unit of body 2's mass; indices 1 and 2 stand for the pivot and the joint. */
 typedef struct {
-    double l1, l2, rho2;  /* [m] */
-    double g;             /* gravity in the plane of motion [m/s^2] */
-    double viscous[2];    /* torque per rate [m^2/s] */
-    double dry[2];        /* torque of dry friction [m^2/s^2] */
-    double slip;          /* dry friction is dry tanh(rate/slip) [rad/s], > 0 */
-    double slant;         /* angle of the pivot's slide to the vertical [rad] */
+    double l1, l2, rho2; /* [m] */
+    double g;            /* gravity in the plane of motion [m/s^2] */
+    double viscous[2];   /* torque per rate [m^2/s] */
+    double dry[2];       /* torque of dry friction [m^2/s^2] */
+    double slip;         /* dry friction is dry tanh(rate/slip) [rad/s], > 0 */
+    double slant;        /* angle of the pivot's slide to the vertical [rad] */
 } pvid_pendulum;
 
 /* Runge-Kutta of order 4 from state x = phi1, phi1 + phi [rad] and their rates [rad/s].

@@ -94,8 +94,8 @@ int qemu_plugin_install(qemu_plugin_id_t id, const qemu_info_t *info, int count,
     static const struct {
         const char *name;
         uint64_t *value;
-    } numbers[] = {{"entry=", &entry}, {"skip=", &skip}, {"caller=", &caller}, {"caller_end=", &caller_end},
-                   {"base=", &base},   {"bytes=", &bytes}};
+    } numbers[] = {{"entry=", &entry},           {"skip=", &skip}, {"caller=", &caller},
+                   {"caller_end=", &caller_end}, {"base=", &base}, {"bytes=", &bytes}};
     (void)info;
     for (int i = 0; i < count; i++) {
         for (size_t k = 0; k < sizeof numbers / sizeof numbers[0]; k++) {

@@ -1,66 +1,11 @@
 /* The C side of pvid.core.native: replays a run through the shipped core and records every tick.
  *
  * Host only. The core is compiled from the same sources with the same flags as on a device; this
- * file adds loops that Python would be slow at, and a table of sizes that Python checks at load.
+ * file adds loops that Python would be slow at.
  */
 #include "replay.h"
 
-#include <stddef.h>
 #include <string.h>
-
-#define FIELD(type, field) (uint32_t) offsetof(type, field)
-
-const uint32_t pvid_native_layout[] = {
-    (uint32_t)sizeof(pvid_fir_bank_f32),
-    FIELD(pvid_fir_bank_f32, weights),
-    (uint32_t)sizeof(pvid_estimator_config_f32),
-    FIELD(pvid_estimator_config_f32, start),
-    FIELD(pvid_estimator_config_f32, row_sd),
-    FIELD(pvid_estimator_config_f32, noise_margin),
-    FIELD(pvid_estimator_config_f32, dead_zone),
-    FIELD(pvid_estimator_config_f32, law),
-    FIELD(pvid_estimator_config_f32, divider),
-    (uint32_t)sizeof(pvid_strong_config_f32),
-    FIELD(pvid_strong_config_f32, drive_min),
-    FIELD(pvid_strong_config_f32, bank),
-    FIELD(pvid_strong_config_f32, gate),
-    FIELD(pvid_strong_config_f32, estimator),
-    (uint32_t)sizeof(pvid_weak_design_f32),
-    FIELD(pvid_weak_design_f32, smooth),
-    FIELD(pvid_weak_design_f32, overlap),
-    FIELD(pvid_weak_design_f32, lag),
-    (uint32_t)sizeof(pvid_weak_config_f32),
-    FIELD(pvid_weak_config_f32, drive_min),
-    FIELD(pvid_weak_config_f32, pivot_noise),
-    FIELD(pvid_weak_config_f32, design),
-    FIELD(pvid_weak_config_f32, angle),
-    FIELD(pvid_weak_config_f32, passes),
-    FIELD(pvid_weak_config_f32, zero_unknown),
-    FIELD(pvid_weak_config_f32, iterations),
-    FIELD(pvid_weak_config_f32, estimator),
-    FIELD(pvid_weak_config_f32, trust),
-    FIELD(pvid_weak_config_f32, gate),
-    (uint32_t)sizeof(pvid_trust_config_f32),
-    FIELD(pvid_trust_config_f32, groups_min),
-    FIELD(pvid_trust_config_f32, renewal),
-    (uint32_t)sizeof(pvid_counters),
-    (uint32_t)sizeof(pvid_estimate_f32),
-    FIELD(pvid_estimate_f32, kappa),
-    (uint32_t)sizeof(pvid_estimator_f32),
-    FIELD(pvid_estimator_f32, counters),
-    (uint32_t)sizeof(pvid_strong_f32),
-    FIELD(pvid_strong_f32, estimator),
-    (uint32_t)sizeof(pvid_weak_f32),
-    FIELD(pvid_weak_f32, estimator),
-    FIELD(pvid_weak_f32, trust.estimate),
-    FIELD(pvid_weak_f32, trust.published),
-    (uint32_t)sizeof(pvid_weak_angle_f32),
-    PVID_MAX_P,
-    PVID_MAX_THETA,
-    PVID_MAX_SUMS,
-    PVID_MAX_WINDOW,
-};
-const uint32_t pvid_native_layout_length = sizeof pvid_native_layout / sizeof pvid_native_layout[0];
 
 const char *pvid_native_build(void)
 {

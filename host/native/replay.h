@@ -8,20 +8,16 @@
 
 /* Where a replay writes; NULL: not recorded. Rows stand one after the other, without padding. */
 typedef struct {
-    float *p;               /* [ticks][n_p] */
-    float *published;       /* [ticks][n_p] of the weak form */
-    float *published_se;    /* likewise: its standard errors */
-    float *sums;            /* [ticks][n_moments + n_theta + 2] */
-    uint8_t *reason;        /* [ticks] */
-    uint32_t *hash;         /* [ticks] running hash after the tick */
-    uint32_t *running_hash; /* in and out; needed with hash */
+    float *p;                    /* [ticks][n_p] */
+    float *published;            /* [ticks][n_p] of the weak form */
+    float *published_se;         /* likewise: its standard errors */
+    float *sums;                 /* [ticks][n_moments + n_theta + 2] */
+    uint8_t *reason;             /* [ticks] */
+    uint32_t *hash;              /* [ticks] running hash after the tick */
+    uint32_t *running_hash;      /* in and out; needed with hash */
     pvid_estimate_f32 *estimate; /* [ticks / estimate_every, rounded up] */
     uint32_t estimate_every;
 } pvid_record_f32;
-
-/* Sizes and offsets of every struct that Python mirrors, in the order of native.py. */
-extern const uint32_t pvid_native_layout[];
-extern const uint32_t pvid_native_layout_length;
 
 /* Compiler and flags this library was built with. */
 const char *pvid_native_build(void);

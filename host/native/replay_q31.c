@@ -1,51 +1,8 @@
-/* The C side of pvid.core.native_q31: replays a run through the shipped fixed-point core and records every tick. */
+/* The C side of pvid.core.native: replays a run through the shipped fixed-point core and records every tick. */
 #include "replay_q31.h"
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <string.h>
-
-#define FIELD(type, field) (uint32_t) offsetof(type, field)
-
-const uint32_t pvid_native_layout_q31[] = {
-    (uint32_t)sizeof(pvid_estimator_config_q31),
-    FIELD(pvid_estimator_config_q31, p_bits),
-    FIELD(pvid_estimator_config_q31, row_sd),
-    FIELD(pvid_estimator_config_q31, dead_zone),
-    FIELD(pvid_estimator_config_q31, divider),
-    (uint32_t)sizeof(pvid_weak_design_q31),
-    FIELD(pvid_weak_design_q31, shift),
-    FIELD(pvid_weak_design_q31, phi_max),
-    FIELD(pvid_weak_design_q31, gram),
-    (uint32_t)sizeof(pvid_weak_config_q31),
-    FIELD(pvid_weak_config_q31, zero_unknown),
-    FIELD(pvid_weak_config_q31, estimator),
-    FIELD(pvid_weak_config_q31, trust),
-    FIELD(pvid_weak_config_q31, gate),
-    (uint32_t)sizeof(pvid_fir_bank_q31),
-    FIELD(pvid_fir_bank_q31, phi_shift),
-    FIELD(pvid_fir_bank_q31, weights),
-    (uint32_t)sizeof(pvid_strong_config_q31),
-    FIELD(pvid_strong_config_q31, u_multiplier),
-    FIELD(pvid_strong_config_q31, drive_ticks),
-    FIELD(pvid_strong_config_q31, gate),
-    FIELD(pvid_strong_config_q31, estimator),
-    (uint32_t)sizeof(pvid_estimate_q31),
-    FIELD(pvid_estimate_q31, kappa),
-    (uint32_t)sizeof(pvid_estimator_q31),
-    FIELD(pvid_estimator_q31, counters),
-    (uint32_t)sizeof(pvid_weak_q31),
-    FIELD(pvid_weak_q31, estimator),
-    FIELD(pvid_weak_q31, trust),
-    FIELD(pvid_weak_q31, trust.published),
-    FIELD(pvid_weak_q31, trust.estimate),
-    (uint32_t)sizeof(pvid_differentiator_q31),
-    (uint32_t)sizeof(pvid_strong_q31),
-    FIELD(pvid_strong_q31, estimator),
-    PVID_MAX_P,
-    PVID_MAX_THETA_Q31,
-};
-const uint32_t pvid_native_layout_q31_length = sizeof pvid_native_layout_q31 / sizeof pvid_native_layout_q31[0];
 
 static void record_tick(const pvid_record_q31 *record, uint32_t tick, const pvid_estimator_q31 *estimator,
                         pvid_reason reason)

@@ -1,4 +1,4 @@
-/* What pvid.core.native_q31 calls besides the core itself: the fixed-point counterpart of replay.h. */
+/* What pvid.core.native calls besides the core itself: the fixed-point counterpart of replay.h. */
 #ifndef PVID_REPLAY_Q31_H
 #define PVID_REPLAY_Q31_H
 
@@ -8,21 +8,17 @@
 
 /* Where a replay writes; NULL: not recorded. Rows stand one after the other, without padding. */
 typedef struct {
-    int32_t *p;             /* [ticks][n_p] */
-    int64_t *sums;          /* [ticks][n_sums] */
-    uint8_t *exponent;      /* [ticks] of the sums */
-    uint8_t *reason;        /* [ticks] */
-    uint32_t *hash;         /* [ticks] running hash after the tick */
-    uint32_t *running_hash; /* in and out; needed with hash */
-    int32_t *published;     /* [ticks][n_p] of the weak form */
-    int32_t *published_se;  /* likewise: its standard errors */
+    int32_t *p;                  /* [ticks][n_p] */
+    int64_t *sums;               /* [ticks][n_sums] */
+    uint8_t *exponent;           /* [ticks] of the sums */
+    uint8_t *reason;             /* [ticks] */
+    uint32_t *hash;              /* [ticks] running hash after the tick */
+    uint32_t *running_hash;      /* in and out; needed with hash */
+    int32_t *published;          /* [ticks][n_p] of the weak form */
+    int32_t *published_se;       /* likewise: its standard errors */
     pvid_estimate_q31 *estimate; /* [ticks / estimate_every, rounded up]; the published one in the weak form */
     uint32_t estimate_every;
 } pvid_record_q31;
-
-/* Sizes and offsets of every struct that Python mirrors, in the order of native_q31.py. */
-extern const uint32_t pvid_native_layout_q31[];
-extern const uint32_t pvid_native_layout_q31_length;
 
 /* Steps an initialised identifier through a run of counts. */
 void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],

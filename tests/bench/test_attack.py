@@ -57,7 +57,7 @@ def test_mutants_are_drawn_from_their_seed() -> None:
         (Outcome(0, "g  9.8", "", (), "", 0.1), None),
     ],
 )
-def test_what_an_attack_calls_a_defect(outcome: Outcome, told: str | None) -> None:
+def test_defects_are_classified(outcome: Outcome, told: str | None) -> None:
     found = complaint(outcome)
     assert found == told if told is None else told in str(found)
 
@@ -84,7 +84,7 @@ def test_what_an_attack_calls_a_defect(outcome: Outcome, told: str | None) -> No
         (["identify", "run\x1b[31m\n.csv"], "run\\x1b[31m\\n.csv"),
     ],
 )
-def test_odd_words_are_refused_by_name(
+def test_unknown_keys_are_refused_by_name(
     arguments: list[str], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -95,7 +95,7 @@ def test_odd_words_are_refused_by_name(
     assert named in outcome.err
 
 
-def test_names_are_told_and_drawn_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_names_are_shown_unchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     name = "[red]$x$[x]漢\udcff.csv"

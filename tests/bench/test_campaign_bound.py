@@ -26,7 +26,7 @@ def standard_bound(native: Native, *, scale: float = 1.0, duration: float = 40.0
 
 
 def test_small_angles_of_the_standard_rig_have_the_bound_of_the_theory(native: Native) -> None:
-    # MATH.md section 6; angles and noise a hundredth, where the equations are linear
+    # theory.md 6; angles and noise a hundredth, where the equations are linear
     assert 100 * standard_bound(native, scale=0.01) == pytest.approx([0.0082, 0.0086, 0.0168], abs=5e-5)
 
 
@@ -52,7 +52,7 @@ def test_unknown_friction_makes_it_wider(native: Native) -> None:
     assert (with_viscous > without).all() and (with_dry > without).all()
 
 
-def test_a_run_without_a_drive_says_nothing_of_w(native: Native) -> None:
+def test_run_without_drive_does_not_identify_w(native: Native) -> None:
     """One mode in free motion: amplitude and frequency do not tell three parameters."""
     acceleration = np.zeros(2 * 2000 + 1)
     bound = cramer_rao(

@@ -107,7 +107,7 @@ def test_a_held_run_is_missed_where_its_data_suffice_and_has_no_values() -> None
     assert record["reason"] == "held not excited" and record["w"] is None and record["worst_error"] is None
 
 
-def test_an_infinite_bound_is_none_and_does_not_suffice() -> None:
+def test_infinite_bound_is_insufficient() -> None:
     record = judged(None, bound=np.inf, refusal="too short")
     assert record["bound_w"] is None and not record["suffices"] and record["reason"] == "too short"
 

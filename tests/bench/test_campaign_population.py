@@ -69,7 +69,7 @@ def test_every_property_lies_in_its_range() -> None:
         assert rig.drive in KINDS
 
 
-def test_an_imperfection_belongs_to_its_condition_alone() -> None:
+def test_imperfection_occurs_in_its_condition_only() -> None:
     population = shipped()
     for index in range(190):
         rig = drawn(population, 2, index)
@@ -87,7 +87,7 @@ def test_an_imperfection_belongs_to_its_condition_alone() -> None:
         assert {name for name, there in found.items() if there} == set(rig.combined) & set(found)
 
 
-def test_a_mixture_combines_as_many_conditions_as_it_says() -> None:
+def test_mixture_combines_the_stated_number_of_conditions() -> None:
     population = shipped()
     mixed = [drawn(population, 1, index) for index in range(190) if population.condition_of(1, index) == "mixed"]
     assert {len(rig.combined) for rig in mixed} == {2, 3, 4}
@@ -122,11 +122,11 @@ def test_acceleration_is_the_second_derivative_of_the_height(kind: str) -> None:
     assert second == pytest.approx(motion.acceleration(t)[1:-1], abs=1e-3)
 
 
-def test_a_drive_that_needs_more_travel_is_none() -> None:
+def test_drive_that_needs_more_travel_is_refused() -> None:
     assert draw_motion("tones1", (0.3, 0.4), np.random.default_rng(1), 0.01, 3.0, 3.0) is None
 
 
-def test_a_population_of_ones_own_takes_what_it_does_not_say_from_the_shipped_one() -> None:
+def test_own_population_inherits_missing_keys_from_the_shipped_one() -> None:
     population = parse("[base]\nl1 = [0.3, 0.3]\n[conditions.short]\nduration = [5, 6]\n")
     rig = drawn(population, 1, 0)
     assert rig.pendulum.l1 == pytest.approx(0.3) and 5 <= rig.duration <= 6 and rig.condition == "short"

@@ -194,7 +194,7 @@ def test_a_running_scheduler_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
             run(campaign, Store(tmp_path / "other.parquet", "key"), lambda _: None, scheduler=cluster.scheduler_address)
 
 
-def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scheduler_without_workers_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bench.campaign.run._WORKERS_S", 0.3)
     with _distributed().LocalCluster(
         n_workers=0, processes=False, host="127.0.0.1", dashboard_address=None, protocol="tcp"

@@ -73,7 +73,7 @@ def test_a_slanted_drive_pushes_sideways(native: Native) -> None:
     assert pushed[1, 2:] / step_s == pytest.approx(wanted, rel=1e-3, abs=1e-5)  # the mean over a step: of its middle
 
 
-def test_a_motion_that_runs_away_is_none(native: Native) -> None:
+def test_diverging_motion_is_refused(native: Native) -> None:
     acceleration = 300.0 * np.sin(2 * math.pi * 1.5 * np.arange(20001) * 5e-4)
     assert integrate(native, STANDARD_PENDULUM, [0.1, 0.1, 0, 0], acceleration, 1e-3) is None
 
@@ -165,7 +165,7 @@ def test_a_kept_rig_is_the_simulated_one(native: Native, tmp_path: Path) -> None
     assert len(list((tmp_path / "cache").iterdir())) == 1
 
 
-def test_a_user_knows_rod_1_the_sensors_and_a_guess_but_no_tilt() -> None:
+def test_campaign_rig_file_contains_rod_1_sensors_and_guess_only() -> None:
     tilted = replace(RIG, pendulum=replace(STANDARD_PENDULUM, g=6.0))
     file = rig_file(tilted)
     assert (file.l1, file.sensor.phi_lsb, file.sensor.y_lsb) == (0.3, RIG.phi_lsb, RIG.y_lsb)

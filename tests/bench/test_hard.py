@@ -36,7 +36,7 @@ def case(label: str) -> Case:
         "drive x0.1, 12 bits",
     ],
 )
-def test_noise_makes_the_answer_worse_and_says_so(label: str) -> None:
+def test_noise_raises_errors_and_standard_errors(label: str) -> None:
     """Errors grow to per cents of w; 15 numbers lie within 3 standard errors (of 40 runs 97 to 100 % do)."""
     assert outcome(label).published.all()
     assert outcome(label).covered.all()
@@ -57,7 +57,7 @@ def test_noise_makes_the_answer_worse_and_says_so(label: str) -> None:
         "fast mode only, 12 bits",
     ],
 )
-def test_what_the_data_cannot_carry_is_not_published(label: str) -> None:
+def test_estimate_without_information_is_not_published(label: str) -> None:
     assert not outcome(label).published.any()
     assert len(outcome(label).held) == SEEDS
     assert all(reason.startswith(("held", "rejected")) for reason in outcome(label).held)
@@ -71,12 +71,12 @@ def test_what_the_data_cannot_carry_is_not_published(label: str) -> None:
         "14 bits, noise of 64 LSB, phi_lsb says 0.58",
     ],
 )
-def test_what_the_model_or_the_rig_file_does_not_know_raises_the_alarm(label: str) -> None:
+def test_unmodelled_effects_raise_the_alarm(label: str) -> None:
     assert (outcome(label).alarmed | ~outcome(label).published).all()
     assert outcome(label).wrong == 0
 
 
-def test_noise_that_is_told_of_raises_none() -> None:
+def test_configured_noise_raises_no_alarm() -> None:
     assert not outcome("14 bits, noise of 64 LSB").alarmed[outcome("14 bits, noise of 64 LSB").published].any()
 
 
@@ -101,7 +101,7 @@ def test_the_twin_has_the_same_bits_where_it_is_hard(native: Native, label: str)
 
 
 def test_the_modes_are_modes() -> None:
-    """Released in a mode without a drive, phi is one cosine: at 0.742 and 2.56 Hz (MATH.md 6)."""
+    """Released in a mode without a drive, phi is one cosine: at 0.742 and 2.56 Hz (theory.md 6)."""
     for shape, frequency in zip(modes(), (0.742, 2.56), strict=True):
         run = simulate(drive=(), sensors=Sensors(), release=(0.1 * shape[0], 0.1 * shape[1]), duration=10.0).run
         spectrum = np.abs(np.fft.rfft(run.phi * np.hanning(len(run.phi))))
@@ -113,7 +113,7 @@ def test_the_modes_are_modes() -> None:
         np.testing.assert_allclose(run.phi, cosine, atol=1e-3 * abs(run.phi[0]))
 
 
-def test_cases_are_the_rig_that_they_say() -> None:
+def test_cases_are_the_stated_rigs() -> None:
     assert len({one.label for one in CASES}) == len(CASES)
     assert all(one.sensors.phi_zero == ZERO for one in CASES)
     largest = float(np.abs(simulate(sensors=Sensors()).run.phi).max())
@@ -124,7 +124,7 @@ def test_cases_are_the_rig_that_they_say() -> None:
     assert replace(noisy, told=False).rig.sensor.phi_lsb == noisy.sensors.phi_lsb
 
 
-def test_a_row_says_what_became_of_the_runs() -> None:
+def test_row_contains_the_verdicts_of_its_runs() -> None:
     few = Outcome(
         published=np.array([True, True, True, False]),
         alarmed=np.array([False, True, False, False]),

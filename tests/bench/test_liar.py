@@ -30,7 +30,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pvid.log.recorder._LOOK_S", 0.005)
 
 
-def test_there_are_many_behaviours() -> None:
+def test_number_of_behaviours() -> None:
     assert len(BEHAVIOURS) >= 100
 
 

@@ -43,10 +43,11 @@ from bench.longevity_signals import (
 from pvid.base.errors import PvidError
 from pvid.board import replay_image
 from pvid.board.boards import board
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.core.native import Native
 from pvid.run import compare_q31
 from pvid.run.compare import first_difference
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import counts_of_samples
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Sensors, simulate
@@ -89,7 +90,7 @@ def test_nothing_of_ours_is_ever_silently_wrong(scenario: str, outcomes: Outcome
 
 
 # A mechanism that is held, or an encoder that sticks, looks like d2 = 0 where the strong form's sensors have noise (see
-# host/README.md); and the end of the drift is only two time constants ago in so short a run.
+# host/docs/benchmarks/longevity.md); and the end of the drift is only two time constants ago in so short a run.
 KNOWN_SILENT = {
     "absent": {"strong q31, 10 s", "strong q31, none"},
     "constant": {"strong q31, 10 s", "strong q31, none"},
@@ -109,7 +110,7 @@ LET_IN = ("one tone", "weak", 0.12)
 
 
 @pytest.mark.parametrize("scenario", OVER)
-def test_what_is_over_is_over(scenario: str, outcomes: Outcomes) -> None:
+def test_expired_alarm_does_not_return(scenario: str, outcomes: Outcomes) -> None:
     for lane in (lane for lane in LANES if lane.gated):
         outcome = outcomes[scenario][lane.label]
         assert outcome.errors <= longevity.BACK, lane.label
@@ -143,7 +144,7 @@ def test_forgetting_follows_a_parameter(lane: str, scenario: str, outcomes: Outc
 
 @pytest.mark.parametrize("scenario", ["step", "drift"])
 @pytest.mark.parametrize("kind", ["weak", "strong"])
-def test_sums_that_never_forget_say_that_they_cannot_follow(kind: str, scenario: str, outcomes: Outcomes) -> None:
+def test_sums_without_forgetting_report_a_change(kind: str, scenario: str, outcomes: Outcomes) -> None:
     outcome = outcomes[scenario][Lane(kind, 0.0).label]
     assert abs(outcome.error_after) > 3.0
     assert outcome.told != Reason.UPDATED.text
@@ -196,7 +197,7 @@ def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: c
     except PvidError:  # their gates let different windows in: one by one
         expected = [(WeakTwin(config, [alone]).run(phi, y), 0) for alone in lanes]
     for estimator, (twin, lane) in zip(lanes, expected, strict=True):
-        record = native.weak(replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
         theirs = (twin.p[:, :, lane], twin.sums[:, :, lane], twin.reason[:, lane])
         assert first_difference(record, *theirs, twin.published[:, :, lane]) is None
 
@@ -211,7 +212,7 @@ def test_the_strong_form_equals_its_twin(scenario: str, ticks: int, native: Nati
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in STRONG_FORGETTING_S]
     expected = StrongTwin(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
-        record = native.strong(replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
         theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
         assert first_difference(record, *theirs) is None
 
@@ -225,7 +226,7 @@ def test_the_weak_form_equals_its_twin_in_fixed_point(scenario: str, native: Nat
         twin = WeakTwinQ31(cast(WeakConfigQ31, alike[0]), [config.estimator for config in alike])
         expected = twin.run(phi, y)
         for lane, config in enumerate(alike):
-            record = compare_q31.identifier_q31(native, config).run(phi, y, hashes=False)
+            record = native.identifier(config).run(phi, y, hashes=False)
             assert compare_q31.first_difference(record, expected, lane) is None
 
 
@@ -236,7 +237,7 @@ def test_the_strong_form_equals_its_twin_in_fixed_point(scenario: str, native: N
     lanes = [config.estimator, replace(config.estimator, forgetting_groups=10_000)]
     expected = StrongTwinQ31(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
-        record = compare_q31.identifier_q31(native, replace(config, estimator=estimator)).run(phi, y, hashes=False)
+        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
         assert compare_q31.first_difference(record, expected, lane) is None
 
 
@@ -309,7 +310,7 @@ def test_a_disturbance_may_be_short_and_a_slip_slow(library: ctypes.CDLL) -> Non
     assert np.array_equal(slow[:30_000], clean[:30_000])
 
 
-def test_what_is_held_out_was_not_seen() -> None:
+def test_held_out_samples_are_not_fitted() -> None:
     assert not set(HELD_OUT) & set(SCENARIOS.values())
     assert {one.kind for one in HELD_OUT} == set(SCENARIOS)
     assert len({one.meaning + one.kind for one in HELD_OUT}) == len(HELD_OUT)
@@ -339,7 +340,7 @@ def test_comments_move_no_result_and_each_core_has_its_own() -> None:
     assert len(set(digests.values())) == 3
 
 
-def test_wrong_answers_without_a_word_are_called_silent() -> None:
+def test_wrong_answers_without_warning_are_silent() -> None:
     assert Outcome(told="updated", errors=4.0).silent
     assert Outcome(told="updated", errors=float("nan")).silent
     assert not Outcome(told="updated", errors=2.0).silent
@@ -393,7 +394,7 @@ def kept_outcomes(disturbance: Disturbance, columns: Sequence[str], ticks: int) 
         longevity_tables.keep(task.disturbance.title, column, ticks, task.made_with, {"lanes": lanes})
 
 
-def test_the_tables_say_what_is_silent(results: Path) -> None:
+def test_tables_mark_silent_errors(results: Path) -> None:
     kept_outcomes(SCENARIOS["step"], list(COLUMNS), 10**7)
     found = {marker: (header, rows) for marker, header, rows in longevity_tables.tables()}
     assert list(found) == [f"longevity-{column}" for column in COLUMNS]
@@ -440,7 +441,7 @@ def test_counts_are_the_samples(library: ctypes.CDLL) -> None:
     assert np.array_equal(run.counts[~missing, 0], np.rint(phi[~missing] / np.float64(run.phi_lsb)))
 
 
-def test_what_does_not_fit_a_count_is_left_out_and_refused(library: ctypes.CDLL) -> None:
+def test_value_beyond_a_count_is_dropped_and_refused(library: ctypes.CDLL) -> None:
     found = longevity_target.combinations(tuple(SCENARIOS))
     assert ("sensor wrap", "strong", "f32") not in found
     assert len(found) == 4 * len(SCENARIOS) - 2

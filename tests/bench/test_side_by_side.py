@@ -46,7 +46,7 @@ def weak() -> Outcome:
 
 
 def test_the_strong_form_fails_with_a_14_bit_encoder(native: Native) -> None:
-    """MATH.md 6: 14 to 58 % with differences, 2.8 % with the best smoother; no run is within 1 % of all three."""
+    """theory.md 6: 14 to 58 % with differences, 2.8 % with the best smoother; no run is within 1 % of all three."""
     differences = accuracy(
         through_core(native, form="strong", differentiator="finite-difference", stride=40), SENSORS, SEEDS
     )
@@ -133,7 +133,7 @@ def test_the_counted_kalman_filter_is_the_one_that_is_measured(tmp_path: Path) -
     np.testing.assert_allclose([np.sqrt(state.p[i][i]) for i in (4, 5, 6)], se[0], rtol=0.01)
 
 
-def test_starts_are_off_by_what_is_said_and_pendulums() -> None:
+def test_starts_are_off_by_the_stated_part_and_physical() -> None:
     starts = np.array([start_off(0.2)(seed) for seed in range(40)])
     np.testing.assert_allclose(np.abs(starts / TRUTH - 1), 0.2)
     assert all(is_physical(start) for start in starts)

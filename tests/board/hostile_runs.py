@@ -18,17 +18,15 @@ import numpy.typing as npt
 from linear_rig import LINEAR_RIG
 
 from pvid.core import snapshot
-from pvid.core.native import Native, StrongIdentifier, WeakConfig, WeakIdentifier
-from pvid.core.native_q31 import StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare_q31 import identifier_q31
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.f32 import config_of
 from pvid.setup.q31 import config_of_q31, counts_of
 from pvid.sim.pendulum import simulate, standard_sensors, standard_start
 
 Samples = npt.NDArray[Any]
-Identifier = StrongIdentifier | WeakIdentifier | StrongIdentifierQ31 | WeakIdentifierQ31
 
 TICKS = 3000  # past the work on the first two windows
 RANDOM = np.random.default_rng(7)
@@ -97,7 +95,7 @@ def play(identifier: Identifier, samples: Iterator[tuple[Samples, Samples]]) -> 
         image = snapshot.save(identifier)
         snapshot.restore(identifier, image[:-1])
         snapshot.restore(identifier, image)
-        if not isinstance(identifier, StrongIdentifier):
+        if not identifier.form == "strong":
             identifier.gap()
         done += len(phi)
     return done
@@ -114,7 +112,7 @@ def play_all(native: Native) -> int:
         rig = rig_of(**settings)
         run = runs[20 if settings["form"] == "strong" else 14]
         config = config_of(rig, 1000.0, start)
-        made = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
+        made = native.identifier(config)
         done += play(made, float_samples(run))
     for settings in SETTINGS:
         rig = rig_of(**settings)
@@ -122,7 +120,7 @@ def play_all(native: Native) -> int:
         fixed = config_of_q31(rig, 1000.0, start)
         phi, y = (counts[:TICKS] for counts in counts_of(rig, run))
         limits = fixed.design if isinstance(fixed, WeakConfigQ31) else fixed.design.bank
-        done += play(identifier_q31(native, fixed), count_samples(phi, y, limits.phi_max, limits.y_max))
+        done += play(native.identifier(fixed), count_samples(phi, y, limits.phi_max, limits.y_max))
     return done
 
 
@@ -130,7 +128,7 @@ def read_behind_an_array(native: Native) -> None:
     """A checksum of one byte more than there is."""
     libc = ctypes.CDLL(None)
     libc.malloc.restype = ctypes.c_void_p
-    native.library.pvid_crc32(ctypes.c_uint32(0), ctypes.c_void_p(libc.malloc(16)), ctypes.c_size_t(17))
+    native.library.pvid_crc32(0, native.headers.ffi.cast("uint8_t *", libc.malloc(16)), 17)
 
 
 if __name__ == "__main__":

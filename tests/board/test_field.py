@@ -72,7 +72,7 @@ def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target, 
     rig = standard_rig("weak")
     record = collect(host_target, TICKS, begin=rig)
     tick = max(record.estimates)
-    identifier = native.weak(rig.config)  # type: ignore[arg-type]
+    identifier = native.identifier(rig.config)
     identifier.run(*record.samples(0, tick))
     last, estimate = identifier.assess(), record.estimates[tick]
     assert np.array_equal(np.array(estimate.p, np.float32), last["p"])
@@ -80,7 +80,7 @@ def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target, 
     assert np.abs(last["p"][:3] / truth - 1).max() < 0.02  # a plausible run of the rig
 
 
-def test_who_joins_late_learns_all_but_the_past(host_target: Target, native: Native) -> None:
+def test_late_client_receives_the_current_state(host_target: Target, native: Native) -> None:
     rig = standard_rig("weak")
     assert collect(host_target, 600, begin=rig).first == 0
     late = collect(host_target, 5000)  # 4 s of the board's time hold an announcement
@@ -123,7 +123,7 @@ class Dropping:
         self.port.close()
 
 
-def test_what_the_line_loses_is_named(native: Native) -> None:
+def test_losses_of_the_line_are_named(native: Native) -> None:
     rig = standard_rig("weak")
     target = open_target(HOST_TARGET, rig, lambda port: Dropping(port, 20_000, 21_000))
     try:

@@ -71,7 +71,7 @@ def test_hostile_runs_of_the_library_are_clean(library: Path) -> None:
     assert int(done.stdout.split()[0]) > 300_000
 
 
-def test_a_byte_behind_an_array_is_seen(library: Path) -> None:
+def test_write_behind_an_array_is_found(library: Path) -> None:
     done = play_hostile(library, "--planted")
     assert done.returncode != 0
     assert "heap-buffer-overflow" in done.stderr and library.name in done.stderr

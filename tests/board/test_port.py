@@ -21,7 +21,7 @@ from pvid.board.boards import BOARDS
 from pvid.board.stream_image import build_image
 from pvid.board.target import judge, open_target
 from pvid.core.native import Native
-from pvid.link.port import open_port, why_not_opened
+from pvid.link.port import open_port, opening_failure
 
 BOARD = BOARDS["mps2-an386"]
 Start = Callable[[str], "subprocess.Popen[bytes]"]
@@ -53,10 +53,10 @@ def assert_equal_through(name: str, native: Native) -> None:
 def test_a_run_goes_through_a_device_by_its_name(start: Start, tmp_path: Path, native: Native) -> None:
     process = start("pty")
     assert process.stdout is not None
-    heard = b""
-    while (found := re.search(rb"(/dev/\S+)\s", heard)) is None:
+    output = b""
+    while (found := re.search(rb"(/dev/\S+)\s", output)) is None:
         assert select.select([process.stdout], [], [], 20)[0]
-        heard += process.stdout.read(200)
+        output += process.stdout.read(200)
     name = tmp_path / "ttyACM0"  # as udev names a board
     name.symlink_to(found.group(1).decode())
     assert_equal_through(str(name), native)
@@ -80,7 +80,7 @@ def test_a_run_goes_through_a_socket(start: Start, native: Native) -> None:
 
 
 @pytest.mark.parametrize("name", ["microbit", "mps2-an386", "netduinoplus2", "virt-rv32imac"])
-def test_what_comes_while_a_board_starts_does_not_deafen_it(name: str, native: Native) -> None:
+def test_bytes_during_startup_do_not_block_the_receiver(name: str, native: Native) -> None:
     """A byte in the UART before its interrupt was on: some UARTs then never call again."""
     for _ in range(3):
         target = open_target(name, standard_rig("weak"))
@@ -99,7 +99,7 @@ def test_a_port_in_use_is_named() -> None:
     os.close(theirs)
 
 
-def test_what_is_no_port_is_named(tmp_path: Path) -> None:
+def test_non_port_is_refused_by_name(tmp_path: Path) -> None:
     nowhere = tmp_path / "ttyUSB0"
     with pytest.raises(PvidError, match=f"^there is no port {nowhere}: is the board plugged in"):
         open_port(str(nowhere))
@@ -112,9 +112,9 @@ def test_what_is_no_port_is_named(tmp_path: Path) -> None:
         open_port("nothing://x")
 
 
-def test_a_missing_permission_says_who_has_it() -> None:
+def test_missing_permission_names_the_group() -> None:
     """Root, as whom the tests may run, lacks none."""
     error = OSError(errno.EACCES, "Permission denied")
-    assert why_not_opened("/dev/ttyACM0", error) == (
+    assert opening_failure("/dev/ttyACM0", error) == (
         "no permission to open the port /dev/ttyACM0: its group (dialout) has it"
     )

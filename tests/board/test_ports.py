@@ -49,7 +49,7 @@ def image(board: Board) -> Path:
 
 
 def ask(board: Board, letters: bytes) -> Outcome:
-    return run(board, image(board), TIMEOUT_S, heard=letters)
+    return run(board, image(board), TIMEOUT_S, input_bytes=letters)
 
 
 def numbers(outcome: Outcome) -> dict[str, int]:

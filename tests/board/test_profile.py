@@ -1,4 +1,4 @@
-"""Where a tick's instructions go: functions' counts are the whole, and the table in firmware/README.md is theirs."""
+"""Instructions of a tick by function: their sum is the whole, and host/docs/benchmarks/cost.md has them as measured."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_only_what_a_tick_calls_is_counted(profiles: dict[str, Profile], form: s
 
 
 def test_the_readme_shows_what_is_measured(profiles: dict[str, Profile]) -> None:
-    text = (ROOT / "firmware" / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
     table = text.split("<!-- profile -->\n")[1].split("<!-- /profile -->")[0].splitlines()[2:]
     shown = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
     measured = table_rows(profiles)

@@ -21,11 +21,12 @@ from pvid.base.errors import PvidError
 from pvid.board.replay_image import SAMPLE_RATE, ReplayRun, native_hashes, standard_run
 from pvid.board.stream_rig import StreamRig, played_samples, stream_rig
 from pvid.board.target import HOST_TARGET, Playback, Target, judge, open_target, play, verify
-from pvid.core.native import Native, WeakConfig
-from pvid.core.native_q31 import WeakConfigQ31
+from pvid.core.native import Native
 from pvid.link.frames import Estimate
 from pvid.link.port import Port
 from pvid.rig.file import RigFile
+from pvid.settings.f32 import WeakConfig
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 TICKS = 5000
@@ -114,7 +115,7 @@ def test_a_long_run_stays_equal_on_two_boards_at_once(form: str, core: str, nati
 def test_the_last_estimate_is_that_of_the_core(native: Native) -> None:
     run = standard_run("weak", TICKS)
     assert isinstance(run.config, WeakConfig)
-    identifier = native.weak(run.config)
+    identifier = native.identifier(run.config)
     identifier.run(run.phi, run.y)
     last = identifier.assess()
     estimate = play_standard(open_target(HOST_TARGET, rig_of(run)), "weak").estimates[TICKS]
@@ -209,7 +210,7 @@ def test_a_killed_emulator_is_started_again_and_the_run_over(name: str, form: st
     assert playback.restarts == 1
 
 
-def test_a_port_that_is_gone_for_good_ends_with_what_is_missing(native: Native) -> None:
+def test_lost_port_ends_with_the_missing_samples(native: Native) -> None:
     target = start_to_be_killed(HOST_TARGET, "weak", 20_000)  # built first
     began = time.monotonic()
     playback = play_standard(target, "weak", patience_s=3)
@@ -263,7 +264,7 @@ def test_an_image_with_the_other_core_is_refused() -> None:
         ("divider", 0),
     ],
 )
-def test_what_the_core_refuses_is_named(field: str, value: Any) -> None:
+def test_refusal_of_the_core_is_named(field: str, value: Any) -> None:
     """Every setting that goes over the link."""
     run, rig = standard_run("weak", TICKS), standard_rig("weak")
     assert isinstance(rig.config, WeakConfig)

@@ -45,7 +45,7 @@ def test_simulate_writes_a_run_and_its_rig_file(place: Path) -> None:
     assert (place / "run.toml").is_file()
 
 
-def test_identify_json_has_what_design_promises(place: Path) -> None:
+def test_identify_json_has_all_documented_keys(place: Path) -> None:
     done = pvid(*strong("identify", "run.csv", "--json"), cwd=place)
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)

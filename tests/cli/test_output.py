@@ -44,7 +44,7 @@ def test_a_closed_output_is_one_sentence_and_exit_code_2() -> None:
     assert done.stderr == "pvid: the output cannot be written: standard output is closed\n"
 
 
-def test_a_reader_that_has_gone_ends_the_command_without_a_word() -> None:
+def test_closed_pipe_ends_the_command_silently() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -54,7 +54,7 @@ def test_a_reader_that_has_gone_ends_the_command_without_a_word() -> None:
     assert (done.returncode, done.stderr) == (READER_GONE, "")
 
 
-def test_messages_that_nobody_takes_change_nothing(tmp_path: Path) -> None:
+def test_unhandled_messages_change_nothing(tmp_path: Path) -> None:
     for where in ("2>&-", "2>/dev/full"):
         command = f"{' '.join(PVID)} simulate run.csv --duration 1 {where}"
         done = subprocess.run(command, shell=True, cwd=tmp_path, check=False)
@@ -87,7 +87,7 @@ def files_up_to(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def test_what_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
+def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     from matplotlib.figure import Figure
 
     from pvid.base.figure_file import save

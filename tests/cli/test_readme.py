@@ -1,10 +1,12 @@
-"""The README's C program is compiled and run as it stands."""
+"""Pages: programs compile and run, commands and options exist, names and figures are right."""
 
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -12,53 +14,208 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources
 from pvid.rig.file import RigFile
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate
+from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate
+
+DOCS = ROOT / "host" / "docs"
+README = ROOT / "README.md"
+FIRMWARE = DOCS / "firmware.md"
+PAGES = [
+    *(ROOT / name for name in ("README.md", "firmware/README.md", "host/README.md")),
+    *sorted((ROOT / ".github").glob("*.md")),
+    *sorted(DOCS.rglob("*.md")),
+]
+PROGRAMS: dict[str, tuple[Path, Truth]] = {"README": (README, "linear"), "firmware.md": (FIRMWARE, "full")}
+READ_BY_GIT = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split(
+    "\n"
+)
 
 
-def example() -> str:
-    block = re.search(r"```c\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    assert block is not None
-    return block.group(1)
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
 
 
-def test_the_example_identifies_the_standard_rig(tmp_path: Path) -> None:
-    (tmp_path / "example.c").write_text(example(), encoding="utf-8")
+def blocks(page: Path) -> list[str]:
+    """The C programs of a page."""
+    return re.findall(r"```c\n(.*?)```", text_of(page), re.DOTALL)
+
+
+# ---- C
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_program_identifies_the_standard_rig(program: str, tmp_path: Path) -> None:
+    page, truth = PROGRAMS[program]
+    (tmp_path / "example.c").write_text(blocks(page)[0], encoding="utf-8")
     RigFile.standard().write(tmp_path / "rig.toml")
     command = [sys.executable, "-P", "-m", "pvid", "weak-table", "--rig", str(tmp_path / "rig.toml")]
     header = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     (tmp_path / "tables.h").write_text(header, encoding="utf-8")
     binary = tmp_path / "example"
-    core = sorted(str(path) for path in (ROOT / "firmware" / "src").glob("*.c"))
+    core = map(str, core_sources())
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
-    includes = [f"-I{ROOT / 'firmware' / 'include'}", f"-I{tmp_path}"]
+    includes = [*INCLUDES, f"-I{tmp_path}"]
     subprocess.run(["gcc", *flags, *includes, str(tmp_path / "example.c"), *core, "-o", str(binary), "-lm"], check=True)
-    run = simulate(truth="full").run  # 14 bits: what `pvid simulate` gives
+    run = simulate(truth=truth).run
     samples = "\n".join(f"{phi:.9g} {y:.9g}" for phi, y in zip(run.phi, run.y, strict=True))
     printed = subprocess.run([str(binary)], input=samples, capture_output=True, text=True, check=True).stdout
     numbers = np.array([float(number) for number in re.findall(r"-?\d+\.\d+", printed)])
     assert len(numbers) == 6, printed
-    truth = np.array([STANDARD_PENDULUM.g, STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2])
-    errors, standard_errors = np.abs(numbers[::2] - truth), numbers[1::2]
+    true_values = np.array([STANDARD_PENDULUM.g, STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2])
+    errors, standard_errors = np.abs(numbers[::2] - true_values), numbers[1::2]
     assert (errors < 4 * standard_errors).all(), printed
-    assert (standard_errors < 2e-3 * truth).all(), printed
+    assert (standard_errors < 2e-3 * true_values).all(), printed
 
 
-@pytest.mark.parametrize("standard", ["c++14", "c++20"])
-def test_the_example_is_cpp_too(standard: str, tmp_path: Path) -> None:
-    (tmp_path / "example.cpp").write_text(example(), encoding="utf-8")
+def compile_as_cpp(source: str, standard: str, folder: Path) -> None:
+    (folder / "example.cpp").write_text(source, encoding="utf-8")
     declared = '#include "pvid/weak.h"\nextern "C" const pvid_weak_design_f32 weak_tables;\n'
-    (tmp_path / "tables.h").write_text(declared, encoding="utf-8")
+    (folder / "tables.h").write_text(declared, encoding="utf-8")
     command = ["g++", f"-std={standard}", "-fsyntax-only", "-Wall"]
-    includes = [f"-I{ROOT / 'firmware' / 'include'}", f"-I{tmp_path}"]
-    done = subprocess.run([*command, *includes, str(tmp_path / "example.cpp")], capture_output=True, text=True)
+    includes = [*PUBLIC_INCLUDES, f"-I{folder}"]
+    done = subprocess.run([*command, *includes, str(folder / "example.cpp")], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 
-def test_every_command_the_readme_names_exists() -> None:
+@pytest.mark.parametrize("standard", ["c++14", "c++20"])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_program_is_cpp_too(program: str, standard: str, tmp_path: Path) -> None:
+    compile_as_cpp(blocks(PROGRAMS[program][0])[0], standard, tmp_path)
+
+
+def test_example_of_an_interrupt_compiles(tmp_path: Path) -> None:
+    stubs = (
+        '#include "pvid/pvid.h"\nfloat read_encoder();\nfloat read_pivot();\nvoid show(const pvid_estimate_f32 *);\n'
+    )
+    compile_as_cpp(stubs + blocks(FIRMWARE)[1], "c++20", tmp_path)
+
+
+# ---- the command line
+
+
+def commands_shown() -> Iterator[tuple[Path, list[str]]]:
+    """The words behind ./tools/pvid of every command that a page shows, in a block or between backquotes."""
+    for page in PAGES:
+        text = text_of(page).split("<!-- demo -->")[0]
+        for line in re.findall(r"(?m)^ {4,}\./tools/pvid (.*)$", text) + re.findall(r"`\./tools/pvid ([^`]*)`", text):
+            yield page, shlex.split(line, comments=True)
+
+
+def test_commands_and_options_exist() -> None:
     from pvid.cli.main import commands
 
-    pages = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "host" / "README.md"]
-    named = set(re.findall(r"\./tools/pvid ([a-z-]+)", "".join(page.read_text(encoding="utf-8") for page in pages)))
-    assert named, "the READMEs name no command"
-    assert named <= set(commands.list_commands(click.Context(commands)))
+    shown = list(commands_shown())
+    assert len(shown) > 40
+    for page, words in shown:
+        command: click.Command = commands
+        context = click.Context(command)
+        words = [word for word in words if word not in ("|", ">")]
+        while isinstance(command, click.Group) and words and not words[0].startswith("-") and words[0] != "X":
+            found = command.get_command(context, words[0])
+            assert found is not None, f"{page}: {' '.join(words)}"
+            command, words = found, words[1:]
+        known = {option for parameter in command.params for option in parameter.opts} | {"--help"}
+        asked = {word.split("=")[0] for word in words if word.startswith("--")}
+        assert asked <= known, f"{page}: {' '.join(words)}"
+
+
+# ---- names
+
+
+def enumerators(header: str) -> list[str]:
+    """Names of the enumerators of a public header."""
+    source = re.sub(r"/\*.*?\*/", "", text_of(ROOT / "firmware" / "include" / "pvid" / header), flags=re.DOTALL)
+    bodies = re.findall(r"typedef enum \{(.*?)\}", source, re.DOTALL)
+    return [name for body in bodies for name in re.findall(r"\bPVID_\w+", body)]
+
+
+@pytest.mark.parametrize("header", ["status.h", "snapshot.h"])
+def test_every_enumerator_has_its_remedy(header: str) -> None:
+    text = text_of(DOCS / "reasons.md")
+    names = enumerators(header)
+    assert len(names) > 8
+    assert [name for name in names if f"`{name}`" not in text] == []
+
+
+def code_spans() -> Iterator[tuple[Path, str]]:
+    for page in PAGES:
+        if page.name != "changelog.md":
+            for span in re.findall(r"`([^`\n]+)`", re.sub(r"(?ms)^```.*?^```", "", text_of(page))):
+                yield page, span
+
+
+def test_identifiers_and_files_that_pages_name_exist() -> None:
+    sources = [name for name in READ_BY_GIT if name.endswith((".c", ".h", ".py", ".txt", ".cmake", ".in"))]
+    tree = "\n".join(text_of(ROOT / name) for name in sources if (ROOT / name).exists())
+    words = set(re.findall(r"\w+", tree))
+    files = {name.rsplit("/", 1)[-1] for name in READ_BY_GIT}
+    missing = []
+    for page, span in code_spans():
+        for name in re.findall(r"\b(?:pvid|PVID)_\w+\b(?!\*)", span):
+            if name not in words and not name.endswith("_"):
+                missing.append(f"{page.relative_to(ROOT)}: {name}")
+        for name in re.findall(r"[\w/.]+\.(?:c|h|py|toml|cmake|md)\b", span):
+            known = name.rsplit("/", 1)[-1] in files or re.match(r"(run|rig|tables|run-tuned|main|RUN|link)\b", name)
+            if not known:
+                missing.append(f"{page.relative_to(ROOT)}: {name}")
+        for name in re.findall(r"^(?:firmware|host|tests|tools)/[\w/.-]+", span):
+            if not (ROOT / name).exists():
+                missing.append(f"{page.relative_to(ROOT)}: {name}")
+    assert missing == []
+
+
+def test_cited_sections_of_the_theory_exist() -> None:
+    headings = set(re.findall(r"(?m)^## (\d)\. ", text_of(DOCS / "theory.md")))
+    equations = set(re.findall(r"(?m) \((\d+)\)$", text_of(DOCS / "theory.md")))
+    assert headings == set("123456")
+    assert equations == {str(number) for number in range(1, 13)} - {"3"}  # (3), the ties, is in a sentence
+    wrong = []
+    for name in READ_BY_GIT:
+        if not name.endswith((".c", ".h", ".py", ".toml")):
+            continue
+        text = text_of(ROOT / name) if (ROOT / name).exists() else ""
+        for cited in re.findall(r"theory\.md,? (?:section )?(\d+)", text):
+            if cited not in headings:
+                wrong.append(f"{name}: section {cited}")
+        for cited in re.findall(r"theory\.md \((\d+)\)", text):
+            if cited not in equations | {"3"}:
+                wrong.append(f"{name}: equation {cited}")
+    assert wrong == []
+
+
+def test_sources_cite_pages_that_exist() -> None:
+    pages = {name.rsplit("/", 1)[-1] for name in READ_BY_GIT if name.endswith(".md")}
+    wrong = []
+    for name in READ_BY_GIT:
+        if not name.endswith((".c", ".h", ".py", ".toml", ".txt")) or not (ROOT / name).exists():
+            continue
+        for cited in re.findall(r"\b[\w-]+\.md\b", text_of(ROOT / name)):
+            if cited not in pages:
+                wrong.append(f"{name}: {cited}")
+    assert wrong == []
+
+
+# ---- figures of the README
+
+
+def test_figures_of_the_readme_are_those_of_the_cost_page() -> None:
+    def rows(page: Path) -> list[list[str]]:
+        return [
+            [cell.strip() for cell in line.strip("|").split("|")]
+            for line in text_of(page).splitlines()
+            if line[:2] == "| "
+        ]
+
+    sizes = {(row[0], row[1]): row[2:] for row in rows(DOCS / "benchmarks" / "cost.md") if len(row) == 11}
+    shown = [row for row in rows(README) if len(row) == 7 and "(" in row[1]]
+    assert len(shown) == 5
+    for form, board, instructions, ram, flash, *_ in shown:
+        text, _, tables, _, bss, stack, _, mean, longest = sizes[board, form]
+        assert (instructions, ram, flash) == (f"{mean} / {longest}", f"{bss} + {stack}", f"{text} + {tables}"), board
+
+
+def test_readme_is_short_and_its_program_comes_first() -> None:
+    lines = text_of(README).splitlines()
+    assert len(lines) <= 180
+    assert lines.index("```c") < 40

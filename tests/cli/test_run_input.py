@@ -157,7 +157,7 @@ def test_dropped_samples_and_jitter_leave_the_answer(run: Run, tmp_path: Path) -
             assert abs(found[name]["value"] - clean[name]["value"]) < 0.3 * clean[name]["se"], name
 
 
-def test_a_clock_off_by_a_thousandth_is_told(run: Run, tmp_path: Path) -> None:
+def test_clock_error_of_a_thousandth_is_reported(run: Run, tmp_path: Path) -> None:
     path = write(tmp_path / "run.csv", run, t=run.t * 1.001)
     RigFile.standard().write(tmp_path / "run.toml")
     done = pvid("identify", path, "--json")

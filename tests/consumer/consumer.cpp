@@ -16,7 +16,8 @@
 
 #include <cstdio>
 
-namespace {
+namespace
+{
 
 pvid_weak_f32 weak;
 pvid_strong_f32 strong;
@@ -39,8 +40,8 @@ int main()
         pvid_strong_init_q31(&strong_integers, &strong_config_q31) == PVID_OK) {
         return 1;
     }
-    if (pvid_weak_init_f32(&weak, &weak_config) == PVID_OK || pvid_strong_init_f32(&strong, &strong_config) == PVID_OK ||
-        pvid_arithmetic_faults_f32() != 0) {
+    if (pvid_weak_init_f32(&weak, &weak_config) == PVID_OK ||
+        pvid_strong_init_f32(&strong, &strong_config) == PVID_OK || pvid_arithmetic_faults_f32() != 0) {
         return 1;
     }
     std::printf("version %d.%d.%d taps %d\n", PVID_VERSION_MAJOR, PVID_VERSION_MINOR, PVID_VERSION_PATCH,

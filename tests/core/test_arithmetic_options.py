@@ -8,15 +8,13 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
 
 from pvid.board import replay_image
 from pvid.board.boards import BOARDS
 from pvid.board.replay_image import build_image, native_hashes, play, standard_run
 from pvid.core.native import Native
+from pvid.core.sources import INCLUDES, core_sources, source
 
-INCLUDE = ROOT / "firmware" / "include"
-SOURCES = ROOT / "firmware" / "src"
 ASK = """#include "pvid/arithmetic.h"
 int main(void) { return (int)pvid_arithmetic_faults_f32(); }
 """
@@ -27,8 +25,8 @@ TIMEOUT_S = 120.0
 def faults(folder: Path, compiler: str, *options: str) -> int:
     """What a program says whose library was compiled with these options."""
     (folder / "ask.c").write_text(ASK, encoding="utf-8")
-    library = [compiler, *options, f"-I{INCLUDE}", "-c", str(SOURCES / "arithmetic_f32.c"), "-o", "arithmetic.o"]
-    program = [compiler, f"-I{INCLUDE}", "ask.c", "arithmetic.o", "-lm", "-o", "ask"]
+    library = [compiler, *options, *INCLUDES, "-c", str(source("arithmetic_f32.c")), "-o", "arithmetic.o"]
+    program = [compiler, *INCLUDES, "ask.c", "arithmetic.o", "-lm", "-o", "ask"]
     for command in (library, program):
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
@@ -51,22 +49,22 @@ def test_gcc_fuses_nothing_at_its_default_standard(tmp_path: Path) -> None:
     ):
         pytest.skip("not an x86-64")
     for options in ((), ("-ffp-contract=fast",)):
-        command = ["gcc", "-O2", "-march=haswell", *options, f"-I{INCLUDE}", "-S", "-o", "-"]
-        for source in ("kapitza_strong_f32.c", "weak_window_f32.c", "cholesky_f32.c", "arithmetic_f32.c"):
-            done = subprocess.run([*command, str(SOURCES / source)], capture_output=True, text=True, check=True)
-            assert "mulss" in done.stdout and "vfmadd" not in done.stdout, source
+        command = ["gcc", "-O2", "-march=haswell", *options, *INCLUDES, "-S", "-o", "-"]
+        for name in ("kapitza_strong_f32.c", "window_f32.c", "cholesky_f32.c", "arithmetic_f32.c"):
+            done = subprocess.run([*command, str(source(name))], capture_output=True, text=True, check=True)
+            assert "mulss" in done.stdout and "vfmadd" not in done.stdout, name
 
 
 def test_gcc_warns_of_nothing_when_it_vectorises() -> None:
-    options = ["-std=c99", "-O3", "-march=haswell", "-Wall", "-Wextra", f"-I{INCLUDE}", "-S", "-o", "/dev/null"]
-    for source in ("estimator_system_q31.c", "estimator_stages_q31.c", "weak_window_f32.c"):
-        done = subprocess.run(["gcc", *options, str(SOURCES / source)], capture_output=True, text=True, check=True)
+    options = ["-std=c99", "-O3", "-march=haswell", "-Wall", "-Wextra", *INCLUDES, "-S", "-o", "/dev/null"]
+    for name in ("system_q31.c", "stages_q31.c", "window_f32.c"):
+        done = subprocess.run(["gcc", *options, str(source(name))], capture_output=True, text=True, check=True)
         assert done.stderr == ""
 
 
 def test_every_float_source_forbids_fusing_before_all_else() -> None:
-    for source in SOURCES.glob("*_f32.c"):
-        assert source.read_text(encoding="utf-8").startswith('#include "uncontracted.h"\n'), source.name
+    for path in core_sources("*_f32.c"):
+        assert path.read_text(encoding="utf-8").startswith('#include "number/uncontracted.h"\n'), path.name
 
 
 def test_a_cortex_m4f_image_at_gccs_default_standard_has_the_same_bits(
@@ -88,5 +86,5 @@ def test_a_cortex_m4f_image_at_gccs_default_standard_has_the_same_bits(
     run = standard_run("weak", 5000)
     image, _ = build_image(BOARDS["mps2-an386"], run)
     given = (tmp_path / "given").read_text(encoding="utf-8")
-    assert "weak_window_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given
+    assert "weak/window_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given
     assert play(BOARDS["mps2-an386"], image, TIMEOUT_S).hash == int(native_hashes(run, native)[-1])

@@ -6,7 +6,6 @@ number, whatever the samples.
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -17,11 +16,12 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from struct_fields import Field, fields_of
 
-from pvid.core.native import EstimatorConfig, Native, RowEstimator, Status, StrongIdentifier, WeakIdentifier
-from pvid.core.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
+from pvid.core.headers import Headers, Scalar, default_library
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
+from pvid.settings.enums import Status
+from pvid.settings.f32 import EstimatorConfig
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import strong_config_q31, weak_config_q31
 from pvid.sim.pendulum import simulate, standard_sensors
@@ -29,11 +29,11 @@ from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
-Identifier = StrongIdentifier | WeakIdentifier | StrongIdentifierQ31 | WeakIdentifierQ31
 Samples = npt.NDArray[Any]
 
 RIG = RigFile.standard()
 TICKS = 5000
+HEADERS = Headers.of(default_library())
 HUGE = float(np.finfo(np.float32).max)
 
 
@@ -46,33 +46,28 @@ class Subject:
     """An identifier whose configuration may be spoilt, and comes back as it was."""
 
     name: str
-    init: str
     identifier: Identifier
     phi: Samples
     y: Samples
 
     def __post_init__(self) -> None:
-        config = self.identifier.config_struct
-        self.fields = {field.name: field for field in fields_of(config)}
-        structs = [config, *([config.design.contents] if hasattr(config, "design") else [])]
-        self._good = [(ctypes.addressof(struct), bytes(struct)) for struct in structs]
-
-    def initialise(self) -> Status:
-        """Runs init on the configuration as it stands."""
-        function = getattr(self.identifier.native.library, self.init)
-        return Status(function(self.identifier.state, ctypes.byref(self.identifier.config_struct)))
+        headers, config = self.identifier.native.headers, self.identifier.config_struct
+        self.fields = {field.name: field for field in headers.scalars(config)}
+        structs = [config, *([config.design[0]] if "design.taps" in self.fields else [])]
+        self._memory = [headers.ffi.buffer(headers.ffi.addressof(struct)) for struct in structs]
+        self._good = [bytes(memory) for memory in self._memory]
 
     def restore(self) -> None:
         """The good configuration again."""
-        for address, good in self._good:
-            ctypes.memmove(address, good, len(good))
+        for memory, good in zip(self._memory, self._good, strict=True):
+            memory[:] = good
 
     def status_with(self, values: dict[str, Any]) -> Status:
         """What init says of the good configuration with other values."""
         self.restore()
         for name, value in values.items():
-            self.fields[name].value = value
-        return self.initialise()
+            self.fields[name].set(value)
+        return self.identifier.initialise()
 
     def assert_finite(self, phi: Samples, y: Samples) -> None:
         """Steps the accepted configuration through samples and looks at all that it shows."""
@@ -86,7 +81,7 @@ class Subject:
         )
         assert (record.p >= lower).all()
         assert (record.p <= upper).all()
-        shown = [one.assess()] + ([one.estimate] if isinstance(one, WeakIdentifier) else [])
+        shown = [one.assess()] + ([one.estimate] if one.publishes else [])
         for estimate in shown:
             for name in estimate.dtype.names or ():
                 assert np.isfinite(np.asarray(estimate[name], np.float64)).all(), name
@@ -100,16 +95,16 @@ def subjects(native: Native) -> dict[str, Subject]:
         np.rint(x / lsb).astype(np.int64) for x, lsb in ((run.phi, RIG.sensor.phi_lsb), (run.y, RIG.sensor.y_lsb))
     ]
     with_friction = rig_with(full_angle=True, damping=True)
-    strong = native.strong(strong_config(rig_with(form="strong"), 1000.0))
-    weak, corrected = (native.weak(weak_config(rig, 1000.0)) for rig in (RIG, with_friction))
-    weak_q31 = WeakIdentifierQ31(native, weak_config_q31(RIG, 1000.0))
-    strong_q31 = StrongIdentifierQ31(native, strong_config_q31(rig_with(form="strong"), 1000.0))
+    strong = native.identifier(strong_config(rig_with(form="strong"), 1000.0))
+    weak, corrected = (native.identifier(weak_config(rig, 1000.0)) for rig in (RIG, with_friction))
+    weak_q31 = native.identifier(weak_config_q31(RIG, 1000.0))
+    strong_q31 = native.identifier(strong_config_q31(rig_with(form="strong"), 1000.0))
     made = (
-        Subject("strong", "pvid_strong_init_f32", strong, run.phi, run.y),
-        Subject("weak", "pvid_weak_init_f32", weak, run.phi, run.y),
-        Subject("corrected", "pvid_weak_init_f32", corrected, run.phi, run.y),
-        Subject("weak q31", "pvid_weak_init_q31", weak_q31, *counts),
-        Subject("strong q31", "pvid_strong_init_q31", strong_q31, *counts),
+        Subject("strong", strong, run.phi, run.y),
+        Subject("weak", weak, run.phi, run.y),
+        Subject("corrected", corrected, run.phi, run.y),
+        Subject("weak q31", weak_q31, *counts),
+        Subject("strong q31", strong_q31, *counts),
     )
     return {subject.name: subject for subject in made}
 
@@ -176,7 +171,7 @@ WEAK = {
     "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
     "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.shut_max": Range(0, 65535, Status.OK),
+    "trust.revert_after": Range(0, 65535, Status.OK),
 }
 LEAST = -(2**31)
 FORMAT = Range(-64, 64, Status.BAD_FORMAT)
@@ -214,7 +209,7 @@ WEAK_Q31 = {
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
     "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.shut_max": Range(0, 65535, Status.OK),
+    "trust.revert_after": Range(0, 65535, Status.OK),
 }
 SHIFT = Range(0, 62, Status.BAD_SHIFT)
 STRONG_Q31 = {
@@ -252,14 +247,14 @@ NAMED = {  # the others by their own names
     **{f"design.{name}": Status.BAD_FULL_SCALE for name in ("phi_max", "y_max", "u_max")},
 }
 REFUSED = {
-    "strong": {"bank.half": (0, 1, 65535), "bank.stride": (0, 65535), "bank.weights": (None,)},
+    "strong": {"bank.half": (0, 1, 65535), "bank.stride": (0, 65535), "bank.weights": (HEADERS.ffi.NULL,)},
     "weak": {
         "design.taps": (0, 1, 3, 6, 65535),
         "design.decimation": (0, 65, 65535),
         "design.window": (0, 7, 156, 65535),
         "design.functions": (0, 3, 255),
         "design.lag": (0,),
-        **{f"design.{table}": (None,) for table in ("smooth", "second", "chi", "gram")},
+        **{f"design.{table}": (HEADERS.ffi.NULL,) for table in ("smooth", "second", "chi", "gram")},
     },
     "weak q31": {
         "design.taps": (0, 1, 3, 6, 65535),
@@ -275,15 +270,15 @@ REFUSED = {
         "design.high_shift[1]": (62, 255),
         "design.product_shift[4]": (63, 255),
         "design.shift[3]": (63, 255),
-        **{f"design.{table}": (None,) for table in ("smooth", "second", "chi", "gram", "multiplier")},
+        **{f"design.{table}": (HEADERS.ffi.NULL,) for table in ("smooth", "second", "chi", "gram", "multiplier")},
     },
 }
 REFUSED["strong q31"] = REFUSED["strong"]
-REFUSED["corrected"] = {**REFUSED["weak"], "angle": (None,)}
+REFUSED["corrected"] = {**REFUSED["weak"], "angle": (HEADERS.ffi.NULL,)}
 NAMES = tuple(RANGES)
 
 
-def is_used(field: Field, n_p: int, n_theta: int) -> bool:
+def is_used(field: Scalar, n_p: int, n_theta: int) -> bool:
     """Whether the model has such an entry."""
     name = field.group.removeprefix("estimator.")
     if name in ("start", "start_sd", "lower", "upper", "p_bits"):
@@ -291,7 +286,7 @@ def is_used(field: Field, n_p: int, n_theta: int) -> bool:
     return name != "n_bits" or field.place < n_theta
 
 
-def ranged(subject: Subject) -> Iterator[tuple[Field, Range]]:
+def ranged(subject: Subject) -> Iterator[tuple[Scalar, Range]]:
     """Every field that is to be used, with what it may hold."""
     for field in subject.fields.values():
         known = RANGES[subject.name].get(field.group)
@@ -299,16 +294,13 @@ def ranged(subject: Subject) -> Iterator[tuple[Field, Range]]:
             yield field, known
 
 
-def integers_of(field: Field) -> tuple[int, int]:
+def integers_of(field: Scalar) -> tuple[int, int]:
     """Least and largest of its C type."""
-    kinds = {key: kind for key, kind, *_ in field.holder._fields_} if isinstance(field.key, str) else {}
-    kind = kinds.get(field.key) or field.holder._type_
-    bits = 8 * ctypes.sizeof(kind)
-    signed = kind(-1).value < 0
-    return (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) if signed else (0, (1 << bits) - 1)
+    limits = np.iinfo(HEADERS.dtype(field.kind))
+    return int(limits.min), int(limits.max)
 
 
-def values_for(field: Field, known: Range) -> st.SearchStrategy[Any]:
+def values_for(field: Scalar, known: Range) -> st.SearchStrategy[Any]:
     """Anything its type can hold, and its range's edges."""
     if isinstance(field.value, float):
         with np.errstate(over="ignore"):
@@ -324,7 +316,7 @@ def values_for(field: Field, known: Range) -> st.SearchStrategy[Any]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_field_is_forgotten_here(name: str, subjects: dict[str, Subject]) -> None:
+def test_every_field_is_tested(name: str, subjects: dict[str, Subject]) -> None:
     known = {field.group for field, _ in ranged(subjects[name])}
     refused = {entry.partition("[")[0] for entry in REFUSED[name]}
     leave = NOT_HERE | (NOT_WEAK if name in ("weak", "corrected") else set()) | {"design.gram_bits"}
@@ -340,8 +332,8 @@ def test_a_field_out_of_its_range_is_refused_by_name(name: str, subjects: dict[s
     field, known = data.draw(st.sampled_from(choices), label="field")
     subject.restore()
     value = data.draw(values_for(field, known), label="value")
-    field.value = value
-    status = subject.initialise()
+    field.set(value)
+    status = subject.identifier.initialise()
     if known.holds(value):
         assert status in (Status.OK, *known.also)
     else:
@@ -351,7 +343,7 @@ def test_a_field_out_of_its_range_is_refused_by_name(name: str, subjects: dict[s
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_no_number_is_always_refused(name: str, subjects: dict[str, Subject]) -> None:
+def test_not_a_number_is_always_refused(name: str, subjects: dict[str, Subject]) -> None:
     for field, known in ranged(subjects[name]):
         if isinstance(field.value, float):
             for value in (math.nan, math.inf, -math.inf):
@@ -367,20 +359,19 @@ def test_sizes_formats_and_missing_tables_are_refused(name: str, subjects: dict[
         for value in values:
             assert subjects[name].status_with({field: value}) is named, (field, value)
     subjects[name].restore()
-    assert subjects[name].initialise() is Status.OK
+    assert subjects[name].identifier.initialise() is Status.OK
 
 
 def test_an_estimator_of_its_own_needs_a_model_and_a_rate(native: Native) -> None:
     config = strong_config(rig_with(form="strong"), 1000.0).estimator
-    estimator = RowEstimator(native, config, 1000.0)
+    estimator = native.estimator(config, 1000.0)
     struct = estimator.config_struct
-    init = native.library.pvid_estimator_init_f32
     for rate in (0.0, -1.0, 9e-7, 1.1e6, math.nan, math.inf):
         struct.update_rate_hz = rate
-        assert Status(init(estimator.state, ctypes.byref(struct))) is Status.BAD_UPDATE_RATE
+        assert estimator.initialise() is Status.BAD_UPDATE_RATE
     struct.update_rate_hz = 1000.0
-    struct.model = None
-    assert Status(init(estimator.state, ctypes.byref(struct))) is Status.BAD_MODEL
+    struct.model = native.headers.ffi.NULL
+    assert estimator.initialise() is Status.BAD_MODEL
 
 
 def test_friction_with_a_known_zero_is_a_contradiction(subjects: dict[str, Subject]) -> None:
@@ -450,7 +441,7 @@ def odd_samples(draw: Callable[..., Any], subject: Subject) -> tuple[Samples, Sa
 @pytest.mark.parametrize("name", ("strong", "weak", "corrected"))
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
-def test_what_is_accepted_stays_finite(name: str, subjects: dict[str, Subject], data: Any) -> None:
+def test_accepted_configurations_stay_finite(name: str, subjects: dict[str, Subject], data: Any) -> None:
     subject = subjects[name]
     subject.restore()
     status = subject.status_with(data.draw(odd_configs(subject), label="config"))
@@ -463,7 +454,7 @@ def test_what_is_accepted_stays_finite(name: str, subjects: dict[str, Subject], 
 @pytest.mark.parametrize("name", ("weak q31", "strong q31"))
 @settings(max_examples=100, deadline=None)
 @given(data=st.data())
-def test_what_the_fixed_point_core_accepts_keeps_its_bounds(name: str, subjects: dict[str, Subject], data: Any) -> None:
+def test_fixed_point_core_keeps_its_bounds(name: str, subjects: dict[str, Subject], data: Any) -> None:
     subject = subjects[name]
     subject.restore()
     many = st.lists(st.sampled_from(list(ranged(subject))), min_size=1, max_size=6)
@@ -483,7 +474,7 @@ def test_an_infinite_mean_of_finite_samples_places_no_zero(native: Native) -> No
     run = simulate(sensors=standard_sensors(14), truth="linear", duration=8.0, seed=1).run
     phi = run.phi.copy()
     phi[:3000:3], phi[1:3000:3] = HUGE, -HUGE
-    core = native.weak(config)
+    core = native.identifier(config)
     record = core.run(phi, run.y)
     twin = WeakTwin(config).run(phi, run.y)
     assert np.isfinite(record.p).all()
@@ -497,7 +488,7 @@ def test_residuals_beyond_float32_have_a_finite_variance(native: Native) -> None
     estimator: EstimatorConfig = replace(config.estimator, start=far, upper=np.float32(10.0) * far)
     config = replace(config, estimator=estimator)
     run = simulate(sensors=standard_sensors(20), truth="linear", duration=2.0, seed=1).run
-    core, twin = native.strong(config), StrongTwin(config)
+    core, twin = native.identifier(config), StrongTwin(config)
     core.run(run.phi, run.y)
     twin.run(run.phi, run.y)
     assert core.assess()["residual_sd"] > 0

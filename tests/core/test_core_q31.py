@@ -17,7 +17,7 @@ from linear_rig import LINEAR_RIG
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.core.native import Native
-from pvid.core.native_q31 import WeakIdentifierQ31
+from pvid.core.sources import INCLUDES, core_sources, source
 from pvid.design.weak_q31 import weak_tables_q31
 from pvid.rig.file import RigFile
 from pvid.rig.run import write_run
@@ -27,8 +27,8 @@ from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 FIRMWARE = ROOT / "firmware"
 # What both cores need.
-SHARED = [FIRMWARE / "src" / name for name in ("crc32.c", "fnv.c", "publication.c", "snapshot.c")]
-SOURCES = sorted([*(FIRMWARE / "src").glob("*_q31.c"), *SHARED])
+SHARED = [source(name) for name in ("crc32.c", "fnv.c", "publication.c", "snapshot.c")]
+SOURCES = sorted([*core_sources("*_q31.c"), *SHARED])
 COMPILERS = {
     "arm-none-eabi": ["-mcpu=cortex-m0plus", "-mthumb"],
     "riscv64-unknown-elf": ["-march=rv32imac", "-mabi=ilp32"],
@@ -61,25 +61,22 @@ def tool(*command: str | Path) -> str:
 
 @pytest.mark.parametrize("prefix", COMPILERS)
 def test_no_object_has_floating_point(prefix: str, tmp_path: Path) -> None:
-    includes = [f"-I{FIRMWARE}/{folder}" for folder in ("include", "src", "ports/freestanding/include")]
+    includes = [*INCLUDES, f"-I{FIRMWARE}/ports/freestanding/include"]
     flags = ["-std=c99", "-O2", "-ffreestanding", *COMPILERS[prefix], *includes]
     assert len(SOURCES) >= 10
-    for source in SOURCES:
-        compiled = tmp_path / f"{source.stem}.o"
-        tool(f"{prefix}-gcc", *flags, "-c", source, "-o", compiled)
+    for one in SOURCES:
+        compiled = tmp_path / f"{one.stem}.o"
+        tool(f"{prefix}-gcc", *flags, "-c", one, "-o", compiled)
         called = tool(f"{prefix}-nm", "--undefined-only", compiled)
-        assert not SOFT_FLOAT.search(called), f"{source.name}: {called}"
+        assert not SOFT_FLOAT.search(called), f"{one.name}: {called}"
         listing = tool(f"{prefix}-objdump", "-d", compiled)
-        assert not FLOAT_INSTRUCTION.search(listing), source.name
+        assert not FLOAT_INSTRUCTION.search(listing), one.name
 
 
 def test_the_search_for_floating_point_finds_it(tmp_path: Path) -> None:
     """The test above can fail: float32's own solve is full of it."""
     compiled = tmp_path / "float.o"
-    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src"]
-    tool(
-        "arm-none-eabi-gcc", "-mcpu=cortex-m0plus", *includes, "-c", FIRMWARE / "src" / "pattern_f32.c", "-o", compiled
-    )
+    tool("arm-none-eabi-gcc", "-mcpu=cortex-m0plus", *INCLUDES, "-c", source("pattern_f32.c"), "-o", compiled)
     assert SOFT_FLOAT.search(tool("arm-none-eabi-nm", "--undefined-only", compiled))
 
 
@@ -112,7 +109,7 @@ def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
         ({"identifier": {"damping": True}}, "core q31 has no damping"),
     ],
 )
-def test_what_it_cannot_do_is_said(
+def test_unsupported_request_is_reported(
     recorded: tuple[Path, Path], tmp_path: Path, change: dict[str, dict[str, object]], sentence: str
 ) -> None:
     rig = RigFile.standard()
@@ -155,7 +152,7 @@ def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: 
     # the hash wraps by its definition, and by nothing else
     (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
     sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
-    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src", f"-I{tmp_path}"]
+    includes = [*INCLUDES, f"-I{tmp_path}"]
     warnings = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
     flags = ["-std=c99", "-O1", *warnings, *sanitizers, *includes]
     tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", program)
@@ -169,7 +166,7 @@ def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: 
     lines = "\n".join(f"{a} {b}" for a, b in zip(phi, y, strict=True))
     done = subprocess.run([program], input=lines, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    core = WeakIdentifierQ31(native, weak_config_q31(rig, 1000.0))
+    core = native.identifier(weak_config_q31(rig, 1000.0))
     core.run(phi, y)
     assert done.stdout == f"{core.running_hash:08x}"
 

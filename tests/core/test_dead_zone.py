@@ -10,12 +10,13 @@ import pytest
 from linear_rig import LINEAR_RIG
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native, Status
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run import compare_q31
 from pvid.run.compare import first_difference
-from pvid.run.compare_q31 import identifier_q31, twin_q31
+from pvid.run.compare_q31 import twin_q31
+from pvid.settings.enums import Status
 from pvid.setup.f32 import config_of
 from pvid.setup.q31 import config_of_q31, counts_of, p_of, se_of
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
@@ -42,7 +43,7 @@ def run() -> Run:
 
 
 def native_of(native: Native, form: str, config: Any) -> Any:
-    return native.weak(config) if form == "weak" else native.strong(config)
+    return native.identifier(config) if form == "weak" else native.identifier(config)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -69,14 +70,14 @@ def test_fixed_point_equals_its_twin(form: str, law: str, native: Native, run: R
     phi, y = (c[:ticks] for c in counts_of(RIG, run))
     twin = twin_q31(config)
     expected = twin.run(phi, y)
-    core = identifier_q31(native, config)
+    core = native.identifier(config)
     assert compare_q31.first_difference(core.run(phi, y, hashes=False), expected) is None
     assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
     assert core.counters["at_rest"] > 0 or law == "paper"
 
 
 @pytest.mark.parametrize("core_name", ["f32", "q31"])
-def test_p_rests_within_the_zone_of_where_it_would_be(core_name: str, native: Native, run: Run) -> None:
+def test_p_stays_within_the_zone_of_the_solution(core_name: str, native: Native, run: Run) -> None:
     """As far as the zone says from the answer without one, hardly moved, and the published errors are the same."""
     ends, errors, solves = [], [], []
     for dead_zone in (0.0, 1.0):
@@ -88,7 +89,7 @@ def test_p_rests_within_the_zone_of_where_it_would_be(core_name: str, native: Na
             p, se = record.p, core.estimate["se"][:4]
         else:
             integers = config_of_q31(rig, 1000.0)
-            core = identifier_q31(native, integers)
+            core = native.identifier(integers)
             record = core.run(*counts_of(rig, run), hashes=False)
             p, se = p_of(integers, record.p), se_of(integers, core.estimate["se"][:4])
         ends.append(p[-1])
@@ -118,14 +119,14 @@ def test_a_mechanism_that_changes_is_followed(core_name: str, native: Native) ->
             p = core.run(part.phi, part.y, hashes=False).p[-1]
     else:
         config = config_of_q31(rig, 1000.0)
-        core = identifier_q31(native, config)
+        core = native.identifier(config)
         for part in parts:
             p = p_of(config, core.run(*counts_of(rig, part), hashes=False).p[-1])
     assert p[0] == pytest.approx(heavier.linear[0], rel=5e-3)
     assert core.counters["at_rest"] > 0
 
 
-def test_it_is_off_unless_asked_for() -> None:
+def test_off_by_default() -> None:
     for form in FORMS:
         rig = rig_with(form=form)
         assert config_of(rig, 1000.0).estimator.dead_zone == 0.0
@@ -137,7 +138,7 @@ def test_it_is_off_unless_asked_for() -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("dead_zone", [-0.1, 100.1, float("nan"), float("inf")])
-def test_what_is_no_dead_zone_is_refused(form: str, dead_zone: float, native: Native) -> None:
+def test_invalid_dead_zone_is_refused(form: str, dead_zone: float, native: Native) -> None:
     config = config_of(rig_with(form=form), 1000.0)
     bad = replace(config, estimator=replace(config.estimator, dead_zone=dead_zone))
     with pytest.raises(PvidError, match=Status.BAD_DEAD_ZONE.name.lower().replace("_", " ")):
@@ -145,13 +146,13 @@ def test_what_is_no_dead_zone_is_refused(form: str, dead_zone: float, native: Na
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_what_is_no_dead_zone_is_refused_in_integers(form: str, native: Native) -> None:
+def test_invalid_dead_zone_is_refused_in_fixed_point(form: str, native: Native) -> None:
     config = config_of_q31(rig_with(form=form), 1000.0)
     bad = replace(config, estimator=replace(config.estimator, dead_zone=(100 << 16) + 1))
     with pytest.raises(PvidError, match="bad dead zone"):
-        identifier_q31(native, bad)
+        native.identifier(bad)
 
 
-def test_a_rig_file_says_how_wide_it_may_be() -> None:
+def test_rig_file_contains_the_parameter_bounds() -> None:
     with pytest.raises(PvidError, match="dead_zone"):
         RigFile.parse("l1 = 0.3\n[identifier]\ndead_zone = 101\n")

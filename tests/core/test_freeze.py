@@ -11,11 +11,12 @@ import pytest
 from linear_rig import LINEAR_RIG
 
 from pvid.core import snapshot
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.run import compare_q31
 from pvid.run.compare import first_difference
-from pvid.run.compare_q31 import identifier_q31, twin_q31
+from pvid.run.compare_q31 import twin_q31
+from pvid.settings.enums import Reason, SnapshotStatus
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import config_of_q31, p_of
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
@@ -53,8 +54,10 @@ def identifier_of(native: Native, form: str, core: str) -> Any:
     """The identifier of a form and core that forgets."""
     rig = rig_with(form=form, stride=8, forgetting_s=5.0)
     if core == "q31":
-        return identifier_q31(native, config_of_q31(rig, 1000.0))
-    return native.weak(weak_config(rig, 1000.0)) if form == "weak" else native.strong(strong_config(rig, 1000.0))
+        return native.identifier(config_of_q31(rig, 1000.0))
+    return (
+        native.identifier(weak_config(rig, 1000.0)) if form == "weak" else native.identifier(strong_config(rig, 1000.0))
+    )
 
 
 def as_counted(samples: Any, core: str) -> Any:
@@ -148,6 +151,6 @@ def test_a_frozen_state_is_saved_and_restored(core_name: str, native: Native, sa
     core, restored = (identifier_of(native, "weak", core_name) for _ in range(2))
     core.run(phi[:FROM], y[:FROM], hashes=False)
     core.freeze(True)
-    assert snapshot.restore(restored, snapshot.save(core)) is snapshot.SnapshotStatus.RESTORED
+    assert snapshot.restore(restored, snapshot.save(core)) is SnapshotStatus.RESTORED
     record = restored.run(phi[FROM:TO], y[FROM:TO], hashes=False)
     assert (record.reason == Reason.HELD_FROZEN).any()

@@ -13,7 +13,8 @@ from conftest import ROOT
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.replay_image import ReplayRun, build_image, native_hashes, play, standard_run
-from pvid.core.native import Native, WeakConfig
+from pvid.core.native import Native
+from pvid.settings.f32 import WeakConfig
 
 TICKS = 5000
 LEFT_OUT = {"PVID_FULL_ANGLE": "0"}
@@ -44,9 +45,9 @@ def test_linear_rows_have_the_same_bits(without: Native, native: Native, run: Re
 def test_the_setting_is_refused(without: Native, native: Native, run: ReplayRun) -> None:
     assert isinstance(run.config, WeakConfig)
     config = replace(run.config, full_angle=True, passes=3)
-    native.weak(config)
+    native.identifier(config)
     with pytest.raises(PvidError, match="angle"):
-        without.weak(config)
+        without.identifier(config)
 
 
 def functions(image: Path) -> set[str]:

@@ -9,10 +9,11 @@ import numpy.typing as npt
 import pytest
 
 from pvid.core.native import Native
-from pvid.core.native_q31 import ESTIMATE_DTYPE, ScaleQ31, physical_q31
 from pvid.models.kapitza.physical import linear, physical
 from pvid.rig.file import RigFile
+from pvid.settings.q31 import ScaleQ31
 from pvid.setup.q31 import ConfigQ31, covariance_of, p_of, scale_of, strong_config_q31, units_of, weak_config_q31
+from pvid.twin import estimates as layouts
 from pvid.twin.kapitza import physical_q31 as kapitza_q31
 
 RIG = RigFile.standard()
@@ -23,7 +24,7 @@ SCALE = scale_of(CONFIG, RIG.l1)
 
 def estimate_of(p: npt.ArrayLike, relative_se: float, correlation: float) -> npt.NDArray[np.void]:
     """An estimate of (w [1/s^2], d1, d2) with equal relative errors."""
-    out = np.zeros((), ESTIMATE_DTYPE)
+    out = np.zeros((), layouts.Q31)
     one = p_of(CONFIG, np.eye(4))[np.arange(3), np.arange(3)]
     out["p"][:3] = np.rint(np.asarray(p) / one)
     out["se"][:3] = np.rint(relative_se * np.asarray(p) / one)
@@ -33,12 +34,12 @@ def estimate_of(p: npt.ArrayLike, relative_se: float, correlation: float) -> npt
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_they_are_those_of_the_closed_form(native: Native, seed: int) -> None:
+def test_values_equal_the_closed_form(native: Native, seed: int) -> None:
     random = np.random.default_rng(seed)
     g, l2, rho2 = random.uniform(2, 30), random.uniform(0.03, 0.5), random.uniform(0.03, 0.5)
     p = linear(g, l2, rho2, RIG.l1)
     estimate = estimate_of(p, 10 ** random.uniform(-4, -1), random.uniform(-0.999, 0.999))
-    answer = physical_q31(native, estimate, SCALE)
+    answer = native.physical_q31(estimate, SCALE)
     exact = p_of(CONFIG, estimate["p"][:4])[:3]
     assert answer is not None
     value, se = (a / 2.0**24 for a in answer)
@@ -51,12 +52,12 @@ def test_they_are_those_of_the_closed_form(native: Native, seed: int) -> None:
 
 @pytest.mark.parametrize("p", [(30.0, 5.0, 6.0), (30.0, 5.0, 4.0), (30.0, 9.0, 0.0), (0.0, 9.0, 5.0)])
 def test_outside_the_physical_region_there_are_none(native: Native, p: tuple[float, float, float]) -> None:
-    assert physical_q31(native, estimate_of(p, 0.01, 0.0), SCALE) is None
+    assert native.physical_q31(estimate_of(p, 0.01, 0.0), SCALE) is None
 
 
 def test_a_length_that_does_not_fit_is_refused(native: Native) -> None:
     """l2 = l1 L2/d2 beyond 127 m."""
-    assert physical_q31(native, estimate_of((30.0, 60.0, 0.1), 0.01, 0.0), SCALE) is None
+    assert native.physical_q31(estimate_of((30.0, 60.0, 0.1), 0.01, 0.0), SCALE) is None
 
 
 @pytest.mark.parametrize("config", [CONFIG, strong_config_q31(STRONG, 1000.0)])
@@ -64,7 +65,7 @@ def test_core_and_twin_agree_on_any_estimate(native: Native, config: ConfigQ31) 
     """Estimates of every size and sign, and scales of every shift: the same integers, or none in both."""
     random = np.random.default_rng(9)
     count = 3000
-    estimates = np.zeros(count, ESTIMATE_DTYPE)
+    estimates = np.zeros(count, layouts.Q31)
     sizes = random.integers(0, 31, (2, count, 3))
     estimates["p"][:, :3] = random.integers(0, 2**31, (count, 3)) >> sizes[0]
     estimates["p"][::50, 0] *= -1
@@ -81,7 +82,7 @@ def test_core_and_twin_agree_on_any_estimate(native: Native, config: ConfigQ31) 
     ):
         values, errors, inside = kapitza_q31.physical(estimates, unit)
         for i in range(count):
-            answer = physical_q31(native, estimates[i : i + 1], unit)
+            answer = native.physical_q31(estimates[i : i + 1], unit)
             assert (answer is not None) == inside[i], i
             if answer is not None:
                 assert np.array_equal(answer[0], values[i]) and np.array_equal(answer[1], errors[i]), i

@@ -11,17 +11,17 @@ import pytest
 from conftest import ROOT
 
 from pvid.board.boards import BOARDS, BUILD, build, run
+from pvid.core.sources import INCLUDES, core_sources, source
 
-CORE = ROOT / "firmware"
 PROGRAM = ROOT / "tests" / "threads" / "read_while_stepping.c"
-PARTS = ("cholesky", "estimator*", "gate", "information", "kapitza*", "pattern", "trust", "weak*")
+ROOMS = ("solve", "judge", "weak", "kapitza")
 TIMEOUT_S = 40.0
 
 
 def play_threads(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    sources = [path for part in PARTS for path in sorted((CORE / "src").glob(f"{part}_f32.c"))]
-    command = ["clang", "-std=c99", "-O1", "-g", "-fsanitize=thread", *options, f"-I{CORE / 'include'}", str(PROGRAM)]
-    command += [str(CORE / "src" / "publication.c"), *map(str, sources), "-lm", "-lpthread", "-o", str(folder / "read")]
+    sources = [path for path in core_sources("*_f32.c") if path.parent.name in ROOMS]
+    command = ["clang", "-std=c99", "-O1", "-g", "-fsanitize=thread", *options, *INCLUDES, str(PROGRAM)]
+    command += [str(source("publication.c")), *map(str, sources), "-lm", "-lpthread", "-o", str(folder / "read")]
     built = subprocess.run(command, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
     return subprocess.run([str(folder / "read")], capture_output=True, text=True, check=False, timeout=TIMEOUT_S)

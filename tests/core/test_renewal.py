@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pvid.core.native import Native, TrustConfig
+from pvid.core.native import Native
 from pvid.models.kapitza import MODEL
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.identify import identify
+from pvid.settings.f32 import TrustConfig
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 RIG = RigFile.standard()

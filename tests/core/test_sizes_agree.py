@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-INCLUDE = ROOT / "firmware" / "include"
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, public_headers, source
+
 FREESTANDING = f"-I{ROOT / 'firmware' / 'ports' / 'freestanding' / 'include'}"
-SOURCES = sorted((ROOT / "firmware" / "src").glob("*.c"))
+SOURCES = core_sources()
 
 # Every size of config.h, and another value than its default that is allowed.
 OTHER = {
@@ -68,7 +69,7 @@ def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProces
 def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The library with the default sizes, static and shared, as who copies include and src makes it."""
     folder = tmp_path_factory.mktemp("library")
-    done = run("gcc", "-std=c99", "-O0", "-fPIC", f"-I{INCLUDE}", "-c", *SOURCES, cwd=folder)
+    done = run("gcc", "-std=c99", "-O0", "-fPIC", *INCLUDES, "-c", *SOURCES, cwd=folder)
     assert done.returncode == 0, done.stderr
     objects = sorted(folder.glob("*.o"))
     made = {"static": folder / "libpvid.a", "shared": folder / "libpvid.so"}
@@ -82,7 +83,7 @@ def user(folder: Path, language: str, *sizes: str) -> Path:
     source = folder / f"user.{language}"
     source.write_text(USER, encoding="utf-8")
     compiled = folder / "user.o"
-    done = run(*LANGUAGES[language], *sizes, f"-I{INCLUDE}", "-c", source, "-o", compiled)
+    done = run(*LANGUAGES[language], *sizes, *PUBLIC_INCLUDES, "-c", source, "-o", compiled)
     assert done.returncode == 0, done.stderr
     return compiled
 
@@ -92,7 +93,7 @@ def link(folder: Path, language: str, compiled: Path, library: Path) -> subproce
 
 
 def test_every_size_of_the_headers_is_tried() -> None:
-    text = "".join(path.read_text(encoding="utf-8") for path in sorted(INCLUDE.glob("pvid/*.h")))
+    text = "".join(path.read_text(encoding="utf-8") for path in public_headers())
     assert set(re.findall(r"#ifndef (PVID_MAX_\w+)", text)) == set(OTHER)
 
 
@@ -121,7 +122,7 @@ def test_another_size_is_refused(language: str, name: str, libraries: dict[str, 
 def test_every_function_that_takes_a_struct_has_its_sizes_in_its_name() -> None:
     texts = {
         path.name: re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-        for path in sorted(INCLUDE.glob("pvid/*.h"))
+        for path in public_headers()
     }
     all_text = "".join(texts.values())
     structs = set(re.findall(r"^\} (pvid_\w+);", all_text, re.MULTILINE)) | set(
@@ -140,8 +141,8 @@ def test_a_size_costs_nothing_on_a_board(tmp_path: Path) -> None:
     sections = {}
     for names in ("", "-DPVID_PLAIN_NAMES"):
         compiled = tmp_path / "weak.o"
-        options = ("-std=c99", "-mcpu=cortex-m4", "-mthumb", "-O2", f"-I{INCLUDE}", FREESTANDING, *names.split())
-        done = run("arm-none-eabi-gcc", *options, "-c", ROOT / "firmware" / "src" / "weak_f32.c", "-o", compiled)
+        options = ("-std=c99", "-mcpu=cortex-m4", "-mthumb", "-O2", *INCLUDES, FREESTANDING, *names.split())
+        done = run("arm-none-eabi-gcc", *options, "-c", source("weak_f32.c"), "-o", compiled)
         assert done.returncode == 0, done.stderr
         sections[names] = run("arm-none-eabi-size", compiled).stdout.split()[6:10]
     assert sections[""] == sections["-DPVID_PLAIN_NAMES"]

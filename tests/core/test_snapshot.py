@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,13 +12,12 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from struct_fields import Field, fields_of
 
 from pvid.core import snapshot
-from pvid.core.native import Native
-from pvid.core.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
-from pvid.core.snapshot import Identifier, SnapshotStatus
+from pvid.core.headers import Scalar
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
+from pvid.settings.enums import SnapshotStatus
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import strong_config_q31, weak_config_q31
 from pvid.sim.pendulum import Simulation
@@ -37,32 +35,32 @@ def rig_with(**settings: Any) -> RigFile:
 
 
 def strong_of(native: Native) -> Identifier:
-    return native.strong(strong_config(rig_with(form="strong", forgetting_s=3.0), 1000.0))
+    return native.identifier(strong_config(rig_with(form="strong", forgetting_s=3.0), 1000.0))
 
 
 def savitzky_golay_of(native: Native) -> Identifier:
-    return native.strong(strong_config(rig_with(form="strong", differentiator="savitzky-golay"), 1000.0))
+    return native.identifier(strong_config(rig_with(form="strong", differentiator="savitzky-golay"), 1000.0))
 
 
 def weak_of(native: Native) -> Identifier:
-    return native.weak(weak_config(rig_with(full_angle=False), 1000.0))
+    return native.identifier(weak_config(rig_with(full_angle=False), 1000.0))
 
 
 def forgetting_of(native: Native) -> Identifier:
-    return native.weak(weak_config(rig_with(forgetting_s=5.0), 1000.0))
+    return native.identifier(weak_config(rig_with(forgetting_s=5.0), 1000.0))
 
 
 def corrected_of(native: Native) -> Identifier:
-    return native.weak(weak_config(rig_with(full_angle=True, damping=True), 1000.0))
+    return native.identifier(weak_config(rig_with(full_angle=True, damping=True), 1000.0))
 
 
 def fixed_point_of(native: Native) -> Identifier:
-    return WeakIdentifierQ31(native, weak_config_q31(RIG, 1000.0))
+    return native.identifier(weak_config_q31(RIG, 1000.0))
 
 
 def strong_fixed_point_of(native: Native) -> Identifier:
     rig = rig_with(form="strong", forgetting_s=3.0, outlier_gate=6.0)
-    return StrongIdentifierQ31(native, strong_config_q31(rig, 1000.0))
+    return native.identifier(strong_config_q31(rig, 1000.0))
 
 
 FOUR = (strong_of, weak_of, strong_fixed_point_of, fixed_point_of)  # every form and core
@@ -72,7 +70,7 @@ Maker = Callable[[Native], Identifier]
 
 def samples_for(identifier: Identifier, simulation: Simulation) -> tuple[Samples, Samples]:
     phi, y = simulation.run.phi[:TICKS], simulation.run.y[:TICKS]
-    if isinstance(identifier, WeakIdentifierQ31 | StrongIdentifierQ31):
+    if identifier.core == "q31":
         return np.rint(phi / RIG.sensor.phi_lsb).astype(np.int64), np.rint(y / RIG.sensor.y_lsb).astype(np.int64)
     return phi, y
 
@@ -86,7 +84,7 @@ def test_a_restored_run_continues_bit_for_bit(maker: Maker, native: Native, stan
         first, second = maker(native), maker(native)
         record = first.run(phi[:place], y[:place], sums=False)
         assert snapshot.restore(second, snapshot.save(first)) is SnapshotStatus.RESTORED
-        second._hash[0] = first.running_hash  # the hash is kept beside the identifier, not in it
+        second.running_hash = first.running_hash  # the hash is kept beside the identifier, not in it
         rest = second.run(phi[place:], y[place:], sums=False)
         assert second.running_hash == whole.running_hash, place
         assert np.array_equal(np.concatenate([record.p, rest.p]), uninterrupted.p), place
@@ -143,7 +141,7 @@ def changed(value: Any) -> Any:
     return value - 1 if value > 0 else value + 1
 
 
-def is_unused(field: Field, n_p: int, n_theta: int) -> bool:
+def is_unused(field: Scalar, n_p: int, n_theta: int) -> bool:
     """An entry beyond those of the model."""
     name = field.group.removeprefix("estimator.")
     if name in ("start", "start_sd", "lower", "upper", "p_bits"):
@@ -155,18 +153,18 @@ def is_unused(field: Field, n_p: int, n_theta: int) -> bool:
 def test_every_setting_that_differs_is_seen(maker: Maker, native: Native) -> None:
     identifier = maker(native)
     image = snapshot.save(identifier)
-    before = bytes(identifier.state)
+    before = identifier.state_bytes
     tried = 0
-    for field in fields_of(identifier.config_struct):
+    for field in identifier.native.headers.scalars(identifier.config_struct):
         if field.name in NOT_SETTINGS[maker] or is_unused(
             field, identifier.n_p, 11 if maker is strong_fixed_point_of else 8
         ):
             continue
         kept = field.value
-        field.value = changed(kept)
+        field.set(changed(kept))
         assert snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG, field.name
-        field.value = kept
-        assert bytes(identifier.state) == before
+        field.set(kept)
+        assert identifier.state_bytes == before
         tried += 1
     assert tried >= 25
     assert snapshot.restore(identifier, image) is SnapshotStatus.RESTORED
@@ -176,17 +174,17 @@ def test_every_table_that_differs_is_seen(native: Native) -> None:
     for maker in FOUR:
         identifier = maker(native)
         image = snapshot.save(identifier)
-        assert identifier._tables
-        for table in identifier._tables.values():
+        assert identifier.tables
+        for table in identifier.tables.values():
             # the arrays are read-only for Python, as the tables are for the core
-            raw = (ctypes.c_uint8 * table.nbytes).from_address(table.ctypes.data)
+            raw = native.headers.ffi.cast("uint8_t *", table.ctypes.data)
             for place in (0, table.nbytes // 2, table.nbytes - 1):
                 raw[place] ^= 1
                 assert snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG
                 raw[place] ^= 1
 
 
-def test_a_correction_that_is_not_asked_for_has_no_passes(native: Native) -> None:
+def test_disabled_correction_has_no_passes(native: Native) -> None:
     image = snapshot.save(weak_of(native))
     identifier = weak_of(native)
     identifier.config_struct.passes += 1
@@ -194,10 +192,10 @@ def test_a_correction_that_is_not_asked_for_has_no_passes(native: Native) -> Non
 
 
 @pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
-def test_what_is_damaged_cut_short_or_of_another_version_changes_nothing(maker: Maker, native: Native) -> None:
+def test_bad_snapshot_changes_nothing(maker: Maker, native: Native) -> None:
     identifier = maker(native)
     image = snapshot.save(identifier)
-    before = bytes(identifier.state)
+    before = identifier.state_bytes
     for place in (*range(0, 28, 4), 28, len(image) // 2, len(image) - 5, len(image) - 1):
         for bit in (1, 128):
             damaged = image[:place] + bytes([image[place] ^ bit]) + image[place + 1 :]
@@ -208,7 +206,7 @@ def test_what_is_damaged_cut_short_or_of_another_version_changes_nothing(maker: 
     sealed = image[:8] + b"\x00\x00\x00\x7f" + image[12:-4]
     other = sealed + zlib.crc32(sealed).to_bytes(4, "little")
     assert snapshot.restore(identifier, other) is SnapshotStatus.OTHER_VERSION
-    assert bytes(identifier.state) == before
+    assert identifier.state_bytes == before
     assert snapshot.restore(identifier, image + b"and what follows") is SnapshotStatus.RESTORED
 
 

@@ -11,15 +11,17 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
-from test_core_q31 import FIRMWARE, SOURCES, tool
+from test_core_q31 import SOURCES, tool
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import RowEstimatorQ31, StrongConfigQ31, StrongIdentifierQ31, strong_rows_q31
+from pvid.core.native import Native
+from pvid.core.sources import INCLUDES
 from pvid.oracle import strong as oracle
 from pvid.rig.file import Law, RigFile
 from pvid.rig.run import write_run
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import StrongConfigQ31
 from pvid.setup.f32 import bank_of, estimator_config, strong_config
 from pvid.setup.q31 import counts_of, covariance_of, p_of, se_of, strong_config_q31, strong_design_of
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
@@ -50,9 +52,9 @@ def from_exact(
     native: Native, config: StrongConfigQ31, phi: npt.NDArray[np.float64], u: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
     """Final p of the fixed-point core fed rows of exact derivatives."""
-    n, y, fits = strong_rows_q31(native, config.design.row, *config.design.integers(phi, u))
+    n, y, fits = native.strong_rows_q31(config.design.row, *config.design.integers(phi, u))
     assert fits.all()
-    record = RowEstimatorQ31(native, config.estimator).run(n, y, sums=False, hashes=False)
+    record = native.estimator_q31(config.estimator).run(n, y, sums=False, hashes=False)
     return p_of(config, record.p[-1])
 
 
@@ -107,11 +109,11 @@ def test_a_sensor_of_20_bits_is_identified_as_by_float32(
         rig = replace(rig, identifier=five)
     run = standard_20_bits.run
     config = strong_config_q31(rig, 1000.0, standard_start(3))
-    core = StrongIdentifierQ31(native, config)
+    core = native.identifier(config)
     record = core.run(*counts_of(rig, run), sums=False, hashes=False)
     last = core.assess()
     p, se = p_of(config, record.p[-1]), se_of(config, last["se"][:3])
-    float_core = native.strong(strong_config(rig, 1000.0, standard_start(3)))
+    float_core = native.identifier(strong_config(rig, 1000.0, standard_start(3)))
     float_record = float_core.run(run.phi, run.y, sums=False, hashes=False)
     expected, known = float_record.p[-1], float_core.assess()
     assert (np.abs(p - expected) < 0.05 * se).all()
@@ -169,7 +171,7 @@ def test_identify_and_compare_take_the_fixed_point_core(recorded: tuple[Path, Pa
         ({"phi_lsb": 2e-8}, "phi_range is 25000000 counts of the sensor and the fixed-point core takes"),
     ],
 )
-def test_what_it_cannot_hold_is_said(sensor: dict[str, float], sentence: str) -> None:
+def test_unsupported_size_is_reported(sensor: dict[str, float], sentence: str) -> None:
     rig = replace(STRONG, sensor=replace(STRONG.sensor, **sensor))
     with pytest.raises(PvidError, match=sentence):
         strong_design_of(rig, 1000.0)
@@ -219,7 +221,7 @@ def test_the_header_is_the_configuration_and_nothing_overflows(
     (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
     sanitizers = ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
     sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
-    includes = [f"-I{FIRMWARE}/include", f"-I{FIRMWARE}/src", f"-I{tmp_path}"]
+    includes = [*INCLUDES, f"-I{tmp_path}"]
     flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", *sanitizers, *includes]
     tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", tmp_path / "program")
     run = simulate(sensors=standard_sensors(20), truth="linear", duration=3.0, seed=2).run
@@ -238,7 +240,7 @@ def test_the_header_is_the_configuration_and_nothing_overflows(
     lines = "\n".join(f"{a} {b}" for a, b in zip(phi, y, strict=True))
     (tmp_path / "counts").write_text(lines)
     printed = tool("sh", "-c", f"{tmp_path / 'program'} < {tmp_path / 'counts'}")
-    core = StrongIdentifierQ31(native, config)
+    core = native.identifier(config)
     core.run(phi, y)
     assert printed == f"{core.running_hash:08x}"
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from conftest import ROOT
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, source
 from pvid.design.c_tables import bank_header, float_array, float_literal
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import design, to_c_header
@@ -59,13 +59,12 @@ def test_five_points_of_the_core_are_what_is_generated(tmp_path: Path) -> None:
         ' printf("%.9g\\n", (double)pvid_five_points_f32[i]); } return 0; }\n',
         encoding="utf-8",
     )
-    core = ROOT / "firmware"
     command = [
         "gcc",
         "-std=c99",
-        f"-I{core / 'include'}",
+        *INCLUDES,
         str(tmp_path / "print.c"),
-        str(core / "src/differentiator_f32.c"),
+        str(source("differentiator_f32.c")),
     ]
     subprocess.run([*command, "-o", str(tmp_path / "print")], check=True)
     printed = subprocess.run([str(tmp_path / "print")], capture_output=True, text=True, check=True).stdout.split()
@@ -121,7 +120,7 @@ def test_weak_tables_reach_the_core_with_their_bits(tmp_path: Path) -> None:
         " print(tables.gram, 6u * k * (k + 1u) / 2u); print(&tables.overlap, 1); return 0; }\n",
         encoding="utf-8",
     )
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{ROOT / 'firmware' / 'include'}"]
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *PUBLIC_INCLUDES]
     subprocess.run(["gcc", *flags, str(tmp_path / "print.c"), "-o", str(tmp_path / "print")], check=True)
     printed = subprocess.run([str(tmp_path / "print")], capture_output=True, text=True, check=True).stdout.split()
     values = [tables.smooth_32, tables.second_32, tables.chi_32, tables.gram_32, np.array([tables.overlap], np.float32)]

@@ -97,7 +97,7 @@ def test_a_savitzky_golay_filter_folds_ten_times_as_much() -> None:
         assert folded_gain(np.asarray(usual), order, decimation, edge) > 10 * ours.folded_gain
 
 
-def test_motion_passes_and_what_would_look_like_it_does_not() -> None:
+def test_motion_passes_and_similar_noise_does_not() -> None:
     """Cosines through filter and decimation: one in the pass band, and one that decimation turns into it."""
     taps, decimation, edge = CASES[0]
     one = fir(taps, decimation, 0, edge)
@@ -147,6 +147,6 @@ def test_noise_is_reduced_as_the_taps_say() -> None:
         (81, math.nan, "not at nan"),
     ],
 )
-def test_what_cannot_be_a_filter_is_named(taps: int, edge: float, named: str) -> None:
+def test_impossible_filter_is_refused_by_name(taps: int, edge: float, named: str) -> None:
     with pytest.raises(PvidError, match=named):
         fir(taps, 9, 0, edge)

@@ -68,7 +68,7 @@ def test_predicted_errors_are_the_spread_of_twenty_runs(
     errors = []
     for seed in range(20):
         run = simulate(pendulum, tones, sensors_of(rig), duration=duration, seed=seed).run
-        identifier = native.weak(weak_config(rig, 1000.0))
+        identifier = native.identifier(weak_config(rig, 1000.0))
         identifier.run(run.phi, run.y, sums=False, hashes=False)
         p = identifier.assess()["p"][:4].astype(np.float64)
         errors.append([*p, *physical(p[:3], rig.l1)] - truth)
@@ -146,7 +146,7 @@ def test_the_delay_covers_front_window_and_work() -> None:
     assert cost.update_s == pytest.approx(0.855)
 
 
-def test_a_design_beyond_the_default_bounds_says_which_and_what_the_correction_takes() -> None:
+def test_design_beyond_default_bounds_names_bounds_and_memory() -> None:
     standard = RigFile.standard()
     plain = cost_of(weak_design_of(standard, 1000.0))
     large = cost_of(weak_design_of(standard, 5000.0))
@@ -200,7 +200,7 @@ def test_the_command_prints_a_table_and_an_object(tmp_path: Path) -> None:
         (("--run", "absent.csv", "--tone", "0.005,2,0"), "--run"),
     ],
 )
-def test_what_cannot_be_predicted_is_one_sentence(arguments: tuple[str, ...], named: str, tmp_path: Path) -> None:
+def test_unpredictable_rig_is_one_sentence(arguments: tuple[str, ...], named: str, tmp_path: Path) -> None:
     RigFile.standard().write(tmp_path / "rig.toml")
     done = pvid("design", "--rig", "rig.toml", *arguments, cwd=tmp_path)
     assert done.returncode == 2

@@ -51,7 +51,7 @@ def test_savitzky_golay_equals_rational_arithmetic(window: int, degree: int) -> 
 
 
 def test_scipy_is_wrong_where_this_design_is_needed() -> None:
-    """The reason not to use scipy.signal.savgol_coeffs (MATH.md 5); drop ours if this ever fails."""
+    """The reason not to use scipy.signal.savgol_coeffs (theory.md 5); drop ours if this ever fails."""
     scipy_taps = savgol_coeffs(321, 10, deriv=4, use="dot")[161:]
     taps = [float(tap) for tap in exact_taps(160, 10, 4)[161:]]
     ours = savitzky_golay(321, 10).weights[4]

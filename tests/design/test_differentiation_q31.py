@@ -8,9 +8,9 @@ import pytest
 
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.core.native_q31 import derivatives_q31
 from pvid.design.fir import ORDERS, FirBank, finite_difference, savitzky_golay
-from pvid.design.fir_q31 import FirBankQ31, integer_bank, largest_sums
+from pvid.design.fir_q31 import integer_bank, largest_sums
+from pvid.settings.tables import FirBankQ31
 from pvid.twin.q31.differentiator import derivatives
 
 PHI_MAX, Y_MAX = 83443, 6000  # 0.5 rad of 20 bits, 30 mm of 5 um
@@ -46,7 +46,7 @@ def test_hostile_counts_equal_the_twin(native: Native, name: str) -> None:
     _, bank, _ = bank_of(name)
     phi, y = hostile(3000)
     twin = derivatives(phi, y, np.ones(len(phi), np.bool_), bank)
-    core = derivatives_q31(native, bank, phi, y)
+    core = native.derivatives_q31(bank, phi, y)
     for ours, other in zip(core, twin, strict=True):
         assert np.array_equal(ours, other)
     assert core[2].sum() == len(phi) - bank.window + 1
@@ -65,7 +65,7 @@ def test_the_proof_names_the_worst_counts(native: Native, name: str) -> None:
         taps = np.concatenate([sign * folded[::-1], [centre], folded])
         phi = np.zeros(bank.window, np.int64)
         phi[places] = PHI_MAX * np.sign(taps)
-        d_phi, _, ready = derivatives_q31(native, bank, phi, np.zeros(bank.window, np.int64))
+        d_phi, _, ready = native.derivatives_q31(bank, phi, np.zeros(bank.window, np.int64))
         assert ready[-1]
         assert d_phi[-1, order] == (largest + (1 << bank.phi_shift[order] >> 1)) >> bank.phi_shift[order]
 
@@ -79,7 +79,7 @@ def test_motion_is_differentiated_as_in_float64(native: Native, name: str, frequ
     t = np.arange(ticks) * point / bank.stride
     phi = np.rint(15000 * np.sin(2 * np.pi * frequency * t + 0.4)).astype(np.int64)
     y = np.rint(1000 * np.sin(2 * np.pi * frequency * t + 2.4)).astype(np.int64)
-    d_phi, d_y, ready = derivatives_q31(native, bank, phi, y)
+    d_phi, d_y, ready = native.derivatives_q31(bank, phi, y)
     tau = 2.0**bank.tau_bits
     for counts, integers, bits, orders in (
         (phi, d_phi, bank.phi_bits, range(5)),
@@ -120,11 +120,11 @@ def test_the_core_refuses_a_bank_that_could_overflow(native: Native) -> None:
     _, bank, _ = bank_of("241 points, degree 12")
     broken = FirBankQ31(**{**vars(bank), "phi_shift": (*bank.phi_shift[:4], bank.phi_shift[4] - 1)})
     with pytest.raises(PvidError, match="refused the bank: bad shift"):
-        derivatives_q31(native, broken, np.zeros(10), np.zeros(10))
+        native.derivatives_q31(broken, np.zeros(10), np.zeros(10))
 
 
 def test_full_scale_alternating_counts_reach_the_limit_of_five_points(native: Native) -> None:
     bank = integer_bank(finite_difference(), PHI_MAX, Y_MAX, 0.72)
     phi = PHI_MAX * np.array([1, -1, 1, -1, 1])
-    d_phi, _, _ = derivatives_q31(native, bank, phi, np.zeros(5))
+    d_phi, _, _ = native.derivatives_q31(bank, phi, np.zeros(5))
     assert d_phi[-1, 4] == 192 * PHI_MAX

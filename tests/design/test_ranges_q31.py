@@ -15,11 +15,11 @@ from bench.campaign.population import shipped
 from bench.campaign.truth import simulate_rig
 from pvid.cli.main import commands
 from pvid.core.native import Native
-from pvid.core.native_q31 import WeakConfigQ31
 from pvid.rig.file import RigFile, Sensor
 from pvid.rig.run import Run, write_run
 from pvid.run.identify import identify
 from pvid.run.survey import fitted
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.q31 import config_for_run
 from pvid.setup.ranges_q31 import DEFAULT_PHI_RANGE, beyond_ranges, pivot_acceleration, with_ranges_of
 from pvid.sim.pendulum import Pendulum, Tone, simulate, standard_sensors
@@ -80,7 +80,7 @@ def test_a_run_that_goes_further_sets_them() -> None:
     assert fast.acceleration_range > 20 * 0.037 * (2 * np.pi) ** 2
 
 
-def test_what_the_file_says_stands() -> None:
+def test_setting_of_the_file_is_kept() -> None:
     sensor = Sensor(phi_range=0.2, y_range=0.01, acceleration_range=7.0)
     kept = with_ranges_of(replace(RIG, sensor=sensor), far_run()).sensor
     assert (kept.phi_range, kept.y_range, kept.acceleration_range) == (0.2, 0.01, 7.0)
@@ -104,7 +104,7 @@ def test_a_run_beyond_a_tenth_of_l1_is_identified(native: Native) -> None:
         assert result.value["g"] == pytest.approx(9.5, rel=0.02)
 
 
-def test_samples_beyond_the_files_range_are_told_with_their_share(native: Native, tmp_path: Path) -> None:
+def test_samples_beyond_range_are_reported_with_their_share(native: Native, tmp_path: Path) -> None:
     run = far_run()
     rig = replace(RIG, sample_rate=None, sensor=replace(RIG.sensor, y_range=0.03))
     share = np.mean(np.abs(run.y - np.median(run.y)) > 0.03)  # the median has more of them within than the middle
@@ -144,7 +144,7 @@ def test_an_angle_turned_by_pi_is_counted_from_there(native: Native) -> None:
     assert config.phi_offset == round(3.14 / known.sensor.phi_lsb)
 
 
-def test_beyond_counts_each_sensor_and_what_only_the_core_refused() -> None:
+def test_beyond_range_counts_each_sensor_and_core_refusals() -> None:
     phi, y = np.array([0, 11, 0, 0, -11]), np.array([0, 0, 21, 0, -21])
     beyond = beyond_ranges(phi, y, 10, 20, rejected=4)
     assert (beyond.phi, beyond.y, beyond.acceleration, beyond.samples) == (2, 2, 1, 5)
@@ -162,7 +162,7 @@ def test_the_pivots_acceleration_of_a_sine() -> None:
     assert len(pivot_acceleration(replace(run, t=t[:5], phi=t[:5], y=t[:5]))) == 0
 
 
-def test_windows_that_never_fill_name_what_was_rejected(native: Native) -> None:
+def test_unfilled_windows_name_the_rejected_samples(native: Native) -> None:
     """A sample that is no number twice a second: the run ends while the windows warm up, and that is not the reason."""
     run = simulate(sensors=standard_sensors(14), duration=6.0, seed=1).run
     phi = run.phi.copy()

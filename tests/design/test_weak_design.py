@@ -106,7 +106,7 @@ def test_overlap_is_what_noise_shares_between_neighbours(standard: WeakDesign) -
         (Sizes(taps=7), "taps"),
     ],
 )
-def test_what_cannot_be_designed_is_named(settings: Sizes, named: str) -> None:
+def test_impossible_design_is_refused_by_name(settings: Sizes, named: str) -> None:
     with pytest.raises(PvidError, match=named):
         design(0.3, 1000.0, NOMINAL, settings)
 

@@ -33,7 +33,7 @@ MODES = [(slow, slow * ratio) for slow, ratio in product((0.3, 0.7, 1.5, 4.0), (
 MODES = [(slow, fast) for slow, fast in MODES if fast <= FASTEST_HZ]
 
 
-def test_the_rigs_have_the_modes_they_are_said_to_have() -> None:
+def test_rigs_have_the_stated_modes() -> None:
     for slow, fast in MODES:
         assert modes_hz(p_of(slow, fast)) == pytest.approx((slow, fast))
 
@@ -80,7 +80,7 @@ def test_given_sizes_are_taken() -> None:
     assert not np.array_equal(one.front.smooth.weights, wider.front.smooth.weights)
 
 
-def test_where_p_is_no_pendulum_both_modes_lie_in_the_middle() -> None:
+def test_unphysical_p_puts_both_modes_in_the_middle() -> None:
     slow, fast = slow_and_fast_hz(np.array([30.0, 2.0, 3.0]))
     assert slow == fast == pytest.approx(math.sqrt(30.0) / (2 * math.pi))
     assert sized(np.array([30.0, 2.0, 3.0]), 1000.0, Sizes()).window > 100

@@ -113,11 +113,12 @@ static void spoil_estimator_f32(pvid_estimator_config_f32 *config)
 
 static void spoil_estimator_q31(pvid_estimator_config_q31 *config)
 {
-    int32_t *const fields[] = {&config->start[below(4)], &config->start_sd[below(4)], &config->lower[below(4)],
-                               &config->upper[below(4)], &config->row_sd,             &config->gain,
+    int32_t *const fields[] = {&config->start[below(4)], &config->start_sd[below(4)],
+                               &config->lower[below(4)], &config->upper[below(4)],
+                               &config->row_sd,          &config->gain,
                                &config->kappa_min};
-    uint32_t *const counts[] = {&config->forgetting_groups, &config->correlation, &config->row_weight,
-                                &config->step_limit, &config->noise_margin, &config->dead_zone};
+    uint32_t *const counts[] = {&config->forgetting_groups, &config->correlation,  &config->row_weight,
+                                &config->step_limit,        &config->noise_margin, &config->dead_zone};
     for (uint32_t left = 1u + below(3); left > 0u; left--) {
         if (one_in(2)) {
             *fields[below((uint32_t)(sizeof fields / sizeof fields[0]))] = any_size_i32();
@@ -197,12 +198,12 @@ static void configure_weak(bool sound)
     if (sound) {
         return;
     }
-    float *const fields[] = {&config->sample_rate_hz,   &config->l1,
-                             &config->drive_min,        &config->pivot_noise,
-                             &config->angle_limit,      &config->trust.kappa_min,
-                             &config->trust.se_max,     &config->trust.misfit_max,
-                             &config->trust.renewal,    &config->gate.sigmas,
-                             &config->gate.patience_s,  &weak.design.overlap};
+    float *const fields[] = {&config->sample_rate_hz,  &config->l1,
+                             &config->drive_min,       &config->pivot_noise,
+                             &config->angle_limit,     &config->trust.kappa_min,
+                             &config->trust.se_max,    &config->trust.misfit_max,
+                             &config->trust.renewal,   &config->gate.sigmas,
+                             &config->gate.patience_s, &weak.design.overlap};
     if (one_in(2)) {
         spoil(fields, sizeof fields / sizeof fields[0]);
     }
@@ -221,7 +222,7 @@ static void configure_weak(bool sound)
     config->iterations = one_in(8) ? (uint8_t)any_word() : config->iterations;
     config->passes = one_in(8) ? (uint8_t)any_word() : config->passes;
     config->trust.groups_min = one_in(8) ? (uint16_t)any_word() : config->trust.groups_min;
-    config->trust.shut_max = one_in(8) ? (uint16_t)below(3) : config->trust.shut_max;
+    config->trust.revert_after = one_in(8) ? (uint16_t)below(3) : config->trust.revert_after;
     config->angle = one_in(8) ? NULL : config->angle;
     config->full_angle = one_in(8) ? true : config->full_angle;
     config->friction = one_in(8);
@@ -380,8 +381,7 @@ static void check_strong(bool published)
         pvid_estimator_assess_f32(&strong.self.estimator, &estimate);
         check_estimate_f32(&estimate, 3);
         pvid_publication_put_f32(&strong.shared, &estimate);
-        require(pvid_publication_read_f32(&strong.shared, &copy, NULL) &&
-                    (memcmp(&copy, &estimate, sizeof copy) == 0),
+        require(pvid_publication_read_f32(&strong.shared, &copy, NULL) && (memcmp(&copy, &estimate, sizeof copy) == 0),
                 "a read estimate is the one that was put");
     }
 }

@@ -72,8 +72,8 @@ static float any_float(void)
 
 static float hostile_float(void)
 {
-    static const float edges[] = {0.0f,  -0.0f, 1.0f,  -1.0f, 1.0e-45f, 1.17549435e-38f, 3.4e38f,  -3.4e38f,
-                                  1e-6f, 1e6f,  0.9f,  1e19f, 1e-19f,   65504.0f,        16777216.f};
+    static const float edges[] = {0.0f,  -0.0f, 1.0f, -1.0f, 1.0e-45f, 1.17549435e-38f, 3.4e38f,   -3.4e38f,
+                                  1e-6f, 1e6f,  0.9f, 1e19f, 1e-19f,   65504.0f,        16777216.f};
     switch (below(5)) {
     case 0:
         return any_float();

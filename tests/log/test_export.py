@@ -21,7 +21,7 @@ import pytest
 from mcap.reader import make_reader
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.export import FORMATS, export_log
 from pvid.log.file import LogWriter
@@ -31,6 +31,7 @@ from pvid.log.rig import run_of_log
 from pvid.log.values import UNKNOWN_RIG, Values, tables_of
 from pvid.rig.file import RigFile
 from pvid.rig.run import read_run
+from pvid.settings.enums import Reason
 
 TICKS = 4000
 MECHANISM = RigFile.standard().mechanism
@@ -142,7 +143,7 @@ def test_mcap_reads_back_with_its_library(tmp_path: Path, log: Path, sent: list[
 _JSON_KINDS = {"number": (int, float), "integer": (int,), "string": (str,)}
 
 
-def test_mcap_has_what_foxglove_and_plotjuggler_ask_for(tmp_path: Path, log: Path) -> None:
+def test_mcap_contains_the_fields_required_by_foxglove_and_plotjuggler(tmp_path: Path, log: Path) -> None:
     """By Foxglove's page on custom schema encodings: schema "jsonschema" of an object, messages "json", UTF-8, each an
     object; a plot's axis is the log time. Both programs read the summary first, and the chunks by their index."""
     (path,) = export_log(log, "mcap", tmp_path / "out", MECHANISM)
@@ -325,7 +326,7 @@ def test_teleplots_times_have_all_digits_at_any_rate(listener: socket.socket) ->
     assert len(times) == 40 and np.diff(times) == pytest.approx(np.full(39, 62.5e-6), abs=1e-6)
 
 
-def test_nobody_need_listen_and_a_bad_address_is_told(sent: list[tuple[int, link.Message]]) -> None:
+def test_missing_listener_is_ignored_and_bad_address_reported(sent: list[tuple[int, link.Message]]) -> None:
     free = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     free.bind(("127.0.0.1", 0))
     port = free.getsockname()[1]

@@ -35,7 +35,7 @@ from pvid.board.target import HOST_TARGET, open_target
 from pvid.cli.main import commands
 from pvid.core.native import Native
 from pvid.link import frames as link
-from pvid.link.port import why_gone
+from pvid.link.port import loss_cause
 from pvid.log.file import LOG_SCHEMA, LOG_SCHEMA_TEXT, Close, LogWriter, Mark, Segment
 from pvid.log.reader import Account, Gap, LogReader, LogStream, Record, Restart
 from pvid.log.recorder import Logger, PortSource
@@ -96,7 +96,7 @@ def test_a_log_holds_what_was_sent_and_describes_itself(tmp_path: Path, sent: li
     assert (account.frames, account.samples, account.lost_share) == (len(sent), TICKS, 0)
     kinds = {type(record.item).__name__ for record in records}
     assert kinds >= {"Segment", "Close", "LinkSchema", "Hello", "Configure", "Status", "Raw", "Estimate", "Hash"}
-    told = next(record.item for record in records if isinstance(record.item, Segment)).told
+    told = next(record.item for record in records if isinstance(record.item, Segment)).description
     assert told["port"] == "a port"
     assert LOG_SCHEMA_TEXT.encode() in data and link.SCHEMA_TEXT.encode()[:200] in data
 
@@ -125,7 +125,7 @@ def test_a_log_read_in_pieces_is_the_same(tmp_path: Path, sent: list[bytes]) -> 
     assert pieces.account.text == whole.account.text
 
 
-def test_what_is_missing_is_told_once_and_exactly(tmp_path: Path, sent: list[bytes]) -> None:
+def test_missing_samples_are_reported_once_and_exactly(tmp_path: Path, sent: list[bytes]) -> None:
     raw = [i for i, frame in enumerate(link.Decoder().feed(b"".join(sent))) if isinstance(frame.message, link.Raw)]  # type: ignore[union-attr]
     lost, spoilt = raw[5], raw[20]
     broken = bytearray(sent[spoilt])
@@ -163,7 +163,7 @@ def test_garbage_alone_is_no_log_and_a_loss_beside_frames(tmp_path: Path, sent: 
     assert account.damaged > 100 and account.missing == 0
 
 
-def test_a_board_that_began_anew_is_no_loss(tmp_path: Path, sent: list[bytes]) -> None:
+def test_restarted_board_is_no_loss(tmp_path: Path, sent: list[bytes]) -> None:
     records, account = read(written(tmp_path / "a.pvlog", [*sent[:200], *sent]))
     assert (account.restarts, account.missing, account.missing_samples) == (1, 0, 0)
     assert sum(isinstance(record.item, Restart) for record in records) == 1
@@ -503,7 +503,7 @@ def test_two_boards_with_the_same_serial_number_are_told_apart_by_their_sockets(
     assert plugged.again(source) == "/dev/ttyACM4"
 
 
-def test_a_second_board_with_the_same_serial_number_that_comes_later_is_told(plugged: Plugged) -> None:
+def test_second_board_with_the_same_serial_number_is_reported(plugged: Plugged) -> None:
     plugged.plug("1-1", "ttyACM0", serial="0001")
     source = PortSource("/dev/ttyACM0")
     source.open()
@@ -529,7 +529,7 @@ def test_a_port_that_is_no_usb_device_is_found_again_by_its_name(plugged: Plugge
     assert source.usb is None
 
 
-def test_a_board_that_refuses_is_told(tmp_path: Path) -> None:
+def test_refusal_of_the_board_is_reported(tmp_path: Path) -> None:
     """Its image was made for another rig than the logger's."""
     rig = field_board.rig()
     target = open_target(HOST_TARGET, stream_rig(rig, 1000.0))
@@ -584,7 +584,7 @@ def test_a_log_that_cannot_be_written_ends_with_its_error(tmp_path: Path, monkey
     assert account.segments[0].why is None
 
 
-def test_what_is_appended_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -> None:
+def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -> None:
     rig = field_board.rig()
     writer = LogWriter(tmp_path / "a.pvlog", rig=rig.text())
     writer.begin("a port", None)
@@ -605,7 +605,7 @@ def test_what_is_appended_has_the_same_rig_file(tmp_path: Path, sent: list[bytes
         CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
 
 
-def test_what_keeps_the_link_down_is_told(tmp_path: Path) -> None:
+def test_cause_of_a_broken_link_is_reported(tmp_path: Path) -> None:
     """The port has gone, and then cannot be opened again: the views say why."""
     line = field_board.PtyLine(tmp_path / "board")
     place = str(tmp_path / "board")
@@ -659,7 +659,7 @@ def test_the_status_line_shows_the_estimate_of_either_core(tmp_path: Path) -> No
         assert told.endswith("w 31.68 1/s^2, d1 8.8739, d2 5.6248, updated")
 
 
-def test_a_full_disk_is_told_with_what_the_log_holds(tmp_path: Path, boards: Boards) -> None:
+def test_full_disk_is_reported_with_the_content_of_the_log(tmp_path: Path, boards: Boards) -> None:
     """A limit of the shell's on the size of files stands for the disk."""
     boards(ticks=20 * TICKS)
     command = f"ulimit -f 100; exec {sys.executable} -m pvid log board out.pvlog"
@@ -674,7 +674,7 @@ def test_a_full_disk_is_told_with_what_the_log_holds(tmp_path: Path, boards: Boa
     assert f"{account.samples} samples in 1 segment; lost 0 frames" in done.stdout
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, boards: Boards) -> None:
+def test_unwritable_folder_is_reported(tmp_path: Path, boards: Boards) -> None:
     boards(ticks=100)
     (tmp_path / "folder").mkdir()
     for out, why in (("nowhere/a.pvlog", "No such file or directory"), ("board/a.pvlog", "Not a directory")):
@@ -692,21 +692,21 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, boards: Boards)
         (serial.SerialException("something else"), "something else"),
     ],
 )
-def test_a_port_that_is_gone_is_told_in_words(error: Exception, told: str) -> None:
-    assert why_gone(error).startswith(told)
+def test_lost_port_is_reported(error: Exception, told: str) -> None:
+    assert loss_cause(error).startswith(told)
 
 
-def test_a_failed_read_is_told_by_its_cause() -> None:
+def test_failed_read_is_reported_with_its_cause() -> None:
     try:
         try:
             raise OSError(6, "No such device or address")
         except OSError as error:
             raise serial.SerialException(f"read failed: {error}")  # noqa: B904 - as pyserial does
     except serial.SerialException as error:
-        assert why_gone(error) == "No such device or address"
+        assert loss_cause(error) == "No such device or address"
 
 
-def test_what_the_board_took_while_the_link_was_down_is_counted(tmp_path: Path, sent: list[bytes]) -> None:
+def test_samples_during_a_broken_link_are_counted(tmp_path: Path, sent: list[bytes]) -> None:
     decoded = [item for item in link.Decoder().feed(b"".join(sent)) if isinstance(item, link.Frame)]
     first, second = 100, 160
     ticks = [item.tick for item in decoded[second:] if isinstance(item.message, link.Raw)]

@@ -91,7 +91,7 @@ def test_a_schema_that_no_frame_can_have_is_refused(line: str) -> None:
     assert link.parse_schema("pvid 1\n6 e p:f32[512]")[6].size == link.MAX_PAYLOAD
 
 
-def test_a_decoder_keeps_the_last_schemas_that_it_learnt() -> None:
+def test_decoder_keeps_the_last_schemas() -> None:
     board, decoder = LyingBoard(), link.Decoder(learns=True)
     texts = [b"pvid 1\n9 k%d a:u8" % i for i in range(100)]
     frames = [item for text in texts for item in decoder.feed(board.schema(text, (9, b"\1")))]
@@ -101,7 +101,7 @@ def test_a_decoder_keeps_the_last_schemas_that_it_learnt() -> None:
     assert len(decoder._expected) <= link.MAX_LEARNT + 2
 
 
-def test_whatever_a_reader_stumbles_over_is_damage() -> None:
+def test_unreadable_bytes_are_damage() -> None:
     def stumbles(_: bytes) -> link.Message:
         raise IndexError("tuple index out of range")
 
@@ -119,7 +119,7 @@ def test_kinds_of_frames_are_counted_in_bounded_memory(tmp_path: Path) -> None:
     assert len(account.by_kind) == 65 and account.by_kind[OTHER_KINDS] > 200
 
 
-def test_what_a_board_calls_itself_is_printable() -> None:
+def test_board_name_is_printable() -> None:
     name = b"\x1b]0;PWN\x07\xff\xc2\x9b\n\0\0\0\0"
     payload = LyingBoard().hello(board="N" * 16).payload.replace(b"N" * 16, name)
     hello = link.Hello.of(payload)
@@ -175,13 +175,13 @@ def test_keys_differ_from_log_to_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("about", [b"[" * 1900, b'{"port": "\\ud800\\u001b[31m"}', b"\xff", b'{"port": {"a": 1}}'])
-def test_a_port_s_name_is_text_whatever_stands_in_a_log(about: bytes) -> None:
+def test_port_name_from_a_log_is_escaped(about: bytes) -> None:
     port = message(logfile.Segment, about=about).port
     assert port.isprintable() and len(port.encode()) < 40
 
 
 @pytest.mark.parametrize("when", [0, 2**62, 2**64 - 1])
-def test_a_log_from_elsewhere_may_tell_of_any_time(when: int, tmp_path: Path) -> None:
+def test_log_with_any_time_stamp_is_read(when: int, tmp_path: Path) -> None:
     frames = (logfile.Segment(0, when, b"{}"), logfile.Mark(when, 2**64 - 1), logfile.Close(when, 2**64 - 1, b""))
     begin, mark, end = (link.encode(frame, i, 5, LOG_SCHEMA) for i, frame in enumerate(frames))
     path = tmp_path / "a.pvlog"
@@ -261,7 +261,7 @@ def test_a_stream_that_fails_does_not_end_the_recording(tmp_path: Path, monkeypa
     assert account_of(tmp_path / "a.pvlog").by_kind["credit"] == 1
 
 
-def test_a_board_that_refuses_after_it_has_run_is_recorded_on(tmp_path: Path) -> None:
+def test_recording_continues_after_a_late_refusal(tmp_path: Path) -> None:
     board = LyingBoard()
     steps = [board.say(board.hello(session=0)), board.say(board.status()), board.say(board.hello(session=0))]
     steps += [board.say(board.status(code=3)), board.honest()]
@@ -345,7 +345,7 @@ def test_a_link_that_falls_at_once_is_taken_up_ever_more_slowly(
 
 
 @pytest.mark.parametrize("garbage", [bytes(5000), b"\xff" * 5000, np.random.default_rng(1).bytes(5000), b"boot\r\n"])
-def test_a_line_that_brings_garbage_alone_is_told(
+def test_line_with_garbage_alone_is_reported(
     garbage: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert print_account(account_of(log_of(tmp_path / "a.pvlog", garbage)), 1.0) == 1
@@ -355,7 +355,7 @@ def test_a_line_that_brings_garbage_alone_is_told(
     assert print_account(nothing, 1.0) == 0
 
 
-def test_a_segment_of_garbage_among_others_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_segment_of_garbage_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     honest = LyingBoard().honest()
     assert print_account(account_of(log_of(tmp_path / "a.pvlog", honest, bytes(5000), honest)), 1.0) == 1
     assert "not one frame in 1 of the segments" in capsys.readouterr().err
@@ -413,7 +413,7 @@ def test_a_logger_loads_no_package_that_it_does_not_need() -> None:
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf"), 1e-38, 3e38])
-def test_a_sample_rate_that_is_none_leaves_times_unknown(rate: float) -> None:
+def test_invalid_sample_rate_leaves_times_unknown(rate: float) -> None:
     board = LyingBoard()
     values = Values()
     assert list(values.rows(Record(0, 10**18, 0, board.hello(sample_rate=rate)))) == []
@@ -431,7 +431,7 @@ def test_ticks_far_apart_at_the_slowest_rate_have_a_time() -> None:
             assert (rows.columns["log_time"] >= 10**18).all()
 
 
-def test_a_run_of_a_log_leaves_out_what_is_no_sample(tmp_path: Path) -> None:
+def test_run_of_a_log_contains_samples_only(tmp_path: Path) -> None:
     board = LyingBoard()
     frames = [*board.introduction(), board.say(board.samples()), board.say(board.samples(float("inf"), 3e38), 20)]
     frames += [board.say(board.samples(), 40)]

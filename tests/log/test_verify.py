@@ -177,7 +177,7 @@ def test_samples_that_were_lost_at_the_very_end_are_not_taken_for_a_healthy_end(
     assert (stretch.verified, stretch.open) == (every, False)
 
 
-def test_a_board_that_does_not_hash_its_samples_vouches_for_those_it_is_done_with(tmp_path: Path, sent: Sent) -> None:
+def test_board_without_sample_hash_confirms_processed_samples(tmp_path: Path, sent: Sent) -> None:
     older = [(tick, replace(one, sample_hash=0) if isinstance(one, link.Hash) else one) for tick, one in sent]
     (stretch,) = verified(tmp_path / "a", list(field_board.frames(older)))
     assert stretch.difference is None and stretch.open and 1000 < stretch.trailing < 3000
@@ -210,7 +210,7 @@ def test_a_count_that_passes_2_to_the_32_is_no_restart(tmp_path: Path, native: N
     assert (reader.account.restarts, reader.account.missing_samples) == (0, 0)
 
 
-def test_a_restart_far_behind_2_to_the_31_is_told_by_the_session(tmp_path: Path, native: Native) -> None:
+def test_restart_beyond_2_to_the_31_is_found_by_the_session(tmp_path: Path, native: Native) -> None:
     """The ticks alone look like a counter that has wrapped and a gap of 2^30 samples."""
     first = 2**32 - 2**30
     before = list(field_board.messages(field_board.Field(800, first_tick=first), native))
@@ -225,7 +225,7 @@ def test_a_restart_far_behind_2_to_the_31_is_told_by_the_session(tmp_path: Path,
         assert (reader.account.restarts, reader.account.missing_samples) == (1, 0)
 
 
-def test_a_board_that_waits_for_its_configuration_is_at_tick_0_again(tmp_path: Path, native: Native) -> None:
+def test_unconfigured_board_is_at_tick_0(tmp_path: Path, native: Native) -> None:
     """Whatever was counted before it was switched off, and though the next session counts on from far beyond it."""
     first, second = 2**32 - 800, 2 * 2**32 - 800
     runs = [
@@ -248,7 +248,7 @@ def test_a_board_that_waits_for_its_configuration_is_at_tick_0_again(tmp_path: P
     assert times.keys() == {0, 1} and max(times.values()) < 10e9
 
 
-def test_what_follows_a_lost_sample_is_not_verified_until_the_board_starts_over(tmp_path: Path, sent: Sent) -> None:
+def test_samples_after_a_loss_are_unverified_until_restart(tmp_path: Path, sent: Sent) -> None:
     frames = list(field_board.frames(sent))
     lost = next(i for i, (tick, message) in enumerate(sent) if isinstance(message, link.Raw) and tick > 2000)
     again = list(field_board.frames(sent[:300]))
@@ -269,7 +269,7 @@ def test_a_link_that_broke_without_costing_a_sample_breaks_nothing(tmp_path: Pat
     assert (stretch.ticks, stretch.checked, stretch.difference) == (TICKS, checks(sent), None)
 
 
-def test_what_cannot_be_verified_says_why(tmp_path: Path, sent: Sent) -> None:
+def test_unverifiable_segment_has_its_reason(tmp_path: Path, sent: Sent) -> None:
     def reason(name: str, frames: list[tuple[int, link.Message]], rig: RigFile | None = None) -> str | None:
         (stretch,) = verified(tmp_path / name, list(field_board.frames(frames)), rig=rig)
         assert not stretch.verified
@@ -290,7 +290,7 @@ def test_what_cannot_be_verified_says_why(tmp_path: Path, sent: Sent) -> None:
     assert stretch.why_not == "the log holds no rig file: name it with --rig"
 
 
-def test_a_segment_of_an_old_session_alone_is_never_said_to_be_right(tmp_path: Path, sent: Sent) -> None:
+def test_segment_of_an_old_session_is_never_verified(tmp_path: Path, sent: Sent) -> None:
     """As when a line is closed and opened while the board samples on, and it is pulled before the board starts over."""
     frames = list(field_board.frames(sent))
     late = [frame for frame, (tick, _) in zip(frames, sent, strict=True) if 1600 <= tick < 2400]
@@ -308,7 +308,7 @@ def test_a_segment_of_an_old_session_alone_is_never_said_to_be_right(tmp_path: P
     )
 
 
-def test_what_was_lost_within_a_segment_is_named(tmp_path: Path, sent: Sent) -> None:
+def test_losses_within_a_segment_are_named(tmp_path: Path, sent: Sent) -> None:
     frames = list(field_board.frames(sent))
     without = [frame for frame, (tick, _) in zip(frames, sent, strict=True) if not 1600 <= tick < 1632]
     begun, lost = verified(tmp_path / "a.pvlog", without)
@@ -318,7 +318,7 @@ def test_what_was_lost_within_a_segment_is_named(tmp_path: Path, sent: Sent) -> 
     )
 
 
-def test_an_empty_log_is_told_as_such(tmp_path: Path) -> None:
+def test_empty_log_is_reported(tmp_path: Path) -> None:
     writer = LogWriter(tmp_path / "a.pvlog")
     with pytest.raises(PvidError, match=r"a.pvlog is empty: the recording ended before the link had come up"):
         list(LogReader(tmp_path / "a.pvlog"))
@@ -435,7 +435,7 @@ def test_a_field_log_is_drawn_and_identified_with_its_own_settings(tmp_path: Pat
     assert found["w"]["value"] == pytest.approx(31.67, rel=0.01)  # the rig is linear: correcting it errs by 0.4 %
 
 
-def test_verify_tells_by_its_exit_code(tmp_path: Path, sent: Sent) -> None:
+def test_verify_exit_codes(tmp_path: Path, sent: Sent) -> None:
     frames = list(field_board.frames(sent[:200]))
     verified(tmp_path / "right.pvlog", frames)
     wrong = [

@@ -50,7 +50,7 @@ def exact(result: Identification) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("core", ["f64", "f32"])
-def test_y_read_too_large_moves_the_estimate_as_told(native: Native, run: Run, core: str) -> None:
+def test_too_large_y_scale_moves_the_estimate_as_predicted(native: Native, run: Run, core: str) -> None:
     rig = RIG
     rig = replace(rig, identifier=replace(rig.identifier, core=core))  # type: ignore[arg-type]
     told, _ = scale_errors(P, STEP, 0.0)
@@ -65,7 +65,7 @@ def test_y_read_too_large_moves_the_estimate_as_told(native: Native, run: Run, c
     assert wrong["d2"] / right["d2"] - 1 == pytest.approx(-2 * STEP, rel=0.01)
 
 
-def test_an_l1_too_long_moves_the_estimate_as_told(native: Native, run: Run) -> None:
+def test_too_long_l1_moves_the_estimate_as_predicted(native: Native, run: Run) -> None:
     rig = RIG
     rig = replace(rig, identifier=replace(rig.identifier, core="f64"))
     _, told = scale_errors(P, 0.0, STEP)
@@ -121,7 +121,7 @@ def test_a_start_has_no_errors_of_scales(native: Native) -> None:
     assert held.se["w"] == pytest.approx(0.5 * held.value["w"], rel=1e-6)
 
 
-def test_identify_tells_what_the_standard_errors_are_made_of(tmp_path: Path) -> None:
+def test_identify_lists_the_parts_of_the_standard_errors(tmp_path: Path) -> None:
     write_run(tmp_path / "run.csv", simulate(sensors=standard_sensors(14), truth="linear", duration=15.0).run)
     (tmp_path / "run.toml").write_text(
         "l1 = 0.3\nl1_sd = 0.002\n[sensor]\ny_gain_sd = 0.01\n[identifier]\nfull_angle = false\n", encoding="utf-8"

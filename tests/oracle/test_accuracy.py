@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pvid.core.native import EstimatorConfig, Law, Native, Reason
+from pvid.core.native import Native
 from pvid.oracle import strong as oracle
 from pvid.rig.file import Core, RigFile
 from pvid.run.identify import identify
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import EstimatorConfig
 from pvid.setup.f32 import bank_of, estimator_config, strong_config
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
 from pvid.twin.strong import StrongTwin
@@ -47,7 +49,7 @@ def test_exact_derivatives_stationary_law_reaches_a_hundredth_of_a_percent_from_
 def test_exact_derivatives_pseudovelocity_law_stops_short_of_it(
     native: Native, exact_rows: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    """MATH.md 4: (5) alone leaves F where the early steps put it; `pvid bench laws` prints the whole table."""
+    """theory.md 4: (5) alone leaves F where the early steps put it; `pvid bench laws` prints the whole table."""
     n, y = exact_rows
     reached = 0
     for seed in range(40):
@@ -73,13 +75,13 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
     """
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0, standard_start(3))
-    n32, y32, fate = StrongTwin(config).rows(run.phi, run.y)
-    ready = fate == Reason.ACCUMULATED
+    n32, y32, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    ready = row_reason == Reason.ACCUMULATED
     n, y = n32[ready].astype(np.float64), y32[ready].astype(np.float64)
     n = n * oracle.BINOMIAL
     m, b = n.T @ n, n.T @ y
     reference = oracle.constrained_least_squares(m, b, TRUTH)
-    identifier = native.strong(config)
+    identifier = native.identifier(config)
     record = identifier.run(run.phi, run.y, sums=False, hashes=False)
     jacobian = oracle.jacobian(reference)
     s = jacobian.T @ m @ jacobian
@@ -92,11 +94,11 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
 def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standard_20_bits: Simulation) -> None:
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0)
-    identifier = native.strong(config)
+    identifier = native.identifier(config)
     identifier.run(run.phi, run.y, sums=False, hashes=False)
     last = identifier.assess()
-    n32, y32, fate = StrongTwin(config).rows(run.phi, run.y)
-    ready = fate == Reason.ACCUMULATED
+    n32, y32, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    ready = row_reason == Reason.ACCUMULATED
     n = n32[ready].astype(np.float64) * oracle.BINOMIAL
     y = y32[ready].astype(np.float64)
     p = last["p"][:3].astype(np.float64)
@@ -117,7 +119,7 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standar
 @pytest.mark.parametrize("core", ["f32", "f64"])
 @pytest.mark.parametrize("bits", [14, 20])
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_without_a_drive_the_start_is_held_and_said_to_be(native: Native, core: Core, bits: int, seed: int) -> None:
+def test_without_drive_the_start_is_held_and_reported(native: Native, core: Core, bits: int, seed: int) -> None:
     """The noise of a still pivot sensor, differentiated, must not pass for a drive (w came out 93 % off)."""
     rig = replace(STRONG, identifier=replace(STRONG.identifier, core=core))
     run = simulate(drive=(), sensors=standard_sensors(bits), truth="linear", duration=6.0, seed=seed).run

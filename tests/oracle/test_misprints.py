@@ -1,6 +1,6 @@
-"""The misprints of the paper (MATH.md 3), each with a proof: the correction holds, the print does not.
+"""The misprints of the paper (theory.md 3), each with a proof: the correction holds, the print does not.
 
-The eliminated equation is derived here from the equations of motion (1); nothing is taken from MATH.md but
+The eliminated equation is derived here from the equations of motion (1); nothing is taken from theory.md but
 the statements under test.
 """
 

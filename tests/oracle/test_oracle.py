@@ -69,7 +69,7 @@ def test_rows_of_a_true_motion_satisfy_the_model(rows: tuple[Float, Float]) -> N
 
 
 def test_one_row_by_hand() -> None:
-    """MATH.md 2 with phi = (2, 0, 3, 5, 7), u = (1, 2, 4) and small whole numbers throughout."""
+    """theory.md 2 with phi = (2, 0, 3, 5, 7), u = (1, 2, 4) and small whole numbers throughout."""
     n, y = oracle.strong_rows([[2.0, 99.0, 3.0, 5.0, 7.0]], [[1.0, 2.0, 4.0]])
     assert y[0] == 7 - 2 * 2 * 5 + (2 * 4 - 4) * 3
     assert n[0].tolist() == [-14 + 20 + 12, -7, -3, -9, -9, -3, -2, -8, -12, -8, -2]
@@ -174,7 +174,7 @@ def test_the_divider_solves_every_so_many_rows(rows: tuple[Float, Float]) -> Non
 
 
 def test_without_a_drive_the_estimate_is_held_at_its_start() -> None:
-    """u = 0: the rows cannot tell w from d1, d2 (MATH.md 4: kappa near 1e-16)."""
+    """u = 0: the rows cannot tell w from d1, d2 (theory.md 4: kappa near 1e-16)."""
     exact = simulate(drive=(), truth="linear", duration=10.0).exact
     assert exact is not None
     n, y = oracle.strong_rows(exact.phi, exact.u)
@@ -198,9 +198,9 @@ def test_kappa_is_the_schur_complement() -> None:
     assert oracle.kappa_of(np.ones((3, 3))) == 0.0
 
 
-def test_kappa_tells_a_driven_rig_from_a_resting_one(sums: tuple[Float, Float, float]) -> None:
+def test_kappa_separates_a_driven_rig_from_a_resting_one(sums: tuple[Float, Float, float]) -> None:
     c = oracle.jacobian(TRUTH)
-    assert oracle.kappa_of(c.T @ sums[0] @ c) > 1e-3  # MATH.md 4: weak 1e-4, good 1e-2
+    assert oracle.kappa_of(c.T @ sums[0] @ c) > 1e-3  # theory.md 4: weak 1e-4, good 1e-2
 
 
 def test_standard_errors_cover_the_truth(rows: tuple[Float, Float]) -> None:
@@ -222,7 +222,7 @@ def test_standard_errors_cover_the_truth(rows: tuple[Float, Float]) -> None:
     assert 152 <= covered < 180
 
 
-def test_standard_errors_fall_back_to_the_start_where_data_say_nothing() -> None:
+def test_standard_errors_fall_back_to_the_start_without_information() -> None:
     """Rows without drive that speak of d1 and d2 alone: w keeps what the start knew."""
     random = np.random.default_rng(3)
     n = np.zeros((200, 11))
@@ -298,7 +298,7 @@ def test_a_step_needs_as_much_information_as_the_start(row_sd: float, held: bool
     assert oracle.identify_strong(n, np.full(5, 14.0), settings).updated[-1] != held
 
 
-def test_estimates_come_when_asked_and_say_the_state_of_their_tick() -> None:
+def test_requested_estimates_contain_the_state_of_their_tick() -> None:
     n, y = noisy_rows(40, 0.1)
     result = oracle.identify_strong(n, y, settings_of(), estimate_every=10)
     assert [tick for tick, _ in result.estimates] == [10, 20, 30]  # at tick 0 one row is too few
@@ -306,7 +306,7 @@ def test_estimates_come_when_asked_and_say_the_state_of_their_tick() -> None:
         np.testing.assert_array_equal(estimate.p, result.p[tick])
 
 
-def test_no_convergence_is_said() -> None:
+def test_missing_convergence_is_reported() -> None:
     with pytest.raises(PvidError, match="did not converge"):
         oracle.constrained_least_squares(np.eye(11), np.ones(11), TRUTH, iterations=2)
 

@@ -9,8 +9,9 @@ import numpy.typing as npt
 import pytest
 from linear_rig import LINEAR_RIG
 
-from pvid.core.native import EstimatorConfig, Native
-from pvid.core.native_q31 import WeakConfigQ31, WeakIdentifierQ31
+from pvid.core.native import Native
+from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.f32 import weak_config
 from pvid.setup.q31 import p_of, se_of, units_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
@@ -34,11 +35,11 @@ def outcomes(native: Native, bits: int, seeds: int, zero: float = 0.0) -> tuple[
         phi, y = counts_of(run.phi, rig.sensor.phi_lsb), counts_of(run.y, rig.sensor.y_lsb)
         start = standard_start(seed)
         settings = weak_config(rig, RATE, start)
-        reference = native.weak(settings)
+        reference = native.identifier(settings)
         reference.run(phi * rig.sensor.phi_lsb, y * rig.sensor.y_lsb, sums=False, hashes=False)
         f32.append(reference.assess()["p"][:3] / TRUTH - 1)
         config = started(nominal, settings.estimator)
-        core = WeakIdentifierQ31(native, config)
+        core = native.identifier(config)
         core.run(phi, y, sums=False, hashes=False)
         last = core.assess()
         q31.append(p_of(config, last["p"][:4])[:3] / TRUTH - 1)
@@ -53,7 +54,7 @@ def started(config: WeakConfigQ31, settings: EstimatorConfig) -> WeakConfigQ31:
     return replace(config, estimator=replace(config.estimator, start=start, start_sd=sd))
 
 
-def test_another_start_is_all_that_a_start_changes() -> None:
+def test_start_changes_nothing_but_the_start() -> None:
     rig, start = LINEAR_RIG, standard_start(3)
     whole = weak_config_q31(rig, RATE, start)
     by_start = started(weak_config_q31(rig, RATE), weak_config(rig, RATE, start).estimator)

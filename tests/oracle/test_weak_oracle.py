@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.core.native import EstimatorConfig, Native, Reason, TrustConfig, WeakConfig
+from pvid.core.native import Native
 from pvid.design.weak import WeakDesign, design
 from pvid.design.weak_sizing import Bounds, Sizes
 from pvid.models.kapitza.physical import linear, physical
 from pvid.oracle import weak
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import EstimatorConfig, TrustConfig, WeakConfig
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
     STANDARD_PENDULUM,
@@ -133,7 +135,9 @@ def test_starts_off_by_half_converge_to_one_answer(standard: WeakDesign) -> None
 @pytest.mark.parametrize(
     ("bits", "allowed"), [(12, (0.06, 0.06, 0.15)), (14, (0.014, 0.014, 0.036)), (16, (0.009, 0.009, 0.02))]
 )
-def test_accuracy_is_what_the_issue_asks(standard: WeakDesign, bits: int, allowed: tuple[float, float, float]) -> None:
+def test_accuracy_is_within_its_requirement(
+    standard: WeakDesign, bits: int, allowed: tuple[float, float, float]
+) -> None:
     relative, standardised = errors(standard, 10, standard_sensors(bits), bits=bits)
     # ten seeds know an RMS to 22 %; the limits are 1.2 to 1.9 times what 60 seeds measure
     assert (100 * np.sqrt(np.mean(relative**2, axis=0)) < allowed).all()
@@ -224,7 +228,7 @@ def test_predicted_errors_are_the_measured_ones(standard: WeakDesign, bits: int)
     measured = np.sqrt(np.mean(relative**2, axis=0))
     # 40 seeds know an RMS to 11 %; R0 leaves out u, worth another 10 %
     np.testing.assert_allclose(predicted.relative, measured, rtol=0.35)
-    assert predicted.kappa == pytest.approx(8e-3, rel=0.5)  # "good" in MATH.md 4
+    assert predicted.kappa == pytest.approx(8e-3, rel=0.5)  # "good" in theory.md 4
 
 
 def test_prediction_from_rough_parameters(standard: WeakDesign) -> None:
@@ -234,7 +238,7 @@ def test_prediction_from_rough_parameters(standard: WeakDesign) -> None:
     assert (rough.relative > 2e-5).all()
 
 
-def test_what_cannot_be_identified_is_said(standard: WeakDesign) -> None:
+def test_unidentifiable_run_is_reported(standard: WeakDesign) -> None:
     given = settings(standard, 0)
     with pytest.raises(PvidError, match="smoothing window"):
         weak.identify_weak(np.zeros(10), np.zeros(10), standard, given)
@@ -259,7 +263,7 @@ def test_the_core_gives_the_oracles_answer(native: Native, standard: WeakDesign,
         row_sd=given.row_sd,
         kappa_min=given.kappa_min,
     )
-    identifier = native.weak(WeakConfig(1000.0, 0.3, standard.f32, config, zero, trust=TrustConfig(renewal=0.0)))
+    identifier = native.identifier(WeakConfig(1000.0, 0.3, standard.f32, config, zero, trust=TrustConfig(renewal=0.0)))
     record = identifier.run(run.phi, run.y, sums=False, hashes=False)
     answer = identifier.assess()
     result = weak.identify_weak(run.phi, run.y, standard, given)

@@ -1,6 +1,6 @@
-/* Estimates read while others are published, by an interrupt on a board: SysTick comes at every instruction of a put and
- * of a read, sooner or later. First the main loop publishes and the interrupt reads, then the other way round. Beside
- * it the same with a plain copy of the struct.
+/* Estimates read while others are published, by an interrupt on a board: SysTick comes at every instruction of a put
+ * and of a read, sooner or later. First the main loop publishes and the interrupt reads, then the other way round.
+ * Beside it the same with a plain copy of the struct.
  *
  * The words of an estimate all hold its number, so that a torn one shows. */
 #include <string.h>

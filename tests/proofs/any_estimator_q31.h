@@ -4,7 +4,7 @@
 
 #include "prove.h"
 
-#include "integer_q31.h"
+#include "number/integer_q31.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/kapitza_strong_q31.h"
 #include "pvid/kapitza_weak_q31.h"
@@ -76,7 +76,7 @@ static inline void any_state(const pvid_model_q31 *model, pvid_estimator_q31 *se
         self->noise[i].e = any_i32(-2000, 2000);
     }
     self->energy = any_i64(0, PVID_WIDE);
-    self->taken = any_i64(0, PVID_WIDE);
+    self->group_weight = any_i64(0, PVID_WIDE);
     self->expected.m = any_i32(0, PVID_ONE_Q30);
     self->expected.e = any_i32(-2000, 2000);
     self->divider = (uint16_t)any_u32(1, UINT16_MAX);

@@ -2,7 +2,7 @@
 #ifndef BLOCK_CONTRACT_H
 #define BLOCK_CONTRACT_H
 
-#include "cholesky_q31.h"
+#include "solve/cholesky_q31.h"
 
 /*@ requires 1 <= n <= PVID_MAX_FUNCTIONS && 1 <= bits <= 30;
     requires \valid(out + (0 .. n - 1)) && \valid_read(x + (0 .. n - 1));

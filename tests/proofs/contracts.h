@@ -4,9 +4,9 @@
 #define CONTRACTS_H
 
 #include "block_contract.h"
-#include "information_q31.h"
-#include "integer_q31.h"
-#include "scaled_q31.h"
+#include "solve/information_q31.h"
+#include "number/integer_q31.h"
+#include "number/scaled_q31.h"
 
 /*@ requires -0x7FFFFFFFFFFFFFFF <= x <= 0x7FFFFFFFFFFFFFFE;
     requires -0x7FFFFFFF <= s;

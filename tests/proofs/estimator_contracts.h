@@ -2,7 +2,7 @@
 #ifndef ESTIMATOR_CONTRACTS_H
 #define ESTIMATOR_CONTRACTS_H
 
-#include "estimator_q31.h"
+#include "solve/estimator_q31.h"
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
 
@@ -19,7 +19,7 @@ pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], 
 
 /*@ requires \valid(self) && 0 <= variance.m <= 0x40000000 && -10000 <= variance.e <= 10000;
     assigns \nothing; */
-void pvid_estimator_expect_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
+void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
 
 /*@ requires \valid(self) && part < PVID_INFORMATION_END_PARTS && factor >= 1;
     assigns \nothing; */
@@ -28,7 +28,7 @@ void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t 
 /*@ requires \valid(self);
     assigns \result \from \nothing;
     ensures 0 <= \result; */
-int32_t pvid_trust_ageing_q31(pvid_trust_q31 *self);
+int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self);
 
 /*@ requires \valid(self) && \valid(solve);
     assigns solve->energy \from \nothing;
@@ -51,8 +51,8 @@ void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_es
     assigns \result, solve->informed \from \nothing;
     ensures \result == 0 || \result == 1;
     ensures solve->informed == 0 || solve->informed == 1; */
-bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
-                                  pvid_estimate_q31 *estimate);
+bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                       pvid_estimate_q31 *estimate);
 
 /*@ requires \valid(self) && square.m >= 0;
     assigns \result \from \nothing;
@@ -62,13 +62,13 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
 /*@ requires \valid_read(self);
     assigns \result \from self;
     ensures \result == \null || \result == &self->estimate.p[0]; */
-const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self);
+const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self);
 
 /*@ requires \valid(self) && \valid(estimator) && \valid_read(candidate);
-    requires size >= 0 && surplus >= 0;
+    requires size >= 0 && variance_ratio >= 0;
     assigns \result \from \nothing;
     ensures PVID_WARMING_UP <= \result <= PVID_REJECTED_SATURATED; */
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
-                                 bool informed, int64_t surplus, const pvid_estimate_q31 *candidate);
+                                 bool above_noise, int64_t variance_ratio, const pvid_estimate_q31 *candidate);
 
 #endif

@@ -1,5 +1,5 @@
-/* pvid_to_block_q31: blocks of two numbers, of p, of the test functions; any number of bits, any entries: one of them, the
- * first or the last (the loop treats all alike), is of the greatest length, which is each in turn. */
+/* pvid_to_block_q31: blocks of two numbers, of p, of the test functions; any number of bits, any entries: one of them,
+ * the first or the last (the loop treats all alike), is of the greatest length, which is each in turn. */
 #include "prove.h"
 
 #include "block_contract.h"

@@ -1,9 +1,9 @@
 /* differentiator_q31: banks of any weights, centre, full scales and shifts that init takes, at every half and stride of
- * windows of up to WINDOW samples and at the ends of the longest; from init and from any place of the ring on, any counts
- * within full scale. */
+ * windows of up to WINDOW samples and at the ends of the longest; from init and from any place of the ring on, any
+ * counts within full scale. */
 #include "prove.h"
 
-#include "integer_q31.h"
+#include "number/integer_q31.h"
 #include "pvid/differentiator_q31.h"
 
 #define WINDOW 41u

@@ -1,5 +1,5 @@
-/* differentiator_q31: the exact five-point bank at strides 1 to 3 with any counts within full scale, from an empty window
- * until the ring has come round three times. */
+/* differentiator_q31: the exact five-point bank at strides 1 to 3 with any counts within full scale, from an empty
+ * window until the ring has come round three times. */
 #include "prove.h"
 
 #include "strong_contracts.h"

@@ -11,7 +11,7 @@ static void any_assessment(const pvid_model_q31 *model)
     pvid_estimate_q31 estimate;
     any_state(model, &estimator);
     pvid_estimator_begin_assessment_q31(&estimator, &solve, &estimate);
-    while (!pvid_estimator_assess_on_q31(&estimator, &solve, &estimate)) {
+    while (!pvid_estimator_assess_advance_q31(&estimator, &solve, &estimate)) {
     }
     for (size_t a = 0; a < model->n_p; a++) {
         /*@ assert 0 <= estimate.se[a]; */
@@ -33,7 +33,7 @@ static void any_group(const pvid_model_q31 *model)
     pvid_estimator_q31 estimator;
     const pvid_scaled_q31 variance = {any_i32(0, PVID_ONE_Q30), any_i32(-2000, 2000)};
     any_state(model, &estimator);
-    pvid_estimator_expect_q31(&estimator, variance);
+    pvid_estimator_set_expected_q31(&estimator, variance);
 }
 
 void main(void)

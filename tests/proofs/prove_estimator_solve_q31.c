@@ -1,19 +1,19 @@
-/* A solve from any state, with a refuge or without: every stage, nothing of `solve` there before. Leaves a state as it
- * was: p within its bounds, the sums within theirs. */
+/* A solve from any state, with a fallback or without: every stage, nothing of `solve` there before. Leaves a state as
+ * it was: p within its bounds, the sums within theirs. */
 #include "any_estimator_q31.h"
 
 #include "contracts.h"
 
-static void any_solve(const pvid_model_q31 *model, bool ends_group, bool has_refuge)
+static void any_solve(const pvid_model_q31 *model, bool ends_group, bool has_fallback)
 {
     pvid_estimator_q31 estimator;
     pvid_estimator_solve_q31 solve;
     any_state(model, &estimator);
     pvid_estimator_begin_q31(&estimator, &solve, ends_group);
-    solve.has_refuge = has_refuge;
-    if (has_refuge) {
+    solve.has_fallback = has_fallback;
+    if (has_fallback) {
         for (size_t a = 0; a < model->n_p; a++) {
-            solve.refuge[a] = any_i32((((model->positive >> a) & 1u) != 0u) ? 1 : -INT32_MAX, INT32_MAX);
+            solve.fallback[a] = any_i32((((model->positive >> a) & 1u) != 0u) ? 1 : -INT32_MAX, INT32_MAX);
         }
     }
     while (!pvid_estimator_advance_q31(&estimator, &solve)) {

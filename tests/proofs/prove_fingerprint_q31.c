@@ -2,7 +2,7 @@
  * estimator of any size. */
 #include "prove.h"
 
-#include "fingerprint_q31.h"
+#include "keep/fingerprint_q31.h"
 #include "pvid/fnv_q31.h"
 
 #define HALF_MAX ((PVID_MAX_TAPS - 1) / 2)

@@ -1,8 +1,8 @@
 /* information_q31: any model size, any forgetting, any row within its limit, one group.
  *
  * The sums are arbitrary within what the end of a group leaves; a group adds as many rows as a window has functions.
- * Eva then shows that no sum overflows within the group. That its end brings all of them back within their bound follows
- * from Cauchy and Schwarz, since it does so with the sums of squares: intervals cannot see that. */
+ * Eva then shows that no sum overflows within the group. That its end brings all of them back within their bound
+ * follows from Cauchy and Schwarz, since it does so with the sums of squares: intervals cannot see that. */
 #include "prove.h"
 
 #include "contracts.h"

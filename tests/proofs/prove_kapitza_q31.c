@@ -1,5 +1,5 @@
-/* The models: theta, its Jacobian and the formats of both of any p and any formats that the estimator takes; the rows of
- * the strong form from any derivatives within their limit and any shifts. theta and C stay within +-2^60. */
+/* The models: theta, its Jacobian and the formats of both of any p and any formats that the estimator takes; the rows
+ * of the strong form from any derivatives within their limit and any shifts. theta and C stay within +-2^60. */
 #include "prove.h"
 
 #include "pvid/kapitza_strong_q31.h"

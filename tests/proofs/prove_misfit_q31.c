@@ -2,7 +2,7 @@
 #include "prove.h"
 
 #include "contracts.h"
-#include "misfit_q31.h"
+#include "judge/misfit_q31.h"
 
 /* Exponents: 65 535 squares below 2^62 add up to less than 2^78, and an estimate of any size is told within 2^31. */
 #define LOWEST (-1000)
@@ -31,7 +31,7 @@ static void any_row(uint16_t left)
     misfit.least_energy = any_sum();
     misfit.least_part = any_sum();
     misfit.left = left;
-    if (pvid_misfit_take_q31(&misfit, any_i64(0, SQUARE_MAX), any_i64(-INT64_MAX, INT64_MAX - 1))) {
+    if (pvid_misfit_add_q31(&misfit, any_i64(0, SQUARE_MAX), any_i64(-INT64_MAX, INT64_MAX - 1))) {
         misfit.energy = any_sum();
         misfit.signal = any_sum();
         (void)pvid_misfit_judge_q31(&misfit);

@@ -1,12 +1,12 @@
-/* The receiver behind a UART's interrupt: its counters are volatile, so that Eva reads another value of them each time, as
- * if any number of bytes had come and gone between any two reads. */
+/* The receiver behind a UART's interrupt: its counters are volatile, so that Eva reads another value of them each time,
+ * as if any number of bytes had come and gone between any two reads. */
 #include "prove.h"
 
 #include "interrupts.h"
 #include "receiver.h"
 #include "uart/uart.h"
 
-void pvid_uart_listen(void)
+void pvid_uart_enable_receive(void)
 {
 }
 

@@ -1,6 +1,6 @@
-/* scaled_q31 on top of pvid_scaled_of_q31: sums at every distance of the two exponents (of which nothing but the distance
- * counts), products and quotients, the exponents (which are but added) at their ends and in the middle; of numbers of
- * either sign and of 0. */
+/* scaled_q31 on top of pvid_scaled_of_q31: sums at every distance of the two exponents (of which nothing but the
+ * distance counts), products and quotients, the exponents (which are but added) at their ends and in the middle; of
+ * numbers of either sign and of 0. */
 #include "prove.h"
 
 #include "contracts.h"
@@ -50,5 +50,6 @@ void main(void)
             any_pair(of_a, of_b);
         }
     }
-    (void)pvid_scaled_shifted_q31(any_scaled(POSITIVE, -EXPONENT_MAX, EXPONENT_MAX), any_i32(-EXPONENT_MAX, EXPONENT_MAX));
+    (void)pvid_scaled_shifted_q31(any_scaled(POSITIVE, -EXPONENT_MAX, EXPONENT_MAX),
+                                  any_i32(-EXPONENT_MAX, EXPONENT_MAX));
 }

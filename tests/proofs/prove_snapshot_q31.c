@@ -2,7 +2,7 @@
  * then are the state's but for its pointers. The hash of the configuration stands for any. */
 #include "prove.h"
 
-#include "fingerprint_q31.h"
+#include "keep/fingerprint_q31.h"
 #include "pvid/snapshot.h"
 #include "pvid/strong_q31.h"
 #include "pvid/weak_q31.h"

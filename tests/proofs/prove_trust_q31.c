@@ -6,7 +6,7 @@
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/trust_q31.h"
 
-#define SURPLUS_MAX (1000000LL << PVID_SURPLUS_BITS)
+#define VARIANCE_RATIO_MAX (1000000LL << PVID_VARIANCE_RATIO_BITS)
 
 static pvid_estimator_q31 estimator;
 
@@ -53,28 +53,29 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     /*@ assert trust.long_memory >= 1; */
     pvid_trust_place_q31(&trust, &estimator);
     trust.groups = (uint16_t)any_u32(0, UINT16_MAX);
-    trust.shut = (uint16_t)any_u32(0, UINT16_MAX);
+    trust.uninformative = (uint16_t)any_u32(0, UINT16_MAX);
     trust.judged = (uint16_t)any_u32(least, most);
     trust.next = (uint8_t)any_u32(0, PVID_TRUST_SHORT - 1);
-    trust.ageing = (uint8_t)any_u32(0, UINT8_MAX);
-    trust.known = any_bool();
-    trust.near = any_bool();
+    trust.groups_to_fade = (uint8_t)any_u32(0, UINT8_MAX);
+    trust.errors_small = any_bool();
+    trust.converged = any_bool();
     trust.published = any_bool();
     trust.misfit = any_bool();
-    trust.long_mean = any_i64(-SURPLUS_MAX, SURPLUS_MAX);
+    trust.long_mean = any_i64(-VARIANCE_RATIO_MAX, VARIANCE_RATIO_MAX);
     for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
-        trust.recent[i] = any_i64(-SURPLUS_MAX, SURPLUS_MAX);
+        trust.recent[i] = any_i64(-VARIANCE_RATIO_MAX, VARIANCE_RATIO_MAX);
     }
     for (size_t a = 0; a < PVID_MAX_P; a++) {
         trust.anchor[a] = any_i32(-INT32_MAX, INT32_MAX);
     }
-    const int32_t fading = pvid_trust_ageing_q31(&trust);
+    const int32_t fading = pvid_trust_fade_factor_q31(&trust);
     /*@ assert 0 <= fading; */
     any_estimate(model, &candidate);
     (void)pvid_trust_judge_q31(&trust, &estimator, (pvid_reason)any_i32(PVID_UPDATED, PVID_HELD_FROZEN),
                                any_i64(0, (int64_t)1 << 62), any_bool(), any_i64(-INT64_MAX, INT64_MAX), &candidate);
-    /*@ assert -SURPLUS_MAX <= trust.long_mean <= SURPLUS_MAX; */
-    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> -SURPLUS_MAX <= trust.recent[i] <= SURPLUS_MAX; */
+    /*@ assert -VARIANCE_RATIO_MAX <= trust.long_mean <= VARIANCE_RATIO_MAX; */
+    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> -VARIANCE_RATIO_MAX <= trust.recent[i] <=
+     * VARIANCE_RATIO_MAX; */
     /*@ assert trust.next < PVID_TRUST_SHORT; */
 }
 

@@ -1,13 +1,13 @@
-/* weak_finish_q31: every stage of a window, at every index, of designs with 4 and with all functions and any Gram tables
- * within what init asks; on any state that the stages before can have left, window sums as weak_window_q31 leaves them. Of
- * the estimator, the gate and the verdict it takes what estimator_contracts.h says of them. */
+/* weak_finish_q31: every stage of a window, at every index, of designs with 4 and with all functions and any Gram
+ * tables within what init asks; on any state that the stages before can have left, window sums as weak_window_q31
+ * leaves them. Of the estimator, the gate and the verdict it takes what estimator_contracts.h says of them. */
 #include "prove.h"
 
 #include "contracts.h"
 #include "estimator_contracts.h"
 #include "weak_design.h"
 
-#include "weak_finish_q31.c" /* its stages, by name */
+#include "weak/finish_q31.c" /* its stages, by name */
 
 static pvid_weak_finish_q31 finish;
 static pvid_estimator_q31 estimator;
@@ -61,7 +61,7 @@ static void any_state(void)
     finish.energy = any_i64(0, PVID_WIDE);
     finish.size = any_i64(0, PVID_WIDE);
     finish.expected = any_scaled(1);
-    finish.ageing = any_i32(0, INT32_MAX);
+    finish.fade_factor = any_i32(0, INT32_MAX);
     finish.gate.limit = any_scaled(0);
 }
 

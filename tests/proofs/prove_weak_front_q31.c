@@ -1,10 +1,10 @@
-/* weak_front_q31: the weights of a design, at every decimation and number of taps of `geometry`, with the ring's head in
- * every place and any samples within full scale in the ring: F and U stay within what the rest of the design counts on, and
- * the job is over when the next one begins. */
+/* weak_front_q31: the weights of a design, at every decimation and number of taps of `geometry`, with the ring's head
+ * in every place and any samples within full scale in the ring: F and U stay within what the rest of the design counts
+ * on, and the job is over when the next one begins. */
 #include "prove.h"
 
 #include "weak_design.h"
-#include "weak_front_q31.h"
+#include "weak/front_q31.h"
 
 static const struct {
     uint16_t taps;

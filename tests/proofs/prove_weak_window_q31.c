@@ -1,11 +1,10 @@
-/* weak_window_q31: a window of a design as it fills, any F and U within their limits and any second differences; from its
- * first sample, and from its middle, as after a gap. Every sum of its products fits. */
+/* weak_window_q31: a window of a design as it fills, any F and U within their limits and any second differences; from
+ * its first sample, and from its middle, as after a gap. Every sum of its products fits. */
 #include "prove.h"
 
 #include "contracts.h"
 #include "weak_design.h"
-#include "weak_window_q31.h"
-
+#include "weak/window_q31.h"
 
 static pvid_weak_window_q31 window;
 static int32_t term[PVID_WEAK_TERMS_Q31];
@@ -17,11 +16,11 @@ static void any_window(const pvid_weak_design_q31 *design, uint16_t first)
     const int32_t f_max = (int32_t)largest_f(design);
     const int64_t bend_max = 4 * (int64_t)f_max;
     for (uint16_t index = first; index < design->window - 1u; index++) {
-        const pvid_weak_bend_q31 bend = {.due = any_bool(), .square = any_i64(0, bend_max * bend_max)};
+        const pvid_weak_curvature_q31 curvature = {.due = any_bool(), .square = any_i64(0, bend_max * bend_max)};
         const int32_t f = any_i32(-f_max, f_max);
         const int32_t u = any_i32(-design->u_max, design->u_max);
         window.index = index;
-        pvid_weak_window_terms_q31(&window, design, f, u, &bend, term);
+        pvid_weak_window_terms_q31(&window, design, f, u, &curvature, term);
         pvid_weak_window_add_q31(&window, design, term, 0, design->functions, sums);
     }
     for (size_t i = 0; i < PVID_WEAK_TERMS_Q31; i++) {
@@ -30,9 +29,9 @@ static void any_window(const pvid_weak_design_q31 *design, uint16_t first)
         }
     }
     (void)pvid_weak_window_drive_q31(&window, design->window);
-    for (uint16_t bends = 0; bends < design->window; bends++) { /* one that divides each time */
-        window.bends = bends;
-        (void)pvid_weak_window_bend_q31(&window);
+    for (uint16_t curvatures = 0; curvatures < design->window; curvatures++) { /* one that divides each time */
+        window.curvatures = curvatures;
+        (void)pvid_weak_window_curvature_q31(&window);
     }
 }
 

@@ -2,8 +2,8 @@
 #ifndef STRONG_CONTRACTS_H
 #define STRONG_CONTRACTS_H
 
-#include "estimator_q31.h"
-#include "misfit_q31.h"
+#include "solve/estimator_q31.h"
+#include "judge/misfit_q31.h"
 #include "pvid/differentiator_q31.h"
 #include "pvid/gate_q31.h"
 
@@ -43,7 +43,7 @@ pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimat
 
 /*@ requires -0x10000000 <= e <= 0x10000000 && 0 <= square <= 0x100000000000000;
     assigns *self \from n[0 .. 10], e, square; */
-void pvid_estimator_take_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
+void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
 
 /*@ requires 1 <= drive_ticks <= 0x40000000;
     assigns *self \from drive_ticks, forgetting_groups; */
@@ -52,7 +52,7 @@ void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t 
 /*@ requires 0 <= square <= 0x100000000000000;
     assigns \result, *self \from *self, square, told;
     ensures \result == 0 || \result == 1; */
-bool pvid_misfit_take_q31(pvid_misfit_q31 *self, int64_t square, int64_t told);
+bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity);
 
 /*@ assigns \result, *self \from *self;
     ensures \result == 0 || \result == 1; */

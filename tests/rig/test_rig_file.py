@@ -88,7 +88,7 @@ def test_the_window_is_the_forms_own_unless_given() -> None:
         ("a." * 3000 + "b = 1", "rig file|TOML"),
     ],
 )
-def test_what_is_wrong_is_named(text: str, sentence: str) -> None:
+def test_wrong_key_is_named(text: str, sentence: str) -> None:
     with pytest.raises(PvidError, match=sentence) as caught:
         RigFile.parse(text)
     assert "\n" not in str(caught.value)
@@ -147,7 +147,7 @@ def test_a_written_file_holds_every_key_and_is_read_back(tmp_path: Path) -> None
     assert load(path) == RigFile.standard()
 
 
-def test_files_that_are_none(tmp_path: Path) -> None:
+def test_non_log_files_are_refused(tmp_path: Path) -> None:
     absent = tmp_path / "absent.toml"
     with pytest.raises(PvidError, match=f"^{absent}: cannot be read: No such file"):
         load(absent)
@@ -250,7 +250,7 @@ def test_whole_numbers_have_a_least_value(key: str, value: int) -> None:
         RigFile.parse(f"l1 = 0.3\n[identifier]\n{key} = {value}")
 
 
-def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+def test_byte_order_mark_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
     path.write_bytes(b"\xef\xbb\xbfl1 = 0.3\n")
     assert load(path).l1 == 0.3
@@ -265,7 +265,7 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
         "l1." + "a." * 3000 + "b = 1",
     ],
 )
-def test_monsters_are_one_sentence(text: str) -> None:
+def test_oversized_files_are_refused_in_one_sentence(text: str) -> None:
     with pytest.raises(PvidError) as caught:
         RigFile.parse(text)
     assert len(str(caught.value)) < 500

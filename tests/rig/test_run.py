@@ -183,7 +183,7 @@ def test_time_in_milliseconds_contradicts_the_rig(tmp_path: Path) -> None:
         read_run(path, 1000.0)
 
 
-def test_what_is_no_file(tmp_path: Path) -> None:
+def test_non_file_is_refused(tmp_path: Path) -> None:
     for path, part in ((tmp_path / "absent.csv", "not exist"), (tmp_path, "must end in")):
         with pytest.raises(PvidError, match=part) as caught:
             read_run(path)

@@ -69,7 +69,7 @@ def test_a_uniform_run_keeps_every_bit(start: float, rate: float, tmp_path: Path
     assert run.notes == () and run.sample_rate == rate
 
 
-def test_stamps_of_few_decimals_are_within_the_usual(tmp_path: Path) -> None:
+def test_stamps_of_few_decimals_are_accepted(tmp_path: Path) -> None:
     t = uniform()
     phi, y = measured(t)
     run = read(tmp_path, np.round(t + 3e-5, 4), phi, y)
@@ -109,7 +109,7 @@ def test_a_sample_missing_among_rounded_stamps_is_seen(tmp_path: Path) -> None:
 # ---- missing samples
 
 
-def test_a_dropped_sample_is_interpolated_and_told(tmp_path: Path) -> None:
+def test_dropped_sample_is_interpolated_and_reported(tmp_path: Path) -> None:
     t = uniform()
     phi, y = measured(t)
     gone = [1234]
@@ -154,7 +154,7 @@ def test_long_gaps_stay_empty(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rate", [200.0, 1000.0, 5000.0])
 @pytest.mark.parametrize("milliseconds", [5.0, 10.0, 20.0])
-def test_what_is_interpolated_is_as_good_as_a_sample(rate: float, milliseconds: float) -> None:
+def test_interpolated_value_is_as_accurate_as_a_sample(rate: float, milliseconds: float) -> None:
     t = uniform(20.0, rate)
     length = round(milliseconds * 1e-3 * rate)
     phi, y = measured(t)
@@ -273,7 +273,7 @@ def test_a_clock_that_changes_its_rate_is_interpolated(tmp_path: Path) -> None:
 # ---- the rig file's rate
 
 
-def test_a_clock_off_the_rig_files_rate_is_believed_and_told(tmp_path: Path) -> None:
+def test_clock_of_the_run_overrides_the_rig_file_with_a_note(tmp_path: Path) -> None:
     t = uniform(10.0, 1001.0)
     phi, y = measured(t)
     run = read(tmp_path, t, phi, y, 1000.0)
@@ -313,7 +313,7 @@ STRETCHED = uniform(1.0) + 5e-5 * np.sin(np.arange(1000))  # a twentieth of a pe
     ],
     ids=["backwards", "a jump of years", "no time at all", "a repeated row", "huge", "huge both ways"],
 )
-def test_what_no_clock_explains_is_refused(times: Float, part: str, tmp_path: Path) -> None:
+def test_unexplainable_clock_is_refused(times: Float, part: str, tmp_path: Path) -> None:
     phi = np.random.default_rng(1).standard_normal(times.size)
     with pytest.raises(PvidError, match=part) as caught:
         read(tmp_path, times, phi, phi)

@@ -102,7 +102,7 @@ def test_separators_and_decimal_commas_are_found(separator: str, decimal: str, e
         "indented",
     ],
 )
-def test_what_programs_add_to_a_table_is_read(content: str, tmp_path: Path) -> None:
+def test_program_added_table_lines_are_read(content: str, tmp_path: Path) -> None:
     assert_is_the_run(written(tmp_path, content))
 
 

@@ -63,7 +63,7 @@ def test_nothing_else_is_joined(phi: Float) -> None:
     np.testing.assert_array_equal(phi, before)
 
 
-def test_a_run_of_counts_that_start_over_is_read_and_told(tmp_path: Path) -> None:
+def test_run_of_wrapping_counts_is_read_with_a_note(tmp_path: Path) -> None:
     from pvid.rig.columns import Columns
 
     counts = np.rint(SWING / LSB).astype(int) % 4096
@@ -75,7 +75,7 @@ def test_a_run_of_counts_that_start_over_is_read_and_told(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("us", 1e6), ("ns", 1e9)])
-def test_a_clock_in_another_unit_is_told_with_what_to_type(unit: str, scale: float, tmp_path: Path) -> None:
+def test_clock_in_another_unit_is_reported_with_its_option(unit: str, scale: float, tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text("t,phi,y\n" + "".join(f"{t * scale:.0f},{p},0.1\n" for t, p in zip(T, SWING, strict=True)))
     with pytest.raises(PvidError, match=f"t looks like {unit}: use --columns t=t:{unit}"):

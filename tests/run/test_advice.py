@@ -14,13 +14,14 @@ from click.testing import CliRunner
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run, write_run
 from pvid.rig.sensor_steps import resolved
 from pvid.run.advice import advice, advice_on_refusal
 from pvid.run.excitation import excitation_of
 from pvid.run.identify import Identification, identify
+from pvid.settings.enums import Reason
 from pvid.sim.pendulum import STANDARD_DRIVE, Pendulum, Tone, simulate, standard_sensors
 
 LSB = 2 * np.pi / 2**12
@@ -190,7 +191,7 @@ def test_a_mistake_gets_its_sentence_and_no_other(native: Native, name: str) -> 
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_what_is_typed_cures_it(native: Native, name: str) -> None:
+def test_suggested_option_cures_the_finding(native: Native, name: str) -> None:
     mistake = MISTAKES[name]
     result, said = advised(*mistake.cured(*mistake.spoilt()), native)
     assert result is not None and result.identified
@@ -235,14 +236,14 @@ def test_a_wrong_resolution_does_not_hide_the_cause(native: Native) -> None:
     assert [one[:14] for one in said] == ["phi moves in s", "angles go to 0"]
 
 
-def test_columns_in_one_anothers_place_are_told(native: Native) -> None:
+def test_swapped_columns_are_reported(native: Native) -> None:
     run = run_of()
     for rig in (RIG, without_a_rig_file(replace(run, phi=run.y))):
         _, said = advised(replace(run, phi=run.y, y=run.phi), rig, native)
         assert len(said) == 1 and said[0].startswith("phi and y are exchanged") and "--columns phi=y,y=phi" in said[0]
 
 
-def test_degrees_of_an_encoder_that_starts_over_are_told(native: Native) -> None:
+def test_wrapping_degrees_are_reported(native: Native) -> None:
     run = run_of()
     over = replace(run, phi=np.degrees(run.phi) % 360.0)
     _, said = advised(over, without_a_rig_file(over), native)
@@ -303,14 +304,14 @@ def test_fixed_point_is_advised_to_let_the_run_set_its_ranges(native: Native) ->
         (0.0, "the pivot does not move"),
     ],
 )
-def test_a_weak_drive_is_called_that_and_nothing_else(native: Native, drive: float, said: str) -> None:
+def test_weak_drive_is_the_only_finding(native: Native, drive: float, said: str) -> None:
     run = run_of(drive=drive)
     result, advices = advised(replace(run, y=run.y if drive else 0 * run.y), RIG, native)
     assert result is not None and result.status in (Reason.HELD_NOT_EXCITED.text, Reason.HELD_UNCERTAIN.text)
     assert len(advices) == 1 and advices[0].startswith(said)
 
 
-def test_a_run_that_is_driven_is_not_called_unexcited(native: Native) -> None:
+def test_driven_run_is_not_reported_as_unexcited(native: Native) -> None:
     for name in ("y in mm", "y's sign turned"):
         result, _ = advised(*MISTAKES[name].spoilt(), native)
         assert result is not None and result.status == "held not explained"
@@ -318,7 +319,7 @@ def test_a_run_that_is_driven_is_not_called_unexcited(native: Native) -> None:
 
 
 @pytest.mark.parametrize(("size", "said"), [(0.0, "phi does not move"), (0.01, "phi hardly moves: 0.")])
-def test_an_angle_that_stands_still_is_told(native: Native, size: float, said: str) -> None:
+def test_constant_angle_is_reported(native: Native, size: float, said: str) -> None:
     run = run_of()
     still = LSB * np.rint(size * (run.phi - 0.01) / LSB)
     still[::3] += LSB * (size > 0)
@@ -327,13 +328,13 @@ def test_an_angle_that_stands_still_is_told(native: Native, size: float, said: s
     assert len(advices) == 1 and advices[0].startswith(said)
 
 
-def test_a_swing_beyond_what_the_equations_hold_for_is_told(native: Native) -> None:
+def test_swing_beyond_the_valid_range_is_reported(native: Native) -> None:
     _, said = advised(run_of(release=3.0), RIG, native)
     assert len(said) == 1
     assert said[0].startswith("angles go to 0.25 rad, and the equations are corrected up to 0.2 rad")
 
 
-def test_a_swing_that_dies_away_is_told(native: Native) -> None:
+def test_decaying_swing_is_reported(native: Native) -> None:
     _, said = advised(run_of(friction=2e-3), RIG, native)
     assert len(said) == 1 and said[0].startswith("the swing dies away")
 
@@ -343,7 +344,7 @@ def test_the_strong_form_is_advised_to_be_the_weak_one(native: Native) -> None:
     assert said == ("the strong form needs an encoder of 20 bits and more: use --form weak, which explains this run",)
 
 
-def test_another_mechanism_is_not_blamed_on_the_drive(native: Native) -> None:
+def test_misfit_of_another_mechanism_is_not_attributed_to_the_drive(native: Native) -> None:
     run = run_of()
     other = np.random.default_rng(1).permutation(run.phi.reshape(-1, 100)).ravel()  # the motion of no pendulum
     _, said = advised(replace(run, phi=other), RIG, native)

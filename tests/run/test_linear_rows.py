@@ -72,7 +72,7 @@ def test_fixed_point_covers_its_linear_rows_and_float32_corrects_them(native: Na
     assert (np.abs(published.p - far.p) < 3 * published.se).all()
 
 
-def test_angles_that_cannot_be_corrected_give_no_fixed_point_answer(native: Native) -> None:
+def test_uncorrectable_angles_give_no_fixed_point_answer(native: Native) -> None:
     run = simulate(
         FAR, DRIVE, standard_sensors(16), sample_rate=500.0, duration=30.0, release=(0.2, 0.05), truth="full", seed=1
     ).run

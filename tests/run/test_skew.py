@@ -47,7 +47,7 @@ def test_without_a_delay_none_is_found(native: Native) -> None:
     assert result.skew == 0.0 and result.warning is None
 
 
-def test_a_delay_that_moves_the_estimate_is_told_with_what_to_type_and_covered(native: Native) -> None:
+def test_delay_that_moves_the_estimate_is_reported_and_covered(native: Native) -> None:
     """2.4 ms took 27 % off d2, and the residuals looked like a small disturbance."""
     simulated = simulate_rig(native, shipped(), 1, 41)
     record, result = identify_rig(native, simulated)

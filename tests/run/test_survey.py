@@ -131,7 +131,7 @@ def test_large_angles_are_no_disturbance_and_friction_is() -> None:
 
 
 @pytest.mark.parametrize("seen", ["still pivot", "nothing at rest", "no samples"])
-def test_where_nothing_is_found_the_guess_stays(standard: Run, seen: str) -> None:
+def test_failed_fit_keeps_the_guess(standard: Run, seen: str) -> None:
     still = np.zeros_like(standard.y)
     run = {
         "still pivot": replace(standard, y=still),
@@ -165,7 +165,7 @@ def test_a_fitted_rig_file_is_not_fitted_again_and_can_be_written(standard: Run)
     assert RigFile.parse(known.text()) == known
 
 
-def test_what_the_rig_file_fixes_stays(standard: Run) -> None:
+def test_fixed_settings_of_the_rig_file_are_kept(standard: Run) -> None:
     rig = guessed(2.0, 0.6)
     own = replace(rig.identifier, window_s=1.2, pass_hz=12.5, test_functions=9)
     kept = fitted(replace(rig, identifier=own), standard).identifier

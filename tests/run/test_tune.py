@@ -64,7 +64,7 @@ def test_friction_is_found() -> None:
     assert choice.chosen.residual_over(choice.default) < 0.5
 
 
-def test_a_survey_that_is_asked_for_friction_leaves_less_to_disturbances() -> None:
+def test_survey_with_friction_leaves_smaller_disturbances() -> None:
     run = RUBBING.run(0)
     without = fitted(RUBBING.rig, run).identifier.disturbance
     asked = fitted(with_identifier(RUBBING.rig, damping=True), run)
@@ -86,7 +86,7 @@ def test_linear_equations_are_no_alternative_at_large_angles(native: Native) -> 
 
 
 def test_bad_sizes_are_replaced(native: Native) -> None:
-    """A window of half a slow period, where MATH.md 5 says that the weak form collapses."""
+    """A window of half a slow period, where theory.md 5 says that the weak form collapses."""
     bad = with_identifier(STANDARD.rig, window_s=0.6, test_functions=8)
     run = STANDARD.run(0)
     choice = tune(run, bad, native)
@@ -122,7 +122,7 @@ def test_the_written_file_gives_the_answer_again(native: Native) -> None:
         assert again.identified
 
 
-def test_what_is_written_is_explicit_and_short() -> None:
+def test_written_file_is_explicit_and_short() -> None:
     rig = tuned(STANDARD).rig
     own = rig.identifier
     assert not own.survey
@@ -235,7 +235,7 @@ def refused(native: Native, run: Run) -> str:
     return str(caught.value)
 
 
-def test_what_cannot_be_tuned_is_said(native: Native) -> None:
+def test_untunable_run_is_reported(native: Native) -> None:
     still = simulate(drive=(), sensors=standard_sensors(14), duration=15.0).run
     said = refused(native, still)
     assert "nothing is identified" in said and "stands still" in said

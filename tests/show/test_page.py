@@ -76,7 +76,7 @@ def state_of(log: bytes, title: str = "") -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("at", ["", "8765", "localhost", "localhost:", "a b:1", "127.0.0.1:70000", "::1:80", "/dev/x"])
-def test_an_address_that_is_none_is_refused(at: str) -> None:
+def test_invalid_address_is_refused(at: str) -> None:
     with pytest.raises(PvidError, match="--web takes HOST:PORT, as in 127.0.0.1:8765"):
         listen(at)
 
@@ -90,7 +90,7 @@ def test_an_address_that_is_taken_is_refused_and_port_0_is_any() -> None:
             listen(f"127.0.0.1:{port}")
 
 
-def test_what_is_local() -> None:
+def test_local_addresses() -> None:
     assert all(is_local(f"http://{host}:1/") for host in ("127.0.0.1", "localhost", "[::1]"))
     assert not any(is_local(f"http://{host}:1/") for host in ("0.0.0.0", "[::]", "192.168.1.2", "lab"))
 
@@ -227,6 +227,7 @@ def drawn(browser: webdriver.Chrome, plot: str) -> list[dict[str, Any]]:
     return list(browser.execute_script(script, plot))
 
 
+@pytest.mark.long
 def test_the_page_moves_in_a_browser_and_asks_nobody_else(
     tmp_path: Path, board: Path, browser: webdriver.Chrome
 ) -> None:

@@ -1,6 +1,6 @@
 """What a person sees of a recording fits the screen: an 80 x 24 terminal, a window of 1280 x 800, a page of paper.
 
-PVID_PICTURES=folder ./tools/test tests/show/test_pictures.py      leaves the pictures there, to be looked at
+PVID_PICTURES=folder ./tools/pvid bench long --only show      leaves the pictures there, to be looked at
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from browser import chromium
 from rich.console import Console
 from selenium import webdriver
 
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
 from pvid.rig.file import RigFile
+from pvid.settings.enums import Reason
 from pvid.show.page import page
 from pvid.show.report import recording_of, write_report
 from pvid.show.view import LiveView
@@ -60,8 +61,8 @@ def photograph(browser: webdriver.Chrome, path: Path) -> None:
     assert 5_000 < path.stat().st_size < 200_000
 
 
-def test_the_terminal_view_fits_80_by_24_whatever_it_has_to_say(
-    sent: list[tuple[int, link.Message]], pictures: Path, tmp_path: Path
+def test_terminal_view_always_fits_80_by_24(
+    sent: list[tuple[int, link.Message]], pictures: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     def told(message: link.Message) -> link.Message:
         if isinstance(message, link.Estimate) and worst:
@@ -86,6 +87,8 @@ def test_the_terminal_view_fits_80_by_24_whatever_it_has_to_say(
         assert len(lines) <= 24 and max(map(len, lines)) <= 80
         assert not worst or "friction, large angles" in " ".join(lines)
         assert "parameters identifiable" in "".join(lines) or worst
+        if not request.config.getoption("--long"):
+            continue
         (tmp_path / "terminal.svg").write_text(console.export_svg(title="pvid log"))
         with chromium(tmp_path / f"chromium{worst}", 1000, 620) as browser:
             browser.get((tmp_path / "terminal.svg").as_uri())
@@ -100,6 +103,7 @@ _TEXTS = """
 """
 
 
+@pytest.mark.long
 def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Path, tmp_path: Path) -> None:
     with (
         page("127.0.0.1:0", log, "/dev/ttyACM0 -> run.pvlog") as address,
@@ -128,7 +132,7 @@ def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Pat
         photograph(browser, pictures / "page.png")
 
 
-def test_the_report_says_what_it_is_and_its_titles_fit(log: Path, pictures: Path) -> None:
+def test_report_has_a_title_and_its_titles_fit(log: Path, pictures: Path) -> None:
     recording = recording_of(log, None)
     misfit = replace(recording, reasons={Reason.MISFIT.text: 190, Reason.UPDATED.text: 10}, state=Reason.MISFIT.text)
     for name, one in (("report.png", recording), ("report-misfit.png", misfit)):

@@ -77,7 +77,7 @@ def test_residuals_at_wrong_parameters_or_of_another_mechanism_are_larger() -> N
     assert corrected < 0.2 * uncorrected
 
 
-def test_residuals_are_those_that_the_board_reports(log: Path) -> None:
+def test_residuals_equal_those_of_the_board(log: Path) -> None:
     recording = recording_of(log, None)
     residuals = residuals_of(recording.run, recording.rig, recording.p)
     values, told = Values(STANDARD.mechanism), 0.0
@@ -110,7 +110,7 @@ def test_residuals_of_the_strong_form() -> None:
 
 
 def test_modes_of_the_standard_rig() -> None:
-    assert modes_hz(P) == pytest.approx((0.742, 2.56), rel=2e-3)  # MATH.md section 6
+    assert modes_hz(P) == pytest.approx((0.742, 2.56), rel=2e-3)  # theory.md 6
 
 
 def test_parameters_outside_the_physical_region_have_no_modes_hz() -> None:
@@ -125,7 +125,7 @@ def shown(svg: Path) -> str:
     return svg.read_text(encoding="utf-8")
 
 
-def test_a_report_says_what_it_shows_with_units(log: Path, tmp_path: Path) -> None:
+def test_report_labels_contain_units(log: Path, tmp_path: Path) -> None:
     write_report(recording_of(log, None), tmp_path / "a.svg")
     text = shown(tmp_path / "a.svg")
     for words in (
@@ -155,7 +155,7 @@ def test_a_report_says_what_it_shows_with_units(log: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("suffix", "begins"), [("png", b"\x89PNG"), ("pdf", b"%PDF")])
-def test_plot_writes_what_the_ending_says(log: Path, tmp_path: Path, suffix: str, begins: bytes) -> None:
+def test_plot_format_follows_the_file_suffix(log: Path, tmp_path: Path, suffix: str, begins: bytes) -> None:
     out = tmp_path / f"out.{suffix}"
     done = CliRunner().invoke(commands, ["plot", str(log), "-o", str(out)], standalone_mode=False)
     assert done.return_value == 0 and done.output == f"{out}\n"
@@ -203,7 +203,7 @@ def test_a_report_of_an_estimate_outside_the_physical_region(log: Path, tmp_path
     assert "mode at" not in text and "nan" not in text
 
 
-def test_a_report_of_a_held_run_says_that_nothing_is_identified_and_why(tmp_path: Path) -> None:
+def test_report_of_a_held_run_states_the_reason(tmp_path: Path) -> None:
     run = simulate(sensors=standard_sensors(14), truth="full", duration=15, seed=3).run
     turned = replace(run, y=-run.y)
     write_run(tmp_path / "run.csv", turned)
@@ -268,13 +268,13 @@ def test_a_simulation_at_100_samples_a_second_and_through_missing_ones() -> None
     assert seen is not None and seen.unexplained < 1e-3
 
 
-def test_what_cannot_be_simulated_is_not() -> None:
+def test_impossible_simulation_is_refused() -> None:
     run = simulate(sensors=SENSORS, truth="full", duration=2, seed=1).run
     assert simulated_angle(run, np.array([11.56, 0.25, 0.2, 0.0]), 0.3) is None
     assert simulated_angle(run, P, 0.3) is None  # less than a block of two slow periods
 
 
-def test_a_board_that_began_anew_is_marked(native: Native, tmp_path: Path) -> None:
+def test_restarted_board_is_marked(native: Native, tmp_path: Path) -> None:
     writer = LogWriter(tmp_path / "two.pvlog", rig=field_board.rig().text())
     writer.begin("a port", None)
     sent = b"".join(field_board.frames(field_board.messages(field_board.Field(6000, estimate_every=100), native)))
@@ -286,7 +286,7 @@ def test_a_board_that_began_anew_is_marked(native: Native, tmp_path: Path) -> No
     assert "the board began anew" in shown(tmp_path / "two.svg")
 
 
-def test_what_cannot_be_drawn_is_refused_in_a_sentence(log: Path, native: Native, tmp_path: Path) -> None:
+def test_undrawable_input_is_refused_in_a_sentence(log: Path, native: Native, tmp_path: Path) -> None:
     recording = recording_of(log, None)
     with pytest.raises(PvidError, match="out.xyz .*must end in .png, .svg, .pdf"):
         write_report(recording, tmp_path / "out.xyz")

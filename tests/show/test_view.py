@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from pvid.base.rounding import with_error
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.history import History, Thinned, envelope
 from pvid.log.reader import Account, LogReader, LogStream, Record
@@ -32,6 +32,7 @@ from pvid.log.values import UNKNOWN_RIG, Rows, Values
 from pvid.log.words import kappa_share, kappa_words, reason_words
 from pvid.models.model import Mechanism
 from pvid.rig.file import RigFile
+from pvid.settings.enums import Reason
 from pvid.show.view import LiveView, sparkline
 
 TICKS = 12_000
@@ -58,7 +59,7 @@ def view_of(frames: list[bytes], mechanism: Mechanism = MECHANISM, width: int = 
 # ---- the picture
 
 
-def test_the_view_says_all_there_is_to_know(sent: list[bytes]) -> None:
+def test_view_shows_every_item(sent: list[bytes]) -> None:
     seen = view_of(sent)
     values, newest = Values(MECHANISM), {}
     stream = LogStream()
@@ -67,8 +68,8 @@ def test_the_view_says_all_there_is_to_know(sent: list[bytes]) -> None:
             if rows.table == "estimates":
                 newest = {name: column[0] for name, column in rows.columns.items()}
     for name in ("g", "l2", "rho2", "w", "d1", "d2", "c"):
-        told, spread = with_error(newest[name], newest[f"{name}_se"])
-        assert f"{told}  ± {spread}" in seen
+        shown, spread = with_error(newest[name], newest[f"{name}_se"])
+        assert f"{shown}  ± {spread}" in seen
     assert "field: weak form, core f32, 1000 samples per second" in seen
     assert f"{TICKS} samples" in seen and "lost       nothing" in seen
     assert f"{newest['kappa']:.2g}  good" in seen and "times the encoder's noise" in seen
@@ -77,13 +78,13 @@ def test_the_view_says_all_there_is_to_know(sent: list[bytes]) -> None:
     assert "rad, pivot" in seen
 
 
-def test_losses_and_a_link_that_is_down_are_told(sent: list[bytes]) -> None:
+def test_losses_and_a_broken_link_are_reported(sent: list[bytes]) -> None:
     without = [frame for i, frame in enumerate(sent) if not 100 <= i < 105]
     seen = view_of(without)
     assert "5 frames" in seen and "samples" in seen.split("lost")[1].splitlines()[0]
 
 
-def test_before_anything_has_come_the_view_says_so(sent: list[bytes]) -> None:
+def test_view_before_the_first_frame_is_labelled(sent: list[bytes]) -> None:
     assert "has not said yet who it is" in view_of([])
     beginning = view_of(sent[:5])
     assert "none yet" in beginning and "no estimate yet" in beginning
@@ -94,7 +95,7 @@ def test_without_the_rods_length_there_are_no_physical_parameters(sent: list[byt
     assert "radius of gyration" not in seen and "L1 L2" in seen
 
 
-def test_an_estimate_outside_the_physical_region_is_told_as_such(sent: list[bytes]) -> None:
+def test_estimate_outside_the_physical_region_is_reported(sent: list[bytes]) -> None:
     decoder, frames = link.Decoder(), []
     for item in decoder.feed(b"".join(sent)):
         assert isinstance(item, link.Frame)
@@ -107,7 +108,7 @@ def test_an_estimate_outside_the_physical_region_is_told_as_such(sent: list[byte
     assert "outside" not in view_of(frames, mechanism=UNKNOWN_RIG)
 
 
-def test_what_a_board_says_of_itself_is_no_markup(native: Native) -> None:
+def test_board_name_is_escaped(native: Native) -> None:
     frames: list[bytes] = []
     for tick, message in field_board.messages(field_board.Field(32), native):
         told = replace(message, board="[/bold][red]x") if isinstance(message, link.Hello) else message
@@ -146,7 +147,7 @@ def test_kappa_in_words_and_as_a_bar() -> None:
         (1.0, float("nan"), ("1", "nan")),
     ],
 )
-def test_a_value_is_told_to_the_second_digit_of_its_error(value: float, error: float, told: tuple[str, str]) -> None:
+def test_value_is_rounded_to_the_second_digit_of_its_error(value: float, error: float, told: tuple[str, str]) -> None:
     assert with_error(value, error) == told
 
 
@@ -312,7 +313,7 @@ def test_log_draws_on_a_terminal_and_leaves_the_last_picture(tmp_path: Path, boa
     assert last.count("ended") >= 1 and "Ctrl-C ends" not in last
 
 
-def test_a_terminal_that_nobody_reads_costs_the_log_nothing(tmp_path: Path, board: Path) -> None:
+def test_blocked_terminal_does_not_delay_the_log(tmp_path: Path, board: Path) -> None:
     terminal = Terminal(tmp_path)
     wait_for_all(tmp_path / "out.pvlog")
     terminal.process.send_signal(signal.SIGINT)

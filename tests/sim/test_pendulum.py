@@ -43,7 +43,7 @@ def exact_of(simulation: Simulation) -> Exact:
 
 
 def test_standard_rig_is_that_of_the_table() -> None:
-    """MATH.md 6: w 31.667, d1 8.875, d2 5.625; |phi| up to 0.107 rad."""
+    """theory.md 6: w 31.667, d1 8.875, d2 5.625; |phi| up to 0.107 rad."""
     np.testing.assert_allclose(STANDARD_PENDULUM.linear, [9.5 / 0.3, 8.875, 5.625], rtol=1e-14)
     run = simulate(sensors=EXACT, truth="full").run
     assert (len(run), run.sample_rate, run.t[0]) == (40_000, 1000.0, 0.0)
@@ -86,7 +86,7 @@ def test_starts_are_within_half_of_the_truth_and_physical() -> None:
 def reference(pendulum: Pendulum, tones: tuple[Tone, ...], truth: str, end: float) -> Float:
     """(a1, a2) at `end` by another method (LSODA) from equations written another way.
 
-    Linear: MATH.md (1). Full: Newton and Euler for body 2 alone, on which the massless rod 1 pulls with a tension T
+    Linear: theory.md (1). Full: Newton and Euler for body 2 alone, on which the massless rod 1 pulls with a tension T
     along itself.
     """
     l1, l2, rho2 = pendulum.l1, pendulum.l2, pendulum.rho2
@@ -183,7 +183,7 @@ def test_energy_is_kept_without_drive_and_falls_with_friction() -> None:
 
 
 def test_free_modes_have_the_frequencies_of_the_table() -> None:
-    """MATH.md 6: 0.742 and 2.56 Hz, as the two lines of a free motion's spectrum."""
+    """theory.md 6: 0.742 and 2.56 Hz, as the two lines of a free motion's spectrum."""
     run = simulate(drive=(), sensors=EXACT, duration=100.0).run
     spectrum = np.abs(np.fft.rfft(run.phi * np.hanning(len(run))))
     frequency = np.fft.rfftfreq(len(run), 1.0 / run.sample_rate)
@@ -248,7 +248,7 @@ def test_a_switched_rig_moves_freely_while_the_drive_is_off() -> None:
     assert np.ptp(total[8001:]) > 1e-4
     linear = exact_of(simulate(drive=drive, duration=12.0))
     w, d1, d2 = STANDARD_PENDULUM.linear
-    residual = linear.phi[:, 4] + d1 * w * linear.phi[:, 2] + d2 * w**2 * linear.phi[:, 0]  # MATH.md 2 with u = 0
+    residual = linear.phi[:, 4] + d1 * w * linear.phi[:, 2] + d2 * w**2 * linear.phi[:, 0]  # theory.md 2 with u = 0
     assert np.abs(residual[4000:8001]).max() < 1e-9 < np.abs(residual[:4000]).max()
 
 
@@ -262,7 +262,7 @@ def test_impossible_intervals_are_refused(on: tuple[tuple[float, float], ...]) -
 
 
 def test_measurement_is_that_of_the_prototype() -> None:
-    """MATH.md's tables were measured with these samples: same seed, same bits."""
+    """The tables of theory.md were measured with these samples: same seed, same bits."""
     simulation = simulate(sensors=standard_sensors(14), seed=11)
     phi, y = simulate(sensors=EXACT).run.phi, simulate(sensors=EXACT).run.y
     random = np.random.default_rng(11)
@@ -351,7 +351,7 @@ def test_impossible_sensors_are_refused(field: str) -> None:
 
 
 def test_parametric_resonance_grows_and_beyond_all_bounds_is_reported() -> None:
-    """MATH.md 6: the linear model blows up at 5 mm for 4.7 to 5.7 Hz (twice the fast mode)."""
+    """theory.md 6: the linear model blows up at 5 mm for 4.7 to 5.7 Hz (twice the fast mode)."""
     grown = simulate(drive=[Tone(5e-3, 5.12)], sensors=EXACT, duration=40.0).run.phi
     assert np.abs(grown).max() > 10.0
     with pytest.raises(PvidError, match="without bound"):

@@ -79,12 +79,12 @@ def as_another_user(clone: Path) -> subprocess.CompletedProcess[str]:
     return done
 
 
-def test_what_another_user_prepared_is_used_as_it_is(foreign: Path) -> None:
+def test_cache_prepared_by_another_user_is_used(foreign: Path) -> None:
     done = as_another_user(foreign)
     assert (done.returncode, done.stdout, done.stderr) == (0, "ran -P -m pvid --version\n", "")
 
 
-def test_what_another_user_has_not_prepared_is_told(foreign: Path) -> None:
+def test_cache_of_another_user_without_preparation_is_reported(foreign: Path) -> None:
     with (foreign / "tools" / "requirements.txt").open("a", encoding="utf-8") as file:
         file.write("# newer\n")
     done = as_another_user(foreign)

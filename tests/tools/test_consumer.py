@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
+from pvid.core.sources import public_headers
+
 CONSUMER = ROOT / "tests" / "consumer"
 SOURCES = ("CMakeLists.txt", "LICENSE", "firmware")  # all that a user's build needs
 TAPS = 101  # not the default: the definition must reach whoever links the library
@@ -173,9 +175,9 @@ def test_a_header_of_sizes_travels_too(tmp_path: Path) -> None:
     assert Printed.of(printed[0]).taps == 91
 
 
-def test_what_is_installed(prefix: Path) -> None:
+def test_installed_files(prefix: Path) -> None:
     files = {path.relative_to(prefix).as_posix() for path in prefix.rglob("*") if path.is_file()}
-    headers = {f"include/pvid/{path.name}" for path in (ROOT / "firmware" / "include" / "pvid").glob("*.h")}
+    headers = {f"include/pvid/{path.name}" for path in public_headers()}
     assert headers == {name for name in files if name.endswith(".h")}  # public headers only, all of them
     assert {"lib/libpvid.a", "lib/pkgconfig/pvid.pc"} <= files
     assert {f"lib/cmake/pvid/pvid-config{part}.cmake" for part in ("", "-version")} <= files

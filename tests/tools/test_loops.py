@@ -120,7 +120,7 @@ def run(copy: Path, *files: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_planted_loops_and_recursion_are_found(copy: Path) -> None:
-    name = "firmware/src/planted.c"
+    name = "firmware/src/weak/planted.c"
     (copy / name).write_text(PLANTED, encoding="utf-8")
     done = run(copy, name)
     assert done.returncode == 1, done.stderr
@@ -135,9 +135,9 @@ def test_planted_loops_and_recursion_are_found(copy: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        ("firmware/src/crc32.c", "i < n; i++", "i < n;"),
-        ("firmware/src/fnv_q31.c", "i < information->n_sums; i++", "i < information->n_sums; i += 0u"),
-        ("firmware/src/weak_front_q31.c", "runs++", "runs += (uint32_t)(i == last)"),
+        ("firmware/src/keep/crc32.c", "i < n; i++", "i < n;"),
+        ("firmware/src/keep/fnv_q31.c", "i < information->n_sums; i++", "i < information->n_sums; i += 0u"),
+        ("firmware/src/weak/front_q31.c", "runs++", "runs += (uint32_t)(i == last)"),
         ("firmware/ports/freestanding/square_root.c", "shift++", ""),
     ],
 )
@@ -167,6 +167,6 @@ def test_reasons_do_not_outlive_their_loops(copy: Path) -> None:
 def test_loops_that_the_compiler_takes_to_end_are_refused(copy: Path) -> None:
     tool = copy / "tools" / "loops.py"
     tool.write_text(tool.read_text(encoding="utf-8").replace(" -fno-finite-loops", " -ffinite-loops"), encoding="utf-8")
-    done = run(copy, "firmware/src/crc32.c")
+    done = run(copy, "firmware/src/keep/crc32.c")
     assert done.returncode != 0
     assert "crc32.c (host): loops are taken to end" in done.stderr

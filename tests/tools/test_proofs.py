@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -18,7 +20,7 @@ def prove(top: Path, name: str = "link") -> subprocess.CompletedProcess[str]:
 
 def copy(top: Path, *names: str) -> None:
     """These files and folders of the repository, what proves them, and the contracts."""
-    for name in ("firmware/include", "tests/proofs", "tools/prove.py", *names):
+    for name in ("firmware/include", "firmware/models", "tests/proofs", "tools/prove.py", *names):
         (top / name).parent.mkdir(parents=True, exist_ok=True)
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, top / name)
@@ -33,7 +35,7 @@ def change(place: Path, old: str, new: str) -> None:
 
 
 def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
-    copy(tmp_path, "firmware/link", "firmware/src/crc32.c")
+    copy(tmp_path, "firmware/link", "firmware/src/keep/crc32.c")
     assert prove(tmp_path).returncode == 0
     link = tmp_path / "firmware" / "link" / "link.c"
     change(link, "if (self->filled == sizeof self->raw) {", "if (self->filled > sizeof self->raw) {")
@@ -42,8 +44,9 @@ def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
     assert "link.c" in done.stdout and "out of bounds index" in done.stdout
 
 
+@pytest.mark.long
 def test_room_that_is_a_byte_short_is_not_proved(tmp_path: Path) -> None:
-    copy(tmp_path, "firmware/link", "firmware/src/crc32.c")
+    copy(tmp_path, "firmware/link", "firmware/src/keep/crc32.c")
     room = "(PVID_LINK_RAW_BYTES(n) / 254u) + "
     change(tmp_path / "firmware" / "link" / "link.h", f"{room}2u)", f"{room}1u)")
     done = prove(tmp_path, "encoder")
@@ -53,7 +56,7 @@ def test_room_that_is_a_byte_short_is_not_proved(tmp_path: Path) -> None:
 
 def test_a_contract_that_is_not_kept_is_an_alarm(tmp_path: Path) -> None:
     copy(tmp_path, "firmware/src")
-    change(tmp_path / "firmware" / "src" / "scaled_q31.c", "#define DIGITS 30\n", "#define DIGITS 31\n")
+    change(tmp_path / "firmware" / "src" / "number" / "scaled_q31.c", "#define DIGITS 30\n", "#define DIGITS 31\n")
     done = prove(tmp_path, "scaled_of_q31")
     assert done.returncode == 1
     assert "function pvid_scaled_of_q31: postcondition got status invalid" in done.stdout

@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
-from pvid.core.native import EstimatorConfig, Law, Native, Reason, StrongConfig
+from pvid.core.native import Native
 from pvid.rig.file import Differentiator, RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import compare_run, first_difference
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import EstimatorConfig, StrongConfig
 from pvid.setup.f32 import strong_config
 from pvid.sim.pendulum import STANDARD_DRIVE, Drive, Simulation, simulate, standard_sensors, standard_start
 from pvid.twin import fnv
@@ -42,7 +45,7 @@ def variants(config: EstimatorConfig) -> list[EstimatorConfig]:
     return [replace(config, law=law, forgetting_s=tau) for law in Law for tau in (0.0, 2.0)]
 
 
-def test_the_matrix_holds_what_its_names_say(matrix: dict[str, Native]) -> None:
+def test_matrix_cases_match_their_names(matrix: dict[str, Native]) -> None:
     assert set(matrix) == set(BUILDS)
     for name, native in matrix.items():
         compiler, level = name.split("-")
@@ -70,7 +73,7 @@ class Group:
     of one twin.
     """
 
-    def __init__(self, config: StrongConfig, natives: list[Native], run: Run, first_row: int) -> None:
+    def __init__(self, config: StrongConfig, natives: list[Native], run: Run, first_row: int, rows: int) -> None:
         self.natives = natives
         starts = [standard_start(seed) for seed in range(STARTS)]
         whole = variants(config.estimator)
@@ -78,12 +81,14 @@ class Group:
         self.lanes = fed_rows + whole
         self.is_whole = [False] * len(fed_rows) + [True] * len(whole)
         self.estimators = [[native.estimator(lane, RATE) for native in natives] for lane in fed_rows]
-        self.identifiers = [[native.strong(replace(config, estimator=lane)) for native in natives] for lane in whole]
+        self.identifiers = [
+            [native.identifier(replace(config, estimator=lane)) for native in natives] for lane in whole
+        ]
         warming_up = window(config)
-        phi, y = (x[first_row - warming_up :] for x in (run.phi, run.y))
-        n, row_y, fate = StrongTwin(config).rows(phi, y)
-        assert (fate[:warming_up] == Reason.WARMING_UP).all()
-        assert (fate[warming_up:] == Reason.ACCUMULATED).all()
+        phi, y = (x[first_row - warming_up : first_row + rows] for x in (run.phi, run.y))
+        n, row_y, row_reason = StrongTwin(config).rows(phi, y)
+        assert (row_reason[:warming_up] == Reason.WARMING_UP).all()
+        assert (row_reason[warming_up:] == Reason.ACCUMULATED).all()
         self.n, self.row_y = n[warming_up:], row_y[warming_up:]
         self.phi, self.y = phi[warming_up:], y[warming_up:]
         self.hashes = [self._warm_up(k, phi[:warming_up], y[:warming_up]) for k in range(len(whole))]
@@ -92,8 +97,10 @@ class Group:
         """Feeds identifier k until its next sample makes a row; returns its hash."""
         start = np.asarray(self.lanes[len(self.estimators) + k].start, np.float32)
         p = np.tile(start, (len(phi), 1))
-        told = np.full(len(phi), Reason.WARMING_UP, np.uint8)
-        return self._compare_identifiers(k, phi, y, p, np.zeros((len(phi), model.SUMS), np.float32), told, fnv.START)
+        reported = np.full(len(phi), Reason.WARMING_UP, np.uint8)
+        return self._compare_identifiers(
+            k, phi, y, p, np.zeros((len(phi), model.SUMS), np.float32), reported, fnv.START
+        )
 
     def _compare_identifiers(
         self,
@@ -129,16 +136,17 @@ class Group:
                 assert first_difference(record, p, sums, reason) is None, native.build
 
 
+@pytest.mark.ticks(short=3000, long=40_000)
 def test_twenty_starts_and_whole_identifiers_equal_the_twin_in_every_build(
-    matrix: dict[str, Native], standard_20_bits: Simulation
+    matrix: dict[str, Native], standard_20_bits: Simulation, ticks: int
 ) -> None:
     """Both differentiators, both laws, with and without forgetting: 168 lanes of one twin, compared at every row."""
     configs = [configuration(of) for of in DIFFERENTIATORS]
     natives = [matrix[name] for name in BUILDS]
     first_row = max(window(config) for config in configs)
-    groups = [Group(config, natives, standard_20_bits.run, first_row) for config in configs]
+    groups = [Group(config, natives, standard_20_bits.run, first_row, ticks) for config in configs]
     rows, lanes = len(groups[0].row_y), len(groups[0].lanes)
-    assert rows >= 40_000
+    assert rows == ticks
     twin = StrongTwin(configs[0], [lane for group in groups for lane in group.lanes])
     gate = GateOfSome(twin, np.array([whole for group in groups for whole in group.is_whole]))
     for first in range(0, rows, PIECE):
@@ -156,7 +164,7 @@ def test_a_changed_bit_is_found_and_named(native: Native, standard_20_bits: Simu
     phi = run.phi[:500].copy()
     twin = StrongTwin(config).run(phi, run.y[:500])
     phi[300] = np.nextafter(np.float32(phi[300]), np.float32(1))
-    record = native.strong(config).run(phi, run.y[:500])
+    record = native.identifier(config).run(phi, run.y[:500])
     difference = first_difference(record, twin.p[:, :, 0], twin.sums[:, :, 0], twin.reason[:, 0])
     assert difference is not None
     assert difference.tick == 300  # five points: the newest sample enters at once
@@ -180,7 +188,7 @@ def test_hostile_samples_equal_the_twin(native: Native, standard_20_bits: Simula
         config = replace(config, estimator=replace(config.estimator, law=law))
         outcome = compare_run(native, config, phi, y)
         assert outcome.equal, outcome.difference
-        record = native.strong(config).run(phi, y)
+        record = native.identifier(config).run(phi, y)
         assert np.isfinite(record.p).all()
         assert np.isfinite(record.sums).all()
 
@@ -191,7 +199,7 @@ def test_a_drive_that_comes_and_goes_equals_the_twin(native: Native) -> None:
     config = replace(configuration("savitzky-golay"), drive_min=2.0)
     outcome = compare_run(native, config, run.phi, run.y)
     assert outcome.equal, outcome.difference
-    reasons = native.strong(config).run(run.phi, run.y).reason
+    reasons = native.identifier(config).run(run.phi, run.y).reason
     assert set(reasons[:2000]) == {Reason.WARMING_UP, Reason.HELD_NOT_EXCITED}
     assert (reasons[4000:5000] == Reason.UPDATED).all()
     assert (reasons[10000:11000] == Reason.HELD_NOT_EXCITED).all()
@@ -201,9 +209,9 @@ def test_a_drive_that_comes_and_goes_equals_the_twin(native: Native) -> None:
 def test_a_run_in_two_pieces_has_the_bits_of_one(native: Native, standard_20_bits: Simulation) -> None:
     run = standard_20_bits.run
     config = configuration("savitzky-golay")
-    whole = native.strong(config)
+    whole = native.identifier(config)
     whole.run(run.phi[:5000], run.y[:5000])
-    pieces = native.strong(config)
+    pieces = native.identifier(config)
     pieces.run(run.phi[:1234], run.y[:1234])
     pieces.run(run.phi[1234:5000], run.y[1234:5000])
     assert pieces.running_hash == whole.running_hash
@@ -213,7 +221,7 @@ def test_published_estimates_equal_the_twin(native: Native, standard_20_bits: Si
     run = standard_20_bits.run
     config = configuration("savitzky-golay")
     for ticks in (0, 100, 400, 2000):
-        identifier = native.strong(config)
+        identifier = native.identifier(config)
         identifier.run(run.phi[:ticks], run.y[:ticks])
         twin = StrongTwin(config)
         twin.run(run.phi[:ticks], run.y[:ticks])

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from pvid.core.native import SIZES
+from pvid.core.sources import INCLUDES, core_sources, source
+from pvid.settings.bounds import SIZES
 
 MUTANTS = {
     "estimator_f32.c": (
@@ -44,18 +45,17 @@ def pvid(folder: Path, *arguments: str, **environment: str) -> subprocess.Comple
     )
 
 
-@pytest.mark.parametrize("source", MUTANTS)
-def test_a_changed_core_exits_1_and_names_tick_variable_and_words(source: str, recorded: Path, tmp_path: Path) -> None:
-    original, changed = MUTANTS[source]
-    core = ROOT / "firmware" / "src"
-    text = (core / source).read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_changed_core_exits_1_and_names_tick_variable_and_words(name: str, recorded: Path, tmp_path: Path) -> None:
+    original, changed = MUTANTS[name]
+    text = source(name).read_text(encoding="utf-8")
     assert text.count(original) == 1
-    (tmp_path / source).write_text(text.replace(original, changed), encoding="utf-8")
+    (tmp_path / name).write_text(text.replace(original, changed), encoding="utf-8")
     library = tmp_path / "libpvid_native.so"
-    others = [str(path) for path in sorted(core.glob("*.c")) if path.name != source]
-    includes = [f"-I{ROOT / 'firmware/include'}", f"-I{core}", '-DPVID_NATIVE_BUILD="mutant"']
+    others = [str(path) for path in core_sources() if path.name != name]
+    includes = [*INCLUDES, '-DPVID_NATIVE_BUILD="mutant"']
     includes += SIZES
-    command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / source)]
+    command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / name)]
     subprocess.run([*command, *others, str(ROOT / "host/native/replay.c"), "-o", str(library), "-lm"], check=True)
 
     compare = ("compare", "run.csv", "--rig", "run.toml", "--form", "strong")

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import EstimatorConfigQ31, RecordQ31, RowEstimatorQ31
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.settings.record import Record
 from pvid.setup.q31 import weak_config_q31
 from pvid.twin.kapitza.weak_q31 import WEAK
 from pvid.twin.q31.estimator import SUM_LIMIT, EstimatorQ31
@@ -19,16 +21,16 @@ LIMIT = 2**28
 Rows = npt.NDArray[np.int64]
 
 
-def against_twin(native: Native, config: EstimatorConfigQ31, n: Rows, y: Rows) -> RecordQ31:
+def against_twin(native: Native, config: EstimatorConfigQ31, n: Rows, y: Rows) -> Record:
     """Steps the core and the twin through rows N [ticks, 8], Y [ticks], a group each; all integers must be equal."""
-    core = RowEstimatorQ31(native, config)
+    core = native.estimator_q31(config)
     record = core.run(n, y)
     twin = EstimatorQ31([config], WEAK)
     for tick in range(len(y)):
         reason = twin.add(n[tick][:, None], y[tick : tick + 1])
         if reason[0] == Reason.ACCUMULATED:
-            for told in twin.solve(ends_group=True):
-                reason = reason if told is None else told
+            for reported in twin.solve(ends_group=True):
+                reason = reason if reported is None else reported
         assert reason[0] == record.reason[tick], tick
         assert np.array_equal(twin.p[:, 0], record.p[tick]), tick
         assert np.array_equal(twin.sums[:, 0], record.sums[tick]), tick

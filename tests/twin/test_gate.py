@@ -13,10 +13,12 @@ from linear_rig import LINEAR_RIG
 from strong_lanes import strong_lanes
 
 from pvid.base.errors import PvidError
-from pvid.core.native import GateConfig, Native, Reason, Status
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import first_difference
+from pvid.settings.enums import Reason, Status
+from pvid.settings.f32 import GateConfig
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.twin.f32.gate import Gate
@@ -53,11 +55,11 @@ def feed(one: Gate, square: float, times: int) -> int:
     return sum(bool(one.passes(np.array([square], np.float32))[0]) for _ in range(times))
 
 
-def test_it_passes_everything_until_it_has_learnt() -> None:
+def test_gate_passes_everything_while_warming_up() -> None:
     assert feed(gate(4.0), 1e9, 10) == 10
 
 
-def test_what_is_larger_than_so_many_times_the_usual_does_not_pass() -> None:
+def test_residual_beyond_the_limit_is_rejected() -> None:
     one = gate(4.0)
     feed(one, 100.0, 40)
     assert feed(one, 15.9 * 100.0, 1) == 1
@@ -66,14 +68,14 @@ def test_what_is_larger_than_so_many_times_the_usual_does_not_pass() -> None:
     assert feed(one, 16.2 * 100.0, 100) == 0
 
 
-def test_the_usual_is_never_below_its_floor() -> None:
+def test_scale_is_never_below_its_floor() -> None:
     one = gate(4.0, floor=1.0)
     assert feed(one, 0.0, 1000) == 1000
     assert feed(one, 15.9, 1) == 1
     assert feed(one, 1e3, 10) == 0
 
 
-def test_outliers_are_not_usual_but_a_change_is_believed_in_the_end() -> None:
+def test_outliers_are_rejected_and_a_lasting_change_is_accepted() -> None:
     never, later = gate(4.0), gate(4.0, patience_s=3.0)
     for one in (never, later):
         feed(one, 1.0, 100)
@@ -85,7 +87,7 @@ def test_outliers_are_not_usual_but_a_change_is_believed_in_the_end() -> None:
     assert refused == pytest.approx(300 * np.log(1e4 / 16) / np.log(1e4), rel=0.03)
 
 
-def test_one_in_a_hundred_does_not_widen_it_much() -> None:
+def test_one_percent_of_outliers_barely_widens_the_scale() -> None:
     one = gate(4.0, patience_s=10.0)
     feed(one, 1.0, 100)
     for _ in range(200):
@@ -96,7 +98,7 @@ def test_one_in_a_hundred_does_not_widen_it_much() -> None:
 
 @settings(deadline=None)
 @given(squares=st.lists(st.floats(0, 1e38), max_size=60), patience=st.floats(0, 1e6))
-def test_its_scale_stays_a_number(squares: list[float], patience: float) -> None:
+def test_gate_scale_stays_finite(squares: list[float], patience: float) -> None:
     one = gate(4.0, patience)
     for square in squares:
         feed(one, square, 1)
@@ -118,7 +120,7 @@ def test_the_weak_form_equals_its_twin(
     twin = WeakTwin(config)
     expected = twin.run(jolted.phi, jolted.y)
     for native in matrix.values():
-        core = native.weak(config)
+        core = native.identifier(config)
         record = core.run(jolted.phi, jolted.y, hashes=False)
         theirs = (expected.p[:, :, 0], expected.sums[:, :, 0], expected.reason[:, 0], expected.published[:, :, 0])
         assert first_difference(record, *theirs) is None, native.build
@@ -136,10 +138,10 @@ def test_the_strong_form_equals_its_twin_in_every_lane(matrix: dict[str, Native]
         assert counters["rejected_outlier"] == (reason == OUTLIER).sum() > 0
 
 
-def test_windows_that_were_touched_are_kept_out(native: Native, jolted: Run) -> None:
+def test_disturbed_windows_are_rejected(native: Native, jolted: Run) -> None:
     errors = {}
     for sigmas in (0.0, 4.0):
-        core = native.weak(weak_config(rig_with(outlier_gate=sigmas), 1000.0))
+        core = native.identifier(weak_config(rig_with(outlier_gate=sigmas), 1000.0))
         record = core.run(jolted.phi, jolted.y, sums=False)
         errors[sigmas] = np.abs(record.published[-1, :3] / STANDARD_PENDULUM.linear - 1).max()
         refused = np.flatnonzero(record.reason == OUTLIER)
@@ -150,31 +152,31 @@ def test_windows_that_were_touched_are_kept_out(native: Native, jolted: Run) -> 
 
 
 def test_a_refused_window_changes_nothing_but_its_counter(native: Native, jolted: Run) -> None:
-    core = native.weak(weak_config(rig_with(outlier_gate=4.0), 1000.0))
+    core = native.identifier(weak_config(rig_with(outlier_gate=4.0), 1000.0))
     record = core.run(jolted.phi, jolted.y)
     for tick in np.flatnonzero(record.reason == OUTLIER):
         assert np.array_equal(record.p[tick - 300], record.p[tick])
         assert np.array_equal(record.sums[tick - 300], record.sums[tick])
 
 
-def test_it_is_on_in_the_stationary_law_and_off_where_it_is_not_wanted(native: Native, jolted: Run) -> None:
+def test_gate_is_enabled_in_the_stationary_law_and_can_be_disabled(native: Native, jolted: Run) -> None:
     for form, sigmas in (("weak", 4.0), ("strong", 6.0)):
         of = weak_config if form == "weak" else strong_config
         assert of(rig_with(form=form, stride=8), 1000.0).gate == GateConfig(sigmas, 0.0)
         assert of(rig_with(form=form, stride=8, law="pseudovelocity"), 1000.0).gate == GateConfig(0.0, 0.0)
         assert of(rig_with(form=form, stride=8, outlier_gate=0.0), 1000.0).gate == GateConfig(0.0, 0.0)
-    assert (native.weak(weak_config(RIG, 1000.0)).run(jolted.phi, jolted.y).reason == OUTLIER).any()
-    off = native.weak(weak_config(rig_with(outlier_gate=0.0), 1000.0))
+    assert (native.identifier(weak_config(RIG, 1000.0)).run(jolted.phi, jolted.y).reason == OUTLIER).any()
+    off = native.identifier(weak_config(rig_with(outlier_gate=0.0), 1000.0))
     assert not (off.run(jolted.phi, jolted.y).reason == OUTLIER).any()
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_it_keeps_nothing_out_of_a_run_that_is_as_it_should_be(seed: int, native: Native) -> None:
+def test_gate_rejects_nothing_of_a_regular_run(seed: int, native: Native) -> None:
     # 40 s from a start that is half wrong: the same bits with the gate and without it
     run = simulate(sensors=standard_sensors(14), truth="linear", duration=40.0, seed=seed).run
     hashes = []
     for sigmas in (0.0, 4.0):
-        core = native.weak(weak_config(rig_with(outlier_gate=sigmas), 1000.0, standard_start(seed)))
+        core = native.identifier(weak_config(rig_with(outlier_gate=sigmas), 1000.0, standard_start(seed)))
         core.run(run.phi, run.y, sums=False)
         assert core.counters["rejected_outlier"] == 0
         hashes.append(core.running_hash)
@@ -193,9 +195,9 @@ def test_it_keeps_nothing_out_of_a_run_that_is_as_it_should_be(seed: int, native
         (GateConfig(4.0, float("inf")), Status.BAD_GATE_PATIENCE),
     ],
 )
-def test_what_makes_no_gate_is_refused(form: str, gate_config: GateConfig, status: Status, native: Native) -> None:
+def test_invalid_gate_is_refused(form: str, gate_config: GateConfig, status: Status, native: Native) -> None:
     with pytest.raises(PvidError, match=status.name.lower().replace("_", " ")):
         if form == "weak":
-            native.weak(replace(weak_config(RIG, 1000.0), gate=gate_config))
+            native.identifier(replace(weak_config(RIG, 1000.0), gate=gate_config))
         else:
-            native.strong(replace(strong_config(rig_with(form="strong", stride=8), 1000.0), gate=gate_config))
+            native.identifier(replace(strong_config(rig_with(form="strong", stride=8), 1000.0), gate=gate_config))

@@ -13,11 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pvid.base.errors import PvidError
-from pvid.core.native import GateConfig, Native, Reason, Status
-from pvid.core.native_q31 import GateConfigQ31, StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare_q31 import first_difference, identifier_q31
+from pvid.run.compare_q31 import first_difference
+from pvid.settings.enums import Reason, Status
+from pvid.settings.f32 import GateConfig
+from pvid.settings.q31 import GateConfigQ31, StrongConfigQ31, WeakConfigQ31
 from pvid.setup.q31 import config_for_run, counts_of, gate_config_q31, p_of, strong_config_q31, weak_config_q31
 from pvid.setup.strong_header_q31 import strong_header_q31
 from pvid.setup.weak_header_q31 import to_c_header_q31
@@ -65,7 +67,7 @@ def one_lane(value: float) -> Scaled:
     patience=st.sampled_from([0.0, 0.5, 10.0]),
     sigmas=st.sampled_from([2.0, 4.0, 1000.0]),
 )
-def test_it_follows_that_of_float32(squares: list[float], patience: float, sigmas: float) -> None:
+def test_scale_follows_that_of_float32(squares: list[float], patience: float, sigmas: float) -> None:
     config = GateConfig(sigmas, patience)
     single = Gate(config, np.float32(100.0), np.float32(10.0), np.array([1.0], np.float32))
     integer = GateQ31(gate_config_q31(config, 100.0), 10, one_lane(1.0))
@@ -81,7 +83,7 @@ def test_it_follows_that_of_float32(squares: list[float], patience: float, sigma
         assert scale == pytest.approx(float(single.scale[0]), rel=1e-4)  # 60 float32 roundings, and ln 1e4 to 3e-6
 
 
-def test_who_is_not_asked_passes_and_leaves_the_scale_as_it_was() -> None:
+def test_disabled_gate_accepts_and_keeps_scale() -> None:
     gate = GateQ31(GateConfigQ31(4 << 16), 1, one_lane(1.0))
     before = gate.scale
     assert gate.passes(one_lane(1e9), np.zeros(1, np.bool_)).all()
@@ -98,10 +100,10 @@ def gated_like(
     phi: npt.NDArray[Any],
     y: npt.NDArray[Any],
     matrix: dict[str, Native],
-) -> list[WeakIdentifierQ31 | StrongIdentifierQ31]:
+) -> list[Identifier]:
     """The core in every build, whose bits and counters were the twin's, and whose gate has kept something out."""
     expected = twin.run(phi, y)
-    cores = [identifier_q31(native, config) for native in matrix.values()]
+    cores = [native.identifier(config) for native in matrix.values()]
     for core in cores:
         record = core.run(phi, y, hashes=False)
         assert first_difference(record, expected) is None, core.native.build
@@ -117,7 +119,7 @@ def test_the_weak_form_equals_its_twin(patience_s: float, zero: bool, matrix: di
     phi, y = counts_of(rig, jolted)
     twin = WeakTwinQ31(config)
     for core in gated_like(twin, config, phi, y, matrix):
-        assert isinstance(core, WeakIdentifierQ31)
+        assert core.publishes
         assert core.estimate.tobytes() == twin.trust.estimate[0].tobytes()
 
 
@@ -129,12 +131,12 @@ def test_the_strong_form_equals_its_twin(patience_s: float, matrix: dict[str, Na
     assert gated_like(StrongTwinQ31(config), config, phi, y, matrix)
 
 
-def test_windows_that_were_touched_are_kept_out(native: Native, jolted: Run) -> None:
+def test_disturbed_windows_are_rejected(native: Native, jolted: Run) -> None:
     errors = {}
     for sigmas in (0.0, 4.0):
         rig = rig_with(outlier_gate=sigmas)
         config = weak_config_q31(rig, 1000.0)
-        core = WeakIdentifierQ31(native, config)
+        core = native.identifier(config)
         record = core.run(*counts_of(rig, jolted), sums=True)
         errors[sigmas] = np.abs(p_of(config, record.published[-1])[:3] / STANDARD_PENDULUM.linear - 1).max()
         refused = np.flatnonzero(record.reason == OUTLIER)
@@ -157,7 +159,7 @@ def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
     phi = np.where(y > 0, bank.phi_max, -bank.phi_max).astype(np.int64)
     twin = StrongTwinQ31(replace(config, drive_min=0))
     expected = twin.run(phi, y)
-    core = StrongIdentifierQ31(native, replace(config, drive_min=0))
+    core = native.identifier(replace(config, drive_min=0))
     assert first_difference(core.run(phi, y, hashes=False), expected) is None
     assert core.counters["rejected_saturated"] > 0
 
@@ -165,7 +167,7 @@ def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
 # ---- settings ----
 
 
-def test_it_is_on_as_in_float32_unless_the_law_is_the_paper_s(jolted: Run) -> None:
+def test_enabled_as_in_float32_except_for_the_papers_law(jolted: Run) -> None:
     for form, sigmas in (("weak", 4), ("strong", 6)):
         assert config_for_run(rig_with(form=form, stride=8), jolted).gate == GateConfigQ31(sigmas << 16, 0)
         paper = rig_with(form=form, stride=8, law="pseudovelocity")
@@ -210,10 +212,10 @@ def test_a_forgetting_that_cannot_be_counted_is_refused_before_the_patience_that
         (GateConfigQ31(4 << 16, 2**30 + 1), Status.BAD_GATE_PATIENCE),
     ],
 )
-def test_what_makes_no_gate_is_refused(form: str, gate: GateConfigQ31, status: Status, native: Native) -> None:
+def test_invalid_gate_is_refused(form: str, gate: GateConfigQ31, status: Status, native: Native) -> None:
     with pytest.raises(PvidError, match=status.name.lower().replace("_", " ")):
         if form == "weak":
-            WeakIdentifierQ31(native, replace(weak_config_q31(RIG, 1000.0), gate=gate))
+            native.identifier(replace(weak_config_q31(RIG, 1000.0), gate=gate))
         else:
             config = strong_config_q31(rig_with(form="strong", stride=8), 1000.0)
-            StrongIdentifierQ31(native, replace(config, gate=gate))
+            native.identifier(replace(config, gate=gate))

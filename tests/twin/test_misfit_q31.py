@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import StrongIdentifierQ31
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare_q31 import first_difference
 from pvid.run.identify import identify
+from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start, strong_config
 from pvid.setup.q31 import counts_of, p_of, strong_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
@@ -36,7 +36,7 @@ def rig_of(bits: int, **identifier: Any) -> RigFile:
 
 
 def reasons_of(native: Native, rig: RigFile, run: Run) -> npt.NDArray[np.uint8]:
-    core = StrongIdentifierQ31(native, strong_config_q31(rig, run.sample_rate))
+    core = native.identifier(strong_config_q31(rig, run.sample_rate))
     return core.run(*counts_of(rig, run), sums=False).reason
 
 
@@ -67,22 +67,22 @@ def test_the_core_equals_its_twin_under_the_alarm(
     expected = twin.run(phi, y)
     assert twin.estimator.counters["misfits"][0] > 0
     for native in matrix.values():
-        core = StrongIdentifierQ31(native, config)
+        core = native.identifier(config)
         assert first_difference(core.run(phi, y, hashes=False), expected) is None, native.build
         assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
 
 
-def test_a_change_that_sums_cannot_follow_is_told(native: Native, changed: Run) -> None:
+def test_change_that_sums_cannot_follow_raises_the_alarm(native: Native, changed: Run) -> None:
     reason = reasons_of(native, rig_of(FINE_BITS), changed)
     assert not (reason[:CHANGE] == Reason.MISFIT).any()
     assert np.isin(reason[CHANGE + 500 :], DOUBTED).all()
     assert (reason[-1000:] == Reason.MISFIT).any()
 
 
-def test_a_change_that_is_followed_is_over_with_its_block(native: Native, changed: Run) -> None:
+def test_alarm_of_a_followed_change_ends_with_its_block(native: Native, changed: Run) -> None:
     rig = rig_of(FINE_BITS, forgetting_s=0.5)
     config = strong_config_q31(rig, SLOW_HZ)
-    core = StrongIdentifierQ31(native, config)
+    core = native.identifier(config)
     reason = core.run(*counts_of(rig, changed), sums=False).reason
     assert (reason == Reason.MISFIT).any()
     assert (reason[-1000:] == Reason.UPDATED).all()
@@ -91,23 +91,23 @@ def test_a_change_that_is_followed_is_over_with_its_block(native: Native, change
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("bits", "alarm"), [(22, False), (20, False), (18, False), (16, True), (14, True), (12, True)])
-def test_an_encoder_that_is_too_coarse_is_told_as_by_float32(bits: int, alarm: bool, seed: int, native: Native) -> None:
+def test_too_coarse_encoder_is_reported_in_fixed_point_too(bits: int, alarm: bool, seed: int, native: Native) -> None:
     run = simulate(sensors=standard_sensors(bits), truth="linear", duration=40.0, seed=seed).run
     rig = rig_of(bits)
     reasons = reasons_of(native, rig, run)[8_500:]  # the second block is the first that is judged
     assert np.isin(reasons, DOUBTED).all() if alarm else not (reasons == Reason.MISFIT).any()
-    single = native.strong(strong_config(rig, run.sample_rate))
+    single = native.identifier(strong_config(rig, run.sample_rate))
     theirs = single.run(run.phi, run.y, sums=False).reason[8_500:]
     assert np.array_equal(reasons == Reason.MISFIT, theirs == Reason.MISFIT) or alarm
 
 
-def test_the_standard_rig_is_never_doubted_from_any_start(native: Native, standard_20_bits: Simulation) -> None:
+def test_standard_rig_raises_no_alarm_from_any_start(native: Native, standard_20_bits: Simulation) -> None:
     rig = rig_of(20)
     counts = [c[:14_000] for c in counts_of(rig, standard_20_bits.run)]
     for seed in range(20):
-        core = StrongIdentifierQ31(native, strong_config_q31(rig, 1000.0, standard_start(seed)))
+        core = native.identifier(strong_config_q31(rig, 1000.0, standard_start(seed)))
         assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any(), seed
-    core = StrongIdentifierQ31(native, strong_config_q31(rig_of(20, law="pseudovelocity"), 1000.0))
+    core = native.identifier(strong_config_q31(rig_of(20, law="pseudovelocity"), 1000.0))
     assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any()
 
 
@@ -122,11 +122,11 @@ def test_other_drives_are_no_misfit(native: Native) -> None:
     assert not (reason[settled] == Reason.MISFIT).any()
 
 
-def test_what_is_told_of_a_row_is_w_times_the_gradient_in_w(changed: Run) -> None:
+def test_sensitivity_of_a_row_is_w_times_the_gradient_in_w(changed: Run) -> None:
     rig = rig_of(FINE_BITS)
     config = strong_config_q31(rig, SLOW_HZ)
-    n, y, fate = StrongTwinQ31(config).rows(*counts_of(rig, changed))
-    rows = np.flatnonzero(fate == Reason.ACCUMULATED)[::50]
+    n, y, row_reason = StrongTwinQ31(config).rows(*counts_of(rig, changed))
+    rows = np.flatnonzero(row_reason == Reason.ACCUMULATED)[::50]
 
     def predicted(w_factor: float) -> npt.NDArray[np.float64]:
         w, d1, d2 = nominal_start(rig)
@@ -135,13 +135,13 @@ def test_what_is_told_of_a_row_is_w_times_the_gradient_in_w(changed: Run) -> Non
         return np.asarray(terms.sum(axis=0), np.float64)
 
     terms = EstimatorQ31([config.estimator], kapitza_strong_q31.STRONG).terms(n[rows].T, y[rows])[0]
-    told = kapitza_strong_q31.told(terms)
+    sensitivity = kapitza_strong_q31.sensitivity(terms)
     slope = (predicted(1.001) - predicted(0.999)) / 0.002
     # of third order in 0.001, and terms rounded to 1
-    assert np.abs(told - slope).max() < 1e-4 * np.abs(told).max() + 11 / 0.002
+    assert np.abs(sensitivity - slope).max() < 1e-4 * np.abs(sensitivity).max() + 11 / 0.002
 
 
-def test_identify_says_so(native: Native) -> None:
+def test_identify_prints_the_finding(native: Native) -> None:
     for bits, doubted in ((20, False), (14, True)):
         run = simulate(sensors=standard_sensors(bits), truth="linear", duration=20.0, seed=1).run
         answer = identify(run, rig_of(bits), native)

@@ -13,10 +13,11 @@ import pytest
 from linear_rig import LINEAR_RIG
 
 from bench.hard import CASES, Case
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import RecordQ31, WeakIdentifierQ31
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.run.compare_q31 import compare_run_q31
+from pvid.settings.enums import Reason
+from pvid.settings.record import Record
 from pvid.setup.f32 import weak_config
 from pvid.setup.q31 import config_for_run, counts_of, p_of, se_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
@@ -35,17 +36,17 @@ def case(label: str) -> Case:
 
 
 @lru_cache
-def played(label: str, seed: int) -> tuple[WeakIdentifierQ31, RecordQ31]:
+def played(label: str, seed: int) -> tuple[Identifier, Record]:
     one = case(label)
     run = one.run(seed, duration=DURATION_S)
-    core = WeakIdentifierQ31(Native(), weak_config_q31(one.rig, run.sample_rate, standard_start(seed)))
+    core = Native().identifier(weak_config_q31(one.rig, run.sample_rate, standard_start(seed)))
     return core, core.run(*counts_of(one.rig, run), sums=False, hashes=False)
 
 
 def verdicts(reason: npt.NDArray[np.uint8]) -> list[Reason]:
     """What became of the windows, in their order; runs of the same told once, for the cores' ticks differ."""
-    told: Iterator[Reason] = (Reason(r) for r in reason if r in VERDICTS)
-    return [key for key, _ in groupby(told)]
+    reported: Iterator[Reason] = (Reason(r) for r in reason if r in VERDICTS)
+    return [key for key, _ in groupby(reported)]
 
 
 @pytest.mark.parametrize(
@@ -60,7 +61,7 @@ def verdicts(reason: npt.NDArray[np.uint8]) -> list[Reason]:
         "fast mode only, 12 bits",
     ],
 )
-def test_what_the_data_cannot_carry_is_not_published(label: str) -> None:
+def test_estimate_without_information_is_not_published(label: str) -> None:
     for seed in range(SEEDS):
         core, record = played(label, seed)
         assert not core.is_published
@@ -70,7 +71,7 @@ def test_what_the_data_cannot_carry_is_not_published(label: str) -> None:
 
 
 @pytest.mark.parametrize("label", ["encoder of 14 bits", "encoder of 10 bits", "drive x0.1, 12 bits"])
-def test_what_they_carry_is_published_with_its_errors(label: str) -> None:
+def test_sufficient_data_are_published_with_errors(label: str) -> None:
     one = case(label)
     for seed in range(SEEDS):
         core, _ = played(label, seed)
@@ -97,15 +98,15 @@ def test_the_verdicts_are_those_of_float32(native: Native, truth: str) -> None:
     for seed in range(SEEDS):
         run = simulate(sensors=standard_sensors(14), truth=truth, duration=DURATION_S, seed=seed).run  # type: ignore[arg-type]
         start = standard_start(seed)
-        reference = native.weak(weak_config(rig, 1000.0, start)).run(run.phi, run.y, sums=False, hashes=False)
-        core = WeakIdentifierQ31(native, config_for_run(rig, run, start))  # type: ignore[arg-type]
+        reference = native.identifier(weak_config(rig, 1000.0, start)).run(run.phi, run.y, sums=False, hashes=False)
+        core = native.identifier(config_for_run(rig, run, start))
         own = core.run(*counts_of(rig, run), sums=False, hashes=False)
         assert verdicts(own.reason) == verdicts(reference.reason)
         # large angles in linear rows are alarmed from the first publication on
         assert (Reason.UPDATED if truth == "linear" else Reason.MISFIT) in own.reason
 
 
-def test_what_is_published_changes_only_when_it_is_trusted() -> None:
+def test_published_estimate_changes_only_when_trusted() -> None:
     core, record = played("full equations, 0.107 rad, 14 bits", 0)
     changed = 1 + np.flatnonzero((record.published[1:] != record.published[:-1]).any(axis=1))
     trusted = np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT))

@@ -9,11 +9,14 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.core.native import EstimatorConfig, Law, Native, Reason, Record, TrustConfig, WeakConfig
+from pvid.core.native import Native
 from pvid.design.weak import design
 from pvid.design.weak_sizing import Sizes
 from pvid.models.kapitza.physical import linear
 from pvid.run.compare import first_difference
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import EstimatorConfig, TrustConfig, WeakConfig
+from pvid.settings.record import Record
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
 from pvid.twin import fnv
 from pvid.twin.weak import WeakTwin
@@ -72,7 +75,7 @@ def assert_lanes_equal(
         p, sums, reason = expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane]
         hashes = fnv.running_hashes(p, sums, reason)
         for native in natives:
-            core = native.weak(replace(config, estimator=one))
+            core = native.identifier(replace(config, estimator=one))
             record = core.run(phi, y)
             published = expected.published[:, :, lane]
             assert first_difference(record, p, sums, reason, published) is None, native.build
@@ -165,7 +168,7 @@ def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
     tables = design(L1, 200.0, NOMINAL, Sizes(window_s=0.3, decimation=1, taps=15, functions=12)).f32
     config = WeakConfig(200.0, L1, tables, with_friction(estimator(0)), full_angle=True, friction=True)
     assert tables.window == 61
-    assert WeakTwin(config).together >= 8
+    assert WeakTwin(config).stages_per_tick >= 8
     record = assert_lanes_equal([native], config, [config.estimator], run.phi, run.y)[0]
     assert (record.reason == Reason.HELD_UNCERTAIN).any()  # windows are worked off, short as they are
 
@@ -235,9 +238,9 @@ def test_a_pause_of_the_drive_freezes_p_and_the_sums(native: Native, standard_14
 
 def test_a_run_in_two_pieces_has_the_bits_of_one(native: Native, standard_14_bits: Simulation) -> None:
     run = standard_14_bits.run
-    whole = native.weak(configuration())
+    whole = native.identifier(configuration())
     whole.run(run.phi[:9000], run.y[:9000])
-    pieces = native.weak(configuration())
+    pieces = native.identifier(configuration())
     for part in (slice(0, 1), slice(1, 2345), slice(2345, 2346), slice(2346, 9000)):
         pieces.run(run.phi[part], run.y[part])
     assert pieces.running_hash == whole.running_hash
@@ -246,11 +249,11 @@ def test_a_run_in_two_pieces_has_the_bits_of_one(native: Native, standard_14_bit
 def test_a_gap_keeps_the_sums_and_starts_the_windows_again(native: Native, standard_14_bits: Simulation) -> None:
     run = standard_14_bits.run
     config = configuration()
-    told, seen = native.weak(config), native.weak(config)
-    for core in (told, seen):
+    reported, seen = native.identifier(config), native.identifier(config)
+    for core in (reported, seen):
         core.run(run.phi[:8000], run.y[:8000])
-    told.gap()
-    told_record = told.run(run.phi[7000:9000], run.y[7000:9000])
+    reported.gap()
+    told_record = reported.run(run.phi[7000:9000], run.y[7000:9000])
     broken = np.concatenate([[np.nan], run.phi[7000:9000]])
     seen_record = seen.run(broken, np.concatenate([[0.0], run.y[7000:9000]]))
     assert np.array_equal(told_record.p, seen_record.p[1:])
@@ -265,7 +268,7 @@ def test_lanes_with_different_schedules_are_refused() -> None:
         WeakTwin(configuration(), lanes)
 
 
-def test_what_the_core_refuses_it_names(native: Native) -> None:
+def test_core_names_its_refusal(native: Native) -> None:
     config = configuration()
     for wrong, name in (
         (replace(config, sample_rate=0.0), "bad sample rate"),
@@ -282,7 +285,7 @@ def test_what_the_core_refuses_it_names(native: Native) -> None:
         (replace(config, estimator=replace(config.estimator, noise_margin=-1.0)), "bad noise margin"),
     ):
         with pytest.raises(PvidError, match=name):
-            native.weak(wrong)
+            native.identifier(wrong)
     tables = design(L1, 1000.0, NOMINAL).f32
     chi = tables.chi.copy()
     chi[7, 1, 3] = np.nan
@@ -292,12 +295,12 @@ def test_what_the_core_refuses_it_names(native: Native) -> None:
         (replace(tables, overlap=0.5), "bad overlap"),
     ):
         with pytest.raises(PvidError, match=name):
-            native.weak(replace(config, design=wrong_tables))
+            native.identifier(replace(config, design=wrong_tables))
 
 
 def test_a_window_too_short_for_its_work_is_refused(native: Native) -> None:
     # a hop of 4 ticks: 8 stages for each function, 17 for each step and some 30 others, of which a tick takes 32
     config = configuration(sizes=Sizes(decimation=1, taps=31, functions=4, window_s=0.008))
-    native.weak(replace(config, iterations=2))
+    native.identifier(replace(config, iterations=2))
     with pytest.raises(PvidError, match="bad iterations"):
-        native.weak(replace(config, iterations=6))
+        native.identifier(replace(config, iterations=6))

@@ -11,10 +11,11 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native, Reason
-from pvid.core.native_q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.run.compare_q31 import first_difference, twin_hashes
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
 from pvid.setup.q31 import counts_of, p_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.twin.weak_q31 import TwinRecordQ31, WeakTwinQ31
@@ -63,7 +64,7 @@ def assert_lanes_equal(
         own = expected.lane(lane)
         hashes = twin_hashes(first_ticks(own, hashed_ticks))
         for native in natives:
-            core = WeakIdentifierQ31(native, replace(config, estimator=one))
+            core = native.identifier(replace(config, estimator=one))
             record = core.run(phi, y)
             assert first_difference(record, own) is None, native.build
             assert np.array_equal(record.hash[:hashed_ticks], hashes)
@@ -99,7 +100,7 @@ def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
     settings = replace(RIG.identifier, window_s=0.3, decimation=1, smoothing_s=0.075)
     config = weak_config_q31(replace(RIG, identifier=settings), 200.0, standard_start(0))
     assert config.design.window == 61
-    assert WeakTwinQ31(config).together >= 5
+    assert WeakTwinQ31(config).stages_per_tick >= 5
     twin = assert_lanes_equal([native], config, [config.estimator], *counts_of(RIG, run))
     assert twin.estimator.counters["updates"][0] > 0
 
@@ -201,7 +202,7 @@ def test_a_quarter_of_full_scale_in_phase_becomes_rows(native: Native) -> None:
     """What no mechanism does still passes the windows: hostile counts are not merely refused at the door."""
     config = configuration()
     phi, y = hostile("full scale in phase", config)
-    core = WeakIdentifierQ31(native, config)
+    core = native.identifier(config)
     core.run(phi // 4, y)
     assert core.counters["rows"] >= 8 * config.design.functions
 
@@ -210,7 +211,7 @@ def test_a_sample_beyond_full_scale_costs_a_window_and_no_more(native: Native, c
     phi, y = (c.copy() for c in counts)
     config = configuration()
     phi[20000] = config.design.phi_max + 1
-    core = WeakIdentifierQ31(native, config)
+    core = native.identifier(config)
     record = core.run(phi, y)
     assert record.reason[20000] == Reason.REJECTED_SATURATED
     assert core.counters["rejected_saturated"] == 1
@@ -218,9 +219,9 @@ def test_a_sample_beyond_full_scale_costs_a_window_and_no_more(native: Native, c
 
 
 def test_a_run_in_pieces_is_the_same_run(native: Native, counts: tuple[Counts, Counts]) -> None:
-    whole = WeakIdentifierQ31(native, configuration())
+    whole = native.identifier(configuration())
     whole.run(*counts)
-    pieces = WeakIdentifierQ31(native, configuration())
+    pieces = native.identifier(configuration())
     for part in np.array_split(np.arange(len(counts[0])), 7):
         pieces.run(counts[0][part], counts[1][part])
     assert pieces.running_hash == whole.running_hash
@@ -239,8 +240,8 @@ def test_a_run_in_pieces_is_the_same_run(native: Native, counts: tuple[Counts, C
         ("divider", 0),
     ],
 )
-def test_what_is_out_of_range_is_refused_by_name(native: Native, field: str, value: int) -> None:
+def test_out_of_range_value_is_refused_by_name(native: Native, field: str, value: int) -> None:
     config = configuration()
     bad = replace(config, estimator=replace(config.estimator, **{field: value}))  # type: ignore[arg-type]
     with pytest.raises(PvidError, match="refused"):
-        WeakIdentifierQ31(native, bad)
+        native.identifier(bad)

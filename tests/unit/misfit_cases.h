@@ -12,19 +12,19 @@
 #include <cmocka.h>
 
 /* A block of rows with residuals e, which say `told` of p[0]: whether it is a misfit. */
-static bool block(double e, double told);
+static bool block(double e, double sensitivity);
 
 /* Prepares the verdict to forget nothing. */
 static int start_again(void **state);
 
-static void the_first_block_only_teaches(void **state)
+static void first_block_sets_the_reference(void **state)
 {
     (void)state;
     assert_false(block(1.0, 1.0)); /* q = 1 */
     assert_true(block(1.0, 1.0));
 }
 
-static void beyond_the_most_is_a_misfit_however_it_was_before(void **state)
+static void misfit_beyond_the_upper_limit(void **state)
 {
     (void)state;
     (void)block(0.0632, 1.0); /* q = 0.003994 */
@@ -43,13 +43,13 @@ static void three_times_the_quietest_in_both_is_a_misfit(void **state)
     assert_false(block(0.01732, 1.0)); /* 2.9998 times */
     assert_true(block(0.01733, 1.0));  /* 3.003 times */
     assert_true(block(0.0176, 1.0));
-    assert_true(block(0.0176, 1.0));   /* the quietest stays the quietest */
-    assert_false(block(0.0176, 1.1));  /* 3.1 times the energy, 2.6 times the part */
-    assert_false(block(0.0170, 0.5));  /* 2.9 times the energy, 11.6 times the part */
-    assert_false(block(0.1, 10.0));    /* a larger drive: the part is the same */
+    assert_true(block(0.0176, 1.0));  /* the quietest stays the quietest */
+    assert_false(block(0.0176, 1.1)); /* 3.1 times the energy, 2.6 times the part */
+    assert_false(block(0.0170, 0.5)); /* 2.9 times the energy, 11.6 times the part */
+    assert_false(block(0.1, 10.0));   /* a larger drive: the part is the same */
 }
 
-static void a_quieter_block_becomes_the_measure(void **state)
+static void a_quieter_block_becomes_the_reference(void **state)
 {
     (void)state;
     (void)block(0.05, 1.0);
@@ -57,7 +57,7 @@ static void a_quieter_block_becomes_the_measure(void **state)
     assert_true(block(0.05, 1.0));
 }
 
-static void below_the_least_nothing_is_a_misfit(void **state)
+static void no_misfit_below_the_lower_limit(void **state)
 {
     (void)state;
     (void)block(1.0e-6, 1.0);
@@ -67,7 +67,7 @@ static void below_the_least_nothing_is_a_misfit(void **state)
     assert_true(block(4.6e-3, 1.0));
 }
 
-static void where_nothing_moves_nothing_is_said(void **state)
+static void no_signal_gives_no_verdict(void **state)
 {
     (void)state;
     assert_false(block(0.0, 0.0));
@@ -89,12 +89,12 @@ static void grows_by_a_tenth_a_block(void)
     assert_int_equal(blocks, 4); /* before the fifth it is 1.1^4 = 1.46 times as large: 4 < 3 * 1.46 */
 }
 
-#define MISFIT_CASES \
-    cmocka_unit_test_setup(the_first_block_only_teaches, start_again), \
-    cmocka_unit_test_setup(beyond_the_most_is_a_misfit_however_it_was_before, start_again), \
-    cmocka_unit_test_setup(three_times_the_quietest_in_both_is_a_misfit, start_again), \
-    cmocka_unit_test_setup(a_quieter_block_becomes_the_measure, start_again), \
-    cmocka_unit_test_setup(below_the_least_nothing_is_a_misfit, start_again), \
-    cmocka_unit_test_setup(where_nothing_moves_nothing_is_said, start_again)
+#define MISFIT_CASES                                                                                                   \
+    cmocka_unit_test_setup(first_block_sets_the_reference, start_again),                                               \
+        cmocka_unit_test_setup(misfit_beyond_the_upper_limit, start_again),                                            \
+        cmocka_unit_test_setup(three_times_the_quietest_in_both_is_a_misfit, start_again),                             \
+        cmocka_unit_test_setup(a_quieter_block_becomes_the_reference, start_again),                                    \
+        cmocka_unit_test_setup(no_misfit_below_the_lower_limit, start_again),                                          \
+        cmocka_unit_test_setup(no_signal_gives_no_verdict, start_again)
 
 #endif

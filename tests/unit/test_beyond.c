@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "estimator_q31.h"
+#include "solve/estimator_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 #include "strong_table_q31.h"
@@ -28,22 +28,22 @@ static bool physical(float w, float d1, float d2, float l1, float w_variance, fl
     estimate.covariance[2][2] = d2_variance;
     pvid_kapitza_f32 value = {1.0f, 2.0f, 3.0f};
     pvid_kapitza_f32 se = {4.0f, 5.0f, 6.0f};
-    const bool told = pvid_kapitza_physical_f32(&estimate, l1, &value, &se);
-    assert_true(told == (value.g != 1.0f)); /* left unwritten unless */
-    assert_true(told == (se.rho2 != 6.0f));
-    return told;
+    const bool is_physical = pvid_kapitza_physical_f32(&estimate, l1, &value, &se);
+    assert_true(is_physical == (value.g != 1.0f)); /* left unwritten unless */
+    assert_true(is_physical == (se.rho2 != 6.0f));
+    return is_physical;
 }
 
 static void physical_parameters_are_finite_or_none(void **state)
 {
     (void)state;
     assert_true(physical(31.0f, 8.9f, 5.6f, 0.3f, 1.0f, 1.0f, 1.0f));
-    assert_false(physical(1.0e38f, 8.9f, 5.6f, 1.0e6f, 0.0f, 0.0f, 0.0f));      /* g */
+    assert_false(physical(1.0e38f, 8.9f, 5.6f, 1.0e6f, 0.0f, 0.0f, 0.0f));       /* g */
     assert_false(physical(31.0f, 1.0e30f, 1.0e-10f, 0.3f, 0.0f, 0.0f, 0.0f));    /* l2 */
     assert_false(physical(31.0f, 1.00001f, 2.0e-39f, 1.0e3f, 0.0f, 0.0f, 0.0f)); /* rho2, and not l2 */
-    assert_false(physical(1.0f, 8.9f, 5.6f, 1.0e21f, 1.0e38f, 0.0f, 0.0f));     /* of g */
-    assert_false(physical(31.0f, 8.9f, 0.1f, 1.0e3f, 0.0f, 3.0e38f, 0.0f));     /* of l2 */
-    assert_false(physical(31.0f, 2.00001f, 1.0f, 1.0f, 0.0f, 3.0e38f, 0.0f));   /* of rho2, and not of l2 */
+    assert_false(physical(1.0f, 8.9f, 5.6f, 1.0e21f, 1.0e38f, 0.0f, 0.0f));      /* of g */
+    assert_false(physical(31.0f, 8.9f, 0.1f, 1.0e3f, 0.0f, 3.0e38f, 0.0f));      /* of l2 */
+    assert_false(physical(31.0f, 2.00001f, 1.0f, 1.0f, 0.0f, 3.0e38f, 0.0f));    /* of rho2, and not of l2 */
 }
 
 /* ---- where p is put ---- */
@@ -90,8 +90,8 @@ static void each_entry_of_a_row_may_be_too_large(void **state)
     assert_true(row_fits(0, limit, 0, 1, 0, 0));
     assert_false(row_fits(0, limit + 1, 0, 1, 0, 0)); /* u phi2 */
     assert_true(row_fits(limit, 0, 0, 1, 0, 0));
-    assert_false(row_fits(limit + 1, 0, 0, 1, 0, 0)); /* phi */
-    assert_false(row_fits(0, 0, limit + 1, 0, 0, 0)); /* phi4 */
+    assert_false(row_fits(limit + 1, 0, 0, 1, 0, 0));     /* phi */
+    assert_false(row_fits(0, 0, limit + 1, 0, 0, 0));     /* phi4 */
     assert_false(row_fits(0, 1 << 15, 0, 0, 1 << 15, 0)); /* u1 phi2 */
     assert_false(row_fits(0, 1 << 9, 0, 0, 1 << 10, 0));  /* 2 u1 u1 phi2: Y */
     assert_false(row_fits(0, 1 << 15, 0, 0, 0, 1 << 15)); /* u2 phi2: the bracket */

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "cholesky_f32.h"
+#include "solve/cholesky_f32.h"
 
 static uint32_t generator = 7u;
 
@@ -60,7 +60,7 @@ static void solving_returns_what_was_multiplied(void **state)
             rhs[i] = (float)sum;
         }
         pvid_cholesky_f32 factor;
-        assert_true(pvid_cholesky_factor_f32(&factor, n, (const float(*)[PVID_MAX_P])s));
+        assert_true(pvid_cholesky_factor_f32(&factor, n, (const float (*)[PVID_MAX_P])s));
         pvid_cholesky_solve_f32(&factor, rhs, back);
         for (size_t i = 0; i < n; i++) {
             /* equilibrated condition at most (4 n + 0.1) / 0.1 = 160: 160 ulp and a few roundings */
@@ -87,8 +87,8 @@ static void order_three_has_the_bits_of_the_general_order(void **state)
         }
         pvid_cholesky_f32 small;
         pvid_cholesky_f32 large;
-        assert_true(pvid_cholesky_factor_f32(&small, 3, (const float(*)[PVID_MAX_P])three));
-        assert_true(pvid_cholesky_factor_f32(&large, 4, (const float(*)[PVID_MAX_P])four));
+        assert_true(pvid_cholesky_factor_f32(&small, 3, (const float (*)[PVID_MAX_P])three));
+        assert_true(pvid_cholesky_factor_f32(&large, 4, (const float (*)[PVID_MAX_P])four));
         for (size_t i = 0; i < 3; i++) {
             assert_memory_equal(&small.scale[i], &large.scale[i + 1], sizeof(float));
             for (size_t j = i; j < 3; j++) {
@@ -108,14 +108,15 @@ static void first_pivot_is_one_minus_r_squared(void **state)
     assert_float_equal(factor.first_pivot, 1.0f - (r * r), 1.0e-6f); /* a few roundings of numbers near 1 */
 }
 
-static void what_is_not_positive_definite_is_refused(void **state)
+static void indefinite_matrix_is_refused(void **state)
 {
     (void)state;
     const float infinity = 3.4e38f * 10.0f;
     const float nan = infinity - infinity;
     const float bad[6][3] = {
         /* s00, s01, s11 */
-        {0.0f, 0.0f, 1.0f}, {1.0f, 0.0f, -1.0f}, {1.0f, 1.0f, 1.0f}, {1.0f, 2.0f, 1.0f}, {infinity, 0.0f, 1.0f}, {1.0f, nan, 1.0f},
+        {0.0f, 0.0f, 1.0f}, {1.0f, 0.0f, -1.0f},    {1.0f, 1.0f, 1.0f},
+        {1.0f, 2.0f, 1.0f}, {infinity, 0.0f, 1.0f}, {1.0f, nan, 1.0f},
     };
     for (int i = 0; i < 6; i++) {
         const float s[PVID_MAX_P][PVID_MAX_P] = {{bad[i][0], bad[i][1]}, {bad[i][1], bad[i][2]}};
@@ -149,8 +150,8 @@ static void scaling_a_parameter_by_a_power_of_two_scales_its_solution_exactly(vo
         pvid_cholesky_f32 other;
         float x[3];
         float y[3];
-        assert_true(pvid_cholesky_factor_f32(&one, 3, (const float(*)[PVID_MAX_P])s));
-        assert_true(pvid_cholesky_factor_f32(&other, 3, (const float(*)[PVID_MAX_P])scaled));
+        assert_true(pvid_cholesky_factor_f32(&one, 3, (const float (*)[PVID_MAX_P])s));
+        assert_true(pvid_cholesky_factor_f32(&other, 3, (const float (*)[PVID_MAX_P])scaled));
         pvid_cholesky_solve_f32(&one, rhs, x);
         pvid_cholesky_solve_f32(&other, scaled_rhs, y);
         for (size_t i = 0; i < 3; i++) {
@@ -167,7 +168,7 @@ static void inverse_times_matrix_is_one(void **state)
     float inverse[PVID_MAX_P][PVID_MAX_P];
     random_matrix(4, s, units);
     pvid_cholesky_f32 factor;
-    assert_true(pvid_cholesky_factor_f32(&factor, 4, (const float(*)[PVID_MAX_P])s));
+    assert_true(pvid_cholesky_factor_f32(&factor, 4, (const float (*)[PVID_MAX_P])s));
     pvid_cholesky_inverse_f32(&factor, inverse);
     for (size_t i = 0; i < 4; i++) {
         for (size_t j = 0; j < 4; j++) {
@@ -188,7 +189,7 @@ int main(void)
         cmocka_unit_test(solving_returns_what_was_multiplied),
         cmocka_unit_test(order_three_has_the_bits_of_the_general_order),
         cmocka_unit_test(first_pivot_is_one_minus_r_squared),
-        cmocka_unit_test(what_is_not_positive_definite_is_refused),
+        cmocka_unit_test(indefinite_matrix_is_refused),
         cmocka_unit_test(scaling_a_parameter_by_a_power_of_two_scales_its_solution_exactly),
         cmocka_unit_test(inverse_times_matrix_is_one),
     };

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "cholesky_q31.h"
+#include "solve/cholesky_q31.h"
 
 #define ONE 1073741824.0 /* 2^30 */
 
@@ -41,7 +41,7 @@ static void solving_returns_what_was_multiplied(void **state)
             double exact[PVID_MAX_P][PVID_MAX_P];
             make(n, 0.3, s, exact);
             pvid_cholesky_q31 factor;
-            assert_true(pvid_cholesky_factor_q31(&factor, n, (const int32_t(*)[PVID_MAX_P])s));
+            assert_true(pvid_cholesky_factor_q31(&factor, n, (const int32_t (*)[PVID_MAX_P])s));
             double x[PVID_MAX_P];
             int64_t rhs[PVID_MAX_P];
             for (size_t i = 0; i < n; i++) {
@@ -63,14 +63,14 @@ static void solving_returns_what_was_multiplied(void **state)
             if (n == 2u) {
                 const double left = 1.0 - (exact[0][1] * exact[0][1]);
                 assert_true(fabs((factor.first_pivot / ONE) - left) < 1.0e-8);
-                const int32_t least = pvid_cholesky_least_pivot_q31(&factor, (const int32_t(*)[PVID_MAX_P])s);
+                const int32_t least = pvid_cholesky_least_pivot_q31(&factor, (const int32_t (*)[PVID_MAX_P])s);
                 assert_int_equal(least, factor.first_pivot);
             }
         }
     }
 }
 
-static void what_is_not_positive_says_nothing_of_the_first(void **state)
+static void indefinite_matrix_gives_zero_first_pivot(void **state)
 {
     (void)state;
     for (uint8_t n = 2; n <= PVID_MAX_P; n++) {
@@ -82,13 +82,13 @@ static void what_is_not_positive_says_nothing_of_the_first(void **state)
         }
         pvid_cholesky_q31 factor;
         memset(&factor, 0x5A, sizeof factor);
-        assert_false(pvid_cholesky_factor_q31(&factor, n, (const int32_t(*)[PVID_MAX_P])s));
+        assert_false(pvid_cholesky_factor_q31(&factor, n, (const int32_t (*)[PVID_MAX_P])s));
         assert_false(factor.positive);
         assert_int_equal(factor.first_pivot, 0);
     }
 }
 
-static void what_was_not_eliminated_is_not_read(void **state)
+static void only_eliminated_columns_are_read(void **state)
 {
     (void)state;
     int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
@@ -97,8 +97,9 @@ static void what_was_not_eliminated_is_not_read(void **state)
     }
     s[PVID_MAX_P - 1][PVID_MAX_P - 1] = 0; /* the first to be eliminated */
     pvid_cholesky_q31 factor;
-    memset(&factor, 0x80, sizeof factor); /* three squares of what stands there overflow an int64: the sanitizers tell */
-    assert_false(pvid_cholesky_factor_q31(&factor, PVID_MAX_P, (const int32_t(*)[PVID_MAX_P])s));
+    memset(&factor, 0x80,
+           sizeof factor); /* three squares of what stands there overflow an int64: the sanitizers tell */
+    assert_false(pvid_cholesky_factor_q31(&factor, PVID_MAX_P, (const int32_t (*)[PVID_MAX_P])s));
     assert_int_equal(factor.first_pivot, 0);
 }
 
@@ -144,8 +145,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solving_returns_what_was_multiplied),
-        cmocka_unit_test(what_is_not_positive_says_nothing_of_the_first),
-        cmocka_unit_test(what_was_not_eliminated_is_not_read),
+        cmocka_unit_test(indefinite_matrix_gives_zero_first_pivot),
+        cmocka_unit_test(only_eliminated_columns_are_read),
         cmocka_unit_test(a_block_keeps_its_largest_entry_in_so_many_bits),
         cmocka_unit_test(a_scale_ends_at_the_widest),
     };

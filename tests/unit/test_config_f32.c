@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "bounds.h"
-#include "fingerprint_f32.h"
+#include "keep/fingerprint_f32.h"
 #include "pvid/pvid.h"
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))
@@ -17,26 +17,24 @@
 #define RATE 1024.0f                       /* Hz; four ticks are 2^-8 s exactly */
 
 /* A field of `type`, which has an estimator's configuration at `in`. */
-#define FIELD(type, in, member, kind, low, high, status)                                                              \
-    {                                                                                                                 \
-        #member, offsetof(type, in member), kind, low, high, status, PVID_OK                                          \
-    }
-#define OF_ESTIMATOR(type, in)                                                                                        \
-    FIELD(type, in, start_sd[0], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                   \
-        FIELD(type, in, start_sd[1], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                               \
-        FIELD(type, in, start_sd[2], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                               \
-        FIELD(type, in, row_sd, KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD),                                      \
-        FIELD(type, in, feedback_hz, KIND_FLOAT, 0.0, 1.0e12f, PVID_BAD_FEEDBACK),                                    \
-        FIELD(type, in, step_limit, KIND_FLOAT, 1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT),                                  \
-        FIELD(type, in, kappa_min, KIND_FLOAT, 0.0, 0.999f, PVID_BAD_KAPPA_MIN),                                      \
-        FIELD(type, in, noise_margin, KIND_FLOAT, 0.0, 1.0e6f, PVID_BAD_NOISE_MARGIN),                                \
-        FIELD(type, in, dead_zone, KIND_FLOAT, 0.0, 100.0f, PVID_BAD_DEAD_ZONE),                                      \
-        FIELD(type, in, law, KIND_INT32, 0.0, 1.0, PVID_BAD_LAW),                                                     \
+#define FIELD(type, in, member, kind, low, high, status)                                                               \
+    {#member, offsetof(type, in member), kind, low, high, status, PVID_OK}
+#define OF_ESTIMATOR(type, in)                                                                                         \
+    FIELD(type, in, start_sd[0], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                    \
+        FIELD(type, in, start_sd[1], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                \
+        FIELD(type, in, start_sd[2], KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_START_SD),                                \
+        FIELD(type, in, row_sd, KIND_FLOAT, 1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD),                                       \
+        FIELD(type, in, feedback_hz, KIND_FLOAT, 0.0, 1.0e12f, PVID_BAD_FEEDBACK),                                     \
+        FIELD(type, in, step_limit, KIND_FLOAT, 1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT),                                   \
+        FIELD(type, in, kappa_min, KIND_FLOAT, 0.0, 0.999f, PVID_BAD_KAPPA_MIN),                                       \
+        FIELD(type, in, noise_margin, KIND_FLOAT, 0.0, 1.0e6f, PVID_BAD_NOISE_MARGIN),                                 \
+        FIELD(type, in, dead_zone, KIND_FLOAT, 0.0, 100.0f, PVID_BAD_DEAD_ZONE),                                       \
+        FIELD(type, in, law, KIND_INT32, 0.0, 1.0, PVID_BAD_LAW),                                                      \
         FIELD(type, in, divider, KIND_UINT16, 1.0, 65535.0, PVID_BAD_DIVIDER)
-#define OF_FORGETTING(type, in, seconds)                                                                              \
+#define OF_FORGETTING(type, in, seconds)                                                                               \
     FIELD(type, in, forgetting_s, KIND_FLOAT, seconds, 1.0e12f, PVID_BAD_FORGETTING)
-#define OF_GATE(type)                                                                                                 \
-    FIELD(type, , gate.sigmas, KIND_FLOAT, 2.0, 1.0e3f, PVID_BAD_GATE_SIGMAS),                                        \
+#define OF_GATE(type)                                                                                                  \
+    FIELD(type, , gate.sigmas, KIND_FLOAT, 2.0, 1.0e3f, PVID_BAD_GATE_SIGMAS),                                         \
         FIELD(type, , gate.patience_s, KIND_FLOAT, 0.0, 1.0e12f, PVID_BAD_GATE_PATIENCE)
 
 static void fill_start(pvid_estimator_config_f32 *config)
@@ -109,7 +107,7 @@ static pvid_status init_own(void)
     return status;
 }
 
-static void an_estimators_fields_end_where_they_say(void **state)
+static void estimator_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     const bound fields[] = {
@@ -162,11 +160,11 @@ static void start_and_bounds_agree_or_are_refused(void **state)
     assert_int_equal(init_with(3, NAN, NAN, NAN), PVID_OK); /* of no parameter */
 }
 
-#define ASSERT_MODEL(change, status)                                                                                  \
-    do {                                                                                                              \
-        (void)start_own(NULL);                                                                                        \
-        change;                                                                                                       \
-        assert_int_equal(init_own(), status);                                                                         \
+#define ASSERT_MODEL(change, status)                                                                                   \
+    do {                                                                                                               \
+        (void)start_own(NULL);                                                                                         \
+        change;                                                                                                        \
+        assert_int_equal(init_own(), status);                                                                          \
     } while (0)
 
 static void a_model_fits_or_is_refused(void **state)
@@ -208,7 +206,7 @@ static void a_model_fits_or_is_refused(void **state)
 }
 
 /* Functions of its own come together or not at all; with them the moments may be fewer, and theta as long as it can. */
-static void a_models_own_functions_come_together(void **state)
+static void own_functions_are_all_or_none(void **state)
 {
     (void)state;
     const pvid_model_f32 *strong = &pvid_kapitza_strong_f32;
@@ -294,7 +292,7 @@ static const bound strong_fields[] = {
     FIELD(pvid_strong_config_f32, estimator., row_weight, KIND_FLOAT, 1.0, 1.0, PVID_BAD_ROW_WEIGHT),
 };
 
-static void the_strong_forms_fields_end_where_they_say(void **state)
+static void strong_form_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     check_bounds(strong_fields, LENGTH(strong_fields), &strong_settings, sizeof strong_settings, init_strong);
@@ -310,7 +308,7 @@ static void the_strong_forms_fields_end_where_they_say(void **state)
     assert_int_equal(init_strong(), PVID_OK);
 }
 
-static void the_strong_form_keeps_what_it_was_told(void **state)
+static void strong_form_keeps_its_settings(void **state)
 {
     (void)state;
     strong_settings.drive_min = 3.0f;
@@ -420,7 +418,7 @@ static const bound weak_fields[] = {
     FIELD(pvid_weak_config_f32, , trust.se_max, KIND_FLOAT, 1.0e-9f, 1.0e9f, PVID_BAD_SE_MAX),
     FIELD(pvid_weak_config_f32, , trust.misfit_max, KIND_FLOAT, 1.0, 1.0e6f, PVID_BAD_MISFIT_MAX),
     FIELD(pvid_weak_config_f32, , trust.groups_min, KIND_UINT16, 0.0, 65535.0, PVID_OK),
-    FIELD(pvid_weak_config_f32, , trust.shut_max, KIND_UINT16, 0.0, 65535.0, PVID_OK),
+    FIELD(pvid_weak_config_f32, , trust.revert_after, KIND_UINT16, 0.0, 65535.0, PVID_OK),
     FIELD(pvid_weak_config_f32, , trust.renewal, KIND_FLOAT, 0.01f, 1.0e3f, PVID_BAD_RENEWAL),
     OF_GATE(pvid_weak_config_f32),
     OF_ESTIMATOR(pvid_weak_config_f32, estimator.),
@@ -428,10 +426,8 @@ static const bound weak_fields[] = {
 };
 
 /* Ends of a size leave a window that cannot always be worked off in time. */
-#define SIZE(member, kind, low, high, status)                                                                         \
-    {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_f32, member), kind, low, high, status, PVID_BAD_ITERATIONS                 \
-    }
+#define SIZE(member, kind, low, high, status)                                                                          \
+    {#member, offsetof(pvid_weak_design_f32, member), kind, low, high, status, PVID_BAD_ITERATIONS}
 static const bound design_fields[] = {
     SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS, PVID_BAD_TAPS),
     SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION, PVID_BAD_DECIMATION),
@@ -441,7 +437,7 @@ static const bound design_fields[] = {
     SIZE(overlap, KIND_FLOAT, 1.0, 1.0e6f, PVID_BAD_OVERLAP),
 };
 
-static void the_weak_forms_fields_end_where_they_say(void **state)
+static void weak_form_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     check_bounds(weak_fields, LENGTH(weak_fields), &weak_settings, sizeof weak_settings, init_weak);
@@ -521,7 +517,7 @@ static void the_correction_needs_storage_and_passes(void **state)
     assert_int_equal(init_weak(), PVID_BAD_ANGLE);
 }
 
-static void the_weak_form_keeps_what_it_was_told(void **state)
+static void weak_form_keeps_its_settings(void **state)
 {
     (void)state;
     weak_settings.drive_min = 3.0f;
@@ -584,18 +580,18 @@ static void every_field_of_the_weak_form_is_in_its_fingerprint(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(an_estimators_fields_end_where_they_say, start_own),
+        cmocka_unit_test_setup(estimator_fields_end_at_their_bounds, start_own),
         cmocka_unit_test(start_and_bounds_agree_or_are_refused),
         cmocka_unit_test(a_model_fits_or_is_refused),
-        cmocka_unit_test(a_models_own_functions_come_together),
+        cmocka_unit_test(own_functions_are_all_or_none),
         cmocka_unit_test_setup(feedback_is_a_rate, start_own),
-        cmocka_unit_test_setup(the_strong_forms_fields_end_where_they_say, start_strong),
-        cmocka_unit_test_setup(the_strong_form_keeps_what_it_was_told, start_strong),
+        cmocka_unit_test_setup(strong_form_fields_end_at_their_bounds, start_strong),
+        cmocka_unit_test_setup(strong_form_keeps_its_settings, start_strong),
         cmocka_unit_test_setup(every_field_of_the_strong_form_is_in_its_fingerprint, start_strong),
-        cmocka_unit_test_setup(the_weak_forms_fields_end_where_they_say, start_weak),
+        cmocka_unit_test_setup(weak_form_fields_end_at_their_bounds, start_weak),
         cmocka_unit_test_setup(every_entry_of_the_tables_has_to_be_finite, start_weak),
         cmocka_unit_test_setup(the_correction_needs_storage_and_passes, start_weak),
-        cmocka_unit_test_setup(the_weak_form_keeps_what_it_was_told, start_weak),
+        cmocka_unit_test_setup(weak_form_keeps_its_settings, start_weak),
         cmocka_unit_test_setup(every_field_of_the_weak_form_is_in_its_fingerprint, start_weak),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

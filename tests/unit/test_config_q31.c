@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "bounds.h"
-#include "fingerprint_q31.h"
+#include "keep/fingerprint_q31.h"
 #include "pvid/pvid.h"
 #include "weak_table_q31.h"
 
@@ -18,26 +18,24 @@
 #define ONE_Q30 1073741824.0
 #define KAPPA_LAST 1072668083.0 /* 2^30 - 2^30 / 1000 */
 
-#define FIELD(type, in, member, kind, low, high, status)                                                              \
-    {                                                                                                                 \
-        #member, offsetof(type, in member), kind, low, high, status, PVID_OK                                          \
-    }
+#define FIELD(type, in, member, kind, low, high, status)                                                               \
+    {#member, offsetof(type, in member), kind, low, high, status, PVID_OK}
 #define FORMAT(type, in, member) FIELD(type, in, member, KIND_INT8, -64.0, 64.0, PVID_BAD_FORMAT)
-#define OF_ESTIMATOR(type, in)                                                                                        \
-    FIELD(type, in, start_sd[0], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                     \
-        FIELD(type, in, start_sd[1], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                 \
-        FIELD(type, in, start_sd[2], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                 \
-        FORMAT(type, in, p_bits[0]), FORMAT(type, in, p_bits[1]), FORMAT(type, in, p_bits[2]),                        \
-        FORMAT(type, in, n_bits[0]), FORMAT(type, in, n_bits[4]), FORMAT(type, in, y_bits),                           \
-        FIELD(type, in, row_sd, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_ROW_SD),                                        \
-        FIELD(type, in, forgetting_groups, KIND_UINT32, 4.0, 16777216.0, PVID_BAD_FORGETTING),                        \
-        FIELD(type, in, gain, KIND_INT32, 0.0, ONE_Q30, PVID_BAD_FEEDBACK),                                           \
-        FIELD(type, in, correlation, KIND_UINT32, 65536.0, 2147483648.0, PVID_BAD_CORRELATION),                       \
-        FIELD(type, in, row_weight, KIND_UINT32, 1.0, 65536.0, PVID_BAD_ROW_WEIGHT),                                  \
-        FIELD(type, in, step_limit, KIND_UINT32, 1.0, 58982.0, PVID_BAD_STEP_LIMIT),                                  \
-        FIELD(type, in, kappa_min, KIND_INT32, 0.0, KAPPA_LAST, PVID_BAD_KAPPA_MIN),                                  \
-        FIELD(type, in, noise_margin, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_NOISE_MARGIN),                              \
-        FIELD(type, in, dead_zone, KIND_UINT32, 0.0, 6553600.0, PVID_BAD_DEAD_ZONE),                                  \
+#define OF_ESTIMATOR(type, in)                                                                                         \
+    FIELD(type, in, start_sd[0], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                      \
+        FIELD(type, in, start_sd[1], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD),                                  \
+        FIELD(type, in, start_sd[2], KIND_INT32, 1.0, INT32_LAST, PVID_BAD_START_SD), FORMAT(type, in, p_bits[0]),     \
+        FORMAT(type, in, p_bits[1]), FORMAT(type, in, p_bits[2]), FORMAT(type, in, n_bits[0]),                         \
+        FORMAT(type, in, n_bits[4]), FORMAT(type, in, y_bits),                                                         \
+        FIELD(type, in, row_sd, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_ROW_SD),                                         \
+        FIELD(type, in, forgetting_groups, KIND_UINT32, 4.0, 16777216.0, PVID_BAD_FORGETTING),                         \
+        FIELD(type, in, gain, KIND_INT32, 0.0, ONE_Q30, PVID_BAD_FEEDBACK),                                            \
+        FIELD(type, in, correlation, KIND_UINT32, 65536.0, 2147483648.0, PVID_BAD_CORRELATION),                        \
+        FIELD(type, in, row_weight, KIND_UINT32, 1.0, 65536.0, PVID_BAD_ROW_WEIGHT),                                   \
+        FIELD(type, in, step_limit, KIND_UINT32, 1.0, 58982.0, PVID_BAD_STEP_LIMIT),                                   \
+        FIELD(type, in, kappa_min, KIND_INT32, 0.0, KAPPA_LAST, PVID_BAD_KAPPA_MIN),                                   \
+        FIELD(type, in, noise_margin, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_NOISE_MARGIN),                               \
+        FIELD(type, in, dead_zone, KIND_UINT32, 0.0, 6553600.0, PVID_BAD_DEAD_ZONE),                                   \
         FIELD(type, in, divider, KIND_UINT16, 1.0, 65535.0, PVID_BAD_DIVIDER)
 
 /* ---- the estimator, on a model of the user's own ---- */
@@ -115,7 +113,7 @@ static pvid_status init_own(void)
     return status;
 }
 
-static void an_estimators_fields_end_where_they_say(void **state)
+static void estimator_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     const bound fields[] = {OF_ESTIMATOR(pvid_estimator_config_q31, )};
@@ -154,11 +152,11 @@ static void start_and_bounds_agree_or_are_refused(void **state)
     assert_int_equal(init_with(3, 0, 0, 0), PVID_OK);                  /* of no parameter */
 }
 
-#define ASSERT_MODEL(change, status)                                                                                  \
-    do {                                                                                                              \
-        (void)start_own(NULL);                                                                                        \
-        change;                                                                                                       \
-        assert_int_equal(init_own(), status);                                                                         \
+#define ASSERT_MODEL(change, status)                                                                                   \
+    do {                                                                                                               \
+        (void)start_own(NULL);                                                                                         \
+        change;                                                                                                        \
+        assert_int_equal(init_own(), status);                                                                          \
     } while (0)
 
 static void a_model_fits_or_is_refused(void **state)
@@ -264,7 +262,7 @@ static void every_field_of_the_strong_form_is_in_its_fingerprint(void **state)
     assert_int_not_equal(strong_fingerprint(), before);
 }
 
-static void the_strong_forms_fields_end_where_they_say(void **state)
+static void strong_form_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     for (size_t k = 0; k < PVID_ORDERS; k++) { /* what the largest counts make stays far from the limit */
@@ -327,7 +325,7 @@ static const bound weak_fields[] = {
     FIELD(pvid_weak_config_q31, , trust.se_max, KIND_INT32, 1.0, INT32_LAST, PVID_BAD_SE_MAX),
     FIELD(pvid_weak_config_q31, , trust.misfit_max, KIND_UINT32, 65536.0, 4294967295.0, PVID_BAD_MISFIT_MAX),
     FIELD(pvid_weak_config_q31, , trust.groups_min, KIND_UINT16, 0.0, 65535.0, PVID_OK),
-    FIELD(pvid_weak_config_q31, , trust.shut_max, KIND_UINT16, 0.0, 65535.0, PVID_OK),
+    FIELD(pvid_weak_config_q31, , trust.revert_after, KIND_UINT16, 0.0, 65535.0, PVID_OK),
     FIELD(pvid_weak_config_q31, , trust.renewal, KIND_UINT32, 655.0, 65536000.0, PVID_BAD_RENEWAL),
     FIELD(pvid_weak_config_q31, , gate.sigmas, KIND_UINT32, 131072.0, 65536000.0, PVID_BAD_GATE_SIGMAS),
     FIELD(pvid_weak_config_q31, , gate.patience_groups, KIND_UINT32, 0.0, ONE_Q30, PVID_BAD_GATE_PATIENCE),
@@ -337,15 +335,11 @@ static const bound weak_fields[] = {
     FORMAT(pvid_weak_config_q31, estimator., n_bits[7]),
 };
 
-#define SIZE(member, kind, low, high, status)                                                                         \
-    {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_ITERATIONS                 \
-    }
+#define SIZE(member, kind, low, high, status)                                                                          \
+    {#member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_ITERATIONS}
 /* Where F or U F would need more than 21 bits the design is refused for that. */
-#define TIGHT(member, kind, low, high, status)                                                                        \
-    {                                                                                                                 \
-        #member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_SHIFT                      \
-    }
+#define TIGHT(member, kind, low, high, status)                                                                         \
+    {#member, offsetof(pvid_weak_design_q31, member), kind, low, high, status, PVID_BAD_SHIFT}
 static const bound design_fields[] = {
     SIZE(taps, KIND_UINT16, 5.0, PVID_MAX_TAPS, PVID_BAD_TAPS),
     SIZE(decimation, KIND_UINT16, 1.0, PVID_MAX_DECIMATION, PVID_BAD_DECIMATION),
@@ -372,7 +366,7 @@ static const bound design_fields[] = {
     TIGHT(u_max, KIND_INT32, 1.0, 262144.0, PVID_BAD_FULL_SCALE),
 };
 
-static void the_weak_forms_fields_end_where_they_say(void **state)
+static void weak_form_fields_end_at_their_bounds(void **state)
 {
     (void)state;
     check_bounds(weak_fields, LENGTH(weak_fields), &weak_settings, sizeof weak_settings, init_weak);
@@ -402,11 +396,11 @@ static void the_weak_forms_fields_end_where_they_say(void **state)
     assert_int_equal(init_weak(), PVID_BAD_FORGETTING);
 }
 
-#define ASSERT_TABLE(table)                                                                                           \
-    do {                                                                                                              \
-        (void)start_weak(NULL);                                                                                       \
-        design.table = NULL;                                                                                          \
-        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                               \
+#define ASSERT_TABLE(table)                                                                                            \
+    do {                                                                                                               \
+        (void)start_weak(NULL);                                                                                        \
+        design.table = NULL;                                                                                           \
+        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                                \
     } while (0)
 
 static void a_design_without_a_table_is_refused(void **state)
@@ -419,13 +413,13 @@ static void a_design_without_a_table_is_refused(void **state)
     ASSERT_TABLE(gram);
 }
 
-#define REFUSED_AND_NOT(place, refused, accepted)                                                                     \
-    do {                                                                                                              \
-        (place) = (refused);                                                                                          \
-        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                               \
-        (place) = (accepted);                                                                                         \
-        assert_int_equal(init_weak(), PVID_OK);                                                                       \
-        (place) = 0;                                                                                                  \
+#define REFUSED_AND_NOT(place, refused, accepted)                                                                      \
+    do {                                                                                                               \
+        (place) = (refused);                                                                                           \
+        assert_int_equal(init_weak(), PVID_BAD_DESIGN);                                                                \
+        (place) = (accepted);                                                                                          \
+        assert_int_equal(init_weak(), PVID_OK);                                                                        \
+        (place) = 0;                                                                                                   \
     } while (0)
 
 /* Both ends of what an entry may be, in the first and the last place of every table. */
@@ -471,19 +465,19 @@ static void a_window_that_cannot_be_worked_off_is_refused(void **state)
     assert_int_equal(init_weak(), PVID_OK);
     design.window = 9;
     assert_int_equal(init_weak(), PVID_OK);
-    assert_in_range(weak.together, 2, 8);
+    assert_in_range(weak.stages_per_tick, 2, 8);
     design.decimation = 1;
     assert_int_equal(init_weak(), PVID_BAD_ITERATIONS);
     weak_settings.iterations = 1;
     assert_int_equal(init_weak(), PVID_OK);
-    assert_in_range(weak.together, 9, 32);
+    assert_in_range(weak.stages_per_tick, 9, 32);
     weak_settings.iterations = 5;
     weak_settings.estimator.gain = (1 << 30) - 1; /* the law of g < 1 is a rate: one step a window */
     assert_int_equal(init_weak(), PVID_OK);
     assert_int_equal(weak.iterations, 1);
 }
 
-static void the_weak_form_keeps_what_it_was_told(void **state)
+static void weak_form_keeps_its_settings(void **state)
 {
     (void)state;
     weak_settings.drive_min = 3;
@@ -557,16 +551,16 @@ static void every_entry_of_the_tables_is_in_the_fingerprint(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(an_estimators_fields_end_where_they_say, start_own),
+        cmocka_unit_test_setup(estimator_fields_end_at_their_bounds, start_own),
         cmocka_unit_test(start_and_bounds_agree_or_are_refused),
         cmocka_unit_test(a_model_fits_or_is_refused),
-        cmocka_unit_test_setup(the_strong_forms_fields_end_where_they_say, start_strong),
+        cmocka_unit_test_setup(strong_form_fields_end_at_their_bounds, start_strong),
         cmocka_unit_test_setup(every_field_of_the_strong_form_is_in_its_fingerprint, start_strong),
-        cmocka_unit_test_setup(the_weak_forms_fields_end_where_they_say, start_weak),
+        cmocka_unit_test_setup(weak_form_fields_end_at_their_bounds, start_weak),
         cmocka_unit_test(a_design_without_a_table_is_refused),
         cmocka_unit_test_setup(a_table_that_would_overflow_is_refused, start_weak),
         cmocka_unit_test_setup(a_window_that_cannot_be_worked_off_is_refused, start_weak),
-        cmocka_unit_test_setup(the_weak_form_keeps_what_it_was_told, start_weak),
+        cmocka_unit_test_setup(weak_form_keeps_its_settings, start_weak),
         cmocka_unit_test_setup(every_field_of_the_weak_form_is_in_its_fingerprint, start_weak),
         cmocka_unit_test_setup(every_entry_of_the_tables_is_in_the_fingerprint, start_weak),
     };

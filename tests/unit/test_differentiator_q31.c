@@ -39,7 +39,8 @@ static void a_quartic_in_counts_is_differentiated_without_an_error(void **state)
         const int32_t own = 1 + (tick % 3);
         int32_t d_phi[PVID_ORDERS];
         int32_t d_y[PVID_Y_ORDERS_Q31];
-        const bool ready = pvid_differentiator_step_q31(&self, own * (int32_t)quartic(x), -(int32_t)quartic(x), d_phi, d_y);
+        const bool ready =
+            pvid_differentiator_step_q31(&self, own * (int32_t)quartic(x), -(int32_t)quartic(x), d_phi, d_y);
         assert_int_equal(ready, tick >= 12);
         if (ready) {
             const int32_t c = x - 2;

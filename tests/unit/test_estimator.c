@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "estimator_f32.h"
+#include "solve/estimator_f32.h"
 #include "pvid/pvid.h"
 
 #define INFINITE (3.4e38f * 10.0f)
@@ -127,7 +127,7 @@ static void standard_errors_of_own_model_match_the_noise(void **state)
     }
     pvid_estimate_f32 estimate;
     pvid_estimator_assess_f32(&estimator, &estimate);
-    assert_float_equal(estimate.residual_sd, 0.028868f, 0.0012f); /* 4 %: four times 1/sqrt(2 rows) */
+    assert_float_equal(estimate.residual_sd, 0.028868f, 0.0012f);        /* 4 %: four times 1/sqrt(2 rows) */
     assert_float_equal(estimate.se[1], 0.028868f * 0.024495f, 0.00004f); /* 6 %: M itself is random */
     assert_float_equal(estimate.se[0], 0.028868f * 0.024495f / 4.1231f, 0.00001f);
     assert_float_equal(estimate.p[1], own_truth[1], 4.0f * estimate.se[1]);
@@ -148,7 +148,7 @@ static void no_standard_error_is_smaller_than_the_sensors_allow(void **state)
         float n[3];
         const float y = own_sample(n);
         (void)pvid_estimator_add_f32(&estimator, n, y);
-        pvid_estimator_expect_f32(&estimator, (i < 500) ? 4.0e-4f : 2.0e-4f);
+        pvid_estimator_set_expected_f32(&estimator, (i < 500) ? 4.0e-4f : 2.0e-4f);
         (void)pvid_estimator_update_f32(&estimator);
     }
     /* the first 2000 rows count with what was said of them: nothing, that is 0 */
@@ -170,24 +170,24 @@ static void the_misfit_is_the_residual_variance_over_what_is_explained(void **st
         float n[3];
         const float y = own_sample(n);
         (void)pvid_estimator_add_f32(&estimator, n, y + (0.05f * noise()));
-        pvid_estimator_expect_f32(&estimator, 0.0025f / 6.0f); /* half of the noise */
+        pvid_estimator_set_expected_f32(&estimator, 0.0025f / 6.0f); /* half of the noise */
         (void)pvid_estimator_update_f32(&estimator);
     }
     pvid_estimator_assess_f32(&estimator, &estimate);
     assert_float_equal(estimate.misfit, 2.0f, 0.16f); /* 8 %: four times sqrt(2 / rows) */
     assert_float_equal(estimate.residual_sd, 0.028868f, 0.0012f);
     /* what is no number, or as large as can be, does not spoil what is published */
-    pvid_estimator_expect_f32(&estimator, NOT_A_NUMBER);
+    pvid_estimator_set_expected_f32(&estimator, NOT_A_NUMBER);
     assert_float_equal(estimator.expected, 0.0025f / 6.0f, 1.0e-6f); /* no row was taken in since */
     (void)pvid_estimator_add_f32(&estimator, (const float[3]){1.0f, 0.0f, 0.0f}, own_truth[0]);
-    pvid_estimator_expect_f32(&estimator, INFINITE);
+    pvid_estimator_set_expected_f32(&estimator, INFINITE);
     pvid_estimator_assess_f32(&estimator, &estimate);
     assert_true((estimate.residual_sd > 0.0f) && (estimate.residual_sd < INFINITE));
     assert_true(estimate.misfit >= 0.0f);
 }
 
 /* A long way with large sums costs the residual its digits: what may be lost is counted, and fades as the sums do. */
-static void what_a_long_way_rounds_off_widens_the_errors(void **state)
+static void rounding_of_long_steps_widens_the_errors(void **state)
 {
     (void)state;
     pvid_estimator_config_f32 config = own_config();
@@ -260,11 +260,21 @@ static void every_bad_field_has_its_own_status(void **state)
         {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, lower), {INFINITE, -1.0f, 0.0f, 20.0f, -INFINITE}},
         {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, upper), {INFINITE, -1.0f, 0.0f, 0.05f, -INFINITE}},
         {PVID_BAD_ROW_SD, offsetof(pvid_estimator_config_f32, row_sd), {INFINITE, -1.0f, 0.0f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_UPDATE_RATE, offsetof(pvid_estimator_config_f32, update_rate_hz), {INFINITE, -1.0f, 0.0f, 1.0e9f, 1.0e-9f}},
-        {PVID_BAD_FORGETTING, offsetof(pvid_estimator_config_f32, forgetting_s), {INFINITE, -1.0f, 0.03f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_FEEDBACK, offsetof(pvid_estimator_config_f32, feedback_hz), {INFINITE, -1.0f, -1.0e-9f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_CORRELATION, offsetof(pvid_estimator_config_f32, correlation), {INFINITE, -1.0f, 0.0f, 0.5f, 1.0e30f}},
-        {PVID_BAD_STEP_LIMIT, offsetof(pvid_estimator_config_f32, step_limit), {INFINITE, -1.0f, 0.0f, 1.0f, -INFINITE}},
+        {PVID_BAD_UPDATE_RATE,
+         offsetof(pvid_estimator_config_f32, update_rate_hz),
+         {INFINITE, -1.0f, 0.0f, 1.0e9f, 1.0e-9f}},
+        {PVID_BAD_FORGETTING,
+         offsetof(pvid_estimator_config_f32, forgetting_s),
+         {INFINITE, -1.0f, 0.03f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_FEEDBACK,
+         offsetof(pvid_estimator_config_f32, feedback_hz),
+         {INFINITE, -1.0f, -1.0e-9f, 1.0e30f, -INFINITE}},
+        {PVID_BAD_CORRELATION,
+         offsetof(pvid_estimator_config_f32, correlation),
+         {INFINITE, -1.0f, 0.0f, 0.5f, 1.0e30f}},
+        {PVID_BAD_STEP_LIMIT,
+         offsetof(pvid_estimator_config_f32, step_limit),
+         {INFINITE, -1.0f, 0.0f, 1.0f, -INFINITE}},
         {PVID_BAD_KAPPA_MIN, offsetof(pvid_estimator_config_f32, kappa_min), {INFINITE, -1.0f, -1.0e-9f, 1.0f, 2.0f}},
     };
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
@@ -425,7 +435,7 @@ static void without_excitation_the_start_is_held(void **state)
     assert_true(estimator.counters.updates > 0);
 }
 
-static void estimate_is_finite_before_any_data_and_says_what_the_start_said(void **state)
+static void estimate_before_data_is_the_start(void **state)
 {
     (void)state;
     pvid_estimator_config_f32 config = own_config();
@@ -478,7 +488,7 @@ int main(void)
         cmocka_unit_test(standard_errors_of_own_model_match_the_noise),
         cmocka_unit_test(no_standard_error_is_smaller_than_the_sensors_allow),
         cmocka_unit_test(the_misfit_is_the_residual_variance_over_what_is_explained),
-        cmocka_unit_test(what_a_long_way_rounds_off_widens_the_errors),
+        cmocka_unit_test(rounding_of_long_steps_widens_the_errors),
         cmocka_unit_test(b_follows_the_estimate),
         cmocka_unit_test(every_bad_field_has_its_own_status),
         cmocka_unit_test(every_bad_model_is_refused),
@@ -488,7 +498,7 @@ int main(void)
         cmocka_unit_test(iterating_goes_on_to_the_least_squares_solution),
         cmocka_unit_test(no_step_is_longer_than_its_limit_and_none_leaves_the_bounds),
         cmocka_unit_test(without_excitation_the_start_is_held),
-        cmocka_unit_test(estimate_is_finite_before_any_data_and_says_what_the_start_said),
+        cmocka_unit_test(estimate_before_data_is_the_start),
         cmocka_unit_test(counters_stop_at_their_end),
         cmocka_unit_test(a_new_init_equals_a_fresh_object),
     };

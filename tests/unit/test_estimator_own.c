@@ -296,7 +296,7 @@ static void a_system_without_a_solution_is_held(void **state)
     }
 }
 
-static void what_tells_less_than_asked_is_held(void **state)
+static void below_noise_margin_is_held(void **state)
 {
     (void)state;
     for (uint8_t parameters = 2; parameters <= MOST; parameters++) {
@@ -349,7 +349,7 @@ int main(void)
         cmocka_unit_test(rows_solves_and_iterations_come_one_by_one),
         cmocka_unit_test(a_row_beyond_the_limit_is_counted_and_changes_nothing),
         cmocka_unit_test(a_system_without_a_solution_is_held),
-        cmocka_unit_test(what_tells_less_than_asked_is_held),
+        cmocka_unit_test(below_noise_margin_is_held),
         cmocka_unit_test(a_step_beyond_all_numbers_is_held),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

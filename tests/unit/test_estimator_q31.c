@@ -51,8 +51,8 @@ static void begin(void)
 /* Row k of a motion that tells all parameters apart, for p = (2.2, 2.8, 1.1, 0.05) without noise. */
 static void row_of(uint32_t k, int32_t n[8], int32_t *y)
 {
-    static const double theta[8] = {2.8, 2.8 * 2.2, 1.1, 1.1 * 2.2, 1.1 * 2.2 * 2.2,
-                                    1.1 * 0.05, 1.1 * 0.05 * 2.2, 1.1 * 0.05 * 2.2 * 2.2};
+    static const double theta[8] = {
+        2.8, 2.8 * 2.2, 1.1, 1.1 * 2.2, 1.1 * 2.2 * 2.2, 1.1 * 0.05, 1.1 * 0.05 * 2.2, 1.1 * 0.05 * 2.2 * 2.2};
     double sum = 0.0;
     for (uint32_t i = 0; i < 8u; i++) {
         n[i] = (int32_t)((((k * 7u) + (i * 13u) + (k * i * i * 5u)) % 41u)) * (ONE_Q20 / 40) - (ONE_Q20 / 2);
@@ -71,8 +71,8 @@ static void add_rows(uint32_t first, uint32_t last)
     }
 }
 
-/* Rows without noise ask for nothing once p is there: every further solve is at rest, with p and the sums as they are; a
- * zone wider than the way is not left at all. */
+/* Rows without noise ask for nothing once p is there: every further solve is at rest, with p and the sums as they are;
+ * a zone wider than the way is not left at all. */
 static void within_the_dead_zone_p_stays(void **state)
 {
     (void)state;
@@ -236,15 +236,15 @@ static void a_solve_in_stages_is_the_solve_at_once(void **state)
     pvid_estimator_begin_assessment_q31(&other, &solve, &in_stages);
     do {
         stages++;
-    } while (!pvid_estimator_assess_on_q31(&other, &solve, &in_stages));
+    } while (!pvid_estimator_assess_advance_q31(&other, &solve, &in_stages));
     assert_int_equal(stages, pvid_estimator_assessment_stages_q31(&other));
     pvid_estimator_assess_q31(&estimator, &at_once);
     assert_memory_equal(&in_stages, &at_once, sizeof at_once);
     assert_memory_equal(&other, &estimator, sizeof other); /* an assessment changes nothing */
 }
 
-/* Held for want of information, p goes to its refuge, and b with it: as if the rows had been met there. */
-static void a_refuge_is_where_p_goes_that_may_not_step(void **state)
+/* Held for want of information, p goes to its fallback, and b with it: as if the rows had been met there. */
+static void p_goes_to_the_fallback_if_it_may_not_step(void **state)
 {
     (void)state;
     config.kappa_min = (1 << 30) - (1 << 21); /* no data are that good */
@@ -252,8 +252,8 @@ static void a_refuge_is_where_p_goes_that_may_not_step(void **state)
     add_rows(0, 60);
     pvid_estimator_begin_q31(&estimator, &solve, true);
     const int32_t there[4] = {3 * ONE_Q26, 2 * ONE_Q26, 2 * ONE_Q26, ONE_Q26 / 8};
-    solve.has_refuge = true;
-    memcpy(solve.refuge, there, sizeof there);
+    solve.has_fallback = true;
+    memcpy(solve.fallback, there, sizeof there);
     while (!pvid_estimator_advance_q31(&estimator, &solve)) {
     }
     assert_int_equal(solve.reason, PVID_HELD_NOT_EXCITED);
@@ -296,7 +296,7 @@ int main(void)
         cmocka_unit_test_setup(gauss_newton_steps_end_at_the_parameters_that_made_the_rows, start_again),
         cmocka_unit_test_setup(a_row_beyond_its_format_changes_nothing_but_the_counter, start_again),
         cmocka_unit_test_setup(a_solve_in_stages_is_the_solve_at_once, start_again),
-        cmocka_unit_test_setup(a_refuge_is_where_p_goes_that_may_not_step, start_again),
+        cmocka_unit_test_setup(p_goes_to_the_fallback_if_it_may_not_step, start_again),
         cmocka_unit_test_setup(without_rows_the_start_is_published, start_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

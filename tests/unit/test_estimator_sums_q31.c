@@ -11,11 +11,11 @@
 
 #include <cmocka.h>
 
-#include "count.h"
-#include "estimator_q31.h"
+#include "number/count.h"
+#include "solve/estimator_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 #include "strong_table_q31.h"
 
 /* ---- y = N^T p with as many entries as there may be parameters ---- */
@@ -110,7 +110,7 @@ static double p_of(const pvid_estimator_q31 *estimator, size_t i)
 
 /* The same data in other units: p and what is known of it are the same, though the sums of one are 4^exponent times
  * smaller than they would be. */
-static void rows_of_any_size_say_the_same(void **state)
+static void result_is_invariant_to_row_scale(void **state)
 {
     (void)state;
     static pvid_estimator_q31 small;
@@ -132,8 +132,8 @@ static void rows_of_any_size_say_the_same(void **state)
             assert_int_equal(pvid_estimator_update_q31(&large), reason);
             assert_true((reason == PVID_UPDATED) || ((reason == PVID_HELD_PIVOT) && (i < 20)));
             for (size_t a = 0; a < PVID_MAX_P; a++) {
-                /* the smaller rows' innovations are rounded: 0.3 of some 40 000, over the root of so many rows; the rates
-                 * keep something of their first steps */
+                /* the smaller rows' innovations are rounded: 0.3 of some 40 000, over the root of so many rows; the
+                 * rates keep something of their first steps */
                 assert_true((i < 20) || (fabs(p_of(&small, a) - p_of(&large, a)) < ((k == 0) ? 5.0e-6 : 2.0e-3)));
             }
         }
@@ -144,7 +144,8 @@ static void rows_of_any_size_say_the_same(void **state)
         for (size_t a = 0; a < PVID_MAX_P; a++) {
             assert_true(fabs(p_of(&small, a) - truth[a]) < 2.0e-4);
             assert_true(fabs(p_of(&small, a) - p_of(&large, a)) < 5.0e-6);
-            assert_true(fabs((double)estimate[0].se[a] - (double)estimate[1].se[a]) <= 2.0 + 1.0e-3 * estimate[0].se[a]);
+            assert_true(fabs((double)estimate[0].se[a] - (double)estimate[1].se[a]) <=
+                        2.0 + 1.0e-3 * estimate[0].se[a]);
             assert_int_equal(estimate[0].correlation[a][a], 1 << 30);
             for (size_t b = 0; b < a; b++) {
                 assert_true(abs(estimate[0].correlation[a][b] - estimate[1].correlation[a][b]) < (1 << 12));
@@ -236,10 +237,10 @@ static void the_residuals_are_weighed_against_what_the_sensors_explain(void **st
         config.row_sd <<= up;
         assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
         const double misfit = ldexp(1.0, 1 - (k % 3));
-        const pvid_scaled_q31 told = pvid_scaled_of_q31((int64_t)floor(ldexp(noise / misfit, (2 * up) + 8)), -8);
+        const pvid_scaled_q31 expected = pvid_scaled_of_q31((int64_t)floor(ldexp(noise / misfit, (2 * up) + 8)), -8);
         for (int i = 0; i < 2000; i++) {
             add_row(&estimator, up);
-            pvid_estimator_expect_q31(&estimator, told);
+            pvid_estimator_set_expected_q31(&estimator, expected);
             (void)pvid_estimator_update_q31(&estimator);
         }
         assert_true((up == 0) || (estimator.information.exponent > 0u));
@@ -250,12 +251,12 @@ static void the_residuals_are_weighed_against_what_the_sensors_explain(void **st
         assert_true((sd > 0.999 * least) && (sd < 1.07 * ((misfit > 1.0) ? sqrt(noise) : least)));
     }
     const pvid_scaled_q31 before = estimator.expected;
-    pvid_estimator_expect_q31(&estimator, pvid_scaled_of_q31(1, 60)); /* no row was taken in since */
+    pvid_estimator_set_expected_q31(&estimator, pvid_scaled_of_q31(1, 60)); /* no row was taken in since */
     assert_memory_equal(&before, &estimator.expected, sizeof before);
 }
 
 /* What is expected of all rows is a mean over them that fades as they do. */
-static void what_is_explained_is_a_mean_over_the_rows_that_are_left(void **state)
+static void expected_variance_is_a_mean_over_remaining_rows(void **state)
 {
     (void)state;
     static pvid_estimator_q31 estimator;
@@ -263,7 +264,7 @@ static void what_is_explained_is_a_mean_over_the_rows_that_are_left(void **state
     for (int i = 0; i < 100; i++) {
         add_row(&estimator, 0);
     }
-    pvid_estimator_expect_q31(&estimator, pvid_scaled_of_q31(4000, 0));
+    pvid_estimator_set_expected_q31(&estimator, pvid_scaled_of_q31(4000, 0));
     (void)pvid_estimator_update_q31(&estimator);
     for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
         pvid_information_fade_q31(&estimator.information, part, 1 << 30); /* a half */
@@ -272,7 +273,7 @@ static void what_is_explained_is_a_mean_over_the_rows_that_are_left(void **state
     for (int i = 0; i < 150; i++) {
         add_row(&estimator, 0);
     }
-    pvid_estimator_expect_q31(&estimator, pvid_scaled_of_q31(2000, 0));
+    pvid_estimator_set_expected_q31(&estimator, pvid_scaled_of_q31(2000, 0));
     assert_true(fabs(ldexp((double)estimator.expected.m, estimator.expected.e) - 2500.0) < 1.0e-3);
 }
 
@@ -427,11 +428,11 @@ static void the_strong_form_agrees_with_the_float_core(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_of_any_size_say_the_same),
+        cmocka_unit_test(result_is_invariant_to_row_scale),
         cmocka_unit_test_setup(the_start_weighs_the_same_beside_sums_of_any_size, start_again),
         cmocka_unit_test_setup(the_expected_noise_is_in_the_unit_of_the_sums, start_again),
         cmocka_unit_test_setup(the_residuals_are_weighed_against_what_the_sensors_explain, start_again),
-        cmocka_unit_test_setup(what_is_explained_is_a_mean_over_the_rows_that_are_left, start_again),
+        cmocka_unit_test_setup(expected_variance_is_a_mean_over_remaining_rows, start_again),
         cmocka_unit_test_setup(a_row_at_its_limit_fits, start_again),
         cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),
         cmocka_unit_test_setup(steps_are_limited_and_bounded, start_again),

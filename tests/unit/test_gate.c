@@ -19,7 +19,7 @@ static void start(float sigmas, float patience_s, float memory)
     assert_int_equal(pvid_gate_init_f32(&gate, &config, 100.0f, memory, FLOOR), PVID_OK);
 }
 
-static void no_gate_lets_everything_in(void **state)
+static void disabled_gate_accepts_everything(void **state)
 {
     (void)state;
     start(0.0f, 0.0f, 4.0f);
@@ -29,7 +29,7 @@ static void no_gate_lets_everything_in(void **state)
     assert_true(gate.judged == 0.0f);
 }
 
-static void it_learns_the_mean_square_and_judges_by_it(void **state)
+static void gate_scale_is_the_mean_square(void **state)
 {
     (void)state;
     start(3.0f, 0.0f, 4.0f);
@@ -48,7 +48,7 @@ static void it_learns_the_mean_square_and_judges_by_it(void **state)
     assert_true(gate.judged == 4.0f);
 }
 
-static void what_is_no_number_is_not_its_business(void **state)
+static void gate_passes_nan(void **state)
 {
     (void)state;
     start(3.0f, 0.0f, 1.0f);
@@ -78,7 +78,7 @@ static void the_scale_stays_between_its_floor_and_its_ceiling(void **state)
 }
 
 /* Nothing but outliers: within the time of patience the scale grows by 1e4. */
-static void it_does_not_stay_shut(void **state)
+static void uninformative_count_is_reset(void **state)
 {
     (void)state;
     start(3.0f, 2.0f, 1.0f); /* 200 residuals */
@@ -102,7 +102,7 @@ static void it_does_not_stay_shut(void **state)
     assert_true(gate.memory == 1.0f);
 }
 
-static void its_settings_end_where_they_say(void **state)
+static void settings_end_at_their_bounds(void **state)
 {
     (void)state;
     const struct {
@@ -133,12 +133,12 @@ static void its_settings_end_where_they_say(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_gate_lets_everything_in),
-        cmocka_unit_test(it_learns_the_mean_square_and_judges_by_it),
-        cmocka_unit_test(what_is_no_number_is_not_its_business),
+        cmocka_unit_test(disabled_gate_accepts_everything),
+        cmocka_unit_test(gate_scale_is_the_mean_square),
+        cmocka_unit_test(gate_passes_nan),
         cmocka_unit_test(the_scale_stays_between_its_floor_and_its_ceiling),
-        cmocka_unit_test(it_does_not_stay_shut),
-        cmocka_unit_test(its_settings_end_where_they_say),
+        cmocka_unit_test(uninformative_count_is_reset),
+        cmocka_unit_test(settings_end_at_their_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

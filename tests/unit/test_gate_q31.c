@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "pvid/pvid.h"
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 
 static pvid_gate_q31 gate;
 
@@ -35,7 +35,7 @@ static uint32_t feed(int64_t square, uint32_t times)
     return passed;
 }
 
-static void test_no_gate_passes_everything_and_learns_nothing(void **state)
+static void test_disabled_gate_passes_everything_and_keeps_scale(void **state)
 {
     (void)state;
     make(0, 0);
@@ -45,7 +45,7 @@ static void test_no_gate_passes_everything_and_learns_nothing(void **state)
     assert_memory_equal(&gate, &before, sizeof gate);
 }
 
-static void test_everything_passes_until_it_has_learnt(void **state)
+static void test_disabled_until_warmed_up(void **state)
 {
     (void)state;
     make(4, 0);
@@ -67,7 +67,7 @@ static void test_the_mean_of_the_first_is_exact(void **state)
     assert_int_equal(pvid_scaled_fixed_q31(gate.scale, 0), 400);
 }
 
-static void test_the_limit_is_sigmas_squared_times_the_usual(void **state)
+static void test_limit_is_sigmas_squared_times_the_scale(void **state)
 {
     (void)state;
     make(4, 0);
@@ -78,7 +78,7 @@ static void test_the_limit_is_sigmas_squared_times_the_usual(void **state)
     assert_int_equal(pvid_scaled_fixed_q31(gate.scale, 0), 250); /* 100 + (1600 - 100) / 10 */
 }
 
-static void test_the_usual_is_never_below_its_floor(void **state)
+static void test_scale_is_never_below_its_floor(void **state)
 {
     (void)state;
     make(4, 0);
@@ -89,7 +89,7 @@ static void test_the_usual_is_never_below_its_floor(void **state)
     assert_int_equal(feed(16, 1), 1);
 }
 
-static void test_a_change_is_believed_after_the_patience(void **state)
+static void test_change_is_accepted_after_the_patience(void **state)
 {
     (void)state;
     make(4, 300);
@@ -102,7 +102,7 @@ static void test_a_change_is_believed_after_the_patience(void **state)
     assert_in_range(refused, 209, 214);
 }
 
-static void test_without_patience_it_never_gives_way(void **state)
+static void test_without_patience_the_scale_never_widens(void **state)
 {
     (void)state;
     make(4, 0);
@@ -134,7 +134,7 @@ static void test_the_scale_has_an_end(void **state)
     assert_int_equal(gate.scale.m, 1 << 29);
 }
 
-static void test_a_memory_of_none_is_one(void **state)
+static void test_memory_is_at_least_one(void **state)
 {
     (void)state;
     const pvid_gate_config_q31 config = {2u << 16, 0};
@@ -149,7 +149,7 @@ static pvid_status status_of(uint32_t sigmas, uint32_t patience)
     return pvid_gate_init_q31(&gate, &config, 10, number(1));
 }
 
-static void test_what_makes_no_gate_is_named(void **state)
+static void test_invalid_gate_status_is_named(void **state)
 {
     (void)state;
     assert_int_equal(status_of(0, 0), PVID_OK);
@@ -167,17 +167,17 @@ static void test_what_makes_no_gate_is_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_no_gate_passes_everything_and_learns_nothing),
-        cmocka_unit_test(test_everything_passes_until_it_has_learnt),
+        cmocka_unit_test(test_disabled_gate_passes_everything_and_keeps_scale),
+        cmocka_unit_test(test_disabled_until_warmed_up),
         cmocka_unit_test(test_the_mean_of_the_first_is_exact),
-        cmocka_unit_test(test_the_limit_is_sigmas_squared_times_the_usual),
-        cmocka_unit_test(test_the_usual_is_never_below_its_floor),
-        cmocka_unit_test(test_a_change_is_believed_after_the_patience),
-        cmocka_unit_test(test_without_patience_it_never_gives_way),
+        cmocka_unit_test(test_limit_is_sigmas_squared_times_the_scale),
+        cmocka_unit_test(test_scale_is_never_below_its_floor),
+        cmocka_unit_test(test_change_is_accepted_after_the_patience),
+        cmocka_unit_test(test_without_patience_the_scale_never_widens),
         cmocka_unit_test(test_the_longest_patience_still_widens_it),
         cmocka_unit_test(test_the_scale_has_an_end),
-        cmocka_unit_test(test_a_memory_of_none_is_one),
-        cmocka_unit_test(test_what_makes_no_gate_is_named),
+        cmocka_unit_test(test_memory_is_at_least_one),
+        cmocka_unit_test(test_invalid_gate_status_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

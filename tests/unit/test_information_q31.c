@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "information_q31.h"
+#include "solve/information_q31.h"
 
 #define N 3
 #define SUMS (6 + 3 + 2)
@@ -129,8 +129,8 @@ static void sums_keep_below_their_limit(void **state)
         memset(fresh, 0, sizeof fresh);
         end_group();
     }
-    assert_true(fabs(((double)information.sums[0] / (double)last) - (4.0 * (double)information.retention / 2147483648.0)) <
-                1.0e-6);
+    assert_true(fabs(((double)information.sums[0] / (double)last) -
+                     (4.0 * (double)information.retention / 2147483648.0)) < 1.0e-6);
     for (int group = 0; group < 2000; group++) { /* and no further than to where they began */
         end_group();
     }

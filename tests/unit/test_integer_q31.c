@@ -6,8 +6,8 @@
 
 #include <cmocka.h>
 
-#include "cholesky_q31.h"
-#include "integer_q31.h"
+#include "solve/cholesky_q31.h"
+#include "number/integer_q31.h"
 
 /* A generator of its own: the same numbers on every machine. */
 static uint64_t next_random(uint64_t *state)
@@ -69,8 +69,8 @@ static void a_shift_left_saturates(void **unused)
 static void a_product_in_halves_is_the_product(void **unused)
 {
     (void)unused;
-    static const int32_t edges[] = {0, 1, -1, 32767, 32768, 65535, 65536, -32768, -65536, INT32_MAX, INT32_MIN,
-                                    0x7FFF0000, -0x7FFF0001};
+    static const int32_t edges[] = {0,      1,      -1,        32767,     32768,      65535,      65536,
+                                    -32768, -65536, INT32_MAX, INT32_MIN, 0x7FFF0000, -0x7FFF0001};
     const size_t n = sizeof edges / sizeof edges[0];
     for (size_t i = 0; i < n; i++) {
         for (size_t j = 0; j < n; j++) {
@@ -156,13 +156,13 @@ static void a_product_with_a_fraction_is_exact_before_it_is_rounded(void **unuse
 }
 
 /* 2 x 2 in Q30 with a closed form: S = [[1/2, r/2], [r/2, 1/2]], first pivot over diagonal 1 - r^2. */
-static void a_factor_tells_what_is_left_of_the_first(void **unused)
+static void first_pivot_is_its_remaining_part(void **unused)
 {
     (void)unused;
     const int32_t half = PVID_ONE_Q30 / 2;
     int32_t s[PVID_MAX_P][PVID_MAX_P] = {{half, half / 2}, {0, half}};
     pvid_cholesky_q31 factor;
-    assert_true(pvid_cholesky_factor_q31(&factor, 2, (const int32_t(*)[PVID_MAX_P])s));
+    assert_true(pvid_cholesky_factor_q31(&factor, 2, (const int32_t (*)[PVID_MAX_P])s));
     assert_in_range(factor.first_pivot, (PVID_ONE_Q30 / 4 * 3) - 8, (PVID_ONE_Q30 / 4 * 3) + 8);
     /* S^-1 (1, 0) = (8/3, -4/3) */
     const int64_t rhs[2] = {(int64_t)1 << 40, 0};
@@ -174,10 +174,10 @@ static void a_factor_tells_what_is_left_of_the_first(void **unused)
     assert_in_range(first, 2796203 - 8, 2796203 + 8); /* 8/3 2^20; a right-hand side has 20 bits */
     assert_in_range(-second, 1398101 - 8, 1398101 + 8);
     s[0][1] = half - 128; /* 1 - r^2 = 5e-7, below 2^-20 */
-    assert_false(pvid_cholesky_factor_q31(&factor, 2, (const int32_t(*)[PVID_MAX_P])s));
+    assert_false(pvid_cholesky_factor_q31(&factor, 2, (const int32_t (*)[PVID_MAX_P])s));
     assert_int_equal(factor.first_pivot, 0);
     s[1][1] = 0;
-    assert_false(pvid_cholesky_factor_q31(&factor, 2, (const int32_t(*)[PVID_MAX_P])s));
+    assert_false(pvid_cholesky_factor_q31(&factor, 2, (const int32_t (*)[PVID_MAX_P])s));
 }
 
 static void half_an_exponent_brings_a_diagonal_near_one(void **unused)
@@ -203,7 +203,7 @@ int main(void)
         cmocka_unit_test(a_scaled_root_keeps_thirty_bits),
         cmocka_unit_test(a_reciprocal_is_short_by_less_than_two),
         cmocka_unit_test(a_product_with_a_fraction_is_exact_before_it_is_rounded),
-        cmocka_unit_test(a_factor_tells_what_is_left_of_the_first),
+        cmocka_unit_test(first_pivot_is_its_remaining_part),
         cmocka_unit_test(half_an_exponent_brings_a_diagonal_near_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -67,14 +67,16 @@ static void paper_row(int i, double n[N], double *y)
 static void paper_theta(double theta[N])
 {
     const double w = (double)p[0], d1 = (double)p[1], d2 = (double)p[2];
-    const double t[N] = {w, w * w, d1, d1 * w, d1 * w * w, d1 * w * w * w, d2, d2 * w, d2 * w * w, d2 * w * w * w, d2 * w * w * w * w};
+    const double t[N] = {w,  w * w,  d1,         d1 * w,         d1 * w * w,        d1 * w * w * w,
+                         d2, d2 * w, d2 * w * w, d2 * w * w * w, d2 * w * w * w * w};
     memcpy(theta, t, sizeof t);
 }
 
 static void paper_c(double c[N][3])
 {
     const double w = (double)p[0], d1 = (double)p[1], d2 = (double)p[2];
-    const double first[N] = {1, 2 * w, 0, d1, 2 * d1 * w, 3 * d1 * w * w, 0, d2, 2 * d2 * w, 3 * d2 * w * w, 4 * d2 * w * w * w};
+    const double first[N] = {
+        1, 2 * w, 0, d1, 2 * d1 * w, 3 * d1 * w * w, 0, d2, 2 * d2 * w, 3 * d2 * w * w, 4 * d2 * w * w * w};
     const double powers[5] = {1, w, w * w, w * w * w, w * w * w * w};
     for (int i = 0; i < N; i++) {
         c[i][0] = first[i];
@@ -256,7 +258,11 @@ static void outside_the_physical_region_nothing_is_written(void **state)
 {
     (void)state;
     const float infinity = 3.4e38f * 10.0f;
-    const float bad[5][3] = {{-1.0f, 9.0f, 5.0f}, {30.0f, 5.0f, 5.0f}, {30.0f, 9.0f, -1.0f}, {30.0f, infinity, 5.0f}, {infinity - infinity, 9.0f, 5.0f}};
+    const float bad[5][3] = {{-1.0f, 9.0f, 5.0f},
+                             {30.0f, 5.0f, 5.0f},
+                             {30.0f, 9.0f, -1.0f},
+                             {30.0f, infinity, 5.0f},
+                             {infinity - infinity, 9.0f, 5.0f}};
     for (int i = 0; i < 5; i++) {
         pvid_estimate_f32 estimate;
         memset(&estimate, 0, sizeof estimate);
@@ -283,7 +289,8 @@ static void absorbing_a_row_is_adding_it_and_projecting(void **state)
         float s[PVID_MAX_P][PVID_MAX_P], expected_s[PVID_MAX_P][PVID_MAX_P];
         float f[PVID_MAX_P], expected_f[PVID_MAX_P];
         pvid_kapitza_strong_f32.accumulate(rows[i], values[i], high, low, sums);
-        (void)pvid_kapitza_strong_f32.project(p, sums, &sums[pvid_kapitza_strong_f32.n_moments], expected_s, expected_f);
+        (void)pvid_kapitza_strong_f32.project(p, sums, &sums[pvid_kapitza_strong_f32.n_moments], expected_s,
+                                              expected_f);
         pvid_kapitza_strong_f32.absorb(p, rows[i], values[i], high, same_low, s, f);
         assert_memory_equal(same_low, low, (pvid_kapitza_strong_f32.n_moments + N + 2u) * sizeof low[0]);
         assert_memory_equal(f, expected_f, 3 * sizeof f[0]);

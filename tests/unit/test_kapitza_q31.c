@@ -20,7 +20,7 @@ static pvid_kapitza_q31 value;
 static pvid_kapitza_q31 se;
 
 /* p = (w, d1, d2) with w in 2^-20, standard errors and the correlation of d1 and d2. */
-static void tell(const double p[3], const double errors[3], double correlation)
+static void set_estimate(const double p[3], const double errors[3], double correlation)
 {
     memset(&estimate, 0, sizeof estimate);
     const double unit[3] = {1 << 20, 1 << D_BITS, 1 << D_BITS};
@@ -45,7 +45,7 @@ static int start_again(void **state)
     const double p[3] = {31.0, 8.875, 5.625};
     const double errors[3] = {0.01, 0.002, 0.003};
     scale = fresh;
-    tell(p, errors, 0.75);
+    set_estimate(p, errors, 0.75);
     return 0;
 }
 
@@ -81,7 +81,7 @@ static void parameters_and_errors_are_the_formulas(void **state)
     for (int i = 0; i < 6; i++) {
         const double *p = cases[i];
         const double errors[3] = {1.0e-2 * p[0], 1.0e-3 * p[1], 2.0e-3 * p[2]};
-        tell(p, errors, p[3]);
+        set_estimate(p, errors, p[3]);
         assert_true(physical());
         const double l1 = 0.3;
         const double big = p[1] - p[2] - 1.0;
@@ -107,27 +107,27 @@ static void parameters_and_errors_are_the_formulas(void **state)
     }
 }
 
-static void errors_that_cancel_or_are_none_are_no_root_of_less_than_nothing(void **state)
+static void cancelling_errors_give_no_negative_root(void **state)
 {
     (void)state;
     const double p[3] = {31.0, 8.875, 5.625};
     const double none[3] = {0.0, 0.0, 0.0};
-    tell(p, none, 0.0);
+    set_estimate(p, none, 0.0);
     assert_true(physical());
     assert_int_equal(se.g, 0);
     assert_int_equal(se.l2, 0);
     assert_int_equal(se.rho2, 0);
     /* l2 = l1 (d1 - d2 - 1)/d2: errors in the ratio d1 - 1 to d2, wholly correlated, leave l2 as it is */
     const double along[3] = {0.0, 7.875e-2, 5.625e-2};
-    tell(p, along, 1.0);
+    set_estimate(p, along, 1.0);
     assert_true(physical());
-    assert_true((se.l2 >= 0) && (se.l2 <= 64)); /* of 85 000 for either alone */
+    assert_true((se.l2 >= 0) && (se.l2 <= 64));                                /* of 85 000 for either alone */
     estimate.correlation[PVID_KAPITZA_D1][PVID_KAPITZA_D2] = (1 << 30) + 1000; /* rounding may say a little more */
     assert_true(physical());
     assert_true((se.l2 >= 0) && (se.l2 <= 64));
 }
 
-static void what_is_not_a_pendulum_has_no_parameters(void **state)
+static void unphysical_p_has_no_parameters(void **state)
 {
     (void)state;
     assert_true(physical());
@@ -149,7 +149,7 @@ static void what_is_not_a_pendulum_has_no_parameters(void **state)
     assert_true(physical());
 }
 
-static void what_is_beyond_its_format_has_none(void **state)
+static void value_beyond_its_format_is_refused(void **state)
 {
     (void)state;
     scale.g_multiplier = 1 << 30;
@@ -171,34 +171,34 @@ static void what_is_beyond_its_format_has_none(void **state)
     assert_true(physical());
     const double shorter[3] = {31.0, 3.5, 1.125}; /* l2 = 1.2 l1, rho2 = 1.04 l1 */
     const double errors[3] = {0.01, 0.01, 0.01};
-    tell(shorter, errors, 0.0);
+    set_estimate(shorter, errors, 0.0);
     assert_false(physical());
     const double slimmer[3] = {31.0, 1.71875, 0.5}; /* l2 = 0.44 l1, rho2 = 0.94 l1 */
-    tell(slimmer, errors, 0.0);
+    set_estimate(slimmer, errors, 0.0);
     assert_true(physical());
     const double equal[3] = {31.0, 3.0, 1.0}; /* l2 and rho2 of l1: as long as they may be */
-    tell(equal, errors, 0.0);
+    set_estimate(equal, errors, 0.0);
     assert_true(physical());
     assert_int_equal(value.l2, INT32_MAX);
     assert_int_equal(value.rho2, INT32_MAX);
     const double slim[3] = {31.0, 1.65625, 0.375}; /* l2 = 0.75 l1, rho2 = 1.41 l1 */
-    tell(slim, errors, 0.0);
+    set_estimate(slim, errors, 0.0);
     assert_false(physical());
-    tell(slimmer, errors, 0.0);
+    set_estimate(slimmer, errors, 0.0);
     estimate.se[PVID_KAPITZA_D2] = INT32_MAX;
     assert_true(physical());
     assert_int_equal(se.l2, INT32_MAX);
     assert_int_equal(se.rho2, INT32_MAX);
 }
 
-#define ASSERT_SCALE(field, good, bad)                                                                                \
-    do {                                                                                                              \
-        (void)start_again(NULL);                                                                                      \
-        estimate.p[PVID_KAPITZA_W] = 1;                                                                               \
-        scale.field = (good);                                                                                         \
-        (void)physical(); /* may be beyond its format */                                                              \
-        scale.field = (bad);                                                                                          \
-        assert_false(physical());                                                                                     \
+#define ASSERT_SCALE(field, good, bad)                                                                                 \
+    do {                                                                                                               \
+        (void)start_again(NULL);                                                                                       \
+        estimate.p[PVID_KAPITZA_W] = 1;                                                                                \
+        scale.field = (good);                                                                                          \
+        (void)physical(); /* may be beyond its format */                                                               \
+        scale.field = (bad);                                                                                           \
+        assert_false(physical());                                                                                      \
     } while (0)
 
 static void a_scale_out_of_its_range_is_refused(void **state)
@@ -246,9 +246,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(parameters_and_errors_are_the_formulas, start_again),
-        cmocka_unit_test_setup(errors_that_cancel_or_are_none_are_no_root_of_less_than_nothing, start_again),
-        cmocka_unit_test_setup(what_is_not_a_pendulum_has_no_parameters, start_again),
-        cmocka_unit_test_setup(what_is_beyond_its_format_has_none, start_again),
+        cmocka_unit_test_setup(cancelling_errors_give_no_negative_root, start_again),
+        cmocka_unit_test_setup(unphysical_p_has_no_parameters, start_again),
+        cmocka_unit_test_setup(value_beyond_its_format_is_refused, start_again),
         cmocka_unit_test_setup(a_scale_out_of_its_range_is_refused, start_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

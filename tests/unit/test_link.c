@@ -46,7 +46,7 @@ static void test_every_length_comes_through(void **state)
     assert_int_equal(decoder.counters.missing, 0u);
 }
 
-static void test_what_does_not_fit_is_not_written(void **state)
+static void test_too_large_frame_is_not_written(void **state)
 {
     (void)state;
     uint8_t bytes[ROOM + 8u];
@@ -109,7 +109,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_every_length_comes_through),
-        cmocka_unit_test(test_what_does_not_fit_is_not_written),
+        cmocka_unit_test(test_too_large_frame_is_not_written),
         cmocka_unit_test(test_a_flipped_bit_anywhere_loses_one_frame),
         cmocka_unit_test(test_missing_frames_are_counted_and_a_restart_is_none),
         cmocka_unit_test(test_endless_garbage_is_one_loss),

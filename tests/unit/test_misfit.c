@@ -3,16 +3,16 @@
 #include <stdint.h>
 
 #include "misfit_cases.h"
-#include "misfit_f32.h"
+#include "judge/misfit_f32.h"
 
 static pvid_misfit_f32 misfit;
 
-static bool block(double e, double told)
+static bool block(double e, double sensitivity)
 {
     for (unsigned rows = misfit.block; rows > 1u; rows--) {
-        assert_false(pvid_misfit_take_f32(&misfit, (float)e, (float)told));
+        assert_false(pvid_misfit_add_f32(&misfit, (float)e, (float)sensitivity));
     }
-    assert_true(pvid_misfit_take_f32(&misfit, (float)e, (float)told));
+    assert_true(pvid_misfit_add_f32(&misfit, (float)e, (float)sensitivity));
     return pvid_misfit_judge_f32(&misfit);
 }
 
@@ -33,7 +33,7 @@ static void a_block_is_four_seconds_of_rows(void **state)
     assert_int_equal(misfit.block, 1);
 }
 
-static void a_measure_is_forgotten_with_the_sums(void **state)
+static void reference_fades_with_the_sums(void **state)
 {
     (void)state;
     pvid_misfit_init_f32(&misfit, 10.0f, 10.0f); /* 1.1 a block */
@@ -42,7 +42,7 @@ static void a_measure_is_forgotten_with_the_sums(void **state)
     assert_true(misfit.growth == 2.0f);
 }
 
-static void rows_that_are_no_numbers_are_a_misfit_and_teach_nothing_wrong(void **state)
+static void nan_rows_are_a_misfit_and_keep_the_reference(void **state)
 {
     (void)state;
     (void)block(0.01, 1.0);
@@ -59,8 +59,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_block_is_four_seconds_of_rows, start_again),
-        cmocka_unit_test_setup(a_measure_is_forgotten_with_the_sums, start_again),
-        cmocka_unit_test_setup(rows_that_are_no_numbers_are_a_misfit_and_teach_nothing_wrong, start_again),
+        cmocka_unit_test_setup(reference_fades_with_the_sums, start_again),
+        cmocka_unit_test_setup(nan_rows_are_a_misfit_and_keep_the_reference, start_again),
         MISFIT_CASES,
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -3,22 +3,22 @@
 #include <stdint.h>
 
 #include "misfit_cases.h"
-#include "misfit_q31.h"
+#include "judge/misfit_q31.h"
 #include "pvid/pvid.h"
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 
 #define UNIT 1000000 /* of e and of what is told */
 
 static pvid_misfit_q31 misfit;
 
 /* e and told [UNIT] */
-static bool block(double e, double told)
+static bool block(double e, double sensitivity)
 {
     const int64_t innovation = (int64_t)(e * UNIT);
     for (unsigned rows = misfit.block; rows > 1u; rows--) {
-        assert_false(pvid_misfit_take_q31(&misfit, innovation * innovation, (int64_t)(told * UNIT)));
+        assert_false(pvid_misfit_add_q31(&misfit, innovation * innovation, (int64_t)(sensitivity * UNIT)));
     }
-    assert_true(pvid_misfit_take_q31(&misfit, innovation * innovation, -(int64_t)(told * UNIT)));
+    assert_true(pvid_misfit_add_q31(&misfit, innovation * innovation, -(int64_t)(sensitivity * UNIT)));
     return pvid_misfit_judge_q31(&misfit);
 }
 
@@ -47,11 +47,11 @@ static void the_squares_of_a_block_add_up(void **state)
 {
     (void)state;
     for (int i = 1; i < 200; i++) {
-        assert_false(pvid_misfit_take_q31(&misfit, 9, 80));
+        assert_false(pvid_misfit_add_q31(&misfit, 9, 80));
     }
     assert_int_equal(pvid_scaled_fixed_q31(misfit.energy, 0), 9 * 136); /* the first eight, and 64 twice */
     assert_int_equal(misfit.few_energy, 9 * 63);
-    assert_true(pvid_misfit_take_q31(&misfit, 9, -80));
+    assert_true(pvid_misfit_add_q31(&misfit, 9, -80));
     assert_int_equal(pvid_scaled_fixed_q31(misfit.energy, 0), 9 * 200);
     assert_int_equal(pvid_scaled_fixed_q31(misfit.signal, 0), 6400 * 200);
     (void)pvid_misfit_judge_q31(&misfit);
@@ -62,7 +62,7 @@ static void the_squares_of_a_block_add_up(void **state)
     assert_int_equal(misfit.few_signal, 0);
 }
 
-static void a_measure_is_forgotten_with_the_sums(void **state)
+static void reference_fades_with_the_sums(void **state)
 {
     (void)state;
     pvid_misfit_init_q31(&misfit, 50, 500); /* 1.1 a block */
@@ -73,7 +73,7 @@ static void a_measure_is_forgotten_with_the_sums(void **state)
     assert_int_equal(pvid_scaled_fixed_q31(misfit.growth, 20), 1 << 20);
 }
 
-static void what_grows_stays_within_the_range(void **state)
+static void growing_scale_stays_in_range(void **state)
 {
     (void)state;
     pvid_misfit_init_q31(&misfit, 1, 4);
@@ -96,9 +96,10 @@ static void the_largest_rows_do_not_overflow(void **state)
     pvid_misfit_init_q31(&misfit, (uint32_t)1 << 30, 0);
     const int64_t row_max = PVID_ROW_LIMIT_Q31;
     for (int rows = 1; rows < 65535; rows++) {
-        assert_false(pvid_misfit_take_q31(&misfit, row_max * row_max, ((rows % 2) == 0) ? INT64_MAX / 2 : -(INT64_MAX / 2)));
+        assert_false(
+            pvid_misfit_add_q31(&misfit, row_max * row_max, ((rows % 2) == 0) ? INT64_MAX / 2 : -(INT64_MAX / 2)));
     }
-    assert_true(pvid_misfit_take_q31(&misfit, row_max * row_max, (int64_t)1 << 31));
+    assert_true(pvid_misfit_add_q31(&misfit, row_max * row_max, (int64_t)1 << 31));
     const pvid_scaled_q31 energy = pvid_scaled_of_q31(65535, 56);
     assert_int_equal(misfit.energy.e, energy.e);
     assert_in_range(misfit.energy.m, energy.m - 1200, energy.m); /* 1024 sums, each rounded */
@@ -114,7 +115,7 @@ static void a_term_counts_by_its_power_of_w(void **state)
     for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
         int64_t term[PVID_KAPITZA_STRONG_THETA] = {0};
         term[i] = -((int64_t)1 << 40);
-        assert_int_equal(pvid_kapitza_strong_told_q31(term), powers[i] * term[i]);
+        assert_int_equal(pvid_kapitza_strong_sensitivity_q31(term), powers[i] * term[i]);
     }
 }
 
@@ -123,8 +124,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_block_is_four_seconds_of_rows, start_again),
         cmocka_unit_test_setup(the_squares_of_a_block_add_up, start_again),
-        cmocka_unit_test_setup(a_measure_is_forgotten_with_the_sums, start_again),
-        cmocka_unit_test_setup(what_grows_stays_within_the_range, start_again),
+        cmocka_unit_test_setup(reference_fades_with_the_sums, start_again),
+        cmocka_unit_test_setup(growing_scale_stays_in_range, start_again),
         cmocka_unit_test_setup(the_largest_rows_do_not_overflow, start_again),
         MISFIT_CASES,
         cmocka_unit_test(a_term_counts_by_its_power_of_w),

@@ -145,7 +145,7 @@ static void init_refuses_null(void **state)
     assert_int_equal(pvid_trust_init_q31(&weak_q31.trust, &weak_unit.trust, NULL), PVID_BAD_POINTER);
 }
 
-static void an_estimate_is_read_from_what_is_ready_alone(void **state)
+static void estimate_is_read_from_a_ready_object_only(void **state)
 {
     (void)state;
     const pvid_weak_config_f32 config = weak_config();
@@ -256,7 +256,7 @@ int main(void)
         cmocka_unit_test(static_objects_before_init_do_nothing),
         cmocka_unit_test(null_is_an_answer),
         cmocka_unit_test(init_refuses_null),
-        cmocka_unit_test(an_estimate_is_read_from_what_is_ready_alone),
+        cmocka_unit_test(estimate_is_read_from_a_ready_object_only),
         cmocka_unit_test(a_refused_init_leaves_an_object_that_does_nothing),
         cmocka_unit_test(estimators_and_differentiators_do_nothing_either),
     };

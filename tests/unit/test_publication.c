@@ -1,4 +1,5 @@
-/* Publications as one context sees them; how they hold while another one writes: tests/core/test_read_while_stepping.py. */
+/* Publications as one context sees them; how they hold while another one writes:
+ * tests/core/test_read_while_stepping.py. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -37,7 +38,7 @@ static void nothing_is_published_at_first(void **state)
     assert_memory_equal(&read, &none, sizeof none);
 }
 
-static void what_was_put_last_is_read_with_its_number(void **state)
+static void latest_publication_is_read_with_its_number(void **state)
 {
     (void)state;
     for (uint32_t i = 1; i <= 3u; i++) {
@@ -113,7 +114,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(nothing_is_published_at_first, start_again),
-        cmocka_unit_test_setup(what_was_put_last_is_read_with_its_number, start_again),
+        cmocka_unit_test_setup(latest_publication_is_read_with_its_number, start_again),
         cmocka_unit_test_setup(the_copy_is_read_while_the_estimate_is_written, start_again),
         cmocka_unit_test_setup(versions_come_round_and_numbers_stop, start_again),
         cmocka_unit_test_setup(null_is_refused, start_again),

@@ -72,7 +72,7 @@ static void meanwhile(void)
     serve();
 }
 
-void pvid_uart_listen(void)
+void pvid_uart_enable_receive(void)
 {
     meanwhile();
     uart.listening = true;

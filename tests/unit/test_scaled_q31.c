@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "scaled_q31.h"
+#include "number/scaled_q31.h"
 
 static double value_of(pvid_scaled_q31 a)
 {
@@ -88,7 +88,7 @@ static void operations_are_those_of_real_numbers(void **state)
     }
 }
 
-static void nothing_changes_nothing(void **state)
+static void empty_input_changes_nothing(void **state)
 {
     (void)state;
     const pvid_scaled_q31 zero = pvid_scaled_of_q31(0, 1000);
@@ -110,7 +110,7 @@ int main(void)
         cmocka_unit_test(an_integer_keeps_thirty_digits),
         cmocka_unit_test(a_shift_and_a_fixed_point_are_exact),
         cmocka_unit_test(operations_are_those_of_real_numbers),
-        cmocka_unit_test(nothing_changes_nothing),
+        cmocka_unit_test(empty_input_changes_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

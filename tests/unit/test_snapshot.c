@@ -92,17 +92,17 @@ static void a_pointer_into_the_object_points_into_the_restored_one(void **state)
 {
     (void)state;
     pvid_weak_config_f32 config = weak_config();
-    config.trust.shut_max = 1;
+    config.trust.revert_after = 1;
     assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
     int seen = 0;
     for (int i = 0; i < 8000; i++) { /* no motion at all: every window is held */
         (void)pvid_weak_step_f32(&identifier, 0.0f, 0.0f);
-        if (identifier.finish.solve.refuge != NULL) {
+        if (identifier.finish.solve.fallback != NULL) {
             seen++;
             assert_int_equal(pvid_weak_init_f32(&restored, &config), PVID_OK);
             const size_t n = save(&config, 1, image);
             assert_int_equal(pvid_snapshot_restore_weak_f32(&restored, &config, image, n), PVID_SNAPSHOT_RESTORED);
-            assert_ptr_equal(restored.finish.solve.refuge, restored.trust.estimate.p);
+            assert_ptr_equal(restored.finish.solve.fallback, restored.trust.estimate.p);
         }
     }
     assert_true(seen > 0);
@@ -200,7 +200,7 @@ static void forge(size_t at, uint32_t word)
     pvid_put_u32(&image[PVID_SNAPSHOT_WEAK_F32 - 4u], pvid_crc32(0u, image, PVID_SNAPSHOT_WEAK_F32 - 4u));
 }
 
-static void a_snapshot_of_something_else_says_of_what(void **state)
+static void snapshot_of_another_object_names_its_kind(void **state)
 {
     (void)state;
     const struct {
@@ -255,9 +255,9 @@ static void slots_are_used_in_turn(void **state)
     for (uint32_t generation = 1; generation < 6u; generation++) {
         assert_int_equal(choice.generation, generation);
         const uint8_t written = choice.next;
-        assert_int_equal(pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, slot[written],
-                                                     sizeof slot[0]),
-                         sizeof slot[0]);
+        assert_int_equal(
+            pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, slot[written], sizeof slot[0]),
+            sizeof slot[0]);
         choice = pvid_snapshot_choose(slot[0], slot[1], sizeof slot[0]);
         assert_int_equal(choice.newest, written);
         assert_int_equal(choice.next, 1 - written);
@@ -329,7 +329,7 @@ int main(void)
         cmocka_unit_test(the_strong_form_continues),
         cmocka_unit_test(every_damaged_byte_is_seen_and_nothing_is_changed),
         cmocka_unit_test(every_length_that_is_too_short_is_refused),
-        cmocka_unit_test(a_snapshot_of_something_else_says_of_what),
+        cmocka_unit_test(snapshot_of_another_object_names_its_kind),
         cmocka_unit_test(a_table_that_changed_is_another_configuration),
         cmocka_unit_test(slots_are_used_in_turn),
         cmocka_unit_test(generations_go_round),

@@ -9,16 +9,16 @@
 
 #include <cmocka.h>
 
-#include "estimator_f32.h"
+#include "solve/estimator_f32.h"
 #include "plant.h"
 #include "pvid/pvid.h"
-#include "weak_angle_f32.h"
-#include "weak_finish_f32.h"
-#include "weak_finish_q31.h"
+#include "full_angle_f32.h"
+#include "weak/finish_f32.h"
+#include "weak/finish_q31.h"
 #include "weak_table.h"
 #include "weak_table_q31.h"
-#include "weak_window_f32.h"
-#include "weak_window_q31.h"
+#include "weak/window_f32.h"
+#include "weak/window_q31.h"
 
 static pvid_weak_f32 identifier;
 static pvid_weak_angle_f32 angle;
@@ -49,7 +49,7 @@ static uint32_t stages_of_a_window(int windows)
             continue;
         }
         begun++;
-        stages = identifier.together; /* of the tick that completed it */
+        stages = identifier.stages_per_tick; /* of the tick that completed it */
         pvid_reason reason = PVID_ACCUMULATED;
         while (pvid_weak_finish_is_busy_f32(&identifier.finish)) {
             stages++;
@@ -76,7 +76,7 @@ static void a_window_takes_the_stages_that_init_counts_with(void **state)
     assert_int_equal(stages, pvid_weak_finish_stages_f32(config.design, 3, &identifier.estimator, &angle));
 }
 
-static void an_assessment_takes_the_stages_that_it_says(void **state)
+static void assessment_takes_the_stated_number_of_stages(void **state)
 {
     (void)state;
     (void)stages_of_a_window(5);
@@ -87,11 +87,11 @@ static void an_assessment_takes_the_stages_that_it_says(void **state)
         pvid_estimate_f32 estimate;
         pvid_estimator_begin_assessment_f32(&identifier.estimator, &solve, &estimate);
         uint32_t stages = 1;
-        while (!pvid_estimator_assess_on_f32(&identifier.estimator, &solve)) {
+        while (!pvid_estimator_assess_advance_f32(&identifier.estimator, &solve)) {
             stages++;
         }
         assert_int_equal(stages, pvid_estimator_assessment_stages_f32(&identifier.estimator));
-        assert_true(pvid_estimator_assess_on_f32(&identifier.estimator, &solve)); /* nothing is left to do */
+        assert_true(pvid_estimator_assess_advance_f32(&identifier.estimator, &solve)); /* nothing is left to do */
     }
 }
 
@@ -115,7 +115,7 @@ static void the_fixed_point_window_takes_the_stages_that_init_counts_with(void *
                 continue;
             }
             begun++;
-            stages = fixed.together; /* of the tick that completed it */
+            stages = fixed.stages_per_tick; /* of the tick that completed it */
             pvid_reason reason = PVID_ACCUMULATED;
             while (pvid_weak_finish_is_busy_q31(&fixed.finish)) {
                 stages++;
@@ -123,8 +123,7 @@ static void the_fixed_point_window_takes_the_stages_that_init_counts_with(void *
                                           &fixed.estimator, &fixed.trust, &reason);
             }
         }
-        assert_int_equal(stages,
-                         pvid_weak_finish_stages_q31(fixed.design->functions, iterations, &fixed.estimator));
+        assert_int_equal(stages, pvid_weak_finish_stages_q31(fixed.design->functions, iterations, &fixed.estimator));
     }
 }
 
@@ -132,15 +131,15 @@ static void the_fixed_point_window_takes_the_stages_that_init_counts_with(void *
 static void one_second_difference_is_a_mean(void **state)
 {
     (void)state;
-    pvid_weak_window_f32 window = {.bend_square_sum = 6.0f};
-    pvid_weak_window_q31 other = {.bend_square_sum = 6 << 20};
+    pvid_weak_window_f32 window = {.curvature_square_sum = 6.0f};
+    pvid_weak_window_q31 other = {.curvature_square_sum = 6 << 20};
     const float means[4] = {0.0f, 6.0f, 3.0f, 2.0f};
-    for (uint16_t bends = 0; bends < 4u; bends++) {
-        window.bends = bends;
-        other.bends = bends;
-        assert_true(pvid_weak_window_bend_f32(&window) == means[bends]);
-        const pvid_scaled_q31 mean = pvid_weak_window_bend_q31(&other);
-        assert_true(fabs((ldexp((double)mean.m, mean.e) / 1048576.0) - (double)means[bends]) < 1.0e-6);
+    for (uint16_t curvatures = 0; curvatures < 4u; curvatures++) {
+        window.curvatures = curvatures;
+        other.curvatures = curvatures;
+        assert_true(pvid_weak_window_curvature_f32(&window) == means[curvatures]);
+        const pvid_scaled_q31 mean = pvid_weak_window_curvature_q31(&other);
+        assert_true(fabs((ldexp((double)mean.m, mean.e) / 1048576.0) - (double)means[curvatures]) < 1.0e-6);
     }
 }
 
@@ -148,7 +147,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_window_takes_the_stages_that_init_counts_with, start_again),
-        cmocka_unit_test_setup(an_assessment_takes_the_stages_that_it_says, start_again),
+        cmocka_unit_test_setup(assessment_takes_the_stated_number_of_stages, start_again),
         cmocka_unit_test_setup(the_fixed_point_window_takes_the_stages_that_init_counts_with, start_again),
         cmocka_unit_test(one_second_difference_is_a_mean),
     };

@@ -32,8 +32,8 @@ static void a_row_is_the_formula(void **state)
 static void shifts_round_half_up(void **state)
 {
     (void)state;
-    const pvid_strong_row_q31 shifts = {.n_a = 2, .n_e = 1, .n_phi2 = {1, 1, 1, 1}, .n_phi0 = {2, 0, 0, 0, 0}, .part = 1,
-                                        .y = 3};
+    const pvid_strong_row_q31 shifts = {
+        .n_a = 2, .n_e = 1, .n_phi2 = {1, 1, 1, 1}, .n_phi0 = {2, 0, 0, 0, 0}, .part = 1, .y = 3};
     const int32_t phi[PVID_ORDERS] = {10, 0, 3, 0, 5};
     const int32_t u[PVID_Y_ORDERS_Q31] = {3, 1, 1};
     int32_t y;
@@ -83,7 +83,8 @@ static void theta_and_its_jacobian_are_those_of_the_model(void **state)
     const pvid_model_q31 *model = &pvid_kapitza_strong_q31;
     const int8_t p_bits[3] = {26, 27, 27};
     const double p[3] = {14.5, 8.75, 5.5};
-    const int32_t fixed[3] = {(int32_t)(p[0] * 67108864.0), (int32_t)(p[1] * 134217728.0), (int32_t)(p[2] * 134217728.0)};
+    const int32_t fixed[3] = {(int32_t)(p[0] * 67108864.0), (int32_t)(p[1] * 134217728.0),
+                              (int32_t)(p[2] * 134217728.0)};
     int16_t theta_bits[PVID_KAPITZA_STRONG_THETA];
     int16_t c_bits[18];
     int64_t theta[PVID_KAPITZA_STRONG_THETA];
@@ -93,17 +94,41 @@ static void theta_and_its_jacobian_are_those_of_the_model(void **state)
     model->jacobian(fixed, c);
     const double w = p[0];
     const double expected[PVID_KAPITZA_STRONG_THETA] = {
-        w,           w * w,       p[1],           3 * p[1] * w,     3 * p[1] * w * w,     p[1] * w * w * w, p[2],
-        4 * p[2] * w, 6 * p[2] * w * w, 4 * p[2] * w * w * w, p[2] * w * w * w * w,
+        w,
+        w * w,
+        p[1],
+        3 * p[1] * w,
+        3 * p[1] * w * w,
+        p[1] * w * w * w,
+        p[2],
+        4 * p[2] * w,
+        6 * p[2] * w * w,
+        4 * p[2] * w * w * w,
+        p[2] * w * w * w * w,
     };
     for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
         const double ratio = (double)theta[i] / (expected[i] * (double)((int64_t)1 << theta_bits[i]));
         assert_true((ratio > 1.0 - 1e-7) && (ratio < 1.0 + 1e-7));
     }
     const double entries[18] = {
-        1,     2 * w,     3 * p[1], 6 * p[1] * w, 3 * p[1] * w * w, 4 * p[2],  12 * p[2] * w, 12 * p[2] * w * w,
-        4 * p[2] * w * w * w,       1,            3 * w,            3 * w * w, w * w * w,     1,
-        4 * w, 6 * w * w, 4 * w * w * w, w * w * w * w,
+        1,
+        2 * w,
+        3 * p[1],
+        6 * p[1] * w,
+        3 * p[1] * w * w,
+        4 * p[2],
+        12 * p[2] * w,
+        12 * p[2] * w * w,
+        4 * p[2] * w * w * w,
+        1,
+        3 * w,
+        3 * w * w,
+        w * w * w,
+        1,
+        4 * w,
+        6 * w * w,
+        4 * w * w * w,
+        w * w * w * w,
     };
     for (size_t k = 0; k < 18u; k++) {
         const double ratio = (double)c[k] / (entries[k] * (double)((int64_t)1 << c_bits[k]));
@@ -124,32 +149,34 @@ static void theta_and_its_jacobian_are_those_of_the_model(void **state)
 static pvid_strong_config_q31 settings(void)
 {
     const pvid_strong_config_q31 config = {
-        .bank = {.half = 2, .stride = 1, .phi_max = 80000, .y_max = 6000, .centre = 12, .weights = pvid_five_points_q31},
+        .bank =
+            {.half = 2, .stride = 1, .phi_max = 80000, .y_max = 6000, .centre = 12, .weights = pvid_five_points_q31},
         .row = {.n_a = 21, .n_phi2 = {0, 21, 28, 28}, .n_phi0 = {0, 24, 28, 28, 27}, .part = 20, .y = 29},
         .u_multiplier = 1563749871,
         .u_shift = 16,
         .drive_ticks = 50,
-        .estimator = {
-            .start = {45256288, 165558848, 190184304},
-            .start_sd = {22628144, 82779424, 95092152},
-            .lower = {2806045, 4194304, 5033165},
-            .upper = {1122418085, 1677721600, 2013265920},
-            .p_bits = {32, 24, 25},
-            .n_bits = {13, 0, 25, 19, 13, 0, 29, 22, 16, 10, 0},
-            .y_bits = 19,
-            .row_sd = 331350,
-            .gain = 1 << 30,
-            .correlation = 131072u,
-            .row_weight = 65536u,
-            .step_limit = 19661u,
-            .kappa_min = 10737,
-            .divider = 1,
-        },
+        .estimator =
+            {
+                .start = {45256288, 165558848, 190184304},
+                .start_sd = {22628144, 82779424, 95092152},
+                .lower = {2806045, 4194304, 5033165},
+                .upper = {1122418085, 1677721600, 2013265920},
+                .p_bits = {32, 24, 25},
+                .n_bits = {13, 0, 25, 19, 13, 0, 29, 22, 16, 10, 0},
+                .y_bits = 19,
+                .row_sd = 331350,
+                .gain = 1 << 30,
+                .correlation = 131072u,
+                .row_weight = 65536u,
+                .step_limit = 19661u,
+                .kappa_min = 10737,
+                .divider = 1,
+            },
     };
     return config;
 }
 
-static void the_edges_of_a_run_are_told(void **state)
+static void limits_of_a_run_are_reported(void **state)
 {
     (void)state;
     pvid_strong_config_q31 config = settings();
@@ -195,7 +222,7 @@ static void a_still_pivot_is_no_drive(void **state)
 }
 
 /* Frozen, it takes no row in but keeps its window filled; then it goes on with the next sample. */
-static void what_is_frozen_takes_no_row_in(void **state)
+static void frozen_form_accepts_no_row(void **state)
 {
     (void)state;
     const pvid_strong_config_q31 config = settings();
@@ -249,7 +276,7 @@ static void a_restored_run_continues_bit_for_bit(void **state)
     assert_memory_equal(&restored, &self, sizeof self);
 }
 
-static void what_is_out_of_range_is_refused_by_name(void **state)
+static void out_of_range_value_is_refused_by_name(void **state)
 {
     (void)state;
     static pvid_strong_q31 self;
@@ -289,11 +316,11 @@ int main(void)
         cmocka_unit_test(shifts_round_half_up),
         cmocka_unit_test(a_row_that_does_not_fit_is_refused),
         cmocka_unit_test(theta_and_its_jacobian_are_those_of_the_model),
-        cmocka_unit_test(the_edges_of_a_run_are_told),
+        cmocka_unit_test(limits_of_a_run_are_reported),
         cmocka_unit_test(a_still_pivot_is_no_drive),
-        cmocka_unit_test(what_is_frozen_takes_no_row_in),
+        cmocka_unit_test(frozen_form_accepts_no_row),
         cmocka_unit_test(a_restored_run_continues_bit_for_bit),
-        cmocka_unit_test(what_is_out_of_range_is_refused_by_name),
+        cmocka_unit_test(out_of_range_value_is_refused_by_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -45,14 +45,15 @@ static pvid_estimate_f32 candidate(float error, float kappa)
     return estimate;
 }
 
-static pvid_reason judge(pvid_reason solved, float size, bool informed, float surplus, pvid_estimate_f32 estimate)
+static pvid_reason judge(pvid_reason solved, float size, bool above_noise, float variance_ratio,
+                         pvid_estimate_f32 estimate)
 {
-    return pvid_trust_judge_f32(&trust, &estimator, solved, size, informed, surplus, &estimate);
+    return pvid_trust_judge_f32(&trust, &estimator, solved, size, above_noise, variance_ratio, &estimate);
 }
 
-static pvid_reason judge_good(float surplus)
+static pvid_reason judge_good(float variance_ratio)
 {
-    return judge(PVID_UPDATED, 1.0e-5f, true, surplus, candidate(0.01f, 1.0e-2f));
+    return judge(PVID_UPDATED, 1.0e-5f, true, variance_ratio, candidate(0.01f, 1.0e-2f));
 }
 
 static void the_first_groups_are_never_published(void **state)
@@ -67,7 +68,7 @@ static void the_first_groups_are_never_published(void **state)
     assert_int_equal(estimator.counters.held_uncertain, 2);
 }
 
-static void what_is_held_leaves_the_published_estimate_and_says_why(void **state)
+static void held_group_keeps_the_published_estimate_with_reason(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
@@ -98,12 +99,12 @@ static void after_sixteen_refusals_p_goes_back(void **state)
 {
     (void)state;
     for (int i = 0; i < 16; i++) {
-        assert_null(pvid_trust_refuge_f32(&trust));
+        assert_null(pvid_trust_fallback_f32(&trust));
         (void)judge(PVID_HELD_NOT_EXCITED, 0.0f, true, 1.0f, candidate(1.0f, 0.0f));
     }
-    assert_ptr_equal(pvid_trust_refuge_f32(&trust), trust.estimate.p);
+    assert_ptr_equal(pvid_trust_fallback_f32(&trust), trust.estimate.p);
     (void)judge(PVID_HELD_NOT_EXCITED, 0.0f, true, 1.0f, candidate(1.0f, 0.0f)); /* it went */
-    assert_null(pvid_trust_refuge_f32(&trust));
+    assert_null(pvid_trust_fallback_f32(&trust));
 }
 
 static void a_step_ends_the_refusals(void **state)
@@ -114,7 +115,7 @@ static void a_step_ends_the_refusals(void **state)
     }
     (void)judge_good(1.0f);
     (void)judge(PVID_HELD_PIVOT, 0.0f, true, 1.0f, candidate(1.0f, 0.0f));
-    assert_null(pvid_trust_refuge_f32(&trust));
+    assert_null(pvid_trust_fallback_f32(&trust));
 }
 
 static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
@@ -137,7 +138,7 @@ static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
     assert_int_equal(judge_good(0.5f), PVID_UPDATED);
 }
 
-static void a_small_surplus_takes_sixteen_groups(void **state)
+static void small_variance_ratio_raises_after_sixteen_groups(void **state)
 {
     (void)state;
     for (int i = 0; i < 3 + 15; i++) {
@@ -146,7 +147,7 @@ static void a_small_surplus_takes_sixteen_groups(void **state)
     assert_int_equal(judge_good(4.2f), PVID_MISFIT);
 }
 
-static void what_is_expected_raises_no_alarm(void **state)
+static void expected_residuals_raise_no_alarm(void **state)
 {
     (void)state;
     for (int i = 0; i < 1000; i++) {
@@ -154,7 +155,7 @@ static void what_is_expected_raises_no_alarm(void **state)
     }
 }
 
-static void a_surplus_that_is_no_number_counts_as_large(void **state)
+static void nan_variance_ratio_counts_as_large(void **state)
 {
     (void)state;
     for (int i = 0; i < 3 + 8; i++) {
@@ -197,11 +198,11 @@ static void rows_that_do_not_fit_raise_the_alarm_with_the_first_publication(void
 }
 
 /* Groups before which the past fades, and what is left of it. */
-static int groups_of_ageing(float *left)
+static int groups_of_fading(float *left)
 {
     int groups = 0;
     *left = 1.0f;
-    for (float fade = pvid_trust_ageing_f32(&trust); fade < 1.0f; fade = pvid_trust_ageing_f32(&trust)) {
+    for (float fade = pvid_trust_fade_factor_f32(&trust); fade < 1.0f; fade = pvid_trust_fade_factor_f32(&trust)) {
         *left *= fade;
         groups++;
     }
@@ -219,19 +220,19 @@ static void rows_of_a_poor_start_fade(void **state)
     (void)state;
     float left;
     judge_moved(1.15f, 20.0f); /* not far from the start */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     judge_moved(1.25f, 1.0f); /* the rows agree with where p is: from here on that counts */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     judge_moved(1.45f, 20.0f);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     judge_moved(1.55f, 20.0f); /* 24 % beyond 1.25 */
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
     assert_true(left < 0.01f);
     judge_moved(1.2f, 20.0f); /* and 23 % below where that was */
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
 }
 
-static void nothing_fades_before_p_has_settled_or_while_little_is_known(void **state)
+static void nothing_fades_before_convergence_or_with_large_errors(void **state)
 {
     (void)state;
     float left;
@@ -240,22 +241,22 @@ static void nothing_fades_before_p_has_settled_or_while_little_is_known(void **s
     estimate.weight = 40.0f;
     estimator.p[0] = 15.0f;
     (void)judge(PVID_UPDATED, 0.021f, true, 1.0f, estimate); /* on its way */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     (void)judge(PVID_HELD_PIVOT, 0.0f, true, 1.0f, estimate);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     pvid_estimate_f32 vague = candidate(0.2f, 1.0e-2f);
     vague.misfit = estimate.misfit;
     vague.weight = estimate.weight;
     (void)judge(PVID_UPDATED, 1.0e-5f, true, 1.0f, vague);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     (void)judge(PVID_UPDATED, 0.019f, true, 1.0f, estimate);
     (void)judge(PVID_UPDATED, 1.0e-5f, true, 1.0f, vague); /* what is left says too little to let it fade further */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     (void)judge(PVID_UPDATED, 1.0e-5f, true, 1.0f, estimate);
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
     trust.config.renewal = 0.0f;
     judge_moved(5.0f, 20.0f);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
 }
 
 /* What the windows told while the past faded is of an estimate that has gone. */
@@ -269,7 +270,7 @@ static void the_alarms_means_begin_anew_with_a_renewal(void **state)
     assert_true(trust.misfit);
     judge_moved(1.5f, 20.0f);
     assert_int_equal(trust.judged, 0);
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
     assert_int_equal(judge_good(1.0f), PVID_UPDATED);
     assert_false(trust.misfit);
 }
@@ -283,10 +284,10 @@ static void sums_without_digits_fade(void **state)
     *yy = 1.0e-6f;
     estimator.information.rounding = 0.9e-6f;
     judge_moved(1.0f, 1.0f);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     estimator.information.rounding = 1.1e-6f;
     judge_moved(1.0f, 1.0f);
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
 }
 
 #define REFUSED(field, value, status)                                                                                  \
@@ -319,16 +320,16 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(the_first_groups_are_never_published, start_again),
-        cmocka_unit_test_setup(what_is_held_leaves_the_published_estimate_and_says_why, start_again),
+        cmocka_unit_test_setup(held_group_keeps_the_published_estimate_with_reason, start_again),
         cmocka_unit_test_setup(after_sixteen_refusals_p_goes_back, start_again),
         cmocka_unit_test_setup(a_step_ends_the_refusals, start_again),
         cmocka_unit_test_setup(large_residuals_raise_the_alarm_and_small_ones_end_it, start_again),
-        cmocka_unit_test_setup(a_small_surplus_takes_sixteen_groups, start_again),
-        cmocka_unit_test_setup(what_is_expected_raises_no_alarm, start_again),
-        cmocka_unit_test_setup(a_surplus_that_is_no_number_counts_as_large, start_again),
+        cmocka_unit_test_setup(small_variance_ratio_raises_after_sixteen_groups, start_again),
+        cmocka_unit_test_setup(expected_residuals_raise_no_alarm, start_again),
+        cmocka_unit_test_setup(nan_variance_ratio_counts_as_large, start_again),
         cmocka_unit_test_setup(rows_that_do_not_fit_raise_the_alarm_with_the_first_publication, start_again),
         cmocka_unit_test_setup(rows_of_a_poor_start_fade, start_again),
-        cmocka_unit_test_setup(nothing_fades_before_p_has_settled_or_while_little_is_known, start_again),
+        cmocka_unit_test_setup(nothing_fades_before_convergence_or_with_large_errors, start_again),
         cmocka_unit_test_setup(the_alarms_means_begin_anew_with_a_renewal, start_again),
         cmocka_unit_test_setup(sums_without_digits_fade, start_again),
         cmocka_unit_test_setup(the_alarm_can_be_switched_off, start_again),

@@ -64,14 +64,15 @@ static pvid_estimate_q31 candidate(double error, double kappa)
     return estimate;
 }
 
-static pvid_reason judge(pvid_reason solved, double moved, bool informed, double surplus, pvid_estimate_q31 estimate)
+static pvid_reason judge(pvid_reason solved, double moved, bool above_noise, double variance_ratio,
+                         pvid_estimate_q31 estimate)
 {
-    return pvid_trust_judge_q31(&trust, &estimator, solved, size(moved), informed, q24(surplus), &estimate);
+    return pvid_trust_judge_q31(&trust, &estimator, solved, size(moved), above_noise, q24(variance_ratio), &estimate);
 }
 
-static pvid_reason judge_good(double surplus)
+static pvid_reason judge_good(double variance_ratio)
 {
-    return judge(PVID_UPDATED, 1.0e-5, true, surplus, candidate(PER_CENT(1), 1.0e-2));
+    return judge(PVID_UPDATED, 1.0e-5, true, variance_ratio, candidate(PER_CENT(1), 1.0e-2));
 }
 
 static void the_first_groups_are_never_published(void **state)
@@ -86,7 +87,7 @@ static void the_first_groups_are_never_published(void **state)
     assert_int_equal(estimator.counters.held_uncertain, 2);
 }
 
-static void what_is_held_leaves_the_published_estimate_and_says_why(void **state)
+static void held_group_keeps_the_published_estimate_with_reason(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
@@ -120,12 +121,12 @@ static void after_sixteen_refusals_p_goes_back(void **state)
 {
     (void)state;
     for (int i = 0; i < 16; i++) {
-        assert_null(pvid_trust_refuge_q31(&trust));
+        assert_null(pvid_trust_fallback_q31(&trust));
         (void)judge(PVID_HELD_NOT_EXCITED, 0.0, true, 1.0, candidate(1.0, 0.0));
     }
-    assert_ptr_equal(pvid_trust_refuge_q31(&trust), trust.estimate.p);
+    assert_ptr_equal(pvid_trust_fallback_q31(&trust), trust.estimate.p);
     (void)judge(PVID_HELD_NOT_EXCITED, 0.0, true, 1.0, candidate(1.0, 0.0)); /* it went */
-    assert_null(pvid_trust_refuge_q31(&trust));
+    assert_null(pvid_trust_fallback_q31(&trust));
 }
 
 static void a_step_ends_the_refusals(void **state)
@@ -136,7 +137,7 @@ static void a_step_ends_the_refusals(void **state)
     }
     (void)judge_good(1.0);
     (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, candidate(1.0, 0.0));
-    assert_null(pvid_trust_refuge_q31(&trust));
+    assert_null(pvid_trust_fallback_q31(&trust));
 }
 
 static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
@@ -159,7 +160,7 @@ static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
     assert_int_equal(judge_good(0.5), PVID_UPDATED);
 }
 
-static void a_small_surplus_takes_sixteen_groups(void **state)
+static void small_variance_ratio_raises_after_sixteen_groups(void **state)
 {
     (void)state;
     for (int i = 0; i < 3 + 15; i++) {
@@ -192,11 +193,12 @@ static void rows_that_do_not_fit_raise_the_alarm_with_the_first_publication(void
 }
 
 /* Groups before which the past fades, and what is left of it. */
-static int groups_of_ageing(double *left)
+static int groups_of_fading(double *left)
 {
     int groups = 0;
     *left = 1.0;
-    for (double fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0; fade > 0.0; fade = (double)pvid_trust_ageing_q31(&trust) / 2147483648.0) {
+    for (double fade = (double)pvid_trust_fade_factor_q31(&trust) / 2147483648.0; fade > 0.0;
+         fade = (double)pvid_trust_fade_factor_q31(&trust) / 2147483648.0) {
         *left *= fade;
         groups++;
     }
@@ -214,19 +216,19 @@ static void rows_of_a_poor_start_fade(void **state)
     (void)state;
     double left;
     judge_moved(1.15, 20.0); /* not far from the start */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     judge_moved(1.25, 1.0); /* the rows agree with where p is: from here on that counts */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     judge_moved(1.45, 20.0);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     judge_moved(1.55, 20.0); /* 24 % beyond 1.25 */
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
     assert_true(left < 0.01);
     judge_moved(1.2, 20.0); /* and 23 % below where that was */
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
 }
 
-static void nothing_fades_before_p_has_settled_or_while_little_is_known(void **state)
+static void nothing_fades_before_convergence_or_with_large_errors(void **state)
 {
     (void)state;
     double left;
@@ -235,22 +237,22 @@ static void nothing_fades_before_p_has_settled_or_while_little_is_known(void **s
     estimate.weight = 40;
     estimator.p[0] = 15 << 20;
     (void)judge(PVID_UPDATED, 0.021, true, 1.0, estimate); /* on its way */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, estimate);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     pvid_estimate_q31 vague = candidate(PER_CENT(20), 1.0e-2);
     vague.misfit = estimate.misfit;
     vague.weight = estimate.weight;
     (void)judge(PVID_UPDATED, 1.0e-5, true, 1.0, vague);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     (void)judge(PVID_UPDATED, 0.019, true, 1.0, estimate);
     (void)judge(PVID_UPDATED, 1.0e-5, true, 1.0, vague); /* what is left says too little to let it fade further */
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
     (void)judge(PVID_UPDATED, 1.0e-5, true, 1.0, estimate);
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
     trust.config.renewal = 0;
     judge_moved(5.0, 20.0);
-    assert_int_equal(groups_of_ageing(&left), 0);
+    assert_int_equal(groups_of_fading(&left), 0);
 }
 
 /* What the windows told while the past faded is of an estimate that has gone. */
@@ -264,13 +266,13 @@ static void the_alarms_means_begin_anew_with_a_renewal(void **state)
     assert_true(trust.misfit);
     judge_moved(1.5, 20.0);
     assert_int_equal(trust.judged, 0);
-    assert_int_equal(groups_of_ageing(&left), 4);
+    assert_int_equal(groups_of_fading(&left), 4);
     assert_int_equal(judge_good(1.0), PVID_UPDATED);
     assert_false(trust.misfit);
 }
 
 /* One group that the model cannot explain at all must not outweigh thousands. */
-static void a_surplus_beyond_all_bounds_is_held(void **state)
+static void huge_variance_ratio_is_clamped(void **state)
 {
     (void)state;
     for (int i = 0; i < 4; i++) {
@@ -314,16 +316,16 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(the_first_groups_are_never_published, start_again),
-        cmocka_unit_test_setup(what_is_held_leaves_the_published_estimate_and_says_why, start_again),
+        cmocka_unit_test_setup(held_group_keeps_the_published_estimate_with_reason, start_again),
         cmocka_unit_test_setup(after_sixteen_refusals_p_goes_back, start_again),
         cmocka_unit_test_setup(a_step_ends_the_refusals, start_again),
         cmocka_unit_test_setup(large_residuals_raise_the_alarm_and_small_ones_end_it, start_again),
-        cmocka_unit_test_setup(a_small_surplus_takes_sixteen_groups, start_again),
+        cmocka_unit_test_setup(small_variance_ratio_raises_after_sixteen_groups, start_again),
         cmocka_unit_test_setup(rows_that_do_not_fit_raise_the_alarm_with_the_first_publication, start_again),
         cmocka_unit_test_setup(rows_of_a_poor_start_fade, start_again),
-        cmocka_unit_test_setup(nothing_fades_before_p_has_settled_or_while_little_is_known, start_again),
+        cmocka_unit_test_setup(nothing_fades_before_convergence_or_with_large_errors, start_again),
         cmocka_unit_test_setup(the_alarms_means_begin_anew_with_a_renewal, start_again),
-        cmocka_unit_test_setup(a_surplus_beyond_all_bounds_is_held, start_again),
+        cmocka_unit_test_setup(huge_variance_ratio_is_clamped, start_again),
         cmocka_unit_test_setup(a_bad_setting_is_named, start_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

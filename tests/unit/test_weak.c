@@ -125,16 +125,16 @@ static void a_sample_that_is_no_number_restarts_the_windows_and_keeps_the_sums(v
 static void a_gap_is_a_sample_that_is_no_number_without_the_sample(void **state)
 {
     (void)state;
-    static pvid_weak_f32 told;
+    static pvid_weak_f32 gapped;
     const pvid_weak_config_f32 config = good_config();
     start(&config);
     plant_state plant = released_plant();
     run(&plant, 4321, 0.0, NULL);
-    told = identifier;
-    pvid_weak_gap_f32(&told);
+    gapped = identifier;
+    pvid_weak_gap_f32(&gapped);
     (void)pvid_weak_step_f32(&identifier, NOT_A_NUMBER, 0.0f);
     identifier.estimator.counters.rejected_not_finite = 0;
-    assert_memory_equal(&told, &identifier, sizeof told);
+    assert_memory_equal(&gapped, &identifier, sizeof gapped);
 }
 
 static void a_new_init_equals_a_fresh_object(void **state)
@@ -160,7 +160,7 @@ static void a_new_init_equals_a_fresh_object(void **state)
     assert_int_equal(fresh.estimator.counters.updates, 3);
 }
 
-static void without_drive_the_start_is_held_and_the_reason_says_so(void **state)
+static void start_is_held_with_reason_without_drive(void **state)
 {
     (void)state;
     pvid_weak_config_f32 config = good_config();
@@ -254,11 +254,11 @@ static void every_bad_table_is_refused(void **state)
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config = good_config();
     config.design = &design;
-#define REFUSED(field, value, status)                                                                                 \
-    do {                                                                                                              \
-        design = table_design;                                                                                        \
-        design.field = (value);                                                                                       \
-        assert_int_equal(status_of(&config), status);                                                                 \
+#define REFUSED(field, value, status)                                                                                  \
+    do {                                                                                                               \
+        design = table_design;                                                                                         \
+        design.field = (value);                                                                                        \
+        assert_int_equal(status_of(&config), status);                                                                  \
     } while (0)
     REFUSED(taps, 3, PVID_BAD_TAPS);
     REFUSED(taps, 6, PVID_BAD_TAPS);
@@ -318,7 +318,7 @@ int main(void)
         cmocka_unit_test(a_sample_that_is_no_number_restarts_the_windows_and_keeps_the_sums),
         cmocka_unit_test(a_gap_is_a_sample_that_is_no_number_without_the_sample),
         cmocka_unit_test(a_new_init_equals_a_fresh_object),
-        cmocka_unit_test(without_drive_the_start_is_held_and_the_reason_says_so),
+        cmocka_unit_test(start_is_held_with_reason_without_drive),
         cmocka_unit_test(absurd_samples_never_make_the_state_infinite),
         cmocka_unit_test(every_bad_field_has_its_own_status),
         cmocka_unit_test(every_bad_table_is_refused),

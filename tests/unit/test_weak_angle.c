@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "pvid/pvid.h"
-#include "weak_angle_f32.h"
+#include "full_angle_f32.h"
 #include "weak_table.h"
 
 static pvid_weak_angle_f32 angle;
@@ -37,7 +37,7 @@ static pvid_weak_config_f32 config_of(bool friction)
 static void fill(float phi)
 {
     for (int i = 0; i < 2 * TABLE_WINDOW; i++) {
-        pvid_weak_angle_keep_f32(&angle, phi, 0.0f);
+        pvid_weak_angle_add_sample_f32(&angle, phi, 0.0f);
     }
     for (size_t k = 0; k < TABLE_FUNCTIONS; k++) {
         for (size_t i = 0; i < PVID_WEAK_TERMS; i++) {
@@ -92,7 +92,7 @@ static void on_it_changes_y_alone(void **state)
     assert_true(changed);
 }
 
-static void what_is_no_pendulum_or_no_number_is_not_corrected(void **state)
+static void unphysical_or_nan_p_is_not_corrected(void **state)
 {
     (void)state;
     const pvid_weak_config_f32 config = config_of(true);
@@ -110,7 +110,7 @@ static void what_is_no_pendulum_or_no_number_is_not_corrected(void **state)
     }
 }
 
-static void it_waits_until_the_estimate_has_settled(void **state)
+static void correction_waits_for_a_converged_estimate(void **state)
 {
     (void)state;
     const pvid_weak_config_f32 config = config_of(false);
@@ -118,17 +118,17 @@ static void it_waits_until_the_estimate_has_settled(void **state)
     fill(0.1f);
     (void)work_off(pendulum);
     const float moved[6] = {31.6666667f * 1.03f, 8.875f, 5.625f, 0.0f, 0.0f, 0.0f};
-    assert_false(pvid_weak_angle_settle_f32(&angle, pendulum, 0.01f, 3)); /* too few windows */
-    assert_false(pvid_weak_angle_settle_f32(&angle, moved, 0.01f, 4));    /* still on its way */
-    assert_false(pvid_weak_angle_settle_f32(&angle, pendulum, 0.06f, 4)); /* too wide */
-    assert_false(pvid_weak_angle_settle_f32(&angle, pendulum, NAN, 4));
+    assert_false(pvid_weak_angle_switch_f32(&angle, pendulum, 0.01f, 3)); /* too few windows */
+    assert_false(pvid_weak_angle_switch_f32(&angle, moved, 0.01f, 4));    /* still on its way */
+    assert_false(pvid_weak_angle_switch_f32(&angle, pendulum, 0.06f, 4)); /* too wide */
+    assert_false(pvid_weak_angle_switch_f32(&angle, pendulum, NAN, 4));
     assert_false(angle.on);
-    assert_true(pvid_weak_angle_settle_f32(&angle, pendulum, 0.01f, 4));
+    assert_true(pvid_weak_angle_switch_f32(&angle, pendulum, 0.01f, 4));
     assert_true(angle.on);
-    assert_false(pvid_weak_angle_settle_f32(&angle, pendulum, 0.01f, 5)); /* it was before */
-    assert_false(pvid_weak_angle_settle_f32(&angle, moved, 0.19f, 100));
+    assert_false(pvid_weak_angle_switch_f32(&angle, pendulum, 0.01f, 5)); /* it was before */
+    assert_false(pvid_weak_angle_switch_f32(&angle, moved, 0.19f, 100));
     assert_true(angle.on);
-    assert_false(pvid_weak_angle_settle_f32(&angle, pendulum, 0.21f, 100)); /* lost */
+    assert_false(pvid_weak_angle_switch_f32(&angle, pendulum, 0.21f, 100)); /* lost */
     assert_false(angle.on);
 }
 
@@ -144,8 +144,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(off_it_changes_nothing_but_the_columns_of_friction),
         cmocka_unit_test(on_it_changes_y_alone),
-        cmocka_unit_test(what_is_no_pendulum_or_no_number_is_not_corrected),
-        cmocka_unit_test(it_waits_until_the_estimate_has_settled),
+        cmocka_unit_test(unphysical_or_nan_p_is_not_corrected),
+        cmocka_unit_test(correction_waits_for_a_converged_estimate),
     };
     return cmocka_run_group_tests(tests, prepare, NULL);
 }

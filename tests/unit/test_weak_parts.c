@@ -7,13 +7,13 @@
 
 #include <cmocka.h>
 
-#include "pattern_f32.h"
+#include "solve/pattern_f32.h"
 #include "pvid/pvid.h"
-#include "weak_finish_f32.h"
-#include "weak_front_f32.h"
-#include "weak_schedule.h"
+#include "weak/finish_f32.h"
+#include "weak/front_f32.h"
+#include "weak/schedule.h"
 #include "weak_table.h"
-#include "weak_window_f32.h"
+#include "weak/window_f32.h"
 
 static void assert_close(double value, double expected, double tolerance)
 {
@@ -58,7 +58,7 @@ static float noise(void)
     return ((float)(generator >> 8) / 8388608.0f) - 1.0f;
 }
 
-static const pvid_weak_bend_f32 no_bend;
+static const pvid_weak_curvature_f32 no_bend;
 
 static void double_integrals_of_polynomials_are_exact_but_for_rounding(void **state)
 {
@@ -107,9 +107,10 @@ static void two_samples_at_a_time_are_one_after_the_other(void **state)
         const float phi = (i == 0u) ? 1.0e30f : noise(); /* what has no weight must not matter */
         float *now = term[i % 2u];
         window.index = i;
-        pvid_weak_window_terms_f32(&window, table_design.window, 0.008f, phi, (i == 0u) ? 1.0e30f : noise(), &no_bend, now);
-        pvid_weak_window_add_f32(&window, &table_design, (const float(*)[PVID_WEAK_SAMPLE_TERMS])term, 0, 2, sums);
-        pvid_weak_window_add_f32(&window, &table_design, (const float(*)[PVID_WEAK_SAMPLE_TERMS])term, 2,
+        pvid_weak_window_terms_f32(&window, table_design.window, 0.008f, phi, (i == 0u) ? 1.0e30f : noise(), &no_bend,
+                                   now);
+        pvid_weak_window_add_f32(&window, &table_design, (const float (*)[PVID_WEAK_SAMPLE_TERMS])term, 0, 2, sums);
+        pvid_weak_window_add_f32(&window, &table_design, (const float (*)[PVID_WEAK_SAMPLE_TERMS])term, 2,
                                  TABLE_FUNCTIONS, sums);
         const float *chi = &table_design.chi[3u * TABLE_FUNCTIONS * i];
         for (size_t k = 0; (i > 0u) && (k < TABLE_FUNCTIONS); k++) {
@@ -139,7 +140,7 @@ static void the_drive_of_a_window_is_the_variance_of_u(void **state)
     }
 }
 
-static void a_window_knows_its_mean_its_reach_and_its_curvature(void **state)
+static void window_has_mean_deviation_and_curvature(void **state)
 {
     (void)state;
     pvid_weak_window_f32 window;
@@ -147,19 +148,19 @@ static void a_window_knows_its_mean_its_reach_and_its_curvature(void **state)
     float term[PVID_WEAK_SAMPLE_TERMS];
     for (int pass = 0; pass < 2; pass++) { /* the second begins afresh */
         for (uint16_t i = 0; i < 100u; i++) {
-            const pvid_weak_bend_f32 bend = {.due = (i % 10u) == 3u, .square = 0.25f};
+            const pvid_weak_curvature_f32 curvature = {.due = (i % 10u) == 3u, .square = 0.25f};
             window.index = i;
             const float phi = 0.25f + ((i == 40u) ? 0.5f : 0.0f) - ((i == 60u) ? 0.75f : 0.0f);
-            pvid_weak_window_terms_f32(&window, 101, 0.008f, phi, 1.0f, &bend, term);
+            pvid_weak_window_terms_f32(&window, 101, 0.008f, phi, 1.0f, &curvature, term);
         }
         assert_close((double)pvid_weak_window_mean_f32(&window, 101), 0.2475, 1.0e-6);
-        assert_close((double)pvid_weak_window_reach_f32(&window, 0.0f), 0.75, 0.0);
-        assert_close((double)pvid_weak_window_reach_f32(&window, 0.25f), 0.75, 0.0);
-        assert_close((double)pvid_weak_window_reach_f32(&window, 0.75f), 1.25, 0.0);
-        assert_close((double)pvid_weak_window_bend_f32(&window), 0.25, 1.0e-7);
+        assert_close((double)pvid_weak_window_max_deviation_f32(&window, 0.0f), 0.75, 0.0);
+        assert_close((double)pvid_weak_window_max_deviation_f32(&window, 0.25f), 0.75, 0.0);
+        assert_close((double)pvid_weak_window_max_deviation_f32(&window, 0.75f), 1.25, 0.0);
+        assert_close((double)pvid_weak_window_curvature_f32(&window), 0.25, 1.0e-7);
     }
     memset(&window, 0, sizeof window);
-    assert_close((double)pvid_weak_window_bend_f32(&window), 0.0, 0.0);
+    assert_close((double)pvid_weak_window_curvature_f32(&window), 0.0, 0.0);
 }
 
 /* ---- a complete window ---- */
@@ -233,7 +234,7 @@ static void rows_are_orthogonal_to_what_is_unknown_of_a_window(void **state)
     }
 }
 
-static void noise_that_passes_for_motion_is_what_a_trace_says(void **state)
+static void noise_trace_equals_noise_information(void **state)
 {
     (void)state;
     static pvid_weak_finish_f32 finish;
@@ -486,9 +487,9 @@ int main(void)
         cmocka_unit_test(double_integrals_of_polynomials_are_exact_but_for_rounding),
         cmocka_unit_test(two_samples_at_a_time_are_one_after_the_other),
         cmocka_unit_test(the_drive_of_a_window_is_the_variance_of_u),
-        cmocka_unit_test(a_window_knows_its_mean_its_reach_and_its_curvature),
+        cmocka_unit_test(window_has_mean_deviation_and_curvature),
         cmocka_unit_test(rows_are_orthogonal_to_what_is_unknown_of_a_window),
-        cmocka_unit_test(noise_that_passes_for_motion_is_what_a_trace_says),
+        cmocka_unit_test(noise_trace_equals_noise_information),
         cmocka_unit_test(without_drive_nothing_is_removed),
         cmocka_unit_test(a_gram_matrix_that_cannot_be_factored_leaves_the_designs_whitening),
         cmocka_unit_test(products_by_pattern_are_those_of_whole_matrices),

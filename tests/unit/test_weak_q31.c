@@ -133,7 +133,7 @@ static void the_first_window_places_the_zero(void **state)
     }
 }
 
-static void what_lies_beyond_full_scale_restarts_the_windows_and_keeps_the_sums(void **state)
+static void sample_beyond_full_scale_restarts_windows_and_keeps_sums(void **state)
 {
     (void)state;
     config.phi_offset = 40;
@@ -168,30 +168,30 @@ static void what_lies_beyond_full_scale_restarts_the_windows_and_keeps_the_sums(
 static void a_gap_is_a_sample_beyond_full_scale_without_the_sample(void **state)
 {
     (void)state;
-    static pvid_weak_q31 told;
+    static pvid_weak_q31 gapped;
     start();
     plant_state plant = released_plant();
     run(&plant, 4321, 0, NULL);
-    told = identifier;
-    pvid_weak_gap_q31(&told);
+    gapped = identifier;
+    pvid_weak_gap_q31(&gapped);
     (void)pvid_weak_step_q31(&identifier, INT32_MAX, 0);
     assert_int_equal(identifier.estimator.counters.rejected_saturated, 1);
     identifier.estimator.counters.rejected_saturated = 0;
-    assert_memory_equal(&told, &identifier, sizeof told);
+    assert_memory_equal(&gapped, &identifier, sizeof gapped);
 }
 
 /* The pivot leaps from one end of its travel to the other at the rate that the smoothing filter lets through best: no
  * such acceleration is within u_max. */
 /* Gap after gap before any window has come round: sums that went on from one to the next would overflow in the end, by
  * the square of a second difference of F after little more than an hour. */
-static void what_a_gap_cuts_off_is_summed_no_further(void **state)
+static void gap_stops_the_running_sums(void **state)
 {
     (void)state;
     pvid_weak_design_q31 design = weak_unit_design;
     design.lag = 1;
     config.design = &design;
     start();
-    int64_t bends = 0;
+    int64_t curvatures = 0;
     int64_t squares = 0;
     for (int turn = 0; turn < 5; turn++) {
         for (int i = 0; i < HOP_TICKS; i++) {
@@ -200,16 +200,16 @@ static void what_a_gap_cuts_off_is_summed_no_further(void **state)
         }
         const pvid_weak_window_q31 *half_way = &identifier.window[1];
         assert_false(half_way->whole);
-        assert_true((half_way->bend_square_sum > 0) && (half_way->u_square_sum > 0));
-        bends = (turn == 0) ? half_way->bend_square_sum : bends;
+        assert_true((half_way->curvature_square_sum > 0) && (half_way->u_square_sum > 0));
+        curvatures = (turn == 0) ? half_way->curvature_square_sum : curvatures;
         squares = (turn == 0) ? half_way->u_square_sum : squares;
-        assert_true((half_way->bend_square_sum == bends) && (half_way->u_square_sum == squares));
+        assert_true((half_way->curvature_square_sum == curvatures) && (half_way->u_square_sum == squares));
         pvid_weak_gap_q31(&identifier);
     }
 }
 
-/* A table of which init knows no more than that its entries fit, and whose matrix has no Cholesky factor: a row with nine
- * entries that come out as 1, whose squares an int64 in Q60 cannot hold. */
+/* A table of which init knows no more than that its entries fit, and whose matrix has no Cholesky factor: a row with
+ * nine entries that come out as 1, whose squares an int64 in Q60 cannot hold. */
 static void a_gram_table_without_a_factor_is_noticed_whatever_it_holds(void **state)
 {
     (void)state;
@@ -254,7 +254,7 @@ static void an_acceleration_beyond_its_range_is_refused(void **state)
     assert_int_equal(identifier.estimator.counters.rejected_saturated, refused);
 }
 
-static void without_drive_the_start_is_held_and_the_reason_says_so(void **state)
+static void start_is_held_with_reason_without_drive(void **state)
 {
     (void)state;
     start();
@@ -299,7 +299,7 @@ static void laws_and_forgetting_take_their_settings(void **state)
 }
 
 /* While it is frozen every whole window is dropped and nothing moves; then it goes on without warming up again. */
-static void what_is_frozen_moves_no_sum_and_goes_on_without_a_bump(void **state)
+static void frozen_form_keeps_sums_and_resumes_bumplessly(void **state)
 {
     (void)state;
     config.estimator.forgetting_groups = 8;
@@ -423,8 +423,7 @@ static void a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_no
     assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &config, image, sizeof image), PVID_SNAPSHOT_DAMAGED);
     assert_memory_equal(&before, &identifier, sizeof before);
     image[1000] ^= 1u;
-    assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &config, image, sizeof image),
-                     PVID_SNAPSHOT_RESTORED);
+    assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &config, image, sizeof image), PVID_SNAPSHOT_RESTORED);
     assert_memory_equal(&before, &identifier, sizeof before);
 }
 
@@ -434,14 +433,14 @@ int main(void)
         cmocka_unit_test_setup(the_pendulum_is_identified_with_its_encoders_zero, start_again),
         cmocka_unit_test_setup(a_zeroed_encoder_needs_five_entries, start_again),
         cmocka_unit_test_setup(the_first_window_places_the_zero, start_again),
-        cmocka_unit_test_setup(what_lies_beyond_full_scale_restarts_the_windows_and_keeps_the_sums, start_again),
+        cmocka_unit_test_setup(sample_beyond_full_scale_restarts_windows_and_keeps_sums, start_again),
         cmocka_unit_test_setup(a_gap_is_a_sample_beyond_full_scale_without_the_sample, start_again),
-        cmocka_unit_test_setup(what_a_gap_cuts_off_is_summed_no_further, start_again),
+        cmocka_unit_test_setup(gap_stops_the_running_sums, start_again),
         cmocka_unit_test_setup(a_gram_table_without_a_factor_is_noticed_whatever_it_holds, start_again),
         cmocka_unit_test_setup(an_acceleration_beyond_its_range_is_refused, start_again),
-        cmocka_unit_test_setup(without_drive_the_start_is_held_and_the_reason_says_so, start_again),
+        cmocka_unit_test_setup(start_is_held_with_reason_without_drive, start_again),
         cmocka_unit_test_setup(laws_and_forgetting_take_their_settings, start_again),
-        cmocka_unit_test_setup(what_is_frozen_moves_no_sum_and_goes_on_without_a_bump, start_again),
+        cmocka_unit_test_setup(frozen_form_keeps_sums_and_resumes_bumplessly, start_again),
         cmocka_unit_test_setup(the_gate_keeps_a_jolt_out, start_again),
         cmocka_unit_test_setup(random_counts_keep_every_bound, start_again),
         cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),

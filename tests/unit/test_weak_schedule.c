@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #include "pvid/config.h"
-#include "weak_schedule.h"
+#include "weak/schedule.h"
 
 /* A block has ticks enough: two windows of slices and the stages' own. */
 static void every_block_has_room(void **state)
@@ -15,12 +15,12 @@ static void every_block_has_room(void **state)
     (void)state;
     for (uint32_t decimation = 3; decimation <= PVID_MAX_DECIMATION; decimation++) {
         for (uint32_t functions = 4; functions <= PVID_MAX_FUNCTIONS; functions++) {
-            const uint32_t slice = pvid_weak_functions_a_tick(decimation, functions);
+            const uint32_t pairs_per_tick = pvid_weak_functions_per_tick(decimation, functions);
             const uint32_t ticks = decimation - pvid_weak_free_ticks(decimation, functions);
-            assert_true((slice >= 1u) && (slice <= functions));
-            assert_true((ticks / 2u) * slice >= functions);          /* a window takes a sample in */
-            assert_true(((ticks / 2u) - 1u) * slice < functions);    /* and wastes no tick */
-            assert_true(ticks <= decimation - (decimation / 2u));    /* in the second half */
+            assert_true((pairs_per_tick >= 1u) && (pairs_per_tick <= functions));
+            assert_true((ticks / 2u) * pairs_per_tick >= functions);       /* a window takes a sample in */
+            assert_true(((ticks / 2u) - 1u) * pairs_per_tick < functions); /* and wastes no tick */
+            assert_true(ticks <= decimation - (decimation / 2u));          /* in the second half */
         }
     }
 }
@@ -30,7 +30,7 @@ static void low_decimation_does_all_at_once(void **state)
 {
     (void)state;
     for (uint32_t decimation = 1; decimation <= 2u; decimation++) {
-        assert_int_equal(pvid_weak_functions_a_tick(decimation, 12), 12);
+        assert_int_equal(pvid_weak_functions_per_tick(decimation, 12), 12);
         assert_int_equal(pvid_weak_free_ticks(decimation, 12), 1);
     }
 }
@@ -39,13 +39,13 @@ static void stages_go_together_only_where_they_must(void **state)
 {
     (void)state;
     /* D = 8, K = 12: windows in 4 of 8 ticks; W = 9: a hop of 4, so 16 ticks for a window's stages */
-    assert_int_equal(pvid_weak_stages_together(16, 9, 8, 12), 1);
-    assert_int_equal(pvid_weak_stages_together(17, 9, 8, 12), 2);
-    assert_int_equal(pvid_weak_stages_together(16 * PVID_STAGES_TOGETHER, 9, 8, 12), PVID_STAGES_TOGETHER);
-    assert_int_equal(pvid_weak_stages_together((16 * PVID_STAGES_TOGETHER) + 1, 9, 8, 12), 0);
+    assert_int_equal(pvid_weak_stages_per_tick(16, 9, 8, 12), 1);
+    assert_int_equal(pvid_weak_stages_per_tick(17, 9, 8, 12), 2);
+    assert_int_equal(pvid_weak_stages_per_tick(16 * PVID_STAGES_PER_TICK_MAX, 9, 8, 12), PVID_STAGES_PER_TICK_MAX);
+    assert_int_equal(pvid_weak_stages_per_tick((16 * PVID_STAGES_PER_TICK_MAX) + 1, 9, 8, 12), 0);
 }
 
-static void what_is_odd_and_within(void **state)
+static void odd_sizes_within_bounds(void **state)
 {
     (void)state;
     assert_true(pvid_is_odd_within(5, 5, 9) && pvid_is_odd_within(9, 5, 9));
@@ -94,8 +94,8 @@ static void a_job_visits_every_pair_at_its_place(void **state)
     assert_int_equal(job.pair, job.half);
 }
 
-/* A job that is done at once, in a ring as short as can be, is cut in two at an end of the ring, unless it begins in the
- * middle or at an end. */
+/* A job that is done at once, in a ring as short as can be, is cut in two at an end of the ring, unless it begins in
+ * the middle or at an end. */
 static void a_job_crosses_an_end_of_the_ring_once(void **state)
 {
     (void)state;
@@ -128,7 +128,7 @@ int main(void)
         cmocka_unit_test(every_block_has_room),
         cmocka_unit_test(low_decimation_does_all_at_once),
         cmocka_unit_test(stages_go_together_only_where_they_must),
-        cmocka_unit_test(what_is_odd_and_within),
+        cmocka_unit_test(odd_sizes_within_bounds),
         cmocka_unit_test(a_job_visits_every_pair_at_its_place),
         cmocka_unit_test(a_job_crosses_an_end_of_the_ring_once),
     };

@@ -74,8 +74,8 @@ static void table_scale(size_t k, double by, size_t from)
 {
     for (size_t d = 0; d < 3; d++) {
         for (size_t i = 0; i < TABLE_WINDOW; i++) {
-            table_double[d][k][i] = (from == k) ? (table_double[d][k][i] * by)
-                                                : (table_double[d][k][i] - (by * table_double[d][from][i]));
+            table_double[d][k][i] =
+                (from == k) ? (table_double[d][k][i] * by) : (table_double[d][k][i] - (by * table_double[d][from][i]));
         }
     }
 }

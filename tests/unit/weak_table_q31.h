@@ -262,7 +262,7 @@ static const pvid_weak_config_q31 weak_unit = {
         .se_max = 838861,
         .misfit_max = 262144,
         .groups_min = 3,
-        .shut_max = 16,
+        .revert_after = 16,
         .renewal = 13107,
     },
     .gate = {262144u, 0u},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -112,11 +111,11 @@ def _key(number: int, tick: int, payload: bytes) -> bytes:
 
 def decode_in_c(native: Native, data: bytes) -> list[tuple[int, int, bytes]]:
     """(type, tick, payload) of the frames that the C decoder lets through."""
-    out = ctypes.create_string_buffer(2 * len(data) + 64)
-    counters = (ctypes.c_uint32 * 5)()
+    ffi = native.headers.ffi
+    out, counters = ffi.new("uint8_t[]", 2 * len(data) + 64), ffi.new("uint32_t[5]")
     n = native.library.pvid_native_link_decode(data, len(data), out, counters)
     found, at = [], 0
-    raw = out.raw
+    raw = bytes(ffi.buffer(out, n))
     while at < n:
         number, _, tick, length = _HEAD.unpack_from(raw, at)
         at += _HEAD.size

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from pvid.base.atomic_write import write_whole
-from pvid.base.console import DIFFERENT, DONE, progress_bar, tell
+from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
@@ -18,7 +18,7 @@ from pvid.core.native import Native
 
 @click.group()
 def bench() -> None:
-    """Measures what the README and host/README.md claim and prints it as tables."""
+    """Measures what the README and the benchmark pages claim and prints it as tables."""
 
 
 @bench.command(name="demo")
@@ -107,7 +107,7 @@ def bench_design_cost(update: bool) -> int:
     mean, longest = design_cost.fit(spreads) if update else weak_cost.coefficients()
     if update:
         write_whole(weak_cost.COEFFICIENTS_FILE, design_cost.as_toml(mean, longest))
-        tell(f"{weak_cost.COEFFICIENTS_FILE.name} written")
+        write_stderr(f"{weak_cost.COEFFICIENTS_FILE.name} written")
     click.echo(markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
     return DONE
 
@@ -175,18 +175,6 @@ def bench_longevity(
     for marker, header, rows in [kept.held_out_table(ticks)] if held_out else kept.tables(ticks):
         if rows:
             put_table(update, marker, markdown(header, rows))
-    return DONE
-
-
-@bench.command(name="noise")
-@UPDATE
-def bench_noise(update: Path | None) -> int:
-    """Bias by the noise inside the weak form's rows, as it is and with that noise taken off, in float64."""
-    from bench import noise
-
-    with progress_bar("noise in the rows", len(noise.CASES)) as advance:
-        rows = list(noise.noise_table(Native(), progress=advance))
-    put_table(update, "noise", markdown(noise.HEADER, rows))
     return DONE
 
 
@@ -309,7 +297,7 @@ def bench_attack(
         tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve())
     for tally in tallies:
         for arguments, wrong, number in tally.defects:
-            tell(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
+            write_stderr(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
     put_table(update, "attack", markdown(HEADER, [tally.cells for tally in tallies]))
     return DIFFERENT if any(tally.defects for tally in tallies) else DONE
 
@@ -372,3 +360,15 @@ def bench_side_by_side(update: Path | None) -> int:
         rows = list(side_by_side.side_by_side(Native(), instructions=counted, progress=advance))
     put_table(update, "side-by-side", markdown(side_by_side.HEADER, rows))
     return DONE
+
+
+@bench.command(name="long")
+@UPDATE
+@click.option("--only", metavar="ROOM", multiple=True, help="A folder of tests/; repeatable.")
+def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
+    """The long forms of the tests: 40 000 ticks, every build and board, mutants, a browser (an hour)."""
+    from bench import long
+
+    rows = long.long_table(only)
+    put_table(update, "long", markdown(long.HEADER, rows))
+    return DONE if all(row[-1] == "passed" for row in rows) else DIFFERENT

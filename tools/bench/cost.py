@@ -15,6 +15,7 @@ from pathlib import Path
 
 from bench.spread import PERIOD
 from pvid.base.errors import PvidError
+from pvid.core.sources import INCLUDES, ROOT, without
 
 STAGES = {
     "differentiator": "two channels, five points, orders 0 to 4",
@@ -48,11 +49,9 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: 
     PvidError
         When the compiler is missing or refuses.
     """
-    root = Path(__file__).resolve().parents[2]
-    core = [path for path in (root / "firmware" / "src").glob("*.c") if not path.stem.endswith("_q31")]
-    sources = sorted([*core, *(root / "tests" / "cost").glob("*.c")])
+    sources = sorted([*without("q31"), *(ROOT / "tests" / "cost").glob("*.c")])
     binary = folder / "tick_cost"
-    command = [compiler, "-std=c99", level, "-ffp-contract=off", f"-I{root / 'firmware' / 'include'}"]
+    command = [compiler, "-std=c99", level, "-ffp-contract=off", *INCLUDES]
     command += [f"-D{definition}" for definition in ("PVID_PLAIN_NAMES", *definitions)]  # callgrind is given names
     try:
         done = subprocess.run(
@@ -78,8 +77,7 @@ def state_bytes(folder: Path) -> dict[str, int]:
     """Bytes of state with the bounds of pvid/config.h as they are, and the baseline's; works in `folder`."""
     source, binary = folder / "sizes.c", folder / "sizes"
     source.write_text(_SIZES, encoding="utf-8")
-    include = Path(__file__).resolve().parents[2] / "firmware" / "include"
-    subprocess.run(["gcc", "-std=c99", f"-I{include}", str(source), "-o", str(binary)], check=True)
+    subprocess.run(["gcc", "-std=c99", *INCLUDES, str(source), "-o", str(binary)], check=True)
     printed = subprocess.run([str(binary)], capture_output=True, text=True, check=True).stdout
     estimator, strong, weak = map(int, printed.split())
     return {
@@ -136,7 +134,7 @@ def stage_costs(binary: Path) -> list[StageCost]:
 
 
 def as_markdown(by_level: dict[str, list[StageCost]], state: dict[str, int]) -> str:
-    """The table in firmware/README.md from the costs at each level of optimisation."""
+    """The table in host/docs/benchmarks/cost.md from the costs at each level of optimisation."""
     levels = list(by_level)
     lines = ["| stage | " + " | ".join(f"gcc {level}" for level in levels) + " | what it does |"]
     lines.append("|---|" + "---:|" * len(levels) + "---|")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import ROOT
+from pvid.core.sources import FIRMWARE, INCLUDES, PUBLIC_INCLUDES, core_sources, source
 
-CORE = ROOT / "firmware"
-LINK = CORE / "link"
+LINK = FIRMWARE / "link"
 FUZZ = ROOT / "tests" / "fuzz"
 _COMPILER = ("clang", "-std=c99", "-g", "-O1", "-fno-sanitize-recover=all")
 
@@ -25,8 +25,8 @@ def fuzz_link(folder: Path, runs: int, seed: int = 1) -> int:
         When clang is missing, it does not build, or an input breaks the codec; the input is kept in `folder`.
     """
     binary = folder / "fuzz_link"
-    sources = [LINK / "link.c", CORE / "src" / "crc32.c", FUZZ / "fuzz_link.c"]
-    build = [*_COMPILER, "-fsanitize=fuzzer,address,undefined", f"-I{LINK}", f"-I{CORE / 'include'}"]
+    sources = [LINK / "link.c", source("crc32.c"), FUZZ / "fuzz_link.c"]
+    build = [*_COMPILER, "-fsanitize=fuzzer,address,undefined", f"-I{LINK}", *PUBLIC_INCLUDES]
     _run("the link", folder, [*build, *map(str, sources), "-o", str(binary)])
     limits = [f"-runs={runs}", f"-seed={seed}", "-max_len=1200", "-timeout=10", f"-artifact_prefix={folder}/"]
     found = re.search(r"^Done (\d+) runs", _run("the link", folder, [str(binary), *limits]).stderr, re.MULTILINE)
@@ -66,8 +66,8 @@ def fuzz_api(folder: Path, calls: int, seed: int = 1) -> ApiCalls:
     binary = folder / "fuzz_api"
     ignored = f"-fsanitize-ignorelist={ROOT / 'tests' / 'sanitizers.ignore'}"
     sanitizers = ["-fsanitize=address,undefined,float-cast-overflow,integer", ignored, "-Wno-pass-failed"]
-    build = [*_COMPILER, *sanitizers, f"-I{CORE / 'include'}", f"-I{ROOT / 'tests' / 'unit'}"]
-    sources = [FUZZ / "fuzz_api.c", *sorted((CORE / "src").glob("*.c"))]
+    build = [*_COMPILER, *sanitizers, *INCLUDES, f"-I{ROOT / 'tests' / 'unit'}"]
+    sources = [FUZZ / "fuzz_api.c", *core_sources()]
     _run("the core", folder, [*build, *map(str, sources), "-lm", "-o", str(binary)])
     done = _run("the core", folder, [str(binary), str(calls), str(seed)])
     figures = dict(re.findall(r"(\w+) (\d+)", done.stdout.splitlines()[0]))

@@ -116,7 +116,7 @@ def modes() -> Float:
     """Release angles (phi1, phi1 + phi) of the slow and the fast mode with phi = 1 rad, [2, 2]."""
     w, d1, d2 = TRUTH
     big_l2 = d1 - d2 - 1
-    stiffness = w * np.array([[1, -big_l2], [-1, big_l2 + d2]])  # of (phi1, phi), MATH.md (1)
+    stiffness = w * np.array([[1, -big_l2], [-1, big_l2 + d2]])  # of (phi1, phi), theory.md (1)
     squares, shapes = np.linalg.eig(stiffness)
     shapes = shapes[:, np.argsort(squares)]
     return np.asarray([[shape[0] / shape[1], shape[0] / shape[1] + 1] for shape in shapes.T])

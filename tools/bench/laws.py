@@ -1,4 +1,4 @@
-"""The two laws and their limits, on exact derivatives: MATH.md 4's table, measured again in the C core."""
+"""The two laws and their limits, on exact derivatives: theory.md 4, measured in the C core."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import EstimatorConfig, Law, Native
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
+from pvid.settings.enums import Law
+from pvid.settings.f32 import EstimatorConfig
 from pvid.setup.f32 import bank_of, estimator_config
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_start
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig, stream_rig
-from pvid.core.native import Native, WeakConfig
+from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.link.frames import (
     MAX_P,
@@ -30,6 +30,7 @@ from pvid.link.frames import (
     Status,
 )
 from pvid.rig.file import RigFile
+from pvid.settings.f32 import WeakConfig
 from pvid.twin import fnv
 
 SESSION = 7
@@ -94,7 +95,7 @@ def _honest_run() -> tuple[tuple[int, Message], ...]:
     """(tick, message) of a board that does what it should, with the bits of the core on this machine."""
     board = _stream_rig()
     assert isinstance(board.config, WeakConfig)
-    identifier = Native().weak(board.config)
+    identifier = Native().identifier(board.config)
     t = np.arange(TICKS) / RATE
     phi = (0.05 * np.sin(9.0 * t)).astype(np.float32)
     y = (0.004 * np.sin(13.0 * t) + 0.002 * np.sin(31.0 * t)).astype(np.float32)

@@ -22,19 +22,13 @@ import numpy.typing as npt
 from bench.longevity_signals import CHUNK, L1, RATE_HZ, Disturbance, Sensing, Signals
 from pvid.base.errors import PvidError
 from pvid.board.boards import ROOT
-from pvid.core.native import (
-    SIZES,
-    Native,
-    Reason,
-    StrongIdentifier,
-    WeakIdentifier,
-    default_library,
-    strong_config_struct,
-)
-from pvid.core.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
+from pvid.core.headers import Headers, default_library
+from pvid.core.native import Identifier, Native
+from pvid.core.sources import PUBLIC_FOLDERS
 from pvid.rig.file import RigFile
-from pvid.run.compare_q31 import identifier_q31
-from pvid.setup.f32 import strong_config, weak_config
+from pvid.settings.bounds import SIZES
+from pvid.settings.enums import Reason
+from pvid.setup.f32 import config_of, strong_config
 from pvid.setup.q31 import ConfigQ31, config_of_q31, counts_of_samples, p_of, se_of
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Tone
 
@@ -169,7 +163,7 @@ def config_q31_of(lane: Lane) -> ConfigQ31:
 class _Ours(ABC):
     """A lane of the shipped core."""
 
-    identifier: WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdentifierQ31
+    identifier: Identifier
 
     def __init__(self, lane: Lane) -> None:
         self.bias = FILTER_BIAS[lane.kind]
@@ -217,13 +211,11 @@ class _Ours(ABC):
 class _InFloat(_Ours):
     """In float32."""
 
-    identifier: WeakIdentifier | StrongIdentifier
+    identifier: Identifier
 
     def __init__(self, native: Native, lane: Lane) -> None:
         super().__init__(lane)
-        rig = rig_of(lane)
-        weak = lane.kind == "weak"
-        self.identifier = native.weak(weak_config(rig, RATE_HZ)) if weak else native.strong(strong_config(rig, RATE_HZ))
+        self.identifier = native.identifier(config_of(rig_of(lane), RATE_HZ))
 
     def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
         record = self.identifier.run(phi, y, sums=False, hashes=False)
@@ -231,20 +223,20 @@ class _InFloat(_Ours):
 
     def look(self) -> tuple[Float, Float]:
         one = self.identifier
-        seen = one.estimate if isinstance(one, WeakIdentifier) else one.assess()
+        seen = one.estimate if one.publishes else one.assess()
         return seen["p"][:3].astype(np.float64), seen["se"][:3].astype(np.float64)
 
 
 class _InFixedPoint(_Ours):
     """In integers, which are always finite."""
 
-    identifier: WeakIdentifierQ31 | StrongIdentifierQ31
+    identifier: Identifier
 
     def __init__(self, native: Native, lane: Lane) -> None:
         super().__init__(lane)
         self._sensing = lane.sensing
         self._config = config_q31_of(lane)
-        self.identifier = identifier_q31(native, self._config)
+        self.identifier = native.identifier(self._config)
 
     def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
         sensing = self._sensing
@@ -255,7 +247,7 @@ class _InFixedPoint(_Ours):
 
     def look(self) -> tuple[Float, Float]:
         one = self.identifier
-        seen = one.estimate if isinstance(one, WeakIdentifierQ31) else one.assess()
+        seen = one.estimate if one.publishes else one.assess()
         n_p = one.n_p
         return p_of(self._config, seen["p"][:n_p])[:3], se_of(self._config, seen["se"][:n_p])[:3]
 
@@ -272,12 +264,14 @@ class _Peer:
         w, d1, d2 = STANDARD_PENDULUM.linear
         theta = [w, w**2, *(d1 * w**j for j in range(4)), *(d2 * w**j for j in range(5))]
         lam = float(np.exp(-1 / (RATE_HZ * lane.forgetting_s))) if lane.forgetting_s else 1.0
-        config, self._tables = strong_config_struct(strong_config(rig_of(Lane("strong", 0.0)), RATE_HZ))
+        headers = Headers.of(default_library())
+        self._config = headers.filled("pvid_strong_config_f32", strong_config(rig_of(Lane("strong", 0.0)), RATE_HZ))
+        bank = headers.ffi.addressof(self._config.struct, "bank")
         made = library.longevity_peer_init(
             self._state,
             ctypes.c_bool(lane.kind == "UD RLS"),
             ctypes.c_float(lam),
-            ctypes.byref(config.bank),
+            ctypes.c_void_p(int(headers.ffi.cast("uintptr_t", bank))),
             ctypes.c_float(RATE_HZ),
             ctypes.c_float(L1),
             (ctypes.c_float * 11)(*theta),
@@ -314,13 +308,13 @@ def build_library(folder: Path) -> ctypes.CDLL:
 
     What they take of the core comes from the library that is measured.
     """
-    include, here, cost = (ROOT / name for name in ("firmware/include", "tests/longevity", "tests/cost"))
+    here, cost = (ROOT / name for name in ("tests/longevity", "tests/cost"))
     sources = [*sorted(here.glob("*.c")), cost / "rls_f32.c"]
     library, core = folder / LIBRARY, default_library().resolve()
     folder.mkdir(parents=True, exist_ok=True)
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=default"]
     command += SIZES
-    command += [f"-I{path}" for path in (include, here, cost)]
+    command += [f"-I{path}" for path in (*PUBLIC_FOLDERS, here, cost)]
     linked = [str(core), f"-Wl,-rpath,{core.parent}", "-lm"]
     try:
         done = subprocess.run(

@@ -1,4 +1,4 @@
-"""Results of the longevity bench that stay, and the tables of them in host/README.md."""
+"""Results of the longevity bench that stay, and the tables of them in host/docs/benchmarks/longevity.md."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ from bench.longevity import (
 from bench.longevity_signals import BEFORE, HELD_OUT, SCENARIOS, Disturbance
 from pvid.base.errors import PvidError
 from pvid.board.boards import ROOT, one_at_a_time
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
+from pvid.core.sources import FOLDERS, core_sources
+from pvid.settings.enums import Reason
 
 RESULTS = ROOT / "build" / "longevity" / "results.json"
 TICKS = 10_000_000
@@ -44,8 +46,8 @@ Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]  # marker, header, ro
 @cache
 def code_digest(core: str) -> str:
     """Of the C code of a core, as the compiler sees it: comments move nothing. core: f32, q31 or peers."""
-    folders = [ROOT / "firmware" / "include", *(ROOT / "tests" / name for name in ("longevity", "cost"))]
-    sources = sorted((ROOT / "firmware" / "src").glob("*_q31.c" if core == "q31" else "*_f32.c"))
+    folders = [*FOLDERS, *(ROOT / "tests" / name for name in ("longevity", "cost"))]
+    sources = core_sources("*_q31.c" if core == "q31" else "*_f32.c")
     if core == "peers":
         sources += sorted((ROOT / "tests" / "longevity").glob("*.c"))
     command = ["gcc", "-std=c99", "-E", "-P", *(f"-I{folder}" for folder in folders)]

@@ -20,10 +20,9 @@ from bench.longevity_tables import keep, load, measured_with
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.replay_image import MISSING, REPORT_EVERY, ReplayRun, build_image, play
-from pvid.core.native import Native, StrongIdentifier, WeakConfig, WeakIdentifier
-from pvid.core.native_q31 import StrongIdentifierQ31, WeakIdentifierQ31
+from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
-from pvid.run.compare_q31 import identifier_q31
+from pvid.settings.f32 import WeakConfig
 from pvid.setup.f32 import config_of
 from pvid.setup.q31 import config_of_q31
 
@@ -78,14 +77,14 @@ def run_of(library: ctypes.CDLL, scenario: str, form: str, core: str, ticks: int
 
 def host_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash on this machine after every REPORT_EVERY ticks; memory does not grow with the run."""
-    identifier: WeakIdentifier | StrongIdentifier | WeakIdentifierQ31 | StrongIdentifierQ31
+    identifier: Identifier
     samples: tuple[npt.NDArray[np.generic], npt.NDArray[np.generic]]
     if run.fixed is not None:
-        identifier, samples = identifier_q31(native, run.fixed), (run.counts[:, 0], run.counts[:, 1])
+        identifier, samples = native.identifier(run.fixed), (run.counts[:, 0], run.counts[:, 1])
     elif isinstance(run.config, WeakConfig):
-        identifier, samples = native.weak(run.config), (run.phi, run.y)
+        identifier, samples = native.identifier(run.config), (run.phi, run.y)
     else:
-        identifier, samples = native.strong(run.config), (run.phi, run.y)
+        identifier, samples = native.identifier(run.config), (run.phi, run.y)
     parts = []
     for at in range(0, run.ticks, CHUNK):
         phi, y = (x[at : at + CHUNK] for x in samples)

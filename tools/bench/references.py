@@ -1,6 +1,6 @@
 """What the weak form is measured against: offline output error and an extended Kalman filter, in float64.
 
-Both take the linear model phi'' = G q, q'' = -d1 G q - d2 G phi with G = w + u (MATH.md 5), the measured angle
+Both take the linear model phi'' = G q, q'' = -d1 G q - d2 G phi with G = w + u (theory.md 5), the measured angle
 sample by sample, and u from the measured pivot through the weak form's own second derivative.
 """
 

@@ -105,7 +105,7 @@ def run_case(native: Native, case: Case) -> Outcome:
     for seed in range(case.seeds):
         sensors = replace(standard_sensors(case.bits), phi_zero=case.zero)
         run = simulate(pendulum, sensors=sensors, truth=case.truth, seed=seed).run
-        identifier = native.weak(weak_config(rig, RATE_HZ, standard_start(seed)))
+        identifier = native.identifier(weak_config(rig, RATE_HZ, standard_start(seed)))
         record = identifier.run(run.phi, run.y, sums=False, hashes=False)
         last = identifier.estimate
         p = last["p"][:3].astype(np.float64)

@@ -47,9 +47,9 @@ extern const float pvid_five_points_f32[PVID_ORDERS * 2];
 typedef struct {
     pvid_fir_bank_f32 bank;
     float rate_power[PVID_ORDERS - 1]; /* rate^1..rate^4 [1/s^k] */
-    uint16_t length;               /* samples in the window */
-    uint16_t head;                 /* place of the oldest sample */
-    uint16_t filled;               /* samples since the reset, at most length */
+    uint16_t length;                   /* samples in the window */
+    uint16_t head;                     /* place of the oldest sample */
+    uint16_t filled;                   /* samples since the reset, at most length */
     float history[PVID_MAX_WINDOW];
 } pvid_differentiator_f32;
 

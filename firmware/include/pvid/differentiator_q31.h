@@ -40,14 +40,14 @@ extern "C" {
  * times 2^-shift. A format is the design tool's affair: an order k whose weights are 2^b times those of a derivative
  * per time unit^k comes out in 2^(shift - b) counts per time unit^k. */
 typedef struct {
-    uint16_t half;    /* points on each side, 2..; 2 half stride + 1 <= PVID_MAX_WINDOW */
-    uint16_t stride;  /* samples between points, 1.. */
-    int32_t phi_max;  /* full scale of the counts, 1..PVID_COUNTS_LIMIT_Q31 */
+    uint16_t half;   /* points on each side, 2..; 2 half stride + 1 <= PVID_MAX_WINDOW */
+    uint16_t stride; /* samples between points, 1.. */
+    int32_t phi_max; /* full scale of the counts, 1..PVID_COUNTS_LIMIT_Q31 */
     int32_t y_max;
-    int32_t centre;   /* 1..2^30 */
+    int32_t centre;                     /* 1..2^30 */
     uint8_t phi_shift[PVID_ORDERS];     /* 0..62 */
     uint8_t y_shift[PVID_Y_ORDERS_Q31]; /* of orders 2, 3, 4 */
-    const PVID_TABLE int32_t *weights; /* [PVID_ORDERS][half]; kept by reference */
+    const PVID_TABLE int32_t *weights;  /* [PVID_ORDERS][half]; kept by reference */
 } pvid_fir_bank_q31;
 
 /* Central differences on five points in twelfths: centre 12, no shift, exact. */
@@ -57,14 +57,14 @@ extern const PVID_TABLE int32_t pvid_five_points_q31[PVID_ORDERS * 2];
 /* Only the functions below write to it. */
 typedef struct {
     pvid_fir_bank_q31 bank;
-    uint16_t length; /* samples in the window */
-    uint16_t head;   /* place of the oldest sample */
-    uint16_t filled; /* samples since the reset, at most length */
+    uint16_t length;                     /* samples in the window */
+    uint16_t head;                       /* place of the oldest sample */
+    uint16_t filled;                     /* samples since the reset, at most length */
     int32_t history[PVID_MAX_WINDOW][2]; /* phi, y */
 } pvid_differentiator_q31;
 
-/* Prepares `self`. Fails iff the bank is not as described above; the status names the field. Where counts within full scale
- * could overflow it that is PVID_BAD_FULL_SCALE for a product with a weight, PVID_BAD_SHIFT for their sum. */
+/* Prepares `self`. Fails iff the bank is not as described above; the status names the field. Where counts within full
+ * scale could overflow it that is PVID_BAD_FULL_SCALE for a product with a weight, PVID_BAD_SHIFT for their sum. */
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
 
 /* Empties the window: after a gap the samples no longer stand at equal distances. */

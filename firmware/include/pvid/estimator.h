@@ -59,45 +59,46 @@ typedef struct {
     float start_sd[PVID_MAX_P]; /* its standard deviation [units of p], > 0: H0 = (row_sd / start_sd)^2 */
     float lower[PVID_MAX_P];    /* bounds of p [units of p]; > 0 where the model says positive */
     float upper[PVID_MAX_P];
-    float row_sd;               /* expected standard deviation of Y - N^T theta [units of Y], > 0 */
-    float update_rate_hz;       /* groups of rows a second, 1e-6..1e6 */
-    float forgetting_s;         /* time constant of forgetting; 0: none; else at least 4 groups */
-    float feedback_hz;          /* stationary law: g = feedback_hz * time between solves, at most 1;
-                                   0: g = 1, a Gauss-Newton step at every solve */
-    float correlation;          /* rows that carry the information of one independent row, >= 1:
-                                   widens the standard errors when filters overlap */
-    float row_weight;           /* independent rows that a row counts for, 0 < . <= 1: (K - 2)/K where K rows
-                                   lost 2 degrees of freedom; 1 where the model accumulates by itself */
-    float step_limit;           /* largest |dp/p| (|dp|/start_sd where p may be zero), 0 < . <= 0.9 */
-    float kappa_min;            /* no step while kappa of S + H0 is below this, or while the data say
-                                   less of p[0] than the start does, 0..1; 0: always step */
-    float noise_margin;         /* no step while the data say less than so many times what noise of row_sd
-                                   alone would (for models that know it), 0..1e6; 0: do not ask */
-    float dead_zone;            /* no step while p is within so many standard errors of the data's solution,
-                                   0..100; 0: no dead zone */
+    float row_sd;         /* expected standard deviation of Y - N^T theta [units of Y], > 0 */
+    float update_rate_hz; /* groups of rows a second, 1e-6..1e6 */
+    float forgetting_s;   /* time constant of forgetting; 0: none; else at least 4 groups */
+    float feedback_hz;    /* stationary law: g = feedback_hz * time between solves, at most 1;
+                             0: g = 1, a Gauss-Newton step at every solve */
+    float correlation;    /* rows that carry the information of one independent row, >= 1:
+                             widens the standard errors when filters overlap */
+    float row_weight;     /* independent rows that a row counts for, 0 < . <= 1: (K - 2)/K where K rows
+                             lost 2 degrees of freedom; 1 where the model accumulates by itself */
+    float step_limit;     /* largest |dp/p| (|dp|/start_sd where p may be zero), 0 < . <= 0.9 */
+    float kappa_min;      /* no step while kappa of S + H0 is below this, or while the data say
+                             less of p[0] than the start does, 0..1; 0: always step */
+    float noise_margin;   /* no step while the data say less than so many times what noise of row_sd
+                             alone would (for models that know it), 0..1e6; 0: do not ask */
+    float dead_zone;      /* no step while p is within so many standard errors of the data's solution,
+                             0..100; 0: no dead zone */
     pvid_law law;
-    uint16_t divider;           /* groups of rows a solve, 1.. */
+    uint16_t divider; /* groups of rows a solve, 1.. */
 } pvid_estimator_config_f32;
 
 /* Defaults: stationary law, Gauss-Newton at every tick, no forgetting, row_weight 1, step_limit 0.3,
- * kappa_min 1e-5, noise_margin 16, no dead zone. Copy, then set model, start, start_sd, bounds, row_sd and update_rate_hz. */
+ * kappa_min 1e-5, noise_margin 16, no dead zone. Copy, then set model, start, start_sd, bounds, row_sd and
+ * update_rate_hz. */
 extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
 
 typedef struct {
-    uint32_t rows;               /* rows taken in */
-    uint32_t updates;            /* steps of p */
-    uint32_t limited;            /* of those, shortened to step_limit */
-    uint32_t bounded;            /* of those, stopped at a bound */
+    uint32_t rows;    /* rows taken in */
+    uint32_t updates; /* steps of p */
+    uint32_t limited; /* of those, shortened to step_limit */
+    uint32_t bounded; /* of those, stopped at a bound */
     uint32_t held_not_excited;
     uint32_t held_pivot;
     uint32_t rejected_not_finite;
     uint32_t rejected_saturated;
-    uint32_t held_uncertain;      /* groups after which nothing was published: see trust.h */
-    uint32_t held_out_of_range;   /* windows dropped because the angle was too large */
-    uint32_t misfits;             /* groups published, or updates told, under the alarm */
-    uint32_t rejected_outlier;    /* rows or windows that the gate kept out: see gate.h */
-    uint32_t at_rest;             /* solves within the dead zone: p stayed */
-} pvid_counters; /* each stops at 2^32 - 1 */
+    uint32_t held_uncertain;    /* groups after which nothing was published: see trust.h */
+    uint32_t held_out_of_range; /* windows dropped because the angle was too large */
+    uint32_t misfits;           /* groups published, or updates told, under the alarm */
+    uint32_t rejected_outlier;  /* rows or windows that the gate kept out: see gate.h */
+    uint32_t at_rest;           /* solves within the dead zone: p stayed */
+} pvid_counters;                /* each stops at 2^32 - 1 */
 
 /* State; only the functions below write to it. */
 typedef struct {
@@ -111,19 +112,19 @@ typedef struct {
     float lower[PVID_MAX_P];
     float upper[PVID_MAX_P];
     float row_variance;
-    float gain;                   /* g */
+    float gain; /* g */
     float correlation;
     float step_limit;
     float kappa_min;
     float noise_margin;
-    float dead_zone;              /* squared */
+    float dead_zone;                /* squared */
     float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; written by the module that makes the rows */
-    float energy;                 /* sum of e^2 of the rows since the last group's end, at the p they met */
-    float taken;                  /* their weight; these two only for models without functions of their own */
-    float expected;               /* mean over the rows in the sums of the variance that the sensors' noise gives them
-                                     [units of Y^2]: no residual variance is taken for smaller. 0: nobody has said */
+    float energy;                   /* sum of e^2 of the rows since the last group's end, at the p they met */
+    float group_weight;             /* their weight; these two only for models without functions of their own */
+    float expected;                 /* mean over the rows in the sums of the variance that the sensors' noise gives them
+                                       [units of Y^2]: no residual variance is taken for smaller. 0: nobody has said */
     uint16_t divider;
-    uint16_t phase;               /* groups since the last solve */
+    uint16_t phase; /* groups since the last solve */
     pvid_counters counters;
 } pvid_estimator_f32;
 
@@ -139,8 +140,8 @@ typedef struct {
 /* What is published. Always finite. */
 typedef struct {
     float p[PVID_MAX_P];
-    float se[PVID_MAX_P];                      /* standard errors; start_sd where data say nothing */
-    float covariance[PVID_MAX_P][PVID_MAX_P];  /* of p, symmetric */
+    float se[PVID_MAX_P];                     /* standard errors; start_sd where data say nothing */
+    float covariance[PVID_MAX_P][PVID_MAX_P]; /* of p, symmetric */
     float kappa;       /* part of p[0]'s information that the other parameters cannot imitate, 0..1 */
     float least_pivot; /* least part of any parameter's information that those after it cannot imitate, 0..1: near
                           1e-6 it is made by the rounding of float32 */
@@ -152,25 +153,25 @@ typedef struct {
 } pvid_estimate_f32;
 
 /* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be
- * read when it is complete, refuge may be set after begin. */
+ * read when it is complete, fallback may be set after begin. */
 typedef struct {
     pvid_reason reason;
-    const float *refuge; /* [n_p] where p goes if it may not step; NULL: it stays */
+    const float *fallback;       /* [n_p] where p goes if it may not step; NULL: it stays */
     pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
-    float size;      /* largest |dp/p| of the step before its limit; 0 while p is held */
-    float energy;    /* sum of e^2 of the group's rows at the p they met */
-    float variance;  /* of a row's noise */
-    bool informed;   /* the data say more than noise does */
+    float size;                  /* largest |dp/p| of the step before its limit; 0 while p is held */
+    float energy;                /* sum of e^2 of the group's rows at the p they met */
+    float variance;              /* of a row's noise */
+    bool above_noise;            /* the data say more than noise does */
     bool solvable;
     uint8_t stage;
-    uint8_t index;   /* of the row within the stage */
-    uint8_t start;   /* of the column of C in work among its non-zeros */
-    uint8_t next;    /* non-zero to be multiplied next */
+    uint8_t index; /* of the row within the stage */
+    uint8_t start; /* of the column of C in work among its non-zeros */
+    uint8_t next;  /* non-zero to be multiplied next */
     bool ends_group;
-    bool rests;      /* within the dead zone: no step is taken */
+    bool in_dead_zone; /* within the dead zone: no step is taken */
     float gain;
-    float fall;      /* of rr */
-    float scale;     /* sum of M_ii dtheta_i^2: the size of the terms that cancel to it */
+    float fall;  /* of rr */
+    float scale; /* sum of M_ii dtheta_i^2: the size of the terms that cancel to it */
     float sums[PVID_MAX_SUMS];
     float c[PVID_MAX_THETA * PVID_MAX_P];
     float column[PVID_MAX_THETA]; /* M times a column of C */
@@ -228,7 +229,7 @@ void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32
  * true. `estimate` must stay where it is meanwhile. */
 void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
                                          pvid_estimate_f32 *estimate);
-bool pvid_estimator_assess_on_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);
+bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);
 uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self);
 
 #ifdef __cplusplus

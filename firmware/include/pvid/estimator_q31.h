@@ -39,21 +39,21 @@ typedef struct {
     int32_t start_sd[PVID_MAX_P]; /* its standard deviation, > 0, in the format of p */
     int32_t lower[PVID_MAX_P];    /* bounds of p; > 0 where the model says positive */
     int32_t upper[PVID_MAX_P];
-    int8_t p_bits[PVID_MAX_P];    /* -64..64 */
+    int8_t p_bits[PVID_MAX_P];         /* -64..64 */
     int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of N, -64..64 */
-    int8_t y_bits;                /* format of Y, -64..64 */
-    int32_t row_sd;               /* expected standard deviation of Y - N^T theta, > 0 [2^-8 units of Y's integer] */
-    uint32_t forgetting_groups;   /* time constant of forgetting in groups of rows, 0: none, else 4..2^24 */
-    int32_t gain;                 /* g in Q30: 2^30 a Gauss-Newton step at every solve, 0 the paper's law */
-    uint32_t correlation;         /* Q16, 2^16..2^31: see estimator.h */
-    uint32_t row_weight;          /* Q16, 1..2^16 */
-    uint32_t step_limit;          /* Q16, 1..0.9: largest |dp/p| (|dp|/start_sd where p may be zero) */
-    int32_t kappa_min;            /* Q30, 0..0.999 */
-    uint32_t noise_margin;        /* Q16: no step while the data say less than so many times what noise of row_sd
-                                     would; 0: not asked. For models that know what noise makes */
-    uint32_t dead_zone;           /* Q16, 0..100: no step while p is within so many standard errors of where the data
-                                     want it, see estimator.h; 0: no dead zone */
-    uint16_t divider;             /* groups of rows a solve, 1.. */
+    int8_t y_bits;                     /* format of Y, -64..64 */
+    int32_t row_sd;             /* expected standard deviation of Y - N^T theta, > 0 [2^-8 units of Y's integer] */
+    uint32_t forgetting_groups; /* time constant of forgetting in groups of rows, 0: none, else 4..2^24 */
+    int32_t gain;               /* g in Q30: 2^30 a Gauss-Newton step at every solve, 0 the paper's law */
+    uint32_t correlation;       /* Q16, 2^16..2^31: see estimator.h */
+    uint32_t row_weight;        /* Q16, 1..2^16 */
+    uint32_t step_limit;        /* Q16, 1..0.9: largest |dp/p| (|dp|/start_sd where p may be zero) */
+    int32_t kappa_min;          /* Q30, 0..0.999 */
+    uint32_t noise_margin;      /* Q16: no step while the data say less than so many times what noise of row_sd
+                                   would; 0: not asked. For models that know what noise makes */
+    uint32_t dead_zone;         /* Q16, 0..100: no step while p is within so many standard errors of where the data
+                                   want it, see estimator.h; 0: no dead zone */
+    uint16_t divider;           /* groups of rows a solve, 1.. */
 } pvid_estimator_config_q31;
 
 /* m 2^e: 2^29 <= |m| <= 2^30, or 0. */
@@ -74,7 +74,7 @@ typedef struct {
 /* The sums M, b, rr and weight. */
 typedef struct {
     uint8_t n_theta;
-    uint8_t exponent;  /* M, b and rr stand divided by 4^exponent */
+    uint8_t exponent; /* M, b and rr stand divided by 4^exponent */
     uint16_t n_sums;
     uint16_t block;    /* groups of rows between acts of forgetting */
     uint16_t age;      /* groups since the last one */
@@ -88,14 +88,14 @@ typedef struct {
     const pvid_model_q31 *model;
     pvid_information_q31 information;
     int32_t p[PVID_MAX_P];
-    int64_t theta[PVID_MAX_THETA_Q31];     /* f(p) */
-    int32_t mantissa[PVID_MAX_THETA_Q31];  /* of theta, 30 bits, */
-    int16_t shift[PVID_MAX_THETA_Q31];     /* and what N_i mantissa_i is shifted right by to be in units of Y */
-    int64_t fresh[PVID_MAX_THETA_Q31];     /* sum N e since the last solve; only while g < 1 */
-    int16_t align[PVID_MAX_THETA_Q31];     /* N_i theta_i 2^-align is in units of Y */
+    int64_t theta[PVID_MAX_THETA_Q31];    /* f(p) */
+    int32_t mantissa[PVID_MAX_THETA_Q31]; /* of theta, 30 bits, */
+    int16_t shift[PVID_MAX_THETA_Q31];    /* and what N_i mantissa_i is shifted right by to be in units of Y */
+    int64_t fresh[PVID_MAX_THETA_Q31];    /* sum N e since the last solve; only while g < 1 */
+    int16_t align[PVID_MAX_THETA_Q31];    /* N_i theta_i 2^-align is in units of Y */
     int16_t theta_bits[PVID_MAX_THETA_Q31];
-    int16_t c_exponent[PVID_MAX_C_Q31];    /* C_k 2^c_exponent: units of Y per N and p */
-    int32_t prior[PVID_MAX_P];             /* H0 = prior 2^-prior_exponent */
+    int16_t c_exponent[PVID_MAX_C_Q31]; /* C_k 2^c_exponent: units of Y per N and p */
+    int32_t prior[PVID_MAX_P];          /* H0 = prior 2^-prior_exponent */
     int16_t prior_exponent[PVID_MAX_P];
     int32_t start_sd[PVID_MAX_P];
     int32_t lower[PVID_MAX_P];
@@ -108,10 +108,10 @@ typedef struct {
     uint32_t noise_margin;
     uint32_t dead_zone;
     pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by the module that makes the rows */
-    int64_t energy; /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
-    int64_t taken;  /* their weight, Q16 */
-    pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them [units
-                                 of Y's integer squared]: residual variances are at least this. 0: not set */
+    int64_t energy;       /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
+    int64_t group_weight; /* their weight, Q16 */
+    pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them
+                                 [units of Y's integer squared]: residual variances are at least this. 0: not set */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
     pvid_counters counters;
@@ -135,35 +135,35 @@ typedef struct {
 } pvid_cholesky_q31;
 
 /* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be read when it is
- * complete, refuge may be set after begin. */
+ * complete, fallback may be set after begin. */
 typedef struct {
     pvid_reason reason;
     uint8_t stage;
     uint8_t index; /* of the row within the stage */
     uint8_t start; /* of the column of C in work among its non-zeros */
     bool ends_group;
-    bool judging;    /* an assessment */
-    bool informed;   /* the data say more than noise does */
-    bool has_refuge;
-    bool rests;      /* within the dead zone: no step is taken */
-    int32_t refuge[PVID_MAX_P]; /* where p goes if it may not step */
-    int64_t size;    /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
-    int64_t energy;  /* sum of e^2 of the group's rows at the p they met */
-    pvid_scaled_q31 variance; /* of a row's noise, divided by 4^exponent as the sums are */
-    pvid_root_q31 wide;       /* root of the variance that standard errors are made of */
+    bool judging;     /* an assessment */
+    bool above_noise; /* the data say more than noise does */
+    bool has_fallback;
+    bool in_dead_zone;                      /* within the dead zone: no step is taken */
+    int32_t fallback[PVID_MAX_P];           /* where p goes if it may not step */
+    int64_t size;                           /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
+    int64_t energy;                         /* sum of e^2 of the group's rows at the p they met */
+    pvid_scaled_q31 variance;               /* of a row's noise, divided by 4^exponent as the sums are */
+    pvid_root_q31 wide;                     /* root of the variance that standard errors are made of */
     int32_t column[PVID_MAX_P][PVID_MAX_P]; /* of an inverted factor, and */
     pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
     int32_t gain;
-    int32_t m[PVID_MAX_MOMENTS_Q31];     /* M_ij = m_ij 2^(h_i + h_j) */
+    int32_t m[PVID_MAX_MOMENTS_Q31]; /* M_ij = m_ij 2^(h_i + h_j) */
     int16_t h[PVID_MAX_THETA_Q31];
-    int32_t c[PVID_MAX_C_Q31];           /* C_k = c_k 2^(f_column - h_row) */
+    int32_t c[PVID_MAX_C_Q31]; /* C_k = c_k 2^(f_column - h_row) */
     int16_t f[PVID_MAX_P];
-    int32_t force[PVID_MAX_THETA_Q31];   /* what drives the step, by rows: 2^(force_exponent + h_row) */
+    int32_t force[PVID_MAX_THETA_Q31]; /* what drives the step, by rows: 2^(force_exponent + h_row) */
     int32_t force_exponent;
-    int64_t s[PVID_MAX_P][PVID_MAX_P];   /* C^T M C + H0, in units of 2^(f_a + f_b + 32) */
-    int64_t first_prior;                 /* H0 of p[0], in the units of s */
+    int64_t s[PVID_MAX_P][PVID_MAX_P]; /* C^T M C + H0, in units of 2^(f_a + f_b + 32) */
+    int64_t first_prior;               /* H0 of p[0], in the units of s */
     int16_t g[PVID_MAX_P];
-    int32_t q[PVID_MAX_P][PVID_MAX_P];   /* s_ab 2^-(g_a + g_b), which is factored */
+    int32_t q[PVID_MAX_P][PVID_MAX_P]; /* s_ab 2^-(g_a + g_b), which is factored */
     pvid_cholesky_q31 factor;
     int64_t dp[PVID_MAX_P];
     int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved */
@@ -178,11 +178,11 @@ typedef struct {
     int32_t p[PVID_MAX_P];  /* in the formats p_bits */
     int32_t se[PVID_MAX_P]; /* standard errors in the same formats; start_sd where data say nothing */
     int32_t correlation[PVID_MAX_P][PVID_MAX_P]; /* of the errors, Q30: covariance_ab = se_a se_b correlation_ab */
-    int32_t kappa;          /* Q30, 0..1: see estimator.h */
-    int32_t least_pivot;    /* likewise */
-    int32_t residual_sd;    /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1: see estimator.h */
-    uint32_t weight;        /* rows remembered */
-    int32_t misfit;         /* Q16, at most 2^31 - 1: see estimator.h; 0: not known */
+    int32_t kappa;                               /* Q30, 0..1: see estimator.h */
+    int32_t least_pivot;                         /* likewise */
+    int32_t residual_sd; /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1: see estimator.h */
+    uint32_t weight;     /* rows remembered */
+    int32_t misfit;      /* Q16, at most 2^31 - 1: see estimator.h; 0: not known */
 } pvid_estimate_q31;
 
 /* Prepares `self`. Fails iff a field of config is not as described there; the status names it:
@@ -216,8 +216,8 @@ void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31
 /* The same in stages: begin, then assess_on until it returns true. */
 void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
                                          pvid_estimate_q31 *estimate);
-bool pvid_estimator_assess_on_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
-                                  pvid_estimate_q31 *estimate);
+bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                       pvid_estimate_q31 *estimate);
 uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self);
 
 #ifdef __cplusplus

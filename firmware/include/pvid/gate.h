@@ -31,12 +31,12 @@ typedef struct {
 
 /* State; only the functions below write to it. */
 typedef struct {
-    float limit;      /* sigmas^2; 0: no gate */
-    float memory;     /* residuals that the scale remembers */
-    float floor;      /* least scale */
-    float widening;   /* factor on the scale at an outlier */
-    float judged;     /* residuals taken in; stops at memory */
-    float scale;      /* mean square of what passed */
+    float limit;    /* sigmas^2; 0: no gate */
+    float memory;   /* residuals that the scale remembers */
+    float floor;    /* least scale */
+    float widening; /* factor on the scale at an outlier */
+    float judged;   /* residuals taken in; stops at memory */
+    float scale;    /* mean square of what passed */
 } pvid_gate_f32;
 
 /* Prepares `self` for residuals that come at rate_hz, of which the scale remembers `memory` (at least 1) and whose mean

@@ -1,4 +1,5 @@
-/* pvid/misfit_q31.h - tells when the fixed-point strong form leaves more unexplained than it should: misfit.h in integers.
+/* pvid/misfit_q31.h - tells when the fixed-point strong form leaves more unexplained than it should: misfit.h in
+ * integers.
  *
  * The same blocks, the same part q and the same thresholds: see there. The squares of up to 64 rows are exact 64-bit
  * sums; what these add up to, and what is judged, are numbers of 30 digits with an exponent, whose range no block ends.

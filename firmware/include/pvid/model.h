@@ -31,12 +31,12 @@ extern "C" {
 typedef struct pvid_model_f32 pvid_model_f32;
 
 struct pvid_model_f32 {
-    uint8_t n_theta;   /* entries of theta and N, 1..PVID_MAX_THETA */
-    uint8_t n_p;       /* free parameters, 1..PVID_MAX_P; p[0] is the one kappa speaks of */
-    uint8_t n_gated;   /* the first so many are what the gates look at, the others only absorb; 0: all */
+    uint8_t n_theta;    /* entries of theta and N, 1..PVID_MAX_THETA */
+    uint8_t n_p;        /* free parameters, 1..PVID_MAX_P; p[0] is the one kappa speaks of */
+    uint8_t n_gated;    /* the first so many are what the gates look at, the others only absorb; 0: all */
     uint16_t n_moments; /* distinct entries of M kept, 1..PVID_MAX_MOMENTS */
-    uint16_t n_c;      /* structural non-zeros of C */
-    uint32_t positive; /* bit i set: p[i] > 0 always, steps and start_sd are taken relative to it */
+    uint16_t n_c;       /* structural non-zeros of C */
+    uint32_t positive;  /* bit i set: p[i] > 0 always, steps and start_sd are taken relative to it */
 
     const uint8_t *c_row;    /* [n_c] row in theta of each non-zero of C, ascending in a column */
     const uint8_t *c_column; /* [n_c] its column (index in p), ascending */

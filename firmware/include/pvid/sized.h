@@ -22,12 +22,11 @@
 #define PVID_ENUM_SIZE 0
 #endif
 
-#define PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers, \
-                      enums)                                                                                          \
-    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak  \
-        ##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_enum##enums
-#define PVID_SIZED_OF(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers, \
-                      enums)                                                                                          \
+#define PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
+                      integers, enums)                                                                                 \
+    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_enum##enums
+#define PVID_SIZED_OF(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
+                      integers, enums)                                                                                 \
     PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers,    \
                   enums)
 #define PVID_SIZED(name)                                                                                               \
@@ -57,7 +56,7 @@
 #define pvid_estimator_place_f32 PVID_SIZED(pvid_estimator_place_f32)
 #define pvid_estimator_assess_f32 PVID_SIZED(pvid_estimator_assess_f32)
 #define pvid_estimator_begin_assessment_f32 PVID_SIZED(pvid_estimator_begin_assessment_f32)
-#define pvid_estimator_assess_on_f32 PVID_SIZED(pvid_estimator_assess_on_f32)
+#define pvid_estimator_assess_advance_f32 PVID_SIZED(pvid_estimator_assess_advance_f32)
 #define pvid_estimator_assessment_stages_f32 PVID_SIZED(pvid_estimator_assessment_stages_f32)
 #define pvid_estimator_defaults_f32 PVID_SIZED(pvid_estimator_defaults_f32)
 
@@ -72,7 +71,7 @@
 #define pvid_estimator_stages_q31 PVID_SIZED(pvid_estimator_stages_q31)
 #define pvid_estimator_assess_q31 PVID_SIZED(pvid_estimator_assess_q31)
 #define pvid_estimator_begin_assessment_q31 PVID_SIZED(pvid_estimator_begin_assessment_q31)
-#define pvid_estimator_assess_on_q31 PVID_SIZED(pvid_estimator_assess_on_q31)
+#define pvid_estimator_assess_advance_q31 PVID_SIZED(pvid_estimator_assess_advance_q31)
 #define pvid_estimator_assessment_stages_q31 PVID_SIZED(pvid_estimator_assessment_stages_q31)
 
 /* fnv.h */
@@ -140,17 +139,17 @@
 /* trust.h */
 #define pvid_trust_init_f32 PVID_SIZED(pvid_trust_init_f32)
 #define pvid_trust_place_f32 PVID_SIZED(pvid_trust_place_f32)
-#define pvid_trust_age_f32 PVID_SIZED(pvid_trust_age_f32)
-#define pvid_trust_ageing_f32 PVID_SIZED(pvid_trust_ageing_f32)
-#define pvid_trust_widest_f32 PVID_SIZED(pvid_trust_widest_f32)
-#define pvid_trust_refuge_f32 PVID_SIZED(pvid_trust_refuge_f32)
+#define pvid_trust_renew_f32 PVID_SIZED(pvid_trust_renew_f32)
+#define pvid_trust_fade_factor_f32 PVID_SIZED(pvid_trust_fade_factor_f32)
+#define pvid_trust_largest_error_f32 PVID_SIZED(pvid_trust_largest_error_f32)
+#define pvid_trust_fallback_f32 PVID_SIZED(pvid_trust_fallback_f32)
 #define pvid_trust_judge_f32 PVID_SIZED(pvid_trust_judge_f32)
 
 /* trust_q31.h */
 #define pvid_trust_init_q31 PVID_SIZED(pvid_trust_init_q31)
 #define pvid_trust_place_q31 PVID_SIZED(pvid_trust_place_q31)
-#define pvid_trust_ageing_q31 PVID_SIZED(pvid_trust_ageing_q31)
-#define pvid_trust_refuge_q31 PVID_SIZED(pvid_trust_refuge_q31)
+#define pvid_trust_fade_factor_q31 PVID_SIZED(pvid_trust_fade_factor_q31)
+#define pvid_trust_fallback_q31 PVID_SIZED(pvid_trust_fallback_q31)
 #define pvid_trust_judge_q31 PVID_SIZED(pvid_trust_judge_q31)
 
 /* weak.h */

@@ -18,9 +18,9 @@
  * write leaves that one to be found. How bytes get into flash is the caller's business; they may be written in any
  * order.
  *
- * What a snapshot is good for: the same build (release, sizes, byte order, width of pointers: all in `layout`), the same
- * form and core, the same configuration with the same tables. Pointers are not saved: they stay what init made of them.
- * The checksum guards against accident, not against malice. Not thread-safe: no tick while one of these works.
+ * What a snapshot is good for: the same build (release, sizes, byte order, width of pointers: all in `layout`), the
+ * same form and core, the same configuration with the same tables. Pointers are not saved: they stay what init made of
+ * them. The checksum guards against accident, not against malice. Not thread-safe: no tick while one of these works.
  *
  * Layout of a snapshot, all numbers little-endian:
  *    0 magic "PVSS"   4 bytes in all   8 version, that of the library   12 kind   16 layout   20 configuration

@@ -26,13 +26,13 @@ extern "C" {
 #endif
 
 typedef struct {
-    float sample_rate_hz;     /* 1e-3..1e6 */
-    float l1;                 /* length of rod 1 [m], > 0 */
-    float drive_min;          /* rms of u = y_A''/l1 [1/s^2] over the last second below which the pivot
-                                 counts as still and no row is taken in; some ten times the noise of u.
-                                 0: every row is taken in */
-    pvid_fir_bank_f32 bank;   /* for both channels; the weights must outlive the identifier */
-    pvid_gate_config_f32 gate; /* on the innovation of a row */
+    float sample_rate_hz;                /* 1e-3..1e6 */
+    float l1;                            /* length of rod 1 [m], > 0 */
+    float drive_min;                     /* rms of u = y_A''/l1 [1/s^2] over the last second below which the pivot
+                                            counts as still and no row is taken in; some ten times the noise of u.
+                                            0: every row is taken in */
+    pvid_fir_bank_f32 bank;              /* for both channels; the weights must outlive the identifier */
+    pvid_gate_config_f32 gate;           /* on the innovation of a row */
     pvid_estimator_config_f32 estimator; /* model and update_rate_hz are filled in by init */
 } pvid_strong_config_f32;
 
@@ -44,7 +44,7 @@ typedef struct {
     float drive_forgetting; /* part of it that a tick replaces */
     float drive_min;        /* mean square below which no row is taken in */
     bool frozen;
-    bool alarm;             /* the last block of rows was a misfit: see misfit.h */
+    bool alarm; /* the last block of rows was a misfit: see misfit.h */
     pvid_gate_f32 gate;
     pvid_misfit_f32 misfit;
     pvid_estimator_f32 estimator;

@@ -42,14 +42,14 @@ typedef struct {
                             PVID_TRUST_LONG groups and more; half as much again on the mean over the last
                             PVID_TRUST_SHORT ones. At least 1; 0: no alarm */
     uint16_t groups_min; /* groups before the first publication */
-    uint16_t shut_max;   /* consecutive groups with too little information for a step, after which p is reset to the
-                            published one, so that it does not stay where noise moved it; 0: never */
-    float renewal;       /* the past is renewed once p has settled so far from where its rows came in, in one of its
-                            positive parameters and relative to it, while the residuals of all rows are beyond the
-                            alarm's limit; 0.01..1e3; 0: never */
+    uint16_t revert_after; /* consecutive groups with too little information for a step, after which p is reset to the
+                          published one, so that it does not stay where noise moved it; 0: never */
+    float renewal;         /* the past is renewed once p has settled so far from where its rows came in, in one of its
+                              positive parameters and relative to it, while the residuals of all rows are beyond the
+                              alarm's limit; 0.01..1e3; 0: never */
 } pvid_trust_config_f32;
 
-/* kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, shut_max 16, renewal 20 %. */
+/* kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %. */
 extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 
 #define PVID_TRUST_SHORT 8
@@ -58,18 +58,18 @@ extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 /* State; only the functions below write to it. */
 typedef struct {
     pvid_trust_config_f32 config;
-    uint16_t groups;  /* taken in; stops at its end */
-    uint16_t shut;    /* groups in a row that said too little */
-    uint16_t judged;  /* residuals in long_mean; stops at long_memory; none before p is near */
+    uint16_t groups;        /* taken in; stops at its end */
+    uint16_t uninformative; /* groups in a row that said too little */
+    uint16_t judged;        /* residuals in long_mean; stops at long_memory; none before p is near */
     uint16_t long_memory;
-    uint8_t next;     /* place of the next residual in recent */
-    bool known;       /* whether p's standard errors are small at present: while they are not nothing fades */
-    bool near;        /* whether p has settled with small standard errors yet */
-    bool published;   /* whether an estimate has been trusted yet */
+    uint8_t next;      /* place of the next residual in recent */
+    bool errors_small; /* whether p's standard errors are small at present: while they are not nothing fades */
+    bool converged;    /* whether p has settled with small standard errors yet */
+    bool published;    /* whether an estimate has been trusted yet */
     bool misfit;
-    uint8_t ageing;   /* groups before which the past is still to fade */
+    uint8_t groups_to_fade;   /* groups before which the past is still to fade */
     float anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
-    float long_mean;  /* of residual variances relative to what is expected */
+    float long_mean;          /* of residual variances relative to what is expected */
     float recent[PVID_TRUST_SHORT];
     pvid_publication_mark mark;
     pvid_estimate_f32 estimate; /* the published one, for the context that calls step */
@@ -85,24 +85,24 @@ pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f3
 void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
 /* Renews the past, and the alarm with it: the rows are made in another way from now on. */
-void pvid_trust_age_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
+void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
 /* Factor on the sums of the past before the coming group's rows are added; 1 where nothing is renewed, or too little
  * would be left. Call it once a group. */
-float pvid_trust_ageing_f32(pvid_trust_f32 *self);
+float pvid_trust_fade_factor_f32(pvid_trust_f32 *self);
 
 /* Largest standard error of the positive parameters, relative to them. */
-float pvid_trust_widest_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate);
+float pvid_trust_largest_error_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate);
 
 /* Where p is to go if the coming group does not let it step; NULL: nowhere. */
-const float *pvid_trust_refuge_f32(const pvid_trust_f32 *self);
+const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self);
 
 /* Judges a group whose last solve and whose assessment of `candidate` are complete.
  *   reason, size: of that solve;  informed: of the assessment;
- *   surplus: variance of the group's residuals over what was expected.
+ *   variance_ratio: variance of the group's residuals over what was expected.
  * Returns what is to be told; counts it. */
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
-                                 bool informed, float surplus, const pvid_estimate_f32 *candidate);
+                                 bool above_noise, float variance_ratio, const pvid_estimate_f32 *candidate);
 
 #ifdef __cplusplus
 }

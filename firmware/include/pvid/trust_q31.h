@@ -15,35 +15,35 @@
 extern "C" {
 #endif
 
-#define PVID_SURPLUS_BITS 24
+#define PVID_VARIANCE_RATIO_BITS 24
 
 /* Settings; pvid.setup.q31 derives them from those of trust.h. */
 typedef struct {
-    int32_t kappa_min;   /* least kappa and least pivot, Q30, 0..0.999 */
-    int32_t se_max;      /* largest standard error of the positive parameters, relative to them, Q24, > 0 */
-    uint32_t misfit_max; /* residual variance over what is expected of it that alarms, Q16, at least 1; 0: no alarm */
-    uint16_t groups_min; /* groups before the first publication */
-    uint16_t shut_max;   /* groups in a row that say too little for a step, after which p goes back to the published
-                            one; 0: never */
-    uint32_t renewal;    /* the past is renewed once p has settled so far from where its rows came in, see trust.h; Q16,
-                            0.01..1e3; 0: never */
+    int32_t kappa_min;     /* least kappa and least pivot, Q30, 0..0.999 */
+    int32_t se_max;        /* largest standard error of the positive parameters, relative to them, Q24, > 0 */
+    uint32_t misfit_max;   /* residual variance over what is expected of it that alarms, Q16, at least 1; 0: no alarm */
+    uint16_t groups_min;   /* groups before the first publication */
+    uint16_t revert_after; /* groups in a row that say too little for a step, after which p goes back to the published
+                          one; 0: never */
+    uint32_t renewal; /* the past is renewed once p has settled so far from where its rows came in, see trust.h; Q16,
+                         0.01..1e3; 0: never */
 } pvid_trust_config_q31;
 
 /* State; only the functions below write to it. */
 typedef struct {
     pvid_trust_config_q31 config;
-    uint16_t groups; /* taken in; stops at its end */
-    uint16_t shut;   /* groups in a row that said too little */
-    uint16_t judged; /* residuals in long_mean; stops at long_memory; none before p is near */
+    uint16_t groups;        /* taken in; stops at its end */
+    uint16_t uninformative; /* groups in a row that said too little */
+    uint16_t judged;        /* residuals in long_mean; stops at long_memory; none before p is near */
     uint16_t long_memory;
-    uint8_t next;    /* place of the next residual in recent */
-    uint8_t ageing;  /* groups before which the past is still to fade */
-    bool known;      /* whether p's standard errors are small at present: while they are not nothing fades */
-    bool near;       /* whether p has settled with small standard errors yet */
-    bool published;  /* whether an estimate has been trusted yet */
+    uint8_t next;           /* place of the next residual in recent */
+    uint8_t groups_to_fade; /* groups before which the past is still to fade */
+    bool errors_small;      /* whether p's standard errors are small at present: while they are not nothing fades */
+    bool converged;         /* whether p has settled with small standard errors yet */
+    bool published;         /* whether an estimate has been trusted yet */
     bool misfit;
     int32_t anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
-    int64_t long_mean; /* of residual variances relative to what is expected, PVID_SURPLUS_BITS */
+    int64_t long_mean;          /* of residual variances relative to what is expected, PVID_VARIANCE_RATIO_BITS */
     int64_t recent[PVID_TRUST_SHORT];
     pvid_publication_mark mark;
     pvid_estimate_q31 estimate; /* the published one, for the context that calls step */
@@ -60,17 +60,17 @@ void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estima
 
 /* Factor on the sums of the past before the coming group's rows are added, Q31; 0 where nothing is renewed, or too
  * little would be left. Call it once a group. */
-int32_t pvid_trust_ageing_q31(pvid_trust_q31 *self);
+int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self);
 
 /* Where p is to go if the coming group does not let it step; NULL: nowhere. */
-const int32_t *pvid_trust_refuge_q31(const pvid_trust_q31 *self);
+const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self);
 
 /* Judges a group whose last solve and whose assessment of `candidate` are complete.
  *   reason, size: of that solve;  informed: of the assessment;
- *   surplus: variance of the group's residuals over what was expected, Q24, >= 0.
+ *   variance_ratio: variance of the group's residuals over what was expected, Q24, >= 0.
  * Returns what is to be told; counts it. */
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
-                                 bool informed, int64_t surplus, const pvid_estimate_q31 *candidate);
+                                 bool above_noise, int64_t variance_ratio, const pvid_estimate_q31 *candidate);
 
 #ifdef __cplusplus
 }

@@ -82,16 +82,16 @@ typedef struct {
                              phi'' [s^4]; 0: an exact pivot. For the alarm only */
     float angle_limit;    /* largest |phi - c| [rad] that a window may hold; 0: no limit */
     const pvid_weak_design_f32 *design; /* must outlive the identifier, as must its tables */
-    pvid_weak_angle_f32 *angle; /* memory for full_angle and friction; must outlive the identifier. NULL if both
-                             are false */
-    bool full_angle;      /* correct the rows for sines and cosines once the estimate has settled; set angle_limit
-                             to 0.2 rad: the correction is not accurate beyond that */
-    bool friction;        /* p = (w, d1, d2, c, c1, c2): two viscous frictions absorb what damps the motion. Needs
-                             zero_unknown, PVID_MAX_P 6 and PVID_MAX_MOMENTS 55 */
-    uint8_t passes;       /* of the correction, 1..PVID_MAX_PASSES; 3 is good */
-    bool zero_unknown;    /* true: p = (w, d1, d2, c), c [rad] the encoder's reading at rest; false: c = 0 */
-    uint8_t iterations;   /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; 3 is good. One where
-                             the estimator's law is a rate (g < 1) */
+    pvid_weak_angle_f32 *angle;         /* memory for full_angle and friction; must outlive the identifier. NULL if both
+                                     are false */
+    bool full_angle;    /* correct the rows for sines and cosines once the estimate has settled; set angle_limit
+                           to 0.2 rad: the correction is not accurate beyond that */
+    bool friction;      /* p = (w, d1, d2, c, c1, c2): two viscous frictions absorb what damps the motion. Needs
+                           zero_unknown, PVID_MAX_P 6 and PVID_MAX_MOMENTS 55 */
+    uint8_t passes;     /* of the correction, 1..PVID_MAX_PASSES; 3 is good */
+    bool zero_unknown;  /* true: p = (w, d1, d2, c), c [rad] the encoder's reading at rest; false: c = 0 */
+    uint8_t iterations; /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; 3 is good. One where
+                           the estimator's law is a rate (g < 1) */
     pvid_estimator_config_f32 estimator; /* model, update_rate_hz, row_weight and correlation are filled
                                             in by init. A group of rows is a window; row_sd [rad] is
                                             the noise of a decimated sample */
@@ -104,9 +104,9 @@ typedef struct {
     pvid_weak_job job;
     const float *smooth;
     const float *second;
-    float u_scale;       /* sample rate^2 / l1 [1/(m s^2)] */
-    float middle[2];     /* centre samples of phi and y */
-    float sum[2];        /* sum smooth q(phi), sum second q(y) */
+    float u_scale;                                          /* sample rate^2 / l1 [1/(m s^2)] */
+    float middle[2];                                        /* centre samples of phi and y */
+    float sum[2];                                           /* sum smooth q(phi), sum second q(y) */
     float ring[PVID_MAX_TAPS + PVID_MAX_DECIMATION - 1][2]; /* phi [rad], y [m] */
 } pvid_weak_front_f32;
 
@@ -121,29 +121,29 @@ typedef struct {
 
 /* One of the two windows. */
 typedef struct {
-    uint16_t index; /* of the present decimated sample in the window, 0..W-2 */
-    bool whole;     /* the window has been filling from its first sample */
-    uint8_t buffer; /* which of the three it fills */
+    uint16_t index;                    /* of the present decimated sample in the window, 0..W-2 */
+    bool whole;                        /* the window has been filling from its first sample */
+    uint8_t buffer;                    /* which of the three it fills */
     float before[PVID_WEAK_INTEGRALS]; /* the integrands at the last sample */
     float once[PVID_WEAK_INTEGRALS];   /* their integrals */
     float twice[PVID_WEAK_INTEGRALS];  /* the integrals of these */
     float u_sum;                       /* of the window's samples */
     float u_square_sum;
     float phi_sum;
-    float lowest;                      /* phi */
+    float lowest; /* phi */
     float highest;
-    float bend_square_sum;             /* of the second differences of phi that fell into the window */
-    uint16_t bends;                    /* how many did */
+    float curvature_square_sum; /* of the second differences of phi that fell into the window */
+    uint16_t curvatures;        /* how many did */
 } pvid_weak_window_f32;
 
 /* Second differences phi(t) - 2 phi(t - lag) + phi(t - 2 lag), one every `lag` decimated samples. */
 typedef struct {
-    uint8_t wait;      /* samples until the next */
-    uint8_t known;     /* samples in `before`, 0..2 */
-    bool due;          /* the present sample ends one */
-    float before[2];   /* phi one lag and two lags ago */
-    float square;      /* of the one that is due */
-} pvid_weak_bend_f32;
+    uint8_t wait;    /* samples until the next */
+    uint8_t known;   /* samples in `before`, 0..2 */
+    bool due;        /* the present sample ends one */
+    float before[2]; /* phi one lag and two lags ago */
+    float square;    /* of the one that is due */
+} pvid_weak_curvature_f32;
 
 #define PVID_WEAK_FACTOR ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 
@@ -159,10 +159,10 @@ enum {
 };
 
 typedef struct {
-    bool whitened;                        /* the Gram matrix could be factored */
-    float combination[5];                 /* of the Gram tables but the first */
-    float trace[PVID_NOISE_TRACES];       /* noise in the columns, a row of unit noise variance */
-    float factor[PVID_WEAK_FACTOR];       /* R0, then its Cholesky factor with inverted diagonal */
+    bool whitened;                  /* the Gram matrix could be factored */
+    float combination[5];           /* of the Gram tables but the first */
+    float trace[PVID_NOISE_TRACES]; /* noise in the columns, a row of unit noise variance */
+    float factor[PVID_WEAK_FACTOR]; /* R0, then its Cholesky factor with inverted diagonal */
 } pvid_weak_whiten_f32;
 
 typedef struct {
@@ -172,44 +172,44 @@ typedef struct {
 } pvid_weak_integral_f32;
 
 /* What the rows lack: the remainder of Y, and the columns of c1 and c2. */
-#define PVID_WEAK_LACKS 3
+#define PVID_WEAK_REMAINDERS 3
 
 /* The samples of the window in work, and what its rows lack. Only the identifier writes to it. */
 struct pvid_weak_angle_f32 {
-    uint16_t length;     /* places of the ring in use: a window and a hop */
-    uint16_t window;     /* W */
-    uint16_t head;       /* place of the next decimated sample */
-    uint16_t first;      /* place of the window's first sample */
-    uint16_t place;      /* of the sample in work */
-    uint16_t index;      /* of it in the window, or of the function in work */
+    uint16_t length; /* places of the ring in use: a window and a hop */
+    uint16_t window; /* W */
+    uint16_t head;   /* place of the next decimated sample */
+    uint16_t first;  /* place of the window's first sample */
+    uint16_t place;  /* of the sample in work */
+    uint16_t index;  /* of it in the window, or of the function in work */
     uint8_t stage;
     uint8_t pass;
     uint8_t passes;
-    uint8_t channels;    /* 1, or 3 with friction */
+    uint8_t channels; /* 1, or 3 with friction */
     bool full_angle;
-    bool on;             /* the estimate has settled: rows are corrected */
-    bool sensible;       /* p is that of a pendulum */
+    bool on;       /* the estimate has settled: rows are corrected */
+    bool physical; /* p is that of a pendulum */
     float dt;
     float inverse_l1_square; /* of rod 1 [1/m^2] */
     float p[PVID_KAPITZA_P];
-    float zero;          /* c */
-    float friction[2];   /* c1, c2 */
-    float l1;            /* L1 and L2 of p */
+    float zero;        /* c */
+    float friction[2]; /* c1, c2 */
+    float l1;          /* L1 and L2 of p */
     float l2;
-    float a;             /* of the window */
+    float a; /* of the window */
     float b;
-    float normal[5];     /* A^T A, A^T B, B^T B, A^T e, B^T e */
+    float normal[5]; /* A^T A, A^T B, B^T B, A^T e, B^T e */
     pvid_weak_integral_f32 motion;
-    pvid_weak_integral_f32 remainder[PVID_WEAK_LACKS];
-    float lack[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS]; /* by the last pass */
-    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_LACKS]; /* by this one */
+    pvid_weak_integral_f32 remainder_integral[PVID_WEAK_REMAINDERS];
+    float remainder[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];              /* by the last pass */
+    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];                   /* by this one */
     float ring[PVID_MAX_WEAK_WINDOW + ((PVID_MAX_WEAK_WINDOW + 1) / 2)][2]; /* phi [rad], u [1/s^2] */
 };
 
 /* The complete window that is being turned into rows and steps. */
 typedef struct {
     uint8_t stage;
-    uint16_t index;    /* of the function, or of its part, within the stage */
+    uint16_t index; /* of the function, or of its part, within the stage */
     uint8_t iteration;
     uint8_t buffer;
     pvid_reason reason; /* of the last solve, then of the window */
@@ -217,34 +217,34 @@ typedef struct {
     float expected;     /* variance of a row's noise */
     float energy;       /* of the window's rows at the p that they meet, where the gate looks at it */
     pvid_gate_f32 gate;
-    pvid_weak_angle_f32 *angle; /* NULL: linear rows */
+    pvid_weak_angle_f32 *angle;          /* NULL: linear rows */
     float direction[PVID_MAX_FUNCTIONS]; /* the one that is being projected out, of length 1 or 0 */
     float along[PVID_WEAK_COLUMNS];      /* the columns' components along it */
     pvid_weak_whiten_f32 whiten;
     pvid_estimator_solve_f32 solve;
-    pvid_estimate_f32 candidate;         /* for publication */
+    pvid_estimate_f32 candidate; /* for publication */
 } pvid_weak_finish_f32;
 
 /* State; only the functions below write to it. */
 typedef struct {
     const pvid_weak_design_f32 *design;
     pvid_weak_angle_f32 *angle; /* NULL: linear rows */
-    float dt;              /* between decimated samples [s] */
-    float drive_min;       /* variance of u below which a window is dropped [1/s^4] */
-    float row_variance;    /* that the encoder's noise gives a row [rad^2] */
-    float pivot_noise;     /* that the pivot's gives it, for each mean square of a second difference */
-    float angle_limit;     /* [rad]; 0: none */
+    float dt;                   /* between decimated samples [s] */
+    float drive_min;            /* variance of u below which a window is dropped [1/s^4] */
+    float row_variance;         /* that the encoder's noise gives a row [rad^2] */
+    float pivot_noise;          /* that the pivot's gives it, for each mean square of a second difference */
+    float angle_limit;          /* [rad]; 0: none */
     uint8_t iterations;
-    uint8_t slice;         /* functions a tick */
-    uint8_t together;      /* stages of a complete window a tick */
-    uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
-    uint8_t function;      /* functions of that window that have, 0..K-1 */
-    bool warm;             /* a window has been completed since the restart */
-    bool frozen;           /* windows are gathered and dropped */
-    float phi;             /* the present decimated sample [rad] */
-    float u;               /* [1/s^2] */
+    uint8_t functions_per_tick; /* functions a tick */
+    uint8_t stages_per_tick;    /* stages of a complete window a tick */
+    uint8_t active;             /* the window that takes the present decimated sample in; 2: both have */
+    uint8_t function;           /* functions of that window that have, 0..K-1 */
+    bool warm;                  /* a window has been completed since the restart */
+    bool frozen;                /* windows are gathered and dropped */
+    float phi;                  /* the present decimated sample [rad] */
+    float u;                    /* [1/s^2] */
     pvid_weak_front_f32 front;
-    pvid_weak_bend_f32 bend;
+    pvid_weak_curvature_f32 curvature;
     pvid_weak_window_f32 window[2];
     pvid_weak_finish_f32 finish;
     float term[2][2][PVID_WEAK_SAMPLE_TERMS]; /* of each window: of its last even and of its last odd sample */

@@ -8,14 +8,14 @@
 #include <stdint.h>
 
 typedef struct {
-    uint16_t half;       /* pairs of taps */
-    uint16_t length;     /* places of the ring in use: taps + decimation - 1, for a job may last a block */
+    uint16_t half;   /* pairs of taps */
+    uint16_t length; /* places of the ring in use: taps + decimation - 1, for a job may last a block */
     uint16_t decimation;
-    uint16_t slice;      /* pairs a tick: a job lasts half a block */
-    uint16_t head;       /* place of the next sample */
-    uint16_t wait;       /* samples until the next block is complete */
-    uint16_t pair;       /* pairs done; half: the job is done */
-    uint16_t newer;      /* places of the last pair */
+    uint16_t pairs_per_tick; /* pairs a tick: a job lasts half a block */
+    uint16_t head;           /* place of the next sample */
+    uint16_t wait;           /* samples until the next block is complete */
+    uint16_t pair;           /* pairs done; half: the job is done */
+    uint16_t newer;          /* places of the last pair */
     uint16_t older;
 } pvid_weak_job;
 

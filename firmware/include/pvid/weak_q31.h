@@ -55,33 +55,33 @@ typedef struct {
     uint8_t u_shift;     /* U = (sum second q) 2^-u_shift */
     uint8_t uf_shift;    /* of the term U F */
     uint8_t integral_shift[PVID_WEAK_INTEGRALS_Q31]; /* of the integrals in dt^2/12 */
-    uint8_t high_shift[2];    /* of the parts of U I2(U F), U I2(F) that go beyond a term */
-    uint8_t product_shift[5]; /* of what they leave, and of U I2(U), U I2(1), U t */
-    uint8_t sum_shift;        /* of chi times a term before it is added, 1.. */
-    uint8_t shift[PVID_WEAK_TERMS_Q31]; /* a term's share of its column: sum multiplier 2^-shift */
+    uint8_t high_shift[2];                           /* of the parts of U I2(U F), U I2(F) that go beyond a term */
+    uint8_t product_shift[5];                        /* of what they leave, and of U I2(U), U I2(1), U t */
+    uint8_t sum_shift;                               /* of chi times a term before it is added, 1.. */
+    uint8_t shift[PVID_WEAK_TERMS_Q31];              /* a term's share of its column: sum multiplier 2^-shift */
     int8_t gram_bits[PVID_WEAK_GRAMS];
     int32_t phi_max; /* full scale of the counts about phi_offset, y_offset */
     int32_t y_max;
-    int32_t u_max;   /* largest |U|, below 2^18 */
-    const PVID_TABLE int32_t *smooth; /* [(taps - 1) / 2] */
-    const PVID_TABLE int32_t *second; /* [(taps - 1) / 2] */
-    const PVID_TABLE int16_t *chi;    /* [W][3][K] */
+    int32_t u_max;                        /* largest |U|, below 2^18 */
+    const PVID_TABLE int32_t *smooth;     /* [(taps - 1) / 2] */
+    const PVID_TABLE int32_t *second;     /* [(taps - 1) / 2] */
+    const PVID_TABLE int16_t *chi;        /* [W][3][K] */
     const PVID_TABLE int32_t *multiplier; /* [PVID_WEAK_TERMS_Q31] */
-    const PVID_TABLE int32_t *gram;   /* [6][K (K + 1) / 2] */
+    const PVID_TABLE int32_t *gram;       /* [6][K (K + 1) / 2] */
 } pvid_weak_design_q31;
 
 typedef struct {
     const pvid_weak_design_q31 *design; /* must outlive the identifier, as must its tables */
-    int32_t phi_offset; /* reading of the encoder near rest [counts]; the estimated zero c is relative to it */
-    int32_t y_offset;   /* reading of the pivot's sensor in the middle of its travel [counts] */
-    int32_t drive_min;  /* rms of U over a window below which it is dropped, 0..2^18; 0: none is */
-    bool zero_unknown;  /* true: p = (w, d1, d2, c); false: p = (w, d1, d2), c = 0 */
-    uint8_t iterations; /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; one where gain < 1 */
+    int32_t phi_offset;          /* reading of the encoder near rest [counts]; the estimated zero c is relative to it */
+    int32_t y_offset;            /* reading of the pivot's sensor in the middle of its travel [counts] */
+    int32_t drive_min;           /* rms of U over a window below which it is dropped, 0..2^18; 0: none is */
+    bool zero_unknown;           /* true: p = (w, d1, d2, c); false: p = (w, d1, d2), c = 0 */
+    uint8_t iterations;          /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; one where gain < 1 */
     pvid_scaled_q31 pivot_noise; /* variance that the pivot sensor's noise gives a row [Y's integer^2] for each mean
                                     square of a second difference of F, m 2^e; 0: an exact pivot. For the alarm only */
     pvid_estimator_config_q31 estimator; /* model is filled in by init */
-    pvid_trust_config_q31 trust; /* which estimates are published */
-    pvid_gate_config_q31 gate;   /* on the residuals of a window */
+    pvid_trust_config_q31 trust;         /* which estimates are published */
+    pvid_gate_config_q31 gate;           /* on the residuals of a window */
 } pvid_weak_config_q31;
 
 /* The front end: a ring of counts, and the FIR job of the last complete block in slices. */
@@ -94,17 +94,17 @@ typedef struct {
 
 /* One of the two windows. */
 typedef struct {
-    uint16_t index; /* of the present decimated sample in the window, 0..W-2 */
-    bool whole;     /* the window has been filling from its first sample */
-    uint8_t buffer; /* which of the three it fills */
+    uint16_t index;                          /* of the present decimated sample in the window, 0..W-2 */
+    bool whole;                              /* the window has been filling from its first sample */
+    uint8_t buffer;                          /* which of the three it fills */
     int64_t before[PVID_WEAK_INTEGRALS_Q31]; /* the integrands at the last sample */
     int64_t once[PVID_WEAK_INTEGRALS_Q31];   /* twice their integrals */
     int64_t twice[PVID_WEAK_INTEGRALS_Q31];  /* four times the integrals of these */
     int64_t f_sum;
     int64_t u_sum;
     int64_t u_square_sum;
-    int64_t bend_square_sum; /* of the second differences of F that fell into the window */
-    uint16_t bends;          /* how many did */
+    int64_t curvature_square_sum; /* of the second differences of F that fell into the window */
+    uint16_t curvatures;          /* how many did */
 } pvid_weak_window_q31;
 
 /* Second differences F(t) - 2 F(t - lag) + F(t - 2 lag), one every `lag` decimated samples. */
@@ -114,7 +114,7 @@ typedef struct {
     bool due;          /* the present sample ends one */
     int32_t before[2]; /* F one lag and two lags ago */
     int64_t square;    /* of the one that is due */
-} pvid_weak_bend_q31;
+} pvid_weak_curvature_q31;
 
 #define PVID_WEAK_FACTOR_Q31 ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 
@@ -124,25 +124,25 @@ typedef struct {
     uint8_t index; /* of the function within the stage */
     uint8_t iteration;
     uint8_t buffer;
-    bool whitened;  /* the Gram matrix could be factored */
-    bool saturated; /* a column did not fit: none of the window's rows is taken in */
+    bool whitened;     /* the Gram matrix could be factored */
+    bool saturated;    /* a column did not fit: none of the window's rows is taken in */
     int16_t gram_bits; /* format of the Gram matrix at p, even */
     int32_t combination[PVID_WEAK_GRAMS];
-    int16_t exponent[PVID_MAX_FUNCTIONS];           /* of the rows of the Gram matrix */
+    int16_t exponent[PVID_MAX_FUNCTIONS];            /* of the rows of the Gram matrix */
     pvid_reciprocal_q31 inverse[PVID_MAX_FUNCTIONS]; /* of the factor's diagonal */
-    int32_t factor[PVID_WEAK_FACTOR_Q31];           /* R0, then its Cholesky factor, Q30 */
-    int32_t inverted[PVID_MAX_FUNCTIONS];           /* a row of the factor's inverse, Q15, then a block of it */
+    int32_t factor[PVID_WEAK_FACTOR_Q31];            /* R0, then its Cholesky factor, Q30 */
+    int32_t inverted[PVID_MAX_FUNCTIONS];            /* a row of the factor's inverse, Q15, then a block of it */
     int16_t inverted_exponent;
-    pvid_scaled_q31 trace[PVID_NOISE_TRACES_Q31];   /* noise in the columns, a row of unit noise variance */
-    pvid_reciprocal_q31 length;                     /* of the column that is being projected out */
-    int32_t direction[PVID_MAX_FUNCTIONS];          /* of it, Q30; length 1 or 0 */
-    int64_t along[PVID_WEAK_COLUMNS_Q31];           /* the columns' components along it, Q30 */
-    pvid_reason reason;       /* of the last solve, then of the window */
-    int64_t size;             /* of the last step, relative, Q22 */
-    int64_t energy;           /* of the window's rows: before they are added where the gate looks at it, then since */
+    pvid_scaled_q31 trace[PVID_NOISE_TRACES_Q31]; /* noise in the columns, a row of unit noise variance */
+    pvid_reciprocal_q31 length;                   /* of the column that is being projected out */
+    int32_t direction[PVID_MAX_FUNCTIONS];        /* of it, Q30; length 1 or 0 */
+    int64_t along[PVID_WEAK_COLUMNS_Q31];         /* the columns' components along it, Q30 */
+    pvid_reason reason;                           /* of the last solve, then of the window */
+    int64_t size;                                 /* of the last step, relative, Q22 */
+    int64_t energy; /* of the window's rows: before they are added where the gate looks at it, then since */
     pvid_gate_q31 gate;
     pvid_scaled_q31 expected; /* variance of a row's noise */
-    int32_t ageing;           /* factor on the past before this window's rows, Q31; 0: none */
+    int32_t fade_factor;      /* factor on the past before this window's rows, Q31; 0: none */
     pvid_estimator_solve_q31 solve;
     pvid_estimate_q31 candidate; /* for publication */
 } pvid_weak_finish_q31;
@@ -152,21 +152,21 @@ typedef struct {
     const pvid_weak_design_q31 *design;
     int32_t phi_offset;
     int32_t y_offset;
-    int64_t drive_min;     /* (W - 1)^2 times the variance of U below which a window is dropped */
-    int8_t zero_bits;      /* format of c */
+    int64_t drive_min; /* (W - 1)^2 times the variance of U below which a window is dropped */
+    int8_t zero_bits;  /* format of c */
     bool zero_unknown;
     uint8_t iterations;
-    uint8_t slice;         /* functions a tick */
-    uint8_t together;      /* stages of a complete window a tick */
-    uint8_t turn;          /* the window that takes the present decimated sample in; 2: both have */
-    uint8_t function;      /* functions of that window that have, 0..K-1 */
-    bool warm;             /* a window has been completed since the restart */
-    bool frozen;           /* windows are gathered and dropped */
-    int32_t f;             /* the present decimated sample */
+    uint8_t functions_per_tick; /* functions a tick */
+    uint8_t stages_per_tick;    /* stages of a complete window a tick */
+    uint8_t active;             /* the window that takes the present decimated sample in; 2: both have */
+    uint8_t function;           /* functions of that window that have, 0..K-1 */
+    bool warm;                  /* a window has been completed since the restart */
+    bool frozen;                /* windows are gathered and dropped */
+    int32_t f;                  /* the present decimated sample */
     int32_t u;
     pvid_scaled_q31 pivot_noise;
     pvid_weak_front_q31 front;
-    pvid_weak_bend_q31 bend;
+    pvid_weak_curvature_q31 curvature;
     pvid_weak_window_q31 window[2];
     pvid_weak_finish_q31 finish;
     int32_t term[PVID_WEAK_TERMS_Q31]; /* of the window in work */
@@ -176,16 +176,16 @@ typedef struct {
 } pvid_weak_q31;
 
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range (the status names it), a table is
- * missing or would overflow (PVID_BAD_DESIGN, and PVID_BAD_SHIFT where fewer bits would do), or a window cannot be worked off before the next one is complete
- * (PVID_BAD_ITERATIONS, as in weak.h).
+ * missing or would overflow (PVID_BAD_DESIGN, and PVID_BAD_SHIFT where fewer bits would do), or a window cannot be
+ * worked off before the next one is complete (PVID_BAD_ITERATIONS, as in weak.h).
  *
  * Of the tables it checks, in one walk, what it costs no analysis to know: a weight of `smooth` or `second` times four
  * full scales fits 32 bits; F and U F fit 21 bits for every count within full scale; an entry of chi times a term of 21
  * bits fits 32 bits with its rounding; no entry of gram is beyond 2^30 (gram_bits may be any). The rest is the design
  * tool's word, which proves it by interval analysis before it writes a table (host/src/pvid/design/weak_q31.py) and
- * tells the bits left free, `margins`: for every sample with |U| <= u_max the double integrals fit 63 bits, each shifted
- * one 32, each term 21, the sum of a window's products 32, and a column of terms 31. Tables of your own need that
- * proof: with others, sums wrap. */
+ * tells the bits left free, `margins`: for every sample with |U| <= u_max the double integrals fit 63 bits, each
+ * shifted one 32, each term 21, the sum of a window's products 32, and a column of terms 31. Tables of your own need
+ * that proof: with others, sums wrap. */
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config);
 
 /* One tick: phi and y_A sampled together [counts]. Answers as pvid_weak_step_f32, but for a sample beyond full scale:

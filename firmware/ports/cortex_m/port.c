@@ -34,7 +34,7 @@ uint32_t pvid_port_counts_per_1024(void)
     return (uint32_t)(((uint64_t)PVID_CLOCK_HZ * 67108864u + 500000000u) / 1000000000u);
 }
 
-#define COUNTS_A_MICROSECOND (PVID_CLOCK_HZ / 1000000u)
+#define COUNTS_PER_MICROSECOND (PVID_CLOCK_HZ / 1000000u)
 #if (PVID_CLOCK_HZ % 1000000u) != 0u
 #error "the clock must be whole MHz"
 #endif
@@ -47,8 +47,8 @@ uint32_t pvid_port_microseconds(void)
     const uint32_t now = VALUE;
     rest += (value - now) & LARGEST;
     value = now;
-    time += rest / COUNTS_A_MICROSECOND;
-    rest %= COUNTS_A_MICROSECOND;
+    time += rest / COUNTS_PER_MICROSECOND;
+    rest %= COUNTS_PER_MICROSECOND;
     return time;
 }
 

@@ -26,7 +26,7 @@ uint32_t pvid_port_counts_per_1024(void)
 
 /* The machine timer of `virt`, 10 MHz. */
 #define MTIME_LOW (*(volatile uint32_t *)(uintptr_t)0x0200BFF8u)
-#define COUNTS_A_MICROSECOND 10u
+#define COUNTS_PER_MICROSECOND 10u
 
 uint32_t pvid_port_microseconds(void)
 {
@@ -36,8 +36,8 @@ uint32_t pvid_port_microseconds(void)
     const uint32_t now = MTIME_LOW;
     rest += now - value;
     value = now;
-    time += rest / COUNTS_A_MICROSECOND;
-    rest %= COUNTS_A_MICROSECOND;
+    time += rest / COUNTS_PER_MICROSECOND;
+    rest %= COUNTS_PER_MICROSECOND;
     return time;
 }
 

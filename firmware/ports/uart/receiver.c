@@ -1,4 +1,5 @@
-/* The receiver behind a UART's interrupt. What does not fit stays in the UART, its interrupt off until there is room. */
+/* The receiver behind a UART's interrupt. What does not fit stays in the UART, its interrupt off until there is room.
+ */
 #include "../receiver.h"
 
 #include "../interrupts.h"
@@ -26,7 +27,7 @@ void pvid_uart_interrupt(void)
 
 void pvid_receiver_init(void)
 {
-    pvid_uart_listen();
+    pvid_uart_enable_receive();
     pvid_interrupts_init();
     /* A byte that came before that holds up all that follow, where the UART calls for a byte only as it arrives. */
     pvid_interrupts_mask();

@@ -18,7 +18,7 @@ bool pvid_uart_get(uint8_t *byte);
 bool pvid_uart_put(uint8_t byte);
 
 /* Has the UART interrupt when a byte arrives, which pvid_uart_interrupt then serves. */
-void pvid_uart_listen(void);
+void pvid_uart_enable_receive(void);
 
 /* Takes the interrupt back, before a byte is taken. */
 void pvid_uart_acknowledge(void);

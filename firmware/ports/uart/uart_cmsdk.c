@@ -39,7 +39,7 @@ bool pvid_uart_put(uint8_t byte)
     return true;
 }
 
-void pvid_uart_listen(void)
+void pvid_uart_enable_receive(void)
 {
     CTRL = CTRL_TX_ENABLE | CTRL_RX_ENABLE | CTRL_RX_INTERRUPT;
 }

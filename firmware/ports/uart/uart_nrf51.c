@@ -55,7 +55,7 @@ bool pvid_uart_put(uint8_t byte)
     return true;
 }
 
-void pvid_uart_listen(void)
+void pvid_uart_enable_receive(void)
 {
     INTERRUPT_SET = INTERRUPT_RX_READY;
 }

@@ -40,7 +40,7 @@ bool pvid_uart_put(uint8_t byte)
     return true;
 }
 
-void pvid_uart_listen(void)
+void pvid_uart_enable_receive(void)
 {
     INTERRUPT_ENABLE = INTERRUPT_RX;
 }

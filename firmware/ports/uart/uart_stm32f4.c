@@ -40,7 +40,7 @@ bool pvid_uart_put(uint8_t byte)
     return true;
 }
 
-void pvid_uart_listen(void)
+void pvid_uart_enable_receive(void)
 {
     CR1 = CR1_USART_ENABLE | CR1_TX_ENABLE | CR1_RX_ENABLE | CR1_RX_INTERRUPT;
 }

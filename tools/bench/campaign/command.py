@@ -9,7 +9,7 @@ from typing import cast
 import click
 from rich.console import Console
 
-from pvid.base.console import DONE, progress_bar, tell
+from pvid.base.console import DONE, progress_bar, write_stderr
 from pvid.rig.file import Core
 
 _WIDTH = 220  # of tables that go into a file
@@ -60,9 +60,9 @@ def campaign(
     store = Store(out, task.key)
     begun = sum(rig < rigs for rig in store.records)
     if begun:
-        tell(f"pvid: {begun} of {rigs} rigs are done already")
+        write_stderr(f"pvid: {begun} of {rigs} rigs are done already")
     if store.foreign:
-        tell(
+        write_stderr(
             f"pvid: {store.foreign} records in {out.name} or its partial file are left out: they are of another "
             f"population, setting or version of pvid"
         )
@@ -70,7 +70,7 @@ def campaign(
         with progress_bar("rigs", rigs) as advance:
             records = run(task, store, advance, scheduler=scheduler, workers=workers)
     except KeyboardInterrupt:
-        tell(f"pvid: {len(store.records)} records are kept in {store.partial}: the same command goes on")
+        write_stderr(f"pvid: {len(store.records)} records are kept in {store.partial}: the same command goes on")
         raise click.Abort from None
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
     console.print(table.by_condition(records, population.conditions))

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.campaign.pivot import PivotMotion
-from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.sim.pendulum import Pendulum
 
@@ -22,21 +20,6 @@ STEPS_A_PERIOD = 128.0
 _STIFFNESS = 0.4
 # Beyond this angle [rad] no rig of a campaign moves: it is running away.
 _LIMIT = 1.5
-
-
-class _PendulumStruct(ctypes.Structure):
-    """pvid_pendulum."""
-
-    _fields_ = [
-        ("l1", ctypes.c_double),
-        ("l2", ctypes.c_double),
-        ("rho2", ctypes.c_double),
-        ("g", ctypes.c_double),
-        ("viscous", ctypes.c_double * 2),
-        ("dry", ctypes.c_double * 2),
-        ("slip", ctypes.c_double),
-        ("slant", ctypes.c_double),
-    ]
 
 
 def step_of(
@@ -76,32 +59,13 @@ def integrate(
     steps = (len(acceleration) - 1) // 2
     out = np.empty((steps + 1, 4))
     begin = np.ascontiguousarray(start, np.float64)
-    rig = _PendulumStruct(
-        l1=pendulum.l1,
-        l2=pendulum.l2,
-        rho2=pendulum.rho2,
-        g=pendulum.g,
-        viscous=(ctypes.c_double * 2)(pendulum.damping1, pendulum.damping2),
-        dry=(ctypes.c_double * 2)(*dry),
-        slip=slip,
-        slant=slant,
-    )
-    try:
-        run = native.library.pvid_pendulum_run
-    except AttributeError as error:
-        raise PvidError(
-            "the C core was built without the campaign's pendulum: build it again with ./tools/pvid"
-        ) from error
-    run.restype = ctypes.c_uint32
-    written = run(
-        ctypes.byref(rig),
-        ctypes.c_void_p(begin.ctypes.data),
-        ctypes.c_void_p(acceleration.ctypes.data),
-        ctypes.c_uint32(steps),
-        ctypes.c_double(step_s),
-        ctypes.c_double(_LIMIT),
-        ctypes.c_void_p(out.ctypes.data),
-    )
+    headers = native.headers
+    rig = headers.ffi.new("pvid_pendulum *")
+    rig.l1, rig.l2, rig.rho2, rig.g = pendulum.l1, pendulum.l2, pendulum.rho2, pendulum.g
+    rig.viscous, rig.dry = [pendulum.damping1, pendulum.damping2], list(dry)
+    rig.slip, rig.slant = slip, slant
+    pointers = map(headers.pointer, (begin, acceleration))
+    written = native.library.pvid_pendulum_run(rig, *pointers, steps, step_s, _LIMIT, headers.pointer(out))
     return out if written == steps + 1 and bool(np.isfinite(out[-1]).all()) else None
 
 

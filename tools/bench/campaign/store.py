@@ -18,7 +18,7 @@ import pvid
 from bench.campaign.judge import COLUMNS, Record
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
-from pvid.core.native import default_library
+from pvid.core.headers import default_library
 
 _KEY = "key"
 

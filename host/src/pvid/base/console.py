@@ -17,7 +17,7 @@ INTERRUPTED = 130
 messages = Console(stderr=True)
 
 
-def tell(sentence: str) -> None:
+def write_stderr(sentence: str) -> None:
     """A line on standard error; the names in it are taken as they are."""
     click.echo(printable(sentence), err=True)
 

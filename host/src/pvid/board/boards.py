@@ -203,12 +203,12 @@ class Outcome:
         return self.sent.decode("ascii", "replace").replace("\r", "")
 
 
-def run(target: Board, image: Path, timeout: float, machine: str | None = None, heard: bytes = b"") -> Outcome:
+def run(target: Board, image: Path, timeout: float, machine: str | None = None, input_bytes: bytes = b"") -> Outcome:
     """Runs an image in its board's emulator until it exits, `timeout` seconds at most.
 
     Parameters
     ----------
-    heard
+    input_bytes
         What the image receives over its UART, from when it has sent something.
     machine
         Another machine of the same emulator.
@@ -222,9 +222,9 @@ def run(target: Board, image: Path, timeout: float, machine: str | None = None, 
     command = [machine if machine and part == target.machine else part for part in target.command(image)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        if heard and process.stdout is not None:  # a UART that is not yet switched on drops what comes
+        if input_bytes and process.stdout is not None:  # a UART that is not yet switched on drops what comes
             select.select([process.stdout], [], [], timeout)
-        sent, complaints = process.communicate(heard, timeout=timeout)
+        sent, complaints = process.communicate(input_bytes, timeout=timeout)
     except subprocess.TimeoutExpired as error:
         process.kill()
         sent, _ = process.communicate()

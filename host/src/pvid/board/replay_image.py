@@ -15,13 +15,15 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.boards import run as run_image
-from pvid.core.native import Native, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
-from pvid.core.native_q31 import StrongConfigQ31
+from pvid.core.headers import Headers, Tables, default_library
+from pvid.core.native import Native
 from pvid.design.c_tables import float_array, float_literal, struct_initializer
 from pvid.design.weak_sizing import raised_bounds
 from pvid.rig.file import RigFile
-from pvid.run.compare_q31 import identifier_q31, twin_q31
 from pvid.run.compare_q31 import twin_hashes as twin_hashes_q31
+from pvid.run.compare_q31 import twin_q31
+from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.settings.q31 import StrongConfigQ31
 from pvid.setup.f32 import config_of
 from pvid.setup.q31 import ConfigQ31, config_of_q31
 from pvid.setup.strong_header_q31 import strong_header_q31
@@ -41,7 +43,7 @@ MANY_TICKS = 100_000
 # Both fit 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20.
 ENCODER_BITS = {"strong": 20, "weak": 14}
 
-# The strong form's five points want 20 ms between samples (host/README.md); its window then is five samples long.
+# The strong form's five points need 20 ms between samples (benchmarks/accuracy.md); its window is five samples long.
 SAMPLE_RATE = {"strong": 50.0, "weak": 1000.0}
 
 STRONG_SETTLED = 500  # ticks by which windows are full and the drive is noticed: from there all ticks are alike
@@ -133,25 +135,21 @@ def _measure_from(config: StrongConfig | WeakConfig, ticks: int) -> int:
 
 def header(run: ReplayRun, samples: Path | None = None) -> str:
     """replay_run.h of a run; its counts stand in it, or little-endian in the file `samples`."""
-    tables: dict[str, npt.NDArray[np.float32]] = {}
+    tables: Tables = {}
     if run.fixed is not None:
         settings = [_header_q31(run.fixed)]
-    elif isinstance(run.config, WeakConfig):
-        weak, tables = weak_config_struct(run.config)
-        design = struct_initializer(weak.design.contents, {name: f"replay_{name}" for name in tables})
-        settings = [
-            f"static const pvid_weak_design_f32 replay_design = {design};",
-            "static const pvid_weak_config_f32 replay_config = "
-            + struct_initializer(weak, {"design": "&replay_design"})
-            + ";",
-        ]
     else:
-        strong, tables = strong_config_struct(run.config)
-        settings = [
-            "static const pvid_strong_config_f32 replay_config = "
-            + struct_initializer(strong, {name: f"replay_{name}" for name in tables})
-            + ";"
-        ]
+        headers = Headers.of(default_library())
+        filled = headers.filled(f"pvid_{run.form}_config_f32", run.config)
+        tables = filled.tables
+        pointers = {name: f"replay_{name}" for name in tables}
+        settings = []
+        if isinstance(run.config, WeakConfig):
+            design = struct_initializer(headers, filled.struct.design[0], pointers)
+            settings = [f"static const pvid_weak_design_f32 replay_design = {design};"]
+            pointers |= {"design": "&replay_design"}
+        initializer = struct_initializer(headers, filled.struct, pointers)
+        settings.append(f"static const pvid_{run.form}_config_f32 replay_config = {initializer};")
     arrays = [
         float_array(f"replay_{name}", np.asarray(table, np.float32).reshape(table.shape[0], -1), "see the settings")
         for name, table in tables.items()
@@ -234,10 +232,10 @@ def _resolutions(run: ReplayRun) -> list[str]:
 def native_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
     if run.fixed is not None:
-        return identifier_q31(native, run.fixed).run(run.counts[:, 0], run.counts[:, 1]).hash
+        return native.identifier(run.fixed).run(run.counts[:, 0], run.counts[:, 1]).hash
     if isinstance(run.config, WeakConfig):
-        return native.weak(run.config).run(run.phi, run.y).hash
-    return native.strong(run.config).run(run.phi, run.y).hash
+        return native.identifier(run.config).run(run.phi, run.y).hash
+    return native.identifier(run.config).run(run.phi, run.y).hash
 
 
 def twin_hashes(run: ReplayRun) -> npt.NDArray[np.uint32]:

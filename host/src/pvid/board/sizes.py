@@ -127,7 +127,7 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
 
 
 def table_rows(footprints: dict[Configuration, Footprint]) -> list[tuple[str, ...]]:
-    """Cells of the table in firmware/README.md, as in HEADER."""
+    """Cells of the table in host/docs/benchmarks/cost.md, as in HEADER."""
     return [
         (
             f"{configuration.board.core} ({configuration.board.name})",

@@ -10,13 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.board.boards import BUILD, ROOT, Board, build, keep_header, one_at_a_time
+from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import FixedConfig, FloatConfig, StreamRig
-from pvid.core.native import MAX_MOMENTS, Law, StrongConfig, WeakConfig, strong_config_struct, weak_config_struct
-from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.core.headers import Headers, default_library
+from pvid.core.sources import FIRMWARE, FOLDERS, without
 from pvid.design.c_tables import float_array, float_literal, struct_initializer
 from pvid.design.weak_sizing import raised_bounds
 from pvid.link.frames import MAX_P, Core
+from pvid.settings.bounds import MAX_MOMENTS
+from pvid.settings.enums import Law
+from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.setup.strong_header_q31 import strong_header_q31
 from pvid.setup.weak_header_q31 import to_c_header_q31
 from pvid.twin.sensor import SensorConstants
@@ -64,26 +68,22 @@ def _tables(config: FloatConfig | FixedConfig, l1: float) -> str:
         if isinstance(shared, WeakConfigQ31):
             return to_c_header_q31(shared, l1, *banner)
         return strong_header_q31(shared, l1, *banner)
-    lines = []
+    headers = Headers.of(default_library())
+    filled = headers.filled(f"pvid_{shared.form}_config_f32", shared)
+    pointers = {name: f"stream_{name}" for name in filled.tables}
+    settings = []
     if isinstance(shared, WeakConfig):
-        weak, tables = weak_config_struct(shared)
-        pointers = {name: f"stream_{name}" for name in tables} | {"design": "&stream_design"}
-        design = struct_initializer(weak.design.contents, pointers)
+        design = struct_initializer(headers, filled.struct.design[0], pointers)
+        settings = [f"static const pvid_weak_design_f32 stream_design = {design};"]
+        pointers |= {"design": "&stream_design"}
         if shared.full_angle or shared.friction:
-            lines.append("static pvid_weak_angle_f32 stream_angle;")
+            settings.insert(0, "static pvid_weak_angle_f32 stream_angle;")
             pointers["angle"] = "&stream_angle"
-        settings = [
-            *lines,
-            f"static const pvid_weak_design_f32 stream_design = {design};",
-            f"static const pvid_weak_config_f32 stream_config = {struct_initializer(weak, pointers)};",
-        ]
-    else:
-        strong, tables = strong_config_struct(shared)
-        initializer = struct_initializer(strong, {name: f"stream_{name}" for name in tables})
-        settings = [f"static const pvid_strong_config_f32 stream_config = {initializer};"]
+    initializer = struct_initializer(headers, filled.struct, pointers)
+    settings.append(f"static const pvid_{shared.form}_config_f32 stream_config = {initializer};")
     arrays = [
         float_array(f"stream_{name}", np.asarray(table, np.float32).reshape(table.shape[0], -1), "see the settings")
-        for name, table in tables.items()
+        for name, table in filled.tables.items()
     ]
     return _guarded("STREAM_TABLES_H", ['#include "pvid/pvid.h"', "", *arrays, *settings])
 
@@ -161,23 +161,21 @@ def build_image(rig: StreamRig, board: Board | None) -> Path:
 
 def _build_for_host(folder: Path, tree: Path, core: Core, sizes: dict[str, str]) -> Path:
     """With the options of the core (firmware/cmake/PvidCompile.cmake); what the other core alone needs is left out."""
-    firmware = ROOT / "firmware"
-    application = firmware / "apps" / "stream"
-    other = {Core.F32: "q31", Core.Q31: "f32"}[core]
+    application = FIRMWARE / "apps" / "stream"
     sources = [
-        *sorted(one for one in (firmware / "src").glob("*.c") if not one.stem.endswith(f"_{other}")),
-        firmware / "link" / "link.c",
-        firmware / "ports" / "host" / "port.c",
-        firmware / "ports" / "host" / "receiver.c",
+        *without({Core.F32: "q31", Core.Q31: "f32"}[core]),
+        FIRMWARE / "link" / "link.c",
+        FIRMWARE / "ports" / "host" / "port.c",
+        FIRMWARE / "ports" / "host" / "receiver.c",
         *(application / file for file in ("main.c", "answers.c", "sensor.c", f"identifier_{core.name.lower()}.c")),
     ]
     image = tree / "stream"
-    inputs = [*sources, *folder.glob("*.h"), *firmware.glob("**/*.h")]
+    inputs = [*sources, *folder.glob("*.h"), *FIRMWARE.glob("**/*.h")]
     if image.exists() and image.stat().st_mtime > max(one.stat().st_mtime for one in inputs):
         return image
     tree.mkdir(parents=True, exist_ok=True)
     fresh = tree / "stream.new"
-    includes = [firmware / "include", firmware / "link", firmware / "ports", folder]
+    includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports", folder]
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
     command += [f"-D{name}={value}" for name, value in sizes.items()]
     command += [f"-I{one}" for one in includes] + [str(one) for one in sources] + ["-lm", "-o", str(fresh)]

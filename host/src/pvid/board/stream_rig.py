@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native, StrongConfig, WeakConfig
-from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.core.native import Native
 from pvid.link.frames import MAX_P, Configure, ConfigureQ31, Core, Count, Form, Sample, Source
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare_q31 import identifier_q31
+from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.setup.f32 import config_of
 from pvid.setup.q31 import config_for_run, config_of_q31, counts_of, units_of
 from pvid.sim.pendulum import standard_sensors
@@ -94,8 +94,8 @@ class StreamRig:
         """Running hash after every tick in the core on this machine, uint32 [n]."""
         config = self.config
         if isinstance(config, FixedConfig):
-            return identifier_q31(native, config).run(phi, y, sums=False).hash
-        identifier = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
+            return native.identifier(config).run(phi, y, sums=False).hash
+        identifier = native.identifier(config)
         return identifier.run(phi, y, sums=False).hash
 
     def configure(

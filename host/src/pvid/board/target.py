@@ -24,7 +24,7 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.stream_image import build_image, settings_number
 from pvid.board.stream_rig import StreamRig
-from pvid.core.native import Native, Status
+from pvid.core.native import Native
 from pvid.link.frames import (
     Code,
     Counters,
@@ -40,6 +40,7 @@ from pvid.link.frames import (
 )
 from pvid.link.frames import Status as BoardStatus
 from pvid.link.port import Port, open_port
+from pvid.settings.enums import Status
 
 SAMPLES_A_FRAME = 64
 HOST_TARGET = "stream-host"
@@ -126,11 +127,11 @@ def _start_host(image: str, wrap: Callable[[Port], Port], patience_s: float = 20
     """The host's build, which says the name of its pseudo-terminal."""
     process = child.start([image], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0)
     assert process.stdout is not None
-    heard = b""
+    output = b""
     if select.select([process.stdout], [], [], patience_s)[0]:
-        heard = process.stdout.read(4096)
+        output = process.stdout.read(4096)
     process.stdout.close()
-    found = re.search(rb"/dev/\S+", heard)
+    found = re.search(rb"/dev/\S+", output)
     if found is None:
         process.kill()
         process.wait()
@@ -256,7 +257,7 @@ class Player:
         self.next = self.room = self.skipped = 0
         self._send(self._configure)
 
-    def _ask_again(self) -> None:
+    def _repeat_request(self) -> None:
         """Nothing has come for a while: something was lost."""
         if self.running:
             self.next = self.account.done
@@ -266,7 +267,7 @@ class Player:
 
     # ---- in
 
-    def _hear(self) -> bool:
+    def _receive(self) -> bool:
         """Takes in what has come; returns whether that was progress."""
         try:
             data = self.target.port.read(4096)
@@ -336,7 +337,7 @@ class Player:
         self.account.hello, self.running = None, False
         limit = time.monotonic() + self.target.coming_up_s
         while self.account.hello is None and time.monotonic() < limit:
-            self._hear()
+            self._receive()
 
     @property
     def _finished(self) -> bool:
@@ -354,7 +355,7 @@ class Player:
         while not self._finished:
             try:
                 self._send_samples()
-                if self._hear():
+                if self._receive():
                     heard_at = asked_at = time.monotonic()
                     if self.progress is not None:
                         self.progress(self.account.done)
@@ -367,7 +368,7 @@ class Player:
                     break
                 if now - asked_at > resend_s:
                     asked_at = now
-                    self._ask_again()
+                    self._repeat_request()
             except PortGoneError as gone:
                 if reconnects <= 0:
                     self.account.ended = f"the port is gone: {gone}"

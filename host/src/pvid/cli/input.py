@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from pvid.base.console import tell
+from pvid.base.console import write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import format_of
 from pvid.log.rig import LOG_SUFFIX, run_of_log
@@ -104,4 +104,4 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
 def print_notes(notes: Iterable[str]) -> None:
     """What was done to a run, on standard error."""
     for note in notes:
-        tell(f"pvid: input: {note}")
+        write_stderr(f"pvid: input: {note}")

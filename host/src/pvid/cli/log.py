@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, tell
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig, stream_rig
@@ -126,13 +126,13 @@ def log_command(
 def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
     if address and not is_local(address):
-        tell(f"every computer that can reach this machine can open {address}")
+        write_stderr(f"every computer that can reach this machine can open {address}")
     console = Console()
     if sys.stdout.isatty() and not console.is_dumb_terminal:
         return LiveView(console, title, mechanism, address)
-    tell(f"{title}; Ctrl-C ends the recording")
+    write_stderr(f"{title}; Ctrl-C ends the recording")
     if address:
-        tell(f"live page: {address}")
+        write_stderr(f"live page: {address}")
     return StatusLine(sys.stderr, mechanism.model)
 
 
@@ -170,7 +170,7 @@ def print_account(account: Account, allow_loss: float, failures: Sequence[str] =
     if wrong:
         return DIFFERENT
     if account.lost_share > allow_loss:
-        tell(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed")
+        write_stderr(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed")
         return DIFFERENT
     return DONE
 

@@ -23,7 +23,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pvid import __version__
-from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, INTERRUPTED, NOTHING_IDENTIFIED, progress_bar, tell
+from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, INTERRUPTED, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.output import watch
 from pvid.base.rounding import with_error
@@ -32,7 +32,6 @@ from pvid.cli.input import FigurePath, columns_option, print_notes, read_input, 
 from pvid.cli.log import COMMANDS as LOG_COMMANDS
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
-from pvid.core.native_q31 import WeakConfigQ31
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import to_c_header
@@ -46,6 +45,7 @@ from pvid.run import answer
 from pvid.run.compare import Comparison
 from pvid.run.identify import Identification, identify
 from pvid.run.survey import fitted
+from pvid.settings.q31 import WeakConfigQ31
 from pvid.setup.f32 import weak_design_of
 from pvid.setup.q31 import config_for_run, strong_config_q31, weak_config_q31
 from pvid.setup.strong_header_q31 import strong_header_q31
@@ -73,22 +73,22 @@ def main() -> None:
         code = commands.main(prog_name="pvid", standalone_mode=False)
         sys.stdout.flush()
     except click.exceptions.Abort:
-        tell("pvid: interrupted")
+        write_stderr("pvid: interrupted")
         code = INTERRUPTED
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         help_hint = f" (see {context.command_path} --help)" if context is not None else ""
-        tell(f"pvid: {error.format_message()}{help_hint}")
+        write_stderr(f"pvid: {error.format_message()}{help_hint}")
         code = BAD_INPUT
     except PvidError as error:
-        tell(f"pvid: {error}")
+        write_stderr(f"pvid: {error}")
         code = BAD_INPUT
     except OSError as error:
-        tell(f"pvid: {'' if error.filename is None else f'{error.filename}: '}{reason(error)}")
+        write_stderr(f"pvid: {'' if error.filename is None else f'{error.filename}: '}{reason(error)}")
         code = BAD_INPUT
     except MemoryError as error:
-        told = f" ({reason(error)})" if str(error) else ""
-        tell(f"pvid: there is not enough memory{told}: is a length, a rate or a count too large?")
+        detail = f" ({reason(error)})" if str(error) else ""
+        write_stderr(f"pvid: there is not enough memory{detail}: is a length, a rate or a count too large?")
         code = BAD_INPUT
     sys.exit(code if isinstance(code, int) else DONE)
 
@@ -131,7 +131,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
 
     on = stage()
     if on.lacking is not None:
-        tell(f"{on.lacking}: the firmware runs on {on.where}")
+        write_stderr(f"{on.lacking}: the firmware runs on {on.where}")
     simulation = simulate(sensors=standard_sensors(bits), truth=truth, seed=seed)  # type: ignore[arg-type]
     run = simulation.run
     standard = RigFile.standard()
@@ -143,7 +143,7 @@ def demo(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
     cores = ("f32", "q31") if form == "weak" else ("f32",)  # the strong form's twins take a solve a tick
     rigs = [replace(rig, identifier=replace(rig.identifier, core=core)) for core in cores]  # type: ignore[arg-type]
     start = standard_start(seed)
-    tell(
+    write_stderr(
         f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
         f"start {', '.join(f'{100 * (s / p - 1):+.0f} %' for s, p in zip(start, simulation.p, strict=True))} off"
     )
@@ -181,7 +181,7 @@ def _print_result(result: Identification, rig: RigFile, truths: dict[str, float]
 
 def _print_warning(result: Identification) -> None:
     if result.warning is not None:
-        tell(f"pvid: warning: {result.warning}")
+        write_stderr(f"pvid: warning: {result.warning}")
 
 
 def _print_comparison(comparison: Comparison, label: str = "C core against the numpy twin") -> None:
@@ -272,7 +272,7 @@ def simulate_command(**options: Any) -> int:
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())
-    tell(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
+    write_stderr(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
     return DONE
 
 
@@ -336,9 +336,9 @@ def identify_command(
         image = stream_rig(fitted(rig, run), run.sample_rate, run)
         with progress_bar(f"streaming to {target}", len(run.t)) as advance:
             verdict = verify(target, image, native, *played_samples(rig, run), progress=advance)
-        tell(f"{target}: {verdict.playback.account}")
+        write_stderr(f"{target}: {verdict.playback.account}")
         if not verdict.equal:
-            tell(f"pvid: {target}: {verdict.text}")
+            write_stderr(f"pvid: {target}: {verdict.text}")
             return DIFFERENT
         result = replace(result, on=target)
     if as_json:
@@ -349,9 +349,9 @@ def identify_command(
         _write_figure(result, figure, None)
     _print_warning(result)
     if not result.identified:
-        tell(f"pvid: nothing identified: {result.verdict}")
+        write_stderr(f"pvid: nothing identified: {result.verdict}")
     for sentence in result.advice:
-        tell(f"pvid: advice: {sentence}")
+        write_stderr(f"pvid: advice: {sentence}")
     return DONE if result.identified else NOTHING_IDENTIFIED
 
 
@@ -508,12 +508,12 @@ def weak_table(rig_path: Path, name: str, check: Path | None, core: str, run_pat
         config = weak_config_q31(rig, rig.sample_rate) if run is None else config_for_run(rig, run)
         assert isinstance(config, WeakConfigQ31)  # by the form
         margins = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
-        tell(f"bits to spare at full scale: {margins}")
+        write_stderr(f"bits to spare at full scale: {margins}")
         _print_raised(config.design)
         made_by = f"pvid weak-table --core q31 {shown} --name {name}"
         return _print_header(to_c_header_q31(config, rig.l1, name, made_by), check)
     tables = weak_design_of(rig, rig.sample_rate)
-    tell(
+    write_stderr(
         f"taps {tables.taps}, decimation {tables.decimation}, windows of {tables.window} samples "
         f"({tables.window_s:g} s), {tables.functions} test functions; {tables.flash_bytes} bytes of flash; "
         f"{tables.update_rate_hz:.2f} answers a second"
@@ -526,7 +526,7 @@ def _print_raised(design: SizesOfDesign) -> None:
     """On standard error what pvid/config.h must be told, where a design exceeds its defaults."""
     raised = [f"-D{macro}={value}" for macro, value in raised_bounds(design).items()]
     if raised:
-        tell(f"build the core with {' '.join(raised)}")
+        write_stderr(f"build the core with {' '.join(raised)}")
 
 
 @commands.command(name="strong-table")
@@ -544,7 +544,7 @@ def strong_table(rig_path: Path, name: str, check: Path | None) -> int:
         raise PvidError(f"{rig_path}: sample_rate is missing, and the formats hang on it")
     config = strong_config_q31(rig, rig.sample_rate)
     margins = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
-    tell(f"bits to spare at full scale: {margins}")
+    write_stderr(f"bits to spare at full scale: {margins}")
     made_by = f"pvid strong-table --rig {rig_path.name} --name {name}"
     return _print_header(strong_header_q31(config, rig.l1, name, made_by), check)
 
@@ -651,5 +651,5 @@ def sizes_command(update: Path | None, budget: Path | None, check: Path | None, 
         sizes.write_budget(budget, footprints)
     excess = sizes.over_budget(check, footprints) if check is not None else []
     for sentence in excess:
-        tell(f"pvid: over budget: {sentence}")
+        write_stderr(f"pvid: over budget: {sentence}")
     return DIFFERENT if excess else DONE

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pvid.base.atomic_write import write_whole
-from pvid.base.console import tell
+from pvid.base.console import write_stderr
 from pvid.base.errors import PvidError
 
 
@@ -23,7 +23,7 @@ def put_table(page: Path | None, marker: str, text: str) -> None:
     head, rest = old.split(opening, 1)
     tail = rest.split(closing, 1)[1]
     write_whole(page, f"{head}{opening}\n{text}\n{closing}{tail}")
-    tell(f"{page}: table {marker} written")
+    write_stderr(f"{page}: table {marker} written")
 
 
 UPDATE = click.option(

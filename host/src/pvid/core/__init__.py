@@ -1,1 +1,1 @@
-"""The shipped C core, loaded from its shared library."""
+"""The shipped C core in this process: its headers, its identifiers, their saved states."""

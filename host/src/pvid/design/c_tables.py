@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import ctypes
 import re
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.core.headers import Headers
 from pvid.design.fir import FirBank
 
 _C_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -59,28 +60,30 @@ def bank_header(bank: FirBank, name: str, made_by: str) -> str:
     return _guarded(name, banner, [array])
 
 
-def struct_initializer(struct: ctypes.Structure, pointers: Mapping[str, str]) -> str:
+def struct_initializer(headers: Headers, struct: Any, pointers: Mapping[str, str]) -> str:
     """The C99 initializer, by field names, that makes a struct equal to `struct`.
 
     Parameters
     ----------
+    headers
+        What declares it.
     struct
-        A mirror of a C struct whose fields are numbers, arrays of them, structs and pointers.
+        Its fields are numbers, arrays of them, structs and pointers.
     pointers
         What stands for each pointer, by its field's name: "replay_weights", "&replay_design"; NULL without an entry.
     """
     fields = []
-    for name, kind, *_ in struct._fields_:
-        value = getattr(struct, name)
-        if isinstance(value, ctypes.Structure):
-            text = struct_initializer(value, pointers)
-        elif isinstance(value, ctypes.Array):
-            # C fills up with zeros; the device's bounds may be narrower than those of the mirror
+    for name, field in headers.ffi.typeof(struct).fields:
+        value, kind = getattr(struct, name), field.type.kind
+        if kind == "struct":
+            text = struct_initializer(headers, value, pointers)
+        elif kind == "array":
+            # C fills up with zeros; the device's bounds may be narrower than those of this machine
             used = max((place + 1 for place, entry in enumerate(value) if entry != 0), default=1)
-            text = "{" + ", ".join(float_literal(np.float32(entry)) for entry in value[:used]) + "}"
-        elif kind is ctypes.c_void_p or issubclass(kind, ctypes._Pointer):
+            text = "{" + ", ".join(float_literal(np.float32(entry)) for entry in value[0:used]) + "}"
+        elif kind == "pointer":
             text = pointers.get(name, "NULL")
-        elif kind is ctypes.c_float:
+        elif isinstance(value, float):
             text = float_literal(np.float32(value))
         else:
             text = str(int(value))

@@ -14,13 +14,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import legendre
 
 from pvid.base.errors import PvidError
+from pvid.settings.tables import Folded
 
 Float = npt.NDArray[np.float64]
 Kind = Literal["finite-difference", "savitzky-golay"]
@@ -28,28 +29,6 @@ Kind = Literal["finite-difference", "savitzky-golay"]
 ORDERS = 5
 MAX_DEGREE = 12
 LONGEST_WINDOW = 8191  # samples: what PVID_MAX_WINDOW can be raised to
-
-
-class Folded:
-    """What folded tables [5, half], whose points are `stride` samples apart, span."""
-
-    weights: npt.NDArray[Any]
-    stride: int
-
-    @property
-    def half(self) -> int:
-        """Points on each side of the centre."""
-        return int(self.weights.shape[1])
-
-    @property
-    def window(self) -> int:
-        """Samples from the first point to the last, both included."""
-        return 2 * self.delay + 1
-
-    @property
-    def delay(self) -> int:
-        """Samples from the newest one back to the instant the derivatives refer to."""
-        return self.half * self.stride
 
 
 @dataclass(frozen=True, eq=False)

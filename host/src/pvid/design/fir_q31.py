@@ -7,15 +7,15 @@ All orders come out in one format in one time unit tau = 2^tau_bits points: one 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.design.fir import ORDERS, FirBank, Folded
+from pvid.design.fir import ORDERS, FirBank
 from pvid.design.shaped_rounding import bits_for, shaped, slow_factor
+from pvid.settings.tables import FirBankQ31
 
 Float = npt.NDArray[np.float64]
 Int32 = npt.NDArray[np.int32]
@@ -28,37 +28,6 @@ FIVE_POINTS_DENOMINATOR = 12
 # What moves slowly, for which the rounding errors of the weights are chosen: rates up to the fastest expected one.
 _RATES = 32
 _OWN_WEIGHT = 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class FirBankQ31(Folded):
-    """pvid_fir_bank_q31 and its formats.
-
-    Attributes
-    ----------
-    weights : int32 [5, half], folded
-    stride : samples from point to point
-    centre : weight of the centre sample in order 0
-    phi_max, y_max : full scale of the counts
-    phi_shift, y_shift : of orders 0..4 of phi and 2..4 of y
-    denominator : angles and heights come out in 1/denominator counts
-    phi_bits, y_bits : formats of the derivatives, all orders alike
-    tau_bits : time unit tau = 2^tau_bits points
-    margins : bits that the largest derivative of each order leaves below its limit, of phi and y
-    """
-
-    weights: Int32
-    stride: int
-    centre: int
-    phi_max: int
-    y_max: int
-    phi_shift: tuple[int, ...]
-    y_shift: tuple[int, ...]
-    denominator: int
-    phi_bits: int
-    y_bits: int
-    tau_bits: int
-    margins: dict[str, float]
 
 
 def largest_sums(weights: Int32, centre: int, full_scale: int) -> list[int]:

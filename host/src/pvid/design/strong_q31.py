@@ -11,15 +11,15 @@ follow from the motion that the rig file lets expect: a quarter of full scale, a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.design.fir import FirBank
-from pvid.design.fir_q31 import FirBankQ31, integer_bank
+from pvid.design.fir_q31 import integer_bank
 from pvid.design.shaped_rounding import bits_for
+from pvid.settings.tables import RowShiftsQ31, StrongDesignQ31
 
 Float = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
@@ -28,55 +28,6 @@ EXPECTED_BITS = 23  # of an entry of a row, signed
 FORMAT_MAX = 64
 _EXPECTED_PART = 0.25  # of full scale, of phi and of the pivot's acceleration
 _EXPECTED_RATE = 0.5  # of the fastest
-
-
-@dataclass(frozen=True)
-class RowShiftsQ31:
-    """pvid_strong_row_q31."""
-
-    n_a: int
-    n_e: int
-    n_phi2: tuple[int, ...]
-    n_phi0: tuple[int, ...]
-    part: int
-    y: int
-
-
-@dataclass(frozen=True, eq=False)
-class StrongDesignQ31:
-    """What pvid_strong_config_q31 needs beside the estimator's settings. A value is its integer times 2^-bits.
-
-    Attributes
-    ----------
-    bank : the integer bank of both channels
-    row : shifts of a row
-    u_multiplier, u_shift : from the derivatives of y to u, u', u''
-    u_bits : format of u [1/tau^2]
-    n_bits, y_bits : formats of N_1..N_11 and Y in units of angle_unit, 1/tau^2 and so on
-    angle_unit : one unit of phi [rad]
-    dt : the time unit tau [s]
-    """
-
-    bank: FirBankQ31
-    row: RowShiftsQ31
-    u_multiplier: int
-    u_shift: int
-    u_bits: int
-    n_bits: tuple[int, ...]
-    y_bits: int
-    angle_unit: float
-    dt: float
-
-    @property
-    def margins(self) -> dict[str, float]:
-        """For each derivative the bits that its largest value leaves free."""
-        return self.bank.margins
-
-    def integers(self, phi: Float, u: Float) -> tuple[Int64, Int64]:
-        """What the core takes for derivatives that are known otherwise: phi [n, 5] and u, u', u'' [n, 3], in SI."""
-        own_phi = np.rint(phi * self.dt ** np.arange(5) / self.angle_unit)
-        own_u = np.rint(u * self.dt ** np.arange(2, 5) * 2.0**self.u_bits)
-        return own_phi.astype(np.int64), own_u.astype(np.int64)
 
 
 def strong_design_q31(

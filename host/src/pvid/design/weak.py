@@ -1,4 +1,4 @@
-"""Design of the weak form's tables: front end, test functions, whitening (MATH.md 5, pvid/weak.h).
+"""Design of the weak form's tables: front end, test functions, whitening (theory.md 5, pvid/weak.h).
 
 The test functions are chi_k(x) = (1 - x^2)^exponent P_k(x), x from -1 to 1 over the window, recombined such
 that the residual filters

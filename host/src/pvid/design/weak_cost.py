@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.core.sources import PUBLIC_INCLUDES
 from pvid.design.weak import WeakDesign
 from pvid.design.weak_sizing import raised_bounds
 
@@ -78,7 +79,7 @@ class Schedule:
     window_slices: int
     period: int
     free: int
-    together: int
+    stages_per_tick: int
 
     @classmethod
     def of(cls, taps: int, decimation: int, window: int, functions: int) -> Schedule:
@@ -98,7 +99,7 @@ class Schedule:
             window_slices=window_slices,
             period=decimation * ((window - 1) // 2),
             free=free,
-            together=-(-stages_of(functions) // (free * ((window - 1) // 2))),
+            stages_per_tick=-(-stages_of(functions) // (free * ((window - 1) // 2))),
         )
 
     def mean_counts(self, zero_unknown: bool) -> npt.NDArray[np.float64]:
@@ -111,7 +112,7 @@ class Schedule:
         """The longest tick by coefficients in the order of LONGEST_TERMS, and those of MEAN_TERMS."""
         tick, front_pair, stage, factor, factor_squared, window_slice = coefficients
         function = float(mean[MEAN_TERMS.index("function")])
-        work = self.together * max(stage, factor + factor_squared * self.functions**2)
+        work = self.stages_per_tick * max(stage, factor + factor_squared * self.functions**2)
         front = tick + front_pair * self.front_slice + work
         window = window_slice + function * self.window_slice
         if self.decimation == 1:
@@ -153,7 +154,7 @@ def cost_of(design: WeakDesign, zero_unknown: bool = True, iterations: int = 3, 
     schedule = Schedule.of(design.taps, design.decimation, design.window, design.functions)
     mean, longest = instructions(schedule, zero_unknown)
     stages = stages_of(design.functions, zero_unknown, iterations)
-    worked_off_s = -(-stages // (schedule.free * schedule.together)) * design.dt
+    worked_off_s = -(-stages // (schedule.free * schedule.stages_per_tick)) * design.dt
     definitions = fitted_definitions(design)
     raised = tuple(f"{macro}={value}" for macro, value in raised_bounds(design).items())
     return WeakCost(
@@ -202,8 +203,7 @@ def state_bytes_32(definitions: tuple[str, ...] = (), corrected: bool = False) -
     """
     if shutil.which("gcc") is None or platform.machine() not in ("x86_64", "i686"):
         return None
-    include = Path(__file__).resolve().parents[4] / "firmware" / "include"
-    command = ["gcc", "-m32", "-msse2", "-mfpmath=sse", "-std=c99", "-ffreestanding", "-fno-common", f"-I{include}"]
+    command = ["gcc", "-m32", "-msse2", "-mfpmath=sse", "-std=c99", "-ffreestanding", "-fno-common", *PUBLIC_INCLUDES]
     room = "sizeof(pvid_weak_f32)" + (" + sizeof(pvid_weak_angle_f32)" if corrected else "")
     source = f'#include "pvid/weak.h"\nchar state[{room}];\n'
     command += [*(f"-D{definition}" for definition in definitions), "-S", "-x", "c", "-", "-o", "-"]

@@ -9,7 +9,6 @@ numbers of 1/dt^2 and integrals need no factor.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.design.shaped_rounding import bits_for, shaped, slow_factor
 from pvid.design.weak import WeakDesign
+from pvid.settings.tables import WeakTablesQ31
 
 Float = npt.NDArray[np.float64]
 Int16 = npt.NDArray[np.int16]
@@ -36,7 +36,7 @@ GRAM_BITS = 30
 
 TERMS = 15
 HIGH_TERMS = 2
-# Terms by the places of weak_window_q31.h. The products with I2(u phi) and I2(phi) need more bits than one term has:
+# Terms by the places of weak/window_q31.h. The products with I2(u phi) and I2(phi) need more bits than one term has:
 # _HIGH holds what lies beyond it, so few bits that their products need no shift.
 UIUF_HIGH, UIF_HIGH, UF, F, UIUF, UIF, UIU, UI1, U, UT, CHI_UF, CHI_F, CHI_U, CHI_1, Y = range(TERMS)
 # Part of full scale that a term is expected to reach: angle and drive an eighth each, and a motion to and fro leaves a
@@ -67,63 +67,6 @@ COLUMN_TERMS = (
     (UT,),
 )
 COLUMNS = len(COLUMN_TERMS)
-
-
-@dataclass(frozen=True, eq=False)
-class WeakTablesQ31:
-    """pvid_weak_design_q31: tables, shifts and formats. A value is its integer times 2^-bits.
-
-    Attributes
-    ----------
-    taps, decimation, window, functions, lag : as in the float design
-    phi_max, y_max : full scale of the counts, about their offsets
-    smooth, second : int32 [(taps - 1) / 2]
-    smooth_bits : format of smooth
-    phi_shift, u_shift : from the FIR sums to F and U
-    uf_shift : from U F to its 20 bits
-    integral_shift : int [3], of the integrals of UF, F, U in dt^2/12
-    high_shift : int [2], of UIUF_HIGH, UIF_HIGH
-    product_shift : int [5], of what these leave of UIUF, UIF, UIU, UI1, UT
-    sum_shift : of every product chi * term before it is added
-    chi : int16 [window, 3, functions]
-    multiplier : int32 [15], shift : int [15], from a term's sum to its share of a column
-    gram : int32 [6, functions (functions + 1) / 2]; gram_bits : int [6]
-    column_bits : int [11], formats of N1..N8, Y, a, b
-    u_bits : format of U [1/dt^2]
-    f_unit : one unit of F [rad]; dt [s]
-    overlap : as in the float design
-    margins : for each quantity the bits that its largest value leaves free
-    """
-
-    taps: int
-    decimation: int
-    window: int
-    functions: int
-    lag: int
-    phi_max: int
-    y_max: int
-    u_max: int
-    smooth: Int32
-    second: Int32
-    smooth_bits: int
-    phi_shift: int
-    u_shift: int
-    uf_shift: int
-    integral_shift: tuple[int, ...]
-    high_shift: tuple[int, ...]
-    product_shift: tuple[int, ...]
-    sum_shift: int
-    chi: Int16
-    multiplier: Int32
-    shift: tuple[int, ...]
-    gram: Int32
-    gram_bits: tuple[int, ...]
-    column_bits: tuple[int, ...]
-    u_bits: int
-    f_unit: float
-    dt: float
-    overlap: float
-    margins: dict[str, float]
 
 
 def _shift_to(largest: float, bits: int) -> int:

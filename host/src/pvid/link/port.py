@@ -53,11 +53,11 @@ def open_port(name: str) -> Port:
         port.open()
         opened: Port = port
     except Exception as error:  # the classes that pyserial loads for URLs let through whatever their text provokes
-        raise PvidError(why_not_opened(name, error)) from error
+        raise PvidError(opening_failure(name, error)) from error
     return opened
 
 
-def why_not_opened(name: str, error: Exception) -> str:
+def opening_failure(name: str, error: Exception) -> str:
     """One sentence on a port that did not open."""
     cause = error.__context__ if getattr(error, "errno", None) is None and error.__context__ is not None else error
     words = {
@@ -75,7 +75,7 @@ def why_not_opened(name: str, error: Exception) -> str:
     return f"cannot open the port {name}: {reason(error)}"
 
 
-def why_gone(error: Exception) -> str:
+def loss_cause(error: Exception) -> str:
     """A few words on a port that stopped working."""
     if "returned no data" in str(error) or "disconnected" in str(error):
         return "nothing is at its other end any more"

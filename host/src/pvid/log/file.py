@@ -56,7 +56,7 @@ class Segment(Message, messages=LOG_MESSAGES):
     about: bytes = wire("char", None)
 
     @property
-    def told(self) -> dict[str, Any]:
+    def description(self) -> dict[str, Any]:
         """`about` as an object; empty when it is none."""
         try:
             found = json.loads(self.about)
@@ -67,7 +67,7 @@ class Segment(Message, messages=LOG_MESSAGES):
     @property
     def port(self) -> str:
         """The port's name; empty when it is not told."""
-        return printable(str(self.told.get("port", "")))
+        return printable(str(self.description.get("port", "")))
 
 
 @dataclass(frozen=True)

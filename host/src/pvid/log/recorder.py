@@ -24,7 +24,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import printable, reason
 from pvid.board.target import Target, refusal
 from pvid.link.frames import Code, Configuration, Credit, Hello, Message, Status, encode
-from pvid.link.port import Port, open_port, why_gone
+from pvid.link.port import Port, loss_cause, open_port
 from pvid.log.file import LogWriter, Segment
 from pvid.log.reader import Account, LogStream, Observer, Record
 from pvid.log.tail import LogTail
@@ -210,7 +210,7 @@ class Recorder(threading.Thread):
             while time.monotonic() < limit and (data := port.read(_CHUNK)):
                 self.writer.take(data)
         except (serial.SerialException, OSError) as error:
-            return f"the port is gone: {why_gone(error)}"
+            return f"the port is gone: {loss_cause(error)}"
         return self.why
 
     def _reopen(self, pause_s: float) -> Target | None:

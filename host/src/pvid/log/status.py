@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from typing import TextIO
 
-from pvid.core.native import Reason
 from pvid.link.frames import Estimate, EstimateQ31, Hello
 from pvid.log.reader import Account, Record
 from pvid.log.values import UNKNOWN_RIG, in_si
 from pvid.models.model import Model
+from pvid.settings.enums import Reason
 
 _ON_TERMINAL_S = 0.25
 _ELSEWHERE_S = 10.0

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Reason
 from pvid.link.frames import (
     MAX_P,
     Code,
@@ -38,6 +37,7 @@ from pvid.log.file import Close, Segment
 from pvid.log.reader import Gap, Record, Restart
 from pvid.models.model import Mechanism, Model, Quantity
 from pvid.models.registry import DEFAULT, MODELS
+from pvid.settings.enums import Reason
 
 _SLOWEST, _FASTEST = 1e-3, 1e9  # [Hz]
 _LONGEST_S = 3e9  # between the PC's clock and a tick: a century, which a time in ns has room for

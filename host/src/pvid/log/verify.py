@@ -24,8 +24,6 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import FixedConfig, FloatConfig, stream_rig
-from pvid.core.native import Law, Reason, StrongConfig, WeakConfig
-from pvid.core.native_q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.link.frames import (
     MAX_P,
     Configuration,
@@ -43,6 +41,9 @@ from pvid.link.frames import (
 from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
 from pvid.run.compare import P_NAMES, Difference
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.twin import fnv
 from pvid.twin.q31.estimator import EstimatorQ31
 from pvid.twin.strong import StrongTwin
@@ -237,7 +238,9 @@ class Verifier:
         opened = self._open
         if opened is None or record.tick != opened.next or not opened.is_of(raw.session):
             yield from self._close()
-            opened = self._open = _Open(Stretch(record.segment, record.tick, 0), self._lacking(record), raw.session)
+            opened = self._open = _Open(
+                Stretch(record.segment, record.tick, 0), self._missing_note(record), raw.session
+            )
             if (configuration := self._configurations.get(raw.session)) is not None:
                 opened.begin_with(configuration)
         self._before = record.segment, record.tick + raw.count
@@ -255,7 +258,7 @@ class Verifier:
             opened.checks.append((tick, check))
             opened.harmed = False
 
-    def _lacking(self, record: Record) -> str:
+    def _missing_note(self, record: Record) -> str:
         """A sentence about the samples missing before this record."""
         if self._before is None or self._before[0] != record.segment:
             return f"its session began before this segment did, and the samples before tick {record.tick} are not in it"

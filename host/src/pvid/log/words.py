@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from pvid.core.native import Reason
 from pvid.link.frames import Code, Core, Form, Hello, Status
 from pvid.log.reader import Account
+from pvid.settings.enums import Reason
 
 _REASONS = {
     Reason.UPDATED: "the estimate took a step",
@@ -25,7 +25,7 @@ _REASONS = {
     "another mechanism",
 }
 
-# What the core publishes (trust.h), and what a good drive reaches (MATH.md 4).
+# What the core publishes (trust.h), and what a good drive reaches (theory.md 4).
 KAPPA_MIN, KAPPA_WEAK, KAPPA_GOOD = 3e-5, 1e-3, 5e-3
 _KAPPA_SHOWN = (1e-6, 1.0)
 

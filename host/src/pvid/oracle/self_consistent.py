@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.design.weak import WeakDesign
-from pvid.oracle.weak import L2_MIN, Remainder, boundary, internal_motion, lack
+from pvid.oracle.weak import L2_MIN, Remainder, boundary, internal_motion, remainder_of_motion
 
 Float = npt.NDArray[np.float64]
 
@@ -39,13 +39,13 @@ def self_consistent(
     def ends_with(known: Remainder) -> Float:
         return boundary(p, columns, known.y + damping @ known.k)
 
-    def lack_at(ends: Float) -> Remainder:
-        return lack(p, internal_motion(p, ends, phi, u, design), phi, u, design, full_angle)
+    def remainder_at(ends: Float) -> Remainder:
+        return remainder_of_motion(p, internal_motion(p, ends, phi, u, design), phi, u, design, full_angle)
 
     with np.errstate(over="ignore", invalid="ignore"):
         out, moved = none, np.inf
         for _ in range(_PASSES):
-            before, out = out, lack_at(ends_with(out))
+            before, out = out, remainder_at(ends_with(out))
             moved = float(np.linalg.norm(out.y - before.y)) / max(float(np.linalg.norm(out.y)), 1e-300)
         if not full_angle or moved <= _CONVERGED:
             return out if np.isfinite(out.y).all() and np.isfinite(out.k).all() else None
@@ -54,10 +54,10 @@ def self_consistent(
 
         def miss(scaled: Float) -> Float:
             ends = scaled * unit
-            wanted = ends_with(lack_at(ends))
+            wanted = ends_with(remainder_at(ends))
             return np.nan_to_num((wanted - ends) / unit, nan=1e6, posinf=1e6, neginf=-1e6)
 
         from scipy.optimize import root  # half the start time of a command, and 40 MB in a logger
 
         found = root(miss, first / unit, options={"xtol": _SOLVED, "maxfev": _EVALUATIONS})
-        return lack_at(found.x * unit) if found.success else None
+        return remainder_at(found.x * unit) if found.success else None

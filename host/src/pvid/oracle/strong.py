@@ -1,4 +1,4 @@
-"""The mathematics in float64, straight from MATH.md sections 2 to 4, to be read beside it.
+"""The mathematics in float64, straight from theory.md 2 to 4, to be read beside it.
 
 Nothing here is fast or bit-exact; it is what the twin and the C core are measured against.
 """
@@ -20,7 +20,7 @@ Law = Literal["stationary", "pseudovelocity"]
 N_THETA = 11
 N_P = 3
 
-# The core keeps the binomial coefficients in theta, not in N (kapitza.h): MATH.md's N = BINOMIAL * the core's.
+# The core keeps the binomial coefficients in theta, not in N (kapitza.h): the N of theory.md = BINOMIAL * the core's.
 BINOMIAL = np.array([1, 1, 1, 3, 3, 1, 1, 4, 6, 4, 1], np.float64)
 
 

@@ -1,4 +1,4 @@
-"""The weak form in float64, straight from MATH.md section 5, to be read beside it.
+"""The weak form in float64, straight from theory.md 5, to be read beside it.
 
 Nothing here is fast or bit-exact; it is what the twin and the C core are measured against, and where what the
 core does not have yet is tried: the full-angle correction and the two damping regressors.
@@ -38,7 +38,7 @@ _SETTLED_MOVE = 0.02
 _SETTLED_ERROR = 0.05
 # Then what the uncorrected windows said is aged, as is what rows of a poor start said: 0.3^4 = 0.8 % of it is left. It
 # waits while the standard errors are not below this.
-_AGEING = 0.3
+_FADE = 0.3
 _AGEING_WINDOWS = 4
 _NEAR = 0.1
 
@@ -231,7 +231,7 @@ class Remainder:
 L2_MIN = 0.05
 
 
-def lack(
+def remainder_of_motion(
     p: Float, motion: tuple[Float, Float], phi: Float, u: Float, design: WeakDesign, full_angle: bool
 ) -> Remainder:
     """What the linear rows of one window lack, with q and q' of `internal_motion`.
@@ -295,7 +295,7 @@ def remainder(
         return out
     for _ in range(passes):
         ends = boundary(p, window_columns, out.y + damping @ out.k)
-        out = lack(p, internal_motion(p, ends, phi, u, design), phi, u, design, full_angle)
+        out = remainder_of_motion(p, internal_motion(p, ends, phi, u, design), phi, u, design, full_angle)
     return out
 
 
@@ -492,8 +492,8 @@ class WeakOracle:
         core = self.p[: self.n_core]
         inverse_factor = np.linalg.inv(np.linalg.cholesky(noise_gram(self.design, core)))
         x = window_columns[: 1 + len(theta(core))]
-        lack = self._remainder(core, window_columns, phi, u)
-        x = np.concatenate([x[:1] - lack.y, x[1:], lack.k])
+        neglected = self._remainder(core, window_columns, phi, u)
+        x = np.concatenate([x[:1] - neglected.y, x[1:], neglected.k])
         return without_directions(x @ inverse_factor.T, window_columns[[A, B]] @ inverse_factor.T), inverse_factor
 
     def _remainder(self, core: Float, window_columns: Float, phi: Float, u: Float) -> Remainder:
@@ -503,15 +503,15 @@ class WeakOracle:
             return Remainder(np.zeros(functions), np.zeros((extra, functions)))
         damping = self.p[self.n_core :] if extra else np.zeros(2)
         settings = self.settings
-        lack = remainder(core, damping, window_columns, phi, u, self.design, settings.passes, settings.full_angle)
-        return Remainder(lack.y, lack.k[:extra])
+        neglected = remainder(core, damping, window_columns, phi, u, self.design, settings.passes, settings.full_angle)
+        return Remainder(neglected.y, neglected.k[:extra])
 
     def add(self, x: Float, inverse_factor: Float) -> None:
         """Sums of a window's rows, those of the past forgotten or aged first."""
         hop_s = self.design.hop_s
         keep = math.exp(-hop_s / self.settings.forgetting_s) if self.settings.forgetting_s > 0 else 1.0
         if self._ageing > 0 and self._known:
-            keep *= _AGEING
+            keep *= _FADE
             self._ageing -= 1
         y, n = x[0], x[1:]
         e = y - self.theta() @ n
@@ -647,7 +647,7 @@ def identify_weak(
 
 # ---- prediction
 
-# Without a drive kappa is 1e-16 and S cannot be inverted; the weakest useful drives leave 1e-5 (MATH.md 4).
+# Without a drive kappa is 1e-16 and S cannot be inverted; the weakest useful drives leave 1e-5 (theory.md 4).
 _UNDRIVEN_KAPPA = 1e-10
 
 

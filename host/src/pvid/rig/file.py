@@ -72,17 +72,16 @@ class Sensor:
 
     Attributes
     ----------
-    phi_lsb : angle sensor [rad]; default 14 bits a turn
-    y_lsb : pivot sensor [m]
-    phi_zero : what the encoder reads at rest, roughly [rad]: needed where that is beyond 1 rad, a half turn say
-    y_delay : how much later than phi the pivot is sampled [s]; the host moves y by it, a board does not
-    y_gain_sd : standard deviation of the gain of y, relative: enters the standard errors, since no run shows it
-    phi_range : largest angle from rest that the fixed-point core takes in [rad]; 0: 0.5, or more where the run at hand
-        needs it
-    y_range : largest height of the pivot about the middle of its travel likewise [m]; 0: a tenth of l1, or more
-        likewise
-    acceleration_range : largest acceleration of the pivot likewise [m/s^2]; 0: twice the run's, without a run four
-        times the nominal g. Ten times the run's would cost accuracy: products of u are rounded
+    phi_lsb : resolution of the encoder; default: that of the recorded run, without a run 14 bits per turn
+    y_lsb : resolution of the pivot sensor
+    phi_zero : approximate reading of the encoder at rest; needed if it is beyond 1 rad, for example half a turn
+    y_delay : delay of the pivot's samples after those of phi; the host shifts y by it, a board does not
+    y_gain_sd : relative standard deviation of the gain of y; part of the standard errors, because no run shows it
+    phi_range : fixed point: largest angle from rest that is accepted; 0: 0.5 rad, or more if the run needs it
+    y_range : fixed point: largest height of the pivot about the middle of its travel; 0: a tenth of l1, or more if the
+        run needs it
+    acceleration_range : fixed point: largest acceleration of the pivot; 0: twice that of the run, without a run four
+        times the nominal g. Ten times that of the run would cost accuracy, because products of u are rounded
     """
 
     phi_lsb: float = _number(Unset(2.0 * math.pi / 2**14), "rad", 0.0, 1.0)
@@ -104,9 +103,9 @@ class Nominal:
 
     Attributes
     ----------
-    g : the part of gravity that lies in the plane of motion [m/s^2]
-    l2 : joint to the centre of mass of body 2 [m]; l1/3 when the file does not say
-    rho2 : radius of gyration of body 2 [m]; l1/3 when the file does not say
+    g : the part of gravity that lies in the plane of motion
+    l2 : distance from the joint to the centre of mass of body 2
+    rho2 : radius of gyration of body 2
     """
 
     l2: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
@@ -123,35 +122,34 @@ class Identifier:
 
     Attributes
     ----------
-    form : "weak" (integrals, for real encoders) or "strong" (the paper's derivatives, for 20 bits and more)
+    form : "weak" (integrals, for real encoders) or "strong" (the derivatives of the paper, for 20 bits and more)
     law : "stationary" (with feedback, converges) or "pseudovelocity" (the paper's equation (5), literally)
-    core : "f32", "q31" (fixed point) or "f64" (the oracle)
-    window_s : window of the weak form or of the differentiator [s]; 0: 1.3 slow periods of the nominal pendulum (weak
+    core : "f32" (float32), "q31" (fixed point) or "f64" (the float64 oracle, on the host only)
+    window_s : window of the weak form or of the differentiator; 0: 1.3 slow periods of the nominal pendulum (weak
         form), 0.241 s (strong form)
-    differentiator : of the strong form
-    degree : of its Savitzky-Golay polynomial
-    stride : samples between the differentiator's points
-    test_functions : of the weak form, per window; 0: up to 1.5 times the nominal fast mode, 8 to 16
-    decimation : of the weak form, samples in per sample used; 0: what leaves about 200 a window
-    smoothing_s : of the weak form, length of the filters before decimation [s]; 0: the shortest that serve
-    pass_hz : of the weak form, up to which frequency these filters leave the motion as it is [Hz]; 0: 7 times the
-        nominal fast mode
-    forgetting_s : time constant of forgetting [s]; 0: nothing is forgotten
-    feedback_hz : rate at which the stationary law removes its misfit [1/s]; 0: a whole Gauss-Newton step at
-        every solve
-    divider : ticks (strong form) or windows (weak form) a solve
-    disturbance : of the joints' angular accelerations, white [rad/s^2/sqrt(Hz)]: rows are weighted by it beside the
-        encoder's noise; a survey finds it from the residuals
-    survey : search a recorded run for start and design before the core identifies it, instead of taking the nominal's
-    full_angle : correct the weak form for sines and cosines; float32 only
-    damping : two regressors more, for viscous friction
-    zero : the encoder's zero is unknown, a fourth parameter of the weak form
-    kappa_min : hold the estimate while less than this part of w's information is its own
-    outlier_gate : keep out rows or windows whose residuals are larger than so many times the usual; 0: none; where the
-        file does not say, see `gate`
-    outlier_patience_s : until the gate believes that the mechanism has changed [s]; 0: never; where the file does not
-        say, 3 times forgetting_s in the weak form, 6 times in the strong one
-    dead_zone : keep p while it is within so many standard errors of where the data want it; 0: always follow them
+    differentiator : filters of the strong form
+    degree : strong form: degree of the Savitzky-Golay polynomial
+    stride : strong form: samples between the points of the differentiator
+    test_functions : weak form: modulating functions per window, at least 4; 0: 8 to 16, up to 1.5 times the nominal
+        fast mode
+    decimation : weak form: samples per decimated sample; 0: about 200 decimated samples per window
+    smoothing_s : weak form: length of the filters before decimation; 0: the shortest that suffice
+    pass_hz : weak form: these filters pass the motion unchanged up to this frequency; 0: 7 times the nominal fast mode
+    forgetting_s : time constant of forgetting; 0: no forgetting
+    feedback_hz : stationary law: rate at which F decays; 0: a whole Gauss-Newton step at every solve
+    divider : ticks (strong form) or windows (weak form) per solve
+    disturbance : white disturbance of the joints' angular accelerations: rows are weighted by it beside the noise of
+        the encoder; a survey finds it from the residuals
+    survey : search a recorded run for start and design before the core identifies it; false: use [nominal]
+    full_angle : weak form, float32: correct the rows for sines and cosines
+    damping : weak form, float32: two more regressors, for viscous friction
+    zero : weak form: the zero of the encoder is unknown, a fourth parameter
+    kappa_min : hold the estimate while less than this share of the information on w is its own
+    outlier_gate : reject rows or windows whose residuals exceed this multiple of the usual; 0: no gate; default: 4
+        (weak form), 6 (strong form), and no gate with the law pseudovelocity
+    outlier_patience_s : the gate accepts a changed mechanism after this time; 0: never; default: forgetting_s times 3
+        (weak form) or 6 (strong form)
+    dead_zone : keep p while it is within this many standard errors of the solution of all data; 0: no dead zone
     """
 
     form: Form = _choice("weak", Form)
@@ -223,10 +221,10 @@ class RigFile:
 
     Attributes
     ----------
-    l1 : length of rod 1 [m]
-    nominal, sensor, identifier, model : the file's tables
-    sample_rate : [Hz]; None: whatever the run says
-    l1_sd : standard deviation of l1, relative: enters the standard errors, since no run shows it
+    l1 : length of rod 1
+    nominal, sensor, identifier, model : the tables of the file
+    sample_rate : rate of the samples; default: that of the run
+    l1_sd : relative standard deviation of l1; part of the standard errors, because no run shows it
     """
 
     l1: float = field(metadata={"unit": "m", "low": 1e-6, "high": 1e6})
@@ -253,8 +251,8 @@ class RigFile:
 
     @classmethod
     def standard(cls) -> RigFile:
-        """The standard rig of MATH.md 6, as a user who knows only l1 and the sensors would write it, and both exactly:
-        a simulation has no error of l1 or of the gain of y."""
+        """The standard rig of theory.md 6, as written by a user who knows only l1 and the sensors, both exactly: a
+        simulation has no error of l1 or of the gain of y."""
         sensor = Sensor(y_gain_sd=0.0)
         return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sensor=sensor, sample_rate=1000.0, l1_sd=0.0)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile, Unset
 from pvid.rig.run import Run
@@ -24,6 +24,7 @@ from pvid.rig.turns import joined
 from pvid.run.excitation import excitation_of
 from pvid.run.identify import Identification, identify
 from pvid.run.survey import fitted
+from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start
 from pvid.setup.ranges_q31 import pivot_acceleration, reach
 

@@ -15,7 +15,7 @@ from pvid.run.identify import Identification
 
 
 def as_json(result: Identification) -> dict[str, Any]:
-    """The object of `identify --json` (MODELS.md 5): null where nothing is identified or judged."""
+    """The object of `identify --json` (host/docs/index.md): null where nothing is identified or judged."""
     parameters = {one.name: _parameter(result, one) for one in result.model.answers}
     beyond = result.beyond
     return {

@@ -8,15 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import (
-    Native,
-    Record,
-    StrongConfig,
-    StrongIdentifier,
-    WeakConfig,
-    WeakIdentifier,
-)
+from pvid.core.native import Identifier, Native
 from pvid.models.registry import DEFAULT, MODELS
+from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.settings.record import Record
 from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
@@ -113,12 +108,12 @@ def compare_run(
 
     Cost: about 0.5 ms a tick in the strong form, which solves at every tick, 0.01 ms in the weak form.
     """
-    identifier: StrongIdentifier | WeakIdentifier
+    identifier: Identifier
     if isinstance(config, WeakConfig):
-        identifier = native.weak(config)
+        identifier = native.identifier(config)
         twin = WeakTwin(config).run(phi, y, progress=progress)
     else:
-        identifier = native.strong(config)
+        identifier = native.identifier(config)
         twin = StrongTwin(config).run(phi, y, progress=progress)
     record = identifier.run(phi, y)
     p, sums, reason = twin.p[:, :, 0], twin.sums[:, :, 0], twin.reason[:, 0]

@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Native
-from pvid.core.native_q31 import RecordQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.core.native import Identifier, Native
 from pvid.run.compare import P_NAMES, Comparison, Difference
+from pvid.settings.q31 import WeakConfigQ31
+from pvid.settings.record import Record
 from pvid.setup.q31 import ConfigQ31
 from pvid.twin import fnv
 from pvid.twin.strong_q31 import StrongTwinQ31
@@ -32,7 +33,7 @@ def sum_name(index: int, n_sums: int) -> str:
     return f"b[{index - moments}]" if index < moments + n_theta else ("rr", "weight")[index - moments - n_theta]
 
 
-def first_difference(record: RecordQ31, twin: TwinRecordQ31, lane: int = 0) -> DifferenceQ31 | None:
+def first_difference(record: Record, twin: TwinRecordQ31, lane: int = 0) -> DifferenceQ31 | None:
     """The first difference between a replay of the core and a lane of the twin, p before sums before status."""
     n_sums = twin.sums.shape[1]
     names: list[Callable[[int], str]] = [
@@ -69,11 +70,11 @@ def twin_hashes(twin: TwinRecordQ31, lane: int = 0) -> npt.NDArray[np.uint32]:
     )
 
 
-def identifier_q31(native: Native, config: ConfigQ31) -> WeakIdentifierQ31 | StrongIdentifierQ31:
+def identifier_q31(native: Native, config: ConfigQ31) -> Identifier:
     """The core's identifier of a configuration."""
     if isinstance(config, WeakConfigQ31):
-        return WeakIdentifierQ31(native, config)
-    return StrongIdentifierQ31(native, config)
+        return native.identifier(config)
+    return native.identifier(config)
 
 
 def twin_q31(config: ConfigQ31) -> WeakTwinQ31 | StrongTwinQ31:
@@ -89,7 +90,7 @@ def compare_run_q31(
     progress: Callable[[int], None] | None = None,
 ) -> Comparison:
     """Runs counts phi, y through the core and the twin and compares every tick."""
-    core = identifier_q31(native, config)
+    core = native.identifier(config)
     record = core.run(phi, y)
     twin = twin_q31(config).run(np.asarray(phi, np.int64), np.asarray(y, np.int64), progress=progress)
     hashes = twin_hashes(twin)

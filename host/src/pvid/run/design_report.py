@@ -19,7 +19,7 @@ from pvid.run.survey import fitted
 from pvid.setup.f32 import weak_config, weak_design_of
 from pvid.sim.pendulum import Drive, Pendulum, Sensors, Tone
 
-# White noise of the sensors beside their rounding [LSB]: that of the standard rig (MATH.md 6). The rig file holds
+# White noise of the sensors beside their rounding [LSB]: that of the standard rig (theory.md 6). The rig file holds
 # resolutions only.
 PHI_NOISE_LSB, Y_NOISE_LSB = 0.5, 0.4
 

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Law, Native, Reason, StrongConfig, WeakConfig, WeakIdentifier
-from pvid.core.native_q31 import StrongConfigQ31, StrongIdentifierQ31, WeakConfigQ31, WeakIdentifierQ31
+from pvid.core.native import Native
 from pvid.models.model import Model
 from pvid.oracle import strong as oracle
 from pvid.oracle.weak import WeakSettings, identify_weak
@@ -20,6 +19,9 @@ from pvid.run.excitation import excitation_of
 from pvid.run.linear_rows import linear_error
 from pvid.run.survey import fitted
 from pvid.run.verdict import DISAGREES, verdict
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.setup.f32 import bank_of, config_of, weak_design_of
 from pvid.setup.q31 import beyond_range, config_for_run, counts_of, covariance_of, p_of, se_of
 from pvid.setup.ranges_q31 import Beyond, with_ranges_of
@@ -317,13 +319,13 @@ def _ticks_needed(config: StrongConfig | WeakConfig) -> int:
 def _in_float32(
     run: Run, rig: RigFile, config: StrongConfig | WeakConfig, every: int, native: Native
 ) -> Identification:
-    identifier = native.weak(config) if isinstance(config, WeakConfig) else native.strong(config)
+    identifier = native.identifier(config)
     record = identifier.run(run.phi, run.y, sums=False, estimate_every=every)
     counters = identifier.counters
-    last = identifier.estimate if isinstance(identifier, WeakIdentifier) else identifier.assess()
+    last = identifier.estimate if identifier.publishes else identifier.assess()
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
-    told = len(trusted) > 0
-    publishes = isinstance(identifier, WeakIdentifier)
+    any_trusted = len(trusted) > 0
+    publishes = identifier.publishes
     estimates = record.estimate
     trajectory = _trajectory(
         run.t[::every],
@@ -349,11 +351,11 @@ def _in_float32(
         friction=tuple(map(float, last["p"][len(model.published) : record.p.shape[1]])),
         covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
         kappa=float(last["kappa"]),
-        trusted_s=float(run.t[trusted[-1]]) if told and publishes else None,
-        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        trusted_s=float(run.t[trusted[-1]]) if any_trusted and publishes else None,
+        first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
         reasons=_counted(record.reason),
-        chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifier) else None,
-        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        chi2=_judged(identifier.misfit) if identifier.publishes else None,
+        alarm=any_trusted and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],
@@ -497,11 +499,9 @@ def _in_q31(
     run: Run, rig: RigFile, config: StrongConfigQ31 | WeakConfigQ31, every: int, native: Native
 ) -> Identification:
     phi, y = counts_of(rig, run)
-    identifier = (
-        WeakIdentifierQ31(native, config) if isinstance(config, WeakConfigQ31) else StrongIdentifierQ31(native, config)
-    )
+    identifier = native.identifier(config)
     record = identifier.run(phi, y, sums=False, estimate_every=every)
-    last = identifier.estimate if isinstance(identifier, WeakIdentifierQ31) else identifier.assess()
+    last = identifier.estimate if identifier.publishes else identifier.assess()
     n_p = record.p.shape[1]
     p = p_of(config, last["p"][:n_p])
     if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
@@ -514,11 +514,11 @@ def _in_q31(
             trusted, status = trusted[:0], Reason.HELD_OUT_OF_RANGE.text
         else:
             linear = found
-    told = len(trusted) > 0
+    any_trusted = len(trusted) > 0
     counters = identifier.counters
     model = rig.mechanism.model
     publications = Publications.none(model)
-    if isinstance(identifier, WeakIdentifierQ31):
+    if identifier.publishes:
         published = p_of(config, record.published[trusted])[:, : model.n_mapped]
         publications = Publications(
             t=run.t[trusted],
@@ -534,13 +534,13 @@ def _in_q31(
         p=p,
         covariance=_with_linear_error(covariance_of(config, last), p, linear),
         kappa=float(last["kappa"]) / 2**30,
-        trusted_s=float(run.t[trusted[-1]]) if told and isinstance(identifier, WeakIdentifierQ31) else None,
-        first_publication_s=float(run.t[trusted[0]]) if told else None,
+        trusted_s=float(run.t[trusted[-1]]) if any_trusted and identifier.publishes else None,
+        first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
         reasons=_counted(record.reason),
         beyond=beyond,
         beyond_words=beyond.words(rig.sensor),
-        chi2=_judged(identifier.misfit) if isinstance(identifier, WeakIdentifierQ31) else None,
-        alarm=told and bool(record.reason[trusted[-1]] == Reason.MISFIT),
+        chi2=_judged(identifier.misfit) if identifier.publishes else None,
+        alarm=any_trusted and bool(record.reason[trusted[-1]] == Reason.MISFIT),
         status=status,
         ticks=len(run.t),
         updates=counters["updates"],

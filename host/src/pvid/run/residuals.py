@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import WeakConfig
 from pvid.oracle import strong as oracle
 from pvid.oracle.weak import WeakOracle, WeakSettings, end_times
 from pvid.oracle.windows import Windows
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
+from pvid.settings.f32 import WeakConfig
 from pvid.setup.f32 import bank_of, strong_config, weak_config, weak_design_of
 
 Float = npt.NDArray[np.float64]

@@ -149,9 +149,9 @@ class RunRows:
         k = np.zeros((len(self.phi), 2, self.design.functions))
         sound = np.zeros(len(self.phi), np.bool_)
         for window, (one, phi, u) in enumerate(zip(self.columns, self.phi, self.u, strict=True)):
-            lack = self_consistent(p[:_CORE], damping, one, phi, u, self.design, full_angle)
-            if lack is not None:
-                y[window], k[window], sound[window] = lack.y, lack.k, True
+            neglected = self_consistent(p[:_CORE], damping, one, phi, u, self.design, full_angle)
+            if neglected is not None:
+                y[window], k[window], sound[window] = neglected.y, neglected.k, True
         parts = [self.columns[:, :1] - y[:, None], self.columns[:, N], self.columns[:, A:]]
         if friction:
             parts.insert(2, k)

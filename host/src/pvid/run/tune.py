@@ -190,7 +190,7 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
         if chosen is not default and not chosen.better_than(default):
             chosen = default
     if chosen.answer is None or not chosen.identified:
-        raise PvidError(bench.why_nothing(default))
+        raise PvidError(bench.untunable_reason(default))
     forgetting = bench.forgetting(chosen.rig)
     keep = _chosen_forgetting(forgetting)
     if keep.forgetting_s > 0:
@@ -375,7 +375,7 @@ class _Bench:
                 out.append(Forgetting(forgetting_s, share, -sigmas(energies, reference)))
         return tuple(out)
 
-    def why_nothing(self, default: Judged) -> str:
+    def untunable_reason(self, default: Judged) -> str:
         """Why nothing is identified, in words."""
         own = default.refusal or (default.answer.verdict if default.answer is not None else "")
         if self.held_back is None:

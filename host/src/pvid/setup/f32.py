@@ -8,12 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import MAX_WINDOW, EstimatorConfig, GateConfig, Law, StrongConfig, TrustConfig, WeakConfig
 from pvid.design.fir import FirBank, finite_difference, savitzky_golay
 from pvid.design.weak import WeakDesign, design
 from pvid.design.weak_sizing import Sizes, decimation_of
 from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile
+from pvid.settings.bounds import MAX_WINDOW
+from pvid.settings.enums import Law
+from pvid.settings.f32 import EstimatorConfig, GateConfig, StrongConfig, TrustConfig, WeakConfig
 
 # The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
 START_RELATIVE_SD = 0.5

@@ -9,8 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import EstimatorConfig, GateConfig, Law
-from pvid.core.native_q31 import (
+from pvid.design.strong_q31 import strong_design_q31
+from pvid.design.weak_q31 import weak_tables_q31
+from pvid.rig.file import RigFile, Sensor
+from pvid.rig.run import Run
+from pvid.settings.enums import Law
+from pvid.settings.f32 import EstimatorConfig, GateConfig
+from pvid.settings.q31 import (
     EstimatorConfigQ31,
     GateConfigQ31,
     ScaleQ31,
@@ -18,10 +23,7 @@ from pvid.core.native_q31 import (
     TrustConfigQ31,
     WeakConfigQ31,
 )
-from pvid.design.strong_q31 import StrongDesignQ31, strong_design_q31
-from pvid.design.weak_q31 import WeakTablesQ31, weak_tables_q31
-from pvid.rig.file import RigFile, Sensor
-from pvid.rig.run import Run
+from pvid.settings.tables import StrongDesignQ31, WeakTablesQ31
 from pvid.setup.f32 import bank_of, nominal_start, strong_config, weak_config, weak_design_of
 from pvid.setup.ranges_q31 import Beyond, beyond_ranges, middle_of_travel, reach, with_default_ranges, with_ranges_of
 
@@ -247,7 +249,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
             se_max=round(float_config.trust.se_max * 2**24),
             misfit_max=round(float_config.trust.misfit_max * 2**16),
             groups_min=float_config.trust.groups_min,
-            shut_max=float_config.trust.shut_max,
+            revert_after=float_config.trust.revert_after,
             renewal=round(float_config.trust.renewal * 2**16),
         ),
         gate=gate_config_q31(float_config.gate, windows_hz),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pvid.core.native_q31 import StrongConfigQ31
+from pvid.settings.q31 import StrongConfigQ31
 from pvid.setup.weak_header_q31 import estimator_lines, gate_line, integer_array, integer_list, scale_lines, unit_lines
 
 

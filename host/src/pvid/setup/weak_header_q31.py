@@ -8,8 +8,8 @@ from dataclasses import fields
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native_q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
 from pvid.models.kapitza import MODEL
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
 from pvid.setup.q31 import ConfigQ31, scale_of, units_of
 
 _TABLES = ("smooth", "second", "chi", "multiplier", "gram")

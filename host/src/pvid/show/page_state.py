@@ -73,12 +73,12 @@ class LiveState(threading.Thread):
                 try:
                     if self._stream.rig != self._rig:
                         self._rig = self._stream.rig
-                        self._know_rig()
+                        self._load_rig()
                     self._history.take(record)
                 except Exception:  # whatever a board sends, the page shows what comes after it
                     self._failed += 1
 
-    def _know_rig(self) -> None:
+    def _load_rig(self) -> None:
         if self._rig is not None:
             try:
                 self._history.know(RigFile.parse(self._rig).mechanism)
@@ -119,8 +119,8 @@ class LiveState(threading.Thread):
         for one in model.answers:
             value = self._history.newest.get(one.name, math.nan)
             if not math.isnan(value):
-                told, spread = with_error(value, self._history.newest[f"{one.name}_se"])
-                row = {"symbol": one.shown, "meaning": one.meaning, "unit": one.shown_unit, "value": told}
+                shown, spread = with_error(value, self._history.newest[f"{one.name}_se"])
+                row = {"symbol": one.shown, "meaning": one.meaning, "unit": one.shown_unit, "value": shown}
                 rows.append({**row, "error": f"± {spread}"})
         if not self._history.is_physical:
             meaning = "outside the physical region"

@@ -24,7 +24,7 @@ from scipy.signal import savgol_filter, welch
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
-from pvid.core.native import Native, Reason
+from pvid.core.native import Native
 from pvid.link.frames import Estimate, Form, Hello
 from pvid.log.reader import LogReader
 from pvid.log.rig import run_of_log
@@ -40,6 +40,7 @@ from pvid.run.identify import identify
 from pvid.run.residuals import Residuals, residuals_of
 from pvid.run.simulated_angle import simulated_angle
 from pvid.run.survey import fitted
+from pvid.settings.enums import Reason
 from pvid.show.axis_limits import interesting
 
 Float = npt.NDArray[np.float64]

@@ -122,8 +122,8 @@ class LiveView:
             if math.isnan(value):
                 continue
             relative = f"{100 * error / abs(value):.2g} %" if name != self.history.model.offset_name and value else ""
-            told, spread = with_error(value, error)
-            table.add_row(one.shown, one.meaning, told, f"± {spread} {one.shown_unit}", relative)
+            shown, spread = with_error(value, error)
+            table.add_row(one.shown, one.meaning, shown, f"± {spread} {one.shown_unit}", relative)
         if not self.history.newest:
             table.add_row("none yet", "the first estimate comes when a window of samples is full")
         elif not self.history.is_physical:

@@ -1,4 +1,4 @@
-"""Simulated rigs: the two-link pendulum on a driven pivot (MATH.md, sections 1 and 6) and its sensors.
+"""Simulated rigs: the two-link pendulum on a driven pivot (theory.md 1 and 6) and its sensors.
 
 The truth is integrated once (DOP853) and cached: many seeds of the sensors' noise cost one integration.
 Angles in the state are absolute (from the vertical): ``a1 = phi1``, ``a2 = phi1 + phi``.
@@ -42,7 +42,7 @@ _MAX_SAMPLES = 10_000_000  # 10 hours at 278 Hz; beyond, the request is a slip o
 
 @dataclass(frozen=True)
 class Pendulum:
-    """Physical parameters of the two-link pendulum (MATH.md section 1).
+    """Physical parameters of the two-link pendulum (theory.md 1).
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Pendulum:
 
 
 def is_physical(p: Sequence[float] | FloatArray) -> bool:
-    """Whether ``p`` = (w, d1, d2) lies in the physical region of MATH.md section 1 (NaN does not)."""
+    """Whether ``p`` = (w, d1, d2) lies in the physical region of theory.md 1 (NaN does not)."""
     w, d1, d2 = (float(value) for value in p)
     return math.isfinite(w + d1 + d2) and w > 0 and d2 > 0 and d1 - d2 - 1 > 0
 
@@ -306,7 +306,7 @@ STANDARD_RELEASE = (0.06, 0.14)
 
 
 def standard_sensors(bits: int = 14) -> Sensors:
-    """Sensors of the standard rig (MATH.md section 6) with an encoder of ``bits`` bits a turn."""
+    """Sensors of the standard rig (theory.md 6) with an encoder of ``bits`` bits a turn."""
     return Sensors(phi_lsb=2 * math.pi / 2**bits, phi_noise_lsb=0.5, random_offset=True, y_lsb=5e-6, y_noise_lsb=0.4)
 
 
@@ -333,7 +333,7 @@ def simulate(
     truth: Truth = "linear",
     seed: int = 0,
 ) -> Simulation:
-    """Simulate a rig; without arguments, the standard rig of MATH.md section 6.
+    """Simulate a rig; without arguments, the standard rig of theory.md 6.
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ def simulate(
     release : (float, float)
         Absolute angles phi1 and phi1 + phi at t = 0 [rad], released at rest.
     truth : {"linear", "full"}
-        The linear model (1) of MATH.md, or the sin/cos equations of motion.
+        The linear model (1) of theory.md, or the sin/cos equations of motion.
     seed : int
         Of the sensors' noise, >= 0.
 

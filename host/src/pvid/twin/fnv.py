@@ -61,8 +61,8 @@ def _running(rows: Bytes, start: int) -> npt.NDArray[np.uint32]:
         multiplied = _multiplied(running & 0xFF, data)
         change = multiplied.astype(np.uint32)
         change -= multiplied ^ data
-        for tick, told in enumerate(np.einsum("ij,j->i", change.reshape(part.shape), weights).tolist(), first):
-            running = (running * whole + told) & 0xFFFFFFFF
+        for tick, linear in enumerate(np.einsum("ij,j->i", change.reshape(part.shape), weights).tolist(), first):
+            running = (running * whole + linear) & 0xFFFFFFFF
             out[tick] = running
     return out
 

@@ -1,6 +1,6 @@
 """The simulated sensor of firmware/apps/stream/sensor.c: a rig that a board without one samples in field mode.
 
-The standard rig's pendulum (MATH.md, section 1, linear) on a pivot that moves in its three tones, integrated in float32
+The standard rig's pendulum (theory.md 1, linear) on a pivot that moves in its three tones, integrated in float32
 by steps whose only operations are + - *, so that every machine gets the same counts. A tone and the pendulum are
 advanced alike: velocity by the acceleration here and now, then position by that velocity (leapfrog), which neither
 gains nor loses energy over any length of run. Velocities are per step.

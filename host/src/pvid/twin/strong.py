@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import EstimatorConfig, Reason, StrongConfig
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import EstimatorConfig, StrongConfig
 from pvid.twin.f32.differentiator import derivatives
 from pvid.twin.f32.estimator import Estimator
 from pvid.twin.f32.gate import Gate
@@ -62,13 +63,13 @@ class StrongTwin:
         d_y, _ = derivatives(y32, finite, *bank)
         u = d_y[:, 2:5] * (np.float32(1) / np.float32(self.config.l1))
         n, row_y = model.rows(d_phi, u)
-        fate = np.full(len(phi32), Reason.ACCUMULATED, np.uint8)
-        fate[ready & ~self._driven(u[:, 0], ready)] = Reason.HELD_NOT_EXCITED
+        row_reason = np.full(len(phi32), Reason.ACCUMULATED, np.uint8)
+        row_reason[ready & ~self._driven(u[:, 0], ready)] = Reason.HELD_NOT_EXCITED
         if self.frozen is not None:
-            fate[self.frozen] = Reason.HELD_FROZEN
-        fate[~ready] = Reason.WARMING_UP
-        fate[~finite] = Reason.REJECTED_NOT_FINITE
-        return n, row_y, fate
+            row_reason[self.frozen] = Reason.HELD_FROZEN
+        row_reason[~ready] = Reason.WARMING_UP
+        row_reason[~finite] = Reason.REJECTED_NOT_FINITE
+        return n, row_y, row_reason
 
     def _driven(self, u: Float32, ready: Mask) -> Mask:
         """Where the mean square of u [ticks] over about a second reaches its threshold."""
@@ -90,8 +91,8 @@ class StrongTwin:
 
         Returns what every tick told, [ticks, lanes].
         """
-        n, row_y, fate = self.rows(phi, y)
-        return follow_rows(self.estimator, n, row_y, fate, after, self.gate, self.misfit)
+        n, row_y, row_reason = self.rows(phi, y)
+        return follow_rows(self.estimator, n, row_y, row_reason, after, self.gate, self.misfit)
 
     def run(
         self,
@@ -102,9 +103,16 @@ class StrongTwin:
         progress: Callable[[int], None] | None = None,
     ) -> TwinRecord:
         """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
-        n, row_y, fate = self.rows(phi, y)
+        n, row_y, row_reason = self.rows(phi, y)
         return run_rows(
-            self.estimator, n, row_y, fate=fate, sums=sums, progress=progress, gate=self.gate, misfit=self.misfit
+            self.estimator,
+            n,
+            row_y,
+            row_reason=row_reason,
+            sums=sums,
+            progress=progress,
+            gate=self.gate,
+            misfit=self.misfit,
         )
 
 
@@ -113,7 +121,7 @@ def run_rows(
     n: Float32,
     y: Float32,
     *,
-    fate: Reasons | None = None,
+    row_reason: Reasons | None = None,
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
     gate: Gate | None = None,
@@ -135,7 +143,7 @@ def run_rows(
         if progress is not None and tick % 512 == 0:
             progress(tick)
 
-    reason = follow_rows(estimator, n, y, fate, record, gate, misfit)
+    reason = follow_rows(estimator, n, y, row_reason, record, gate, misfit)
     return TwinRecord(p=p, sums=state, reason=reason, published=np.empty((0, model.N_P, lanes), np.float32))
 
 
@@ -143,7 +151,7 @@ def follow_rows(
     estimator: Estimator,
     n: Float32,
     y: Float32,
-    fate: Reasons | None,
+    row_reason: Reasons | None,
     after: Callable[[int, Reasons], None],
     gate: Gate | None = None,
     misfit: Misfit | None = None,
@@ -158,12 +166,12 @@ def follow_rows(
     wide_n = np.broadcast_to(n if n.ndim == 3 else n[:, :, np.newaxis], (ticks, model.N_THETA, lanes))
     wide_y = np.broadcast_to(y if y.ndim == 2 else y[:, np.newaxis], (ticks, lanes))
     for tick in range(ticks):
-        if fate is None or fate[tick] == Reason.ACCUMULATED:
+        if row_reason is None or row_reason[tick] == Reason.ACCUMULATED:
             reason[tick] = estimator.step(wide_n[tick], wide_y[tick], gate, misfit)
         else:
-            reason[tick] = fate[tick]
-            if fate[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
-                estimator.counters[Reason(fate[tick]).name.lower()] += 1
+            reason[tick] = row_reason[tick]
+            if row_reason[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
+                estimator.counters[Reason(row_reason[tick]).name.lower()] += 1
         after(tick, reason[tick])
     return reason
 

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason
-from pvid.core.native_q31 import EstimatorConfigQ31, StrongConfigQ31
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31, StrongConfigQ31
 from pvid.twin.kapitza import strong_q31 as model
 from pvid.twin.q31.differentiator import derivatives
 from pvid.twin.q31.estimator import EstimatorQ31
@@ -49,15 +49,15 @@ class StrongTwinQ31:
         u[~usable] = 0
         n, row_y, fits = model.rows(design.row, d_phi, u)
         driven = self._driven(u[:, 0], usable)
-        fate = np.full(len(phi), Reason.ACCUMULATED, np.uint8)
-        fate[~fits] = Reason.REJECTED_SATURATED
-        fate[~driven] = Reason.HELD_NOT_EXCITED
+        row_reason = np.full(len(phi), Reason.ACCUMULATED, np.uint8)
+        row_reason[~fits] = Reason.REJECTED_SATURATED
+        row_reason[~driven] = Reason.HELD_NOT_EXCITED
         if self.frozen is not None:
-            fate[self.frozen] = Reason.HELD_FROZEN
-        fate[~usable] = Reason.REJECTED_SATURATED
-        fate[~ready] = Reason.WARMING_UP
-        fate[~within] = Reason.REJECTED_SATURATED
-        return n, row_y, fate
+            row_reason[self.frozen] = Reason.HELD_FROZEN
+        row_reason[~usable] = Reason.REJECTED_SATURATED
+        row_reason[~ready] = Reason.WARMING_UP
+        row_reason[~within] = Reason.REJECTED_SATURATED
+        return n, row_y, row_reason
 
     def _driven(self, u: Int, usable: Mask) -> Mask:
         """Where the mean square of u [ticks] over about a second reaches its threshold."""
@@ -90,7 +90,7 @@ def run_rows(
     estimator: EstimatorQ31,
     n: Int,
     y: Int,
-    fate: Reasons,
+    row_reason: Reasons,
     *,
     sums: bool = True,
     progress: Callable[[int], None] | None = None,
@@ -115,7 +115,7 @@ def run_rows(
         if progress is not None and tick % 512 == 0:
             progress(tick)
 
-    reason = follow_rows(estimator, n, y, fate, record, gate, misfit)
+    reason = follow_rows(estimator, n, y, row_reason, record, gate, misfit)
     return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)
 
 
@@ -123,7 +123,7 @@ def follow_rows(
     estimator: EstimatorQ31,
     n: Int,
     y: Int,
-    fate: Reasons,
+    row_reason: Reasons,
     after: Callable[[int, Reasons], None],
     gate: GateQ31 | None = None,
     misfit: MisfitQ31 | None = None,
@@ -138,12 +138,12 @@ def follow_rows(
     wide_n = np.broadcast_to(n[:, :, None], (ticks, n.shape[1], lanes))
     wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
     for tick in range(ticks):
-        if fate[tick] == Reason.ACCUMULATED:
+        if row_reason[tick] == Reason.ACCUMULATED:
             reason[tick] = _step(estimator, wide_n[tick], wide_y[tick], gate, misfit)
         else:
-            reason[tick] = fate[tick]
-            if fate[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
-                estimator.counters[Reason(fate[tick]).name.lower()] += 1
+            reason[tick] = row_reason[tick]
+            if row_reason[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
+                estimator.counters[Reason(row_reason[tick]).name.lower()] += 1
         after(tick, reason[tick])
     return reason
 
@@ -153,7 +153,7 @@ def _step(estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None, misfit:
     terms, e, fits = estimator.terms(n, y)
     held = np.where(fits, e, 0)
     if misfit is not None and fits.all():
-        misfit.take(held * held, model.told(terms))
+        misfit.take(held * held, model.sensitivity(terms))
     if gate is not None and gate.is_on:
         passes = gate.passes(scaled(held * held, 0), fits)
         if passes.any() != passes.all():
@@ -167,8 +167,8 @@ def _step(estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None, misfit:
         return reason
     if not taken.all():
         raise PvidError("lanes of one twin must take the same rows in: step those that do not apart")
-    for told in estimator.solve(ends_group=True):
-        reason = reason if told is None else told
+    for reported in estimator.solve(ends_group=True):
+        reason = reason if reported is None else reported
     if misfit is None:
         return reason
     doubted = misfit.alarm & (reason == Reason.UPDATED)

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import EstimatorConfig, Reason, WeakConfig
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import EstimatorConfig, WeakConfig
 from pvid.twin.f32 import weak_finish, weak_front, weak_window
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.f32.estimator import RelativeEstimator
@@ -51,7 +52,7 @@ class WeakTwin:
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.angle = Angle(config, len(lanes)) if config.full_angle or config.friction else None
         self.schedule = Schedule.of(design)
-        self.together = self.schedule.together(
+        self.stages_per_tick = self.schedule.stages_per_tick(
             weak_finish.number_of_stages(design, self.iterations, self.estimator, self.angle)
         )
         self.trust = Trust(config.trust, self.estimator)
@@ -93,12 +94,12 @@ class WeakTwin:
                     mean=seen.mean[m],
                     lowest=seen.lowest[m],
                     highest=seen.highest[m],
-                    bend=seen.bend[m],
+                    curvature=seen.curvature[m],
                 )
             self.schedule.occupy(free, first, last, len(part[0]))
         return complete, finite, free
 
-    def _objection(self, window: Window) -> Reasons | None:
+    def _drop_reason(self, window: Window) -> Reasons | None:
         """Why a window is dropped [lanes], None if it is not; all lanes must agree."""
         estimator = self.estimator
         lanes = estimator.p.shape[1]
@@ -124,11 +125,11 @@ class WeakTwin:
 
     def _take(self, window: Window) -> Reasons | Work:
         """Why a window is dropped, or its stages."""
-        objection = self._objection(window)
-        if objection is not None:
-            return objection
+        drop_reason = self._drop_reason(window)
+        if drop_reason is not None:
+            return drop_reason
         with np.errstate(all="ignore"):
-            expected = self.row_variance + self.pivot_noise * window.bend
+            expected = self.row_variance + self.pivot_noise * window.curvature
         return weak_finish.stages(
             window, self.config.design, self.iterations, self.estimator, self.trust, self.angle, expected, self.gate
         )
@@ -144,7 +145,9 @@ class WeakTwin:
         """
         complete, finite, free = self.windows(phi, y)
         lanes = self.estimator.p.shape[1]
-        return play(finite, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=after)
+        return play(
+            finite, free, complete, self.stages_per_tick, lanes, reject=self._reject, take=self._take, record=after
+        )
 
     def run(
         self,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Reason
-from pvid.core.native_q31 import EstimatorConfigQ31, WeakConfigQ31
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31, WeakConfigQ31
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.kapitza import weak_q31 as kapitza_weak_q31
 from pvid.twin.q31 import weak_finish as weak_finish_q31
@@ -62,7 +62,7 @@ class WeakTwinQ31:
         self.pivot_noise = Scaled(*map(integers, config.pivot_noise))
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.schedule = Schedule.of(config.design)
-        self.together = self.schedule.together(
+        self.stages_per_tick = self.schedule.stages_per_tick(
             weak_finish_q31.number_of_stages(config.design, self.iterations, self.estimator)
         )
 
@@ -104,20 +104,20 @@ class WeakTwinQ31:
             within[last] = free[last] = False
         driven = weak_window_q31.drives(u, design) >= threshold
         angles = weak_window_q31.angle_sums(f, design)
-        bends = weak_window_q31.bends(f, design)
+        curvatures = weak_window_q31.curvatures(f, design)
         for m, sums in enumerate(weak_window_q31.sums(f, u, design)):
             tick = first + self.schedule.tick_of_window(m)
-            bend = Scaled(bends.m[m], bends.e[m])
+            curvature = Scaled(curvatures.m[m], curvatures.e[m])
             if self.frozen is not None and self.frozen[tick]:
                 complete[tick] = Reason.HELD_FROZEN
             elif not driven[m]:
                 complete[tick] = Reason.HELD_NOT_EXCITED
             else:
-                complete[tick] = Window(sums, int(angles[m]), bend)
+                complete[tick] = Window(sums, int(angles[m]), curvature)
         self.schedule.occupy(free, first, last, len(f))
         return last + 1
 
-    def _place_zero(self, window: Window) -> None:
+    def _place_offset(self, window: Window) -> None:
         """The first window's mean angle as the start of c."""
         if not self.config.zero_unknown or self.estimator.counters["rows"].any():
             return
@@ -131,7 +131,7 @@ class WeakTwinQ31:
         if isinstance(window, Reason):
             self.estimator.counters["held_not_excited"] += window is Reason.HELD_NOT_EXCITED
             return np.full(self.estimator.lanes, window, np.uint8)
-        self._place_zero(window)
+        self._place_offset(window)
         return weak_finish_q31.stages(
             window, self.config.design, self.iterations, self.estimator, self.trust, self.pivot_noise, self.gate
         )
@@ -147,7 +147,9 @@ class WeakTwinQ31:
         """
         complete, within, free = self.window_sums(phi, y)
         lanes = self.estimator.lanes
-        return play(within, free, complete, self.together, lanes, reject=self._reject, take=self._take, record=after)
+        return play(
+            within, free, complete, self.stages_per_tick, lanes, reject=self._reject, take=self._take, record=after
+        )
 
     def run(
         self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None

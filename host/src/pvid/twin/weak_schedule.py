@@ -1,4 +1,4 @@
-"""Twin of weak_schedule.h: at which tick the weak form does what, whatever its arithmetic."""
+"""Twin of weak/schedule.h: at which tick the weak form does what, whatever its arithmetic."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Reason
+from pvid.settings.enums import Reason
 
 Mask = npt.NDArray[np.bool_]
 Reasons = npt.NDArray[np.uint8]
@@ -95,7 +95,7 @@ class Schedule:
             start = first + self.tick_of(index) + 1
             free[start : min(start + self.window_ticks, last)] = False
 
-    def together(self, stages: int) -> int:
+    def stages_per_tick(self, stages: int) -> int:
         """Stages a tick that work a window off before the next one is complete."""
         free_ticks = 1 if self.decimation <= 2 else self.decimation - self.window_ticks
         return -(-stages // (self.hop * free_ticks))
@@ -105,7 +105,7 @@ def play(
     usable: Mask,
     free: Mask,
     complete: Mapping[int, WindowT],
-    together: int,
+    stages_per_tick: int,
     lanes: int,
     *,
     reject: Callable[[], Reason],
@@ -137,19 +137,19 @@ def play(
             warm = False
             reason[tick] = reject()
         else:
-            told = None
+            reported = None
             if tick in complete:
                 warm = True
                 taken = take(complete[tick])
                 if isinstance(taken, np.ndarray):
-                    told = taken
+                    reported = taken
                 else:
                     work = taken
-            if told is None and free[tick]:
-                for _ in range(together):
+            if reported is None and free[tick]:
+                for _ in range(stages_per_tick):
                     latest = next(work, None)
-                    told = told if latest is None else latest
+                    reported = reported if latest is None else latest
             usual = Reason.ACCUMULATED if warm else Reason.WARMING_UP
-            reason[tick] = usual if told is None else told
+            reason[tick] = usual if reported is None else reported
         record(tick, reason[tick])
     return reason

@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import ESTIMATE_DTYPE, EstimatorConfig, Law, Reason
+from pvid.settings.enums import Law, Reason
+from pvid.settings.f32 import EstimatorConfig
+from pvid.twin import estimates
 from pvid.twin.f32 import cholesky
 from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.information import Information
@@ -117,9 +119,9 @@ class Estimator:
             passed = np.ones(len(y), np.bool_) if gate is None else gate.passes(e * e)
             reason = self._step(n, y, e, gradient, passed)
             if misfit is not None:
-                told = misfit.alarm & (reason == Reason.UPDATED)
-                reason[told] = Reason.MISFIT
-                self.counters["misfits"] += told
+                reported = misfit.alarm & (reason == Reason.UPDATED)
+                reason[reported] = Reason.MISFIT
+                self.counters["misfits"] += reported
             return reason
 
     def _step(
@@ -156,8 +158,8 @@ class Estimator:
     def _solve(self, due: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
         s, force, _ = model.project(self.p, self.sums)
         everywhere = np.ones(len(due), np.bool_)
-        x, reason, rests = self._step_from(s, force, self.gain, due, everywhere)
-        moving = due & (reason == Reason.UPDATED) & ~rests
+        x, reason, in_dead_zone = self._step_from(s, force, self.gain, due, everywhere)
+        moving = due & (reason == Reason.UPDATED) & ~in_dead_zone
         self.p = np.where(moving, x, self.p)
         self.counters["updates"] += moving
         return reason
@@ -176,7 +178,7 @@ class Estimator:
         force: Float32,
         gain: Float32,
         due: npt.NDArray[np.bool_],
-        informed: npt.NDArray[np.bool_],
+        above_noise: npt.NDArray[np.bool_],
     ) -> tuple[Float32, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
         """Where p goes from S and F, whether it may (UPDATED or why it is held), and whether it rests in its dead zone,
         in every lane."""
@@ -188,12 +190,12 @@ class Estimator:
         kappa = self._kappa(s, f)
         solvable = f.ok & kappa.ok
         own = (kappa.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
-        excited = informed & (kappa.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
-        rests = due & solvable & excited & self._at_rest(f, force)
+        excited = above_noise & (kappa.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
+        in_dead_zone = due & solvable & excited & self._at_rest(f, force)
         dp = cholesky.solve(f, rhs)
         magnitudes = (dp / self._reference()).view(np.uint32) & np.uint32(0x7FFFFFFF)
         size = magnitudes.max(axis=0).view(np.float32)
-        moving = due & solvable & excited & np.isfinite(size) & ~rests
+        moving = due & solvable & excited & np.isfinite(size) & ~in_dead_zone
         self.size = np.where(moving, size, np.float32(0))
         limited = size > self.step_limit
         factor = np.where(limited, self.step_limit / size, np.float32(1)).astype(np.float32, copy=False)
@@ -203,15 +205,15 @@ class Estimator:
         below = x < self.lower
         x = np.where(below, self.lower, x)
         reason = np.full(len(due), Reason.UPDATED, np.uint8)
-        reason[~np.isfinite(size) & ~rests] = Reason.HELD_PIVOT
+        reason[~np.isfinite(size) & ~in_dead_zone] = Reason.HELD_PIVOT
         reason[~excited] = Reason.HELD_NOT_EXCITED
         reason[~solvable] = Reason.HELD_PIVOT
         self.counters["limited"] += moving & limited
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         self.counters["held_not_excited"] += due & (reason == Reason.HELD_NOT_EXCITED)
         self.counters["held_pivot"] += due & (reason == Reason.HELD_PIVOT)
-        self.counters["at_rest"] += rests
-        return x, reason, rests
+        self.counters["at_rest"] += in_dead_zone
+        return x, reason, in_dead_zone
 
     def _at_rest(self, f: cholesky.Factor, force: Float32) -> npt.NDArray[np.bool_]:
         """Where p is within the dead zone: f the factor of S + H0."""
@@ -234,7 +236,7 @@ class Estimator:
         return s, np.where(residual > floor, residual, floor)
 
     def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimator_assess_f32 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        """pvid_estimator_assess_f32 of every lane, dtype estimates.F32 [lanes]."""
         with np.errstate(all="ignore"):
             sums = self.information.read()
             s, residual = self._assessed(sums)
@@ -265,7 +267,7 @@ class Estimator:
         covariance = cholesky.inverse(f) * wide
         se = np.sqrt(np.stack([covariance[a, a] for a in range(n_p)]))
         known = f.ok & np.isfinite(covariance).all(axis=(0, 1)) & np.isfinite(se).all(axis=0)
-        out = np.zeros(self.p.shape[1], ESTIMATE_DTYPE)
+        out = np.zeros(self.p.shape[1], estimates.F32)
         out["p"][:, :n_p] = self.p.T
         out["kappa"] = np.where(kappa.ok, kappa.first_pivot, np.float32(0))
         out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))
@@ -287,8 +289,8 @@ class RelativeEstimator(Estimator):
     theta float32 [n_theta, lanes] is f(p); B and yy are b = B - M theta and the sum of squared residuals.
     """
 
-    _ROWS_A_STAGE = 4
-    _COLUMNS_A_STAGE = 3
+    _ROWS_PER_STAGE = 4
+    _COLUMNS_PER_STAGE = 3
 
     def __init__(self, configs: Sequence[EstimatorConfig], update_rate: float, pattern: PatternModel) -> None:
         super().__init__(configs, update_rate, pattern.n_p, pattern.n_sums)
@@ -303,7 +305,7 @@ class RelativeEstimator(Estimator):
         self.noise = np.zeros((3, len(configs)), np.float32)
         self.energy = np.zeros(len(configs), np.float32)
         self.group_energy = self.energy
-        self.taken = np.zeros(len(configs), np.float32)
+        self.group_weight = np.zeros(len(configs), np.float32)
         self.expected = np.zeros(len(configs), np.float32)
         self.everywhere = np.ones(len(configs), np.bool_)
         self.was_due = True
@@ -326,7 +328,7 @@ class RelativeEstimator(Estimator):
                 gradient = self.model.transpose_times(self.model.jacobian(self.p), n)
                 self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
             self.energy = np.where(fits, self.energy + e * e, self.energy)
-            self.taken = np.where(fits, self.taken + self.row_weight, self.taken)
+            self.group_weight = np.where(fits, self.group_weight + self.row_weight, self.group_weight)
             self.sums = self.information.add(self.model.terms(n, e, self.row_weight), fits)
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
@@ -337,7 +339,7 @@ class RelativeEstimator(Estimator):
         return reason
 
     def solve(
-        self, ends_group: bool, refuge: tuple[npt.NDArray[np.bool_], Float32] | None = None
+        self, ends_group: bool, fallback: tuple[npt.NDArray[np.bool_], Float32] | None = None
     ) -> Iterator[npt.NDArray[np.uint8] | None]:
         """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one.
 
@@ -349,7 +351,7 @@ class RelativeEstimator(Estimator):
         if ends_group:
             self.group_energy = self.energy
             self.energy = np.zeros_like(self.energy)
-            self.taken = np.zeros_like(self.taken)
+            self.group_weight = np.zeros_like(self.group_weight)
             self.phase += 1
             self.was_due = bool(self.phase[0] >= self.divider[0])
         elif self.is_rate:
@@ -361,7 +363,7 @@ class RelativeEstimator(Estimator):
             for _ in range(self.solve_stages(False) - 1):
                 yield None
             with np.errstate(all="ignore"):
-                reason = self._commit(self.gain if ends_group else np.ones_like(self.gain), refuge)
+                reason = self._commit(self.gain if ends_group else np.ones_like(self.gain), fallback)
             self.sums = self.information.read()
             yield None if ends_group else reason
         if ends_group:
@@ -372,11 +374,11 @@ class RelativeEstimator(Estimator):
     @property
     def _projection_stages(self) -> int:
         columns = self.model.c_column
-        return 1 + sum(1 + -(-columns.count(a) // self._COLUMNS_A_STAGE) for a in range(self.model.n_p))
+        return 1 + sum(1 + -(-columns.count(a) // self._COLUMNS_PER_STAGE) for a in range(self.model.n_p))
 
     def solve_stages(self, ends_group: bool) -> int:
         """Stages of a solve that is due."""
-        return self._projection_stages + 4 + -(-self.model.n_theta // self._ROWS_A_STAGE) + ends_group
+        return self._projection_stages + 4 + -(-self.model.n_theta // self._ROWS_PER_STAGE) + ends_group
 
     @property
     def assessment_stages(self) -> int:
@@ -388,9 +390,9 @@ class RelativeEstimator(Estimator):
         sums = self.information.read()
         s, residual = self._assessed(sums)
         variance = self._variance(sums, residual)
-        return self._assess(sums, s.copy(), variance), self._informed(s, variance, sums[-1])
+        return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
 
-    def _informed(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
+    def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
         if self.model.noise is None:
             return self.everywhere
         gated = self.model.gated
@@ -406,7 +408,7 @@ class RelativeEstimator(Estimator):
         gated = self.model.gated
         return whole if gated == self.model.n_p else cholesky.factor(s[:gated, :gated])
 
-    def _commit(self, gain: Float32, refuge: tuple[npt.NDArray[np.bool_], Float32] | None) -> npt.NDArray[np.uint8]:
+    def _commit(self, gain: Float32, fallback: tuple[npt.NDArray[np.bool_], Float32] | None) -> npt.NDArray[np.uint8]:
         pattern = self.model
         sums = self.information.read()
         matrix = pattern.matrix(sums)
@@ -414,14 +416,14 @@ class RelativeEstimator(Estimator):
         c = pattern.jacobian(self.p)
         force = pattern.transpose_times(c, b)
         s = pattern.project(c, matrix)
-        informed = self._informed(s, self.row_variance, sums[-1])
-        x, reason, rests = self._step_from(s, force, gain, self.everywhere, informed)
-        stepping = (reason == Reason.UPDATED) & ~rests
+        above_noise = self._above_noise(s, self.row_variance, sums[-1])
+        x, reason, in_dead_zone = self._step_from(s, force, gain, self.everywhere, above_noise)
+        stepping = (reason == Reason.UPDATED) & ~in_dead_zone
         x = np.where(stepping, x, self.p)
-        fleeing = np.zeros_like(stepping)
-        if refuge is not None:
-            fleeing = ~stepping & ~rests & refuge[0]
-            x = np.where(fleeing, refuge[1], x)
+        falls_back = np.zeros_like(stepping)
+        if fallback is not None:
+            falls_back = ~stepping & ~in_dead_zone & fallback[0]
+            x = np.where(falls_back, fallback[1], x)
         theta = pattern.theta(x)
         step = theta - self.theta
         moved = pattern.times(matrix, step)
@@ -435,7 +437,7 @@ class RelativeEstimator(Estimator):
         overflow = stepping & ~finite
         reason[overflow] = Reason.HELD_PIVOT
         self.counters["held_pivot"] += overflow
-        moving = (stepping | fleeing) & finite
+        moving = (stepping | falls_back) & finite
         places = slice(pattern.moments, pattern.moments + pattern.n_theta)
         low = self.information.low.copy()
         low[places] = low[places] - moved
@@ -465,13 +467,13 @@ class RelativeEstimator(Estimator):
         residual = _capped(sums[-2] + self.information.rounding)
         return s, np.where(residual > floor, residual, floor)
 
-    def expect(self, variance: Float32) -> None:
-        """pvid_estimator_expect_f32: variance [lanes] that the sensors' noise gives the rows since the last group."""
+    def set_expected(self, variance: Float32) -> None:
+        """pvid_estimator_set_expected_f32: variance [lanes] of the rows since the last group by the sensors' noise."""
         with np.errstate(all="ignore"):
-            part = self.taken / self.sums[-1]
-            share = np.where(self.taken < self.sums[-1], part, np.float32(1))
+            part = self.group_weight / self.sums[-1]
+            share = np.where(self.group_weight < self.sums[-1], part, np.float32(1))
             moved = self.expected + (_capped(variance) - self.expected) * share
-        self.expected = np.where(self.taken > 0, moved, self.expected)
+        self.expected = np.where(self.group_weight > 0, moved, self.expected)
 
     def misfit(self, sums: Float32) -> Float32:
         """pvid_estimator_misfit_f32 [lanes]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import GateConfig
+from pvid.settings.f32 import GateConfig
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
@@ -42,9 +42,9 @@ class Gate:
             return np.ones(len(square), np.bool_)
         with np.errstate(all="ignore"):
             known = np.isfinite(square)
-            learning = self.judged < self.memory
-            passes = learning | (square <= self.limit * self.scale)
-            judged = np.where(passes & learning, self.judged + np.float32(1), self.judged)
+            warming_up = self.judged < self.memory
+            passes = warming_up | (square <= self.limit * self.scale)
+            judged = np.where(passes & warming_up, self.judged + np.float32(1), self.judged)
             taken = self.scale + (square - self.scale) / judged
             scale = np.where(passes, taken, self.scale * self.widening)
             scale = np.where(scale > self.floor, scale, self.floor)

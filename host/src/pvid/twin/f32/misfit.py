@@ -30,21 +30,21 @@ class Misfit:
         self.left = self.block
         self.alarm = np.zeros(lanes, np.bool_)
 
-    def take(self, e: Float32, told: Float32) -> None:
+    def take(self, e: Float32, sensitivity: Float32) -> None:
         """A row of every lane: its residual and p[0] times its gradient in p[0], [lanes]."""
         self.energy = self.energy + e * e
-        self.signal = self.signal + told * told
+        self.signal = self.signal + sensitivity * sensitivity
         self.left -= 1
         if self.left == 0:
             self._judge()
 
     def _judge(self) -> None:
         part = self.energy / self.signal
-        taught = self.least_part < _UNKNOWN
-        louder = (self.energy > TIMES * self.least_energy) & (part > TIMES * self.least_part) & (part > LEAST)
+        has_reference = self.least_part < _UNKNOWN
+        larger = (self.energy > TIMES * self.least_energy) & (part > TIMES * self.least_part) & (part > LEAST)
         numbers = np.isfinite(self.energy) & np.isfinite(self.signal)
         moves = numbers & (self.signal > 0)
-        self.alarm = ~numbers | (moves & taught & (louder | (part > MOST)))
+        self.alarm = ~numbers | (moves & has_reference & (larger | (part > MOST)))
         self.least_energy = np.where(moves, self._least(self.least_energy, self.energy), self.least_energy)
         self.least_part = np.where(moves, self._least(self.least_part, part), self.least_part)
         self.energy = np.zeros_like(self.energy)

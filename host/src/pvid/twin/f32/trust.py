@@ -7,25 +7,27 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import ESTIMATE_DTYPE, Reason, TrustConfig
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import TrustConfig
+from pvid.twin import estimates
 from pvid.twin.f32.estimator import RelativeEstimator
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 
 _SHORT, _LONG, _LONG_MEMORY = 8, 16, np.float32(4096)
-_ARRIVED, _SMALL_STEP, _SURPLUS_MAX = np.float32(0.3), np.float32(1e-4), np.float32(1e6)
+_ARRIVED, _SMALL_STEP, _VARIANCE_RATIO_MAX = np.float32(0.3), np.float32(1e-4), np.float32(1e6)
 _SETTLED_STEP, _NEAR = np.float32(0.02), np.float32(0.1)
-_AGEING, _AGEING_GROUPS = np.float32(0.3), 4
+_FADE, _FADE_GROUPS = np.float32(0.3), 4
 _COUNT_MAX = 0xFFFF
 
 
-def shut_after(shut: npt.NDArray[np.int64], stepped: Mask, is_back: Mask) -> npt.NDArray[np.int64]:
+def uninformative_groups(uninformative: npt.NDArray[np.int64], stepped: Mask, is_back: Mask) -> npt.NDArray[np.int64]:
     """Groups in a row that said too little for a step [lanes]; of trust_tell.h, as `tell`."""
-    return np.where(stepped | is_back, 0, np.minimum(shut + 1, _COUNT_MAX))
+    return np.where(stepped | is_back, 0, np.minimum(uninformative + 1, _COUNT_MAX))
 
 
-def tell(
+def report(
     counters: dict[str, npt.NDArray[np.int64]],
     reason: npt.NDArray[np.uint8],
     excited: Mask,
@@ -34,25 +36,25 @@ def tell(
 ) -> npt.NDArray[np.uint8]:
     """Counts the verdicts on what solves with these reasons left, and says what is told of them [lanes]."""
     stepped = reason == Reason.UPDATED
-    told = reason.copy()
-    told[stepped & ~excited] = Reason.HELD_NOT_EXCITED
-    told[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
-    told[stepped & excited & sure & misfit] = Reason.MISFIT
-    counters["misfits"] += told == Reason.MISFIT
-    counters["held_uncertain"] += told == Reason.HELD_UNCERTAIN
+    reported = reason.copy()
+    reported[stepped & ~excited] = Reason.HELD_NOT_EXCITED
+    reported[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
+    reported[stepped & excited & sure & misfit] = Reason.MISFIT
+    counters["misfits"] += reported == Reason.MISFIT
+    counters["held_uncertain"] += reported == Reason.HELD_UNCERTAIN
     counters["held_not_excited"] += stepped & ~excited
-    return told
+    return reported
 
 
 class Trust:
-    """pvid_trust_f32 of every lane of an estimator; `estimate` is what is published, ESTIMATE_DTYPE [lanes]."""
+    """pvid_trust_f32 of every lane of an estimator; `estimate` is what is published, estimates.F32 [lanes]."""
 
     def __init__(self, config: TrustConfig, estimator: RelativeEstimator) -> None:
         self.config = replace(config)
         self.estimator = estimator
         lanes = estimator.p.shape[1]
         self.groups = 0
-        self.shut = np.zeros(lanes, np.int64)
+        self.uninformative = np.zeros(lanes, np.int64)
         self.judged = np.zeros(lanes, np.int64)
         information = estimator.information
         with np.errstate(all="ignore"):
@@ -60,14 +62,14 @@ class Trust:
         memory = np.where((information.retention < 1) & (memory < _LONG_MEMORY), memory, _LONG_MEMORY)
         self.long_memory = np.maximum(memory, np.float32(_LONG)).astype(np.int64)
         self.next = np.zeros(lanes, np.int64)
-        self.ageing = np.zeros(lanes, np.int64)
-        self.known = np.zeros(lanes, np.bool_)
-        self.near = np.zeros(lanes, np.bool_)
+        self.groups_to_fade = np.zeros(lanes, np.int64)
+        self.errors_small = np.zeros(lanes, np.bool_)
+        self.converged = np.zeros(lanes, np.bool_)
         self.published = np.zeros(lanes, np.bool_)
         self.misfit = np.zeros(lanes, np.bool_)
         self.long_mean = np.zeros(lanes, np.float32)
         self.recent = np.zeros((_SHORT, lanes), np.float32)
-        self.estimate = np.zeros(lanes, ESTIMATE_DTYPE)
+        self.estimate = np.zeros(lanes, estimates.F32)
         self.place()
         for a, sd in enumerate(estimator.start_sd):
             self.estimate["se"][:, a] = sd
@@ -79,14 +81,14 @@ class Trust:
         self.anchor = self.estimator.p.copy()
 
     @property
-    def refuge(self) -> tuple[Mask, Float32]:
+    def fallback(self) -> tuple[Mask, Float32]:
         """In which lanes p has one, and where [n_p, lanes]."""
-        some = (self.config.shut_max > 0) & (self.shut >= self.config.shut_max)
+        some = (self.config.revert_after > 0) & (self.uninformative >= self.config.revert_after)
         return some, np.ascontiguousarray(self.estimate["p"][:, : len(self.estimator.p)].T)
 
-    def _take_surplus(self, lanes: Mask, surplus: Float32) -> Mask:
+    def _add_variance_ratio(self, lanes: Mask, variance_ratio: Float32) -> Mask:
         """Where the windows alone raise the alarm, of the given lanes."""
-        x = np.where(surplus <= _SURPLUS_MAX, surplus, _SURPLUS_MAX)
+        x = np.where(variance_ratio <= _VARIANCE_RATIO_MAX, variance_ratio, _VARIANCE_RATIO_MAX)
         self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
         with np.errstate(all="ignore"):
             mean = self.long_mean + (x - self.long_mean) / self.judged.astype(np.float32)
@@ -98,9 +100,9 @@ class Trust:
         for i in range(_SHORT):
             total = total + self.recent[i]
         limit = np.float32(self.config.misfit_max)
-        lately = (self.judged >= _SHORT) & (total > np.float32(1.5) * (limit * np.float32(_SHORT)))
-        at_length = (self.judged >= _LONG) & (self.long_mean > limit)
-        return lanes & (lately | at_length)
+        short_exceeds = (self.judged >= _SHORT) & (total > np.float32(1.5) * (limit * np.float32(_SHORT)))
+        long_exceeds = (self.judged >= _LONG) & (self.long_mean > limit)
+        return lanes & (short_exceeds | long_exceeds)
 
     def _restart_alarm(self, lanes: Mask) -> None:
         self.judged = np.where(lanes, 0, self.judged)
@@ -114,57 +116,59 @@ class Trust:
         limit = np.float32(self.config.misfit_max)
         return np.asarray(candidate["misfit"] <= limit * (np.float32(1) + np.float32(3) * chance))
 
-    def age(self, lanes: Mask) -> None:
-        """pvid_trust_age_f32 in the given lanes."""
-        self.ageing = np.where(lanes, _AGEING_GROUPS, self.ageing)
+    def renew(self, lanes: Mask) -> None:
+        """pvid_trust_renew_f32 in the given lanes."""
+        self.groups_to_fade = np.where(lanes, _FADE_GROUPS, self.groups_to_fade)
         self.anchor = np.where(lanes, self.estimator.p, self.anchor)
         self._restart_alarm(lanes)
 
-    def next_ageing(self) -> Float32:
-        """pvid_trust_ageing_f32 [lanes]."""
-        fading = (self.ageing > 0) & self.known
-        factor = np.where(fading, _AGEING, np.float32(1))
-        self.ageing = np.where(fading, self.ageing - 1, self.ageing)
+    def next_fade_factor(self) -> Float32:
+        """pvid_trust_fade_factor_f32 [lanes]."""
+        fading = (self.groups_to_fade > 0) & self.errors_small
+        factor = np.where(fading, _FADE, np.float32(1))
+        self.groups_to_fade = np.where(fading, self.groups_to_fade - 1, self.groups_to_fade)
         return factor.astype(np.float32, copy=False)
 
-    def _settle(self, lanes: Mask, known: Mask, agrees: Mask) -> None:
+    def _renew_if_stale(self, lanes: Mask, errors_small: Mask, agrees: Mask) -> None:
         renewal = np.float32(self.config.renewal)
         moved = np.zeros(len(lanes), np.bool_)
         for a, positive in enumerate(self.estimator.model.positive):
             if positive:
                 part = self.estimator.p[a] / self.anchor[a] - np.float32(1)
                 moved = moved | (part > renewal) | (part < -renewal)
-        stale = lanes & ((known & ~agrees & moved) | self.estimator.rounded)
-        self.age(stale)
-        self.anchor = np.where(lanes & ~stale & known & agrees, self.estimator.p, self.anchor)
+        stale = lanes & ((errors_small & ~agrees & moved) | self.estimator.rounded)
+        self.renew(stale)
+        self.anchor = np.where(lanes & ~stale & errors_small & agrees, self.estimator.p, self.anchor)
 
-    def widest(self, candidate: npt.NDArray[np.void]) -> Float32:
-        """pvid_trust_widest_f32 [lanes]."""
-        widest = np.zeros(len(candidate), np.float32)
+    def largest_error(self, candidate: npt.NDArray[np.void]) -> Float32:
+        """pvid_trust_largest_error_f32 [lanes]."""
+        largest_error = np.zeros(len(candidate), np.float32)
         for a, positive in enumerate(self.estimator.model.positive):
             if positive:
                 relative = candidate["se"][:, a] / candidate["p"][:, a]
-                widest = np.where(relative <= widest, widest, relative)
-        return widest
+                largest_error = np.where(relative <= largest_error, largest_error, relative)
+        return largest_error
 
-    def _raise_alarm(self, settled: Mask, known: Mask, surplus: Float32, candidate: npt.NDArray[np.void]) -> None:
+    def _raise_alarm(
+        self, settled: Mask, errors_small: Mask, variance_ratio: Float32, candidate: npt.NDArray[np.void]
+    ) -> None:
         """The alarm, and the renewal that may follow from it; where p has settled, and where it is known well."""
         agrees = self._all_agree(candidate)
-        renewing = self.ageing > 0
-        self.known = known
+        renewing = self.groups_to_fade > 0
+        self.errors_small = errors_small
         self._restart_alarm(renewing)
-        lately = self._take_surplus(~renewing & self.near, surplus)
-        self.misfit = (self.config.misfit_max > 0) & (~agrees | lately)
-        self.near = self.near | (~renewing & settled & known & (self.groups >= self.config.groups_min))
+        short_exceeds = self._add_variance_ratio(~renewing & self.converged, variance_ratio)
+        self.misfit = (self.config.misfit_max > 0) & (~agrees | short_exceeds)
+        self.converged = self.converged | (~renewing & settled & errors_small & (self.groups >= self.config.groups_min))
         if self.config.renewal > 0:
-            self._settle(settled & ~renewing, known, agrees)
+            self._renew_if_stale(settled & ~renewing, errors_small, agrees)
 
     def judge(
         self,
         reason: npt.NDArray[np.uint8],
         size: Float32,
-        informed: Mask,
-        surplus: Float32,
+        above_noise: Mask,
+        variance_ratio: Float32,
         candidate: npt.NDArray[np.void],
     ) -> npt.NDArray[np.uint8]:
         """pvid_trust_judge_f32 in every lane; shapes [lanes]."""
@@ -172,17 +176,17 @@ class Trust:
         if (reason == Reason.ACCUMULATED).all():
             return reason
         stepped = reason == Reason.UPDATED
-        self.shut = shut_after(self.shut, stepped, self.refuge[0])
+        self.uninformative = uninformative_groups(self.uninformative, stepped, self.fallback[0])
         with np.errstate(all="ignore"):
-            error = self.widest(candidate)
+            error = self.largest_error(candidate)
             part = _ARRIVED * error
             arrived = size <= np.where(part > _SMALL_STEP, part, _SMALL_STEP)
-            self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _NEAR, surplus, candidate)
+            self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _NEAR, variance_ratio, candidate)
         enough_kappa = np.float32(self.config.kappa_min)
-        excited = informed & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
+        excited = above_noise & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         enough = self.groups >= self.config.groups_min
         sure = enough & (error <= np.float32(self.config.se_max)) & arrived
         good = stepped & excited & sure
         self.estimate = np.where(good, candidate, self.estimate)
         self.published = self.published | good
-        return tell(self.estimator.counters, reason, excited, sure, self.misfit)
+        return report(self.estimator.counters, reason, excited, sure, self.misfit)

@@ -1,4 +1,4 @@
-"""Twin of weak_finish_f32.c: a complete window becomes rows and steps, one stage a tick."""
+"""Twin of weak/finish_f32.c: a complete window becomes rows and steps, one stage a tick."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason, WeakTables
+from pvid.settings.enums import Reason
+from pvid.settings.f32 import WeakTables
 from pvid.twin.f32 import weak_whiten
 from pvid.twin.f32.estimator import RelativeEstimator
 from pvid.twin.f32.gate import Gate
@@ -21,7 +22,7 @@ Reasons = npt.NDArray[np.uint8]
 
 COLUMNS = 13
 _Y, _A, _B = 8, 9, 10
-_FUNCTIONS_A_STAGE = 6
+_FUNCTIONS_PER_STAGE = 6
 _PLACES = [*range(8), 11, 12]  # of the entries of N
 
 
@@ -65,14 +66,14 @@ def rows(
 
 
 def _stages_of_rows(design: WeakTables) -> int:
-    parts = -(-design.functions // _FUNCTIONS_A_STAGE)
+    parts = -(-design.functions // _FUNCTIONS_PER_STAGE)
     return 7 * design.functions + 2 + 5 * parts
 
 
 def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEstimator, angle: Angle | None) -> int:
     """Stages of a window with all its solves."""
-    lack = 1 if angle is None else angle.stages
-    rows_and_adds = _stages_of_rows(design) + lack + design.functions
+    remainder = 1 if angle is None else angle.stages
+    rows_and_adds = _stages_of_rows(design) + remainder + design.functions
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
     return rows_and_adds + solves + estimator.assessment_stages
 
@@ -113,18 +114,18 @@ def stages(
         return
     estimator.noise = np.where(whitened, noise, estimator.noise)
     with np.errstate(all="ignore"):
-        estimator.information.fade(trust.next_ageing())
+        estimator.information.fade(trust.next_fade_factor())
     estimator.sums = estimator.information.read()
     yield None
     places = _PLACES[: estimator.model.n_theta]
     for k in range(design.functions):
         added = estimator.add(x[places, k], x[_Y, k])
         yield None if (added == Reason.ACCUMULATED).all() else added
-    estimator.expect(expected)
+    estimator.set_expected(expected)
     reason = np.full(estimator.p.shape[1], Reason.ACCUMULATED, np.uint8)
     for iteration in range(iterations):
-        refuge = trust.refuge if iteration == 0 else None
-        for solved in estimator.solve(ends_group=iteration == 0, refuge=refuge):
+        fallback = trust.fallback if iteration == 0 else None
+        for solved in estimator.solve(ends_group=iteration == 0, fallback=fallback):
             yield None
             if solved is not None:
                 reason = solved
@@ -134,12 +135,12 @@ def stages(
     for _ in range(estimator.assessment_stages - 1):
         yield None
     with np.errstate(all="ignore"):
-        candidate, informed = estimator.judged()
-        surplus = estimator.group_energy / ((np.float32(design.functions) - np.float32(2)) * expected)
+        candidate, above_noise = estimator.judged()
+        variance_ratio = estimator.group_energy / ((np.float32(design.functions) - np.float32(2)) * expected)
     stepped = reason == Reason.UPDATED
-    told = trust.judge(reason, size, informed, surplus, candidate)
+    reported = trust.judge(reason, size, above_noise, variance_ratio, candidate)
     if angle is not None:
         with np.errstate(all="ignore"):
-            switched = angle.settle(stepped, estimator.p, trust.widest(candidate), trust.groups)
-        trust.age(switched)
-    yield told
+            switched = angle.switch(stepped, estimator.p, trust.largest_error(candidate), trust.groups)
+        trust.renew(switched)
+    yield reported

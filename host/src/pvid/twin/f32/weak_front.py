@@ -1,11 +1,11 @@
-"""Twin of weak_front_f32.c. It feeds forward, so a whole stretch of samples is computed at once."""
+"""Twin of weak/front_f32.c. It feeds forward, so a whole stretch of samples is computed at once."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import WeakTables
+from pvid.settings.f32 import WeakTables
 from pvid.twin.weak_schedule import Schedule
 
 Float32 = npt.NDArray[np.float32]

@@ -1,11 +1,11 @@
-"""Twin of weak_whiten_f32.c: the noise covariance of a window's rows at p, its factor, and what noise is in it."""
+"""Twin of weak/whiten_f32.c: the noise covariance of a window's rows at p, its factor, and what noise is in it."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import WeakTables
+from pvid.settings.f32 import WeakTables
 from pvid.twin.f32.cholesky import PIVOT_MIN
 
 Float32 = npt.NDArray[np.float32]

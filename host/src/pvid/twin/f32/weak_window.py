@@ -1,4 +1,4 @@
-"""Twin of weak_window_f32.c: the sums of every whole window of a stretch, all windows at once."""
+"""Twin of weak/window_f32.c: the sums of every whole window of a stretch, all windows at once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import WeakTables
+from pvid.settings.f32 import WeakTables
 
 Float32 = npt.NDArray[np.float32]
 
@@ -23,13 +23,13 @@ def window_count(decimated: int, hop: int) -> int:
     return max(0, (decimated - 1) // hop - 1)
 
 
-def bend_squares(phi: Float32, lag: int) -> tuple[Float32, Float32]:
+def curvature_squares(phi: Float32, lag: int) -> tuple[Float32, Float32]:
     """At each decimated sample of a stretch: the square of the second difference that ends there, and 1, or 0 and 0."""
     squares, due = np.zeros(len(phi), np.float32), np.zeros(len(phi), np.float32)
     with np.errstate(all="ignore"):
         for i in range(2 * lag, len(phi), lag):
-            bend = (phi[i] - phi[i - lag]) - (phi[i - lag] - phi[i - 2 * lag])
-            squares[i], due[i] = bend * bend, 1
+            curvature = (phi[i] - phi[i - lag]) - (phi[i - lag] - phi[i - 2 * lag])
+            squares[i], due[i] = curvature * curvature, 1
     return squares, due
 
 
@@ -44,7 +44,7 @@ class Observed:
     mean: Float32
     lowest: Float32
     highest: Float32
-    bend: Float32
+    curvature: Float32
 
 
 def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
@@ -52,8 +52,8 @@ def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
     hop = (design.window - 1) // 2
     starts = hop * np.arange(window_count(len(u), hop))
     zero = np.zeros(len(starts), np.float32)
-    u_sum, u_squares, phi_sum, bend_sum, bends = zero, zero, zero, zero, zero
-    squares, due = bend_squares(phi, design.lag)
+    u_sum, u_squares, phi_sum, curvature_sum, curvatures = zero, zero, zero, zero, zero
+    squares, due = curvature_squares(phi, design.lag)
     lowest, highest = phi[starts], phi[starts]
     n = np.float32(design.window - 1)
     with np.errstate(all="ignore"):
@@ -64,11 +64,11 @@ def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
             phi_sum = phi_sum + phi[at]
             lowest = np.where(phi[at] < lowest, phi[at], lowest)
             highest = np.where(phi[at] > highest, phi[at], highest)
-            bend_sum = bend_sum + squares[at]
-            bends = bends + due[at]
+            curvature_sum = curvature_sum + squares[at]
+            curvatures = curvatures + due[at]
         mean = u_sum / n
-        bend = np.where(bends > 0, bend_sum / bends, zero)
-        return Observed(u_squares / n - mean * mean, phi_sum / n, lowest, highest, bend)
+        curvature = np.where(curvatures > 0, curvature_sum / curvatures, zero)
+        return Observed(u_squares / n - mean * mean, phi_sum / n, lowest, highest, curvature)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Window:
     mean: np.float32
     lowest: np.float32
     highest: np.float32
-    bend: np.float32
+    curvature: np.float32
 
 
 def _terms(index: int, samples: int, dt: np.float32, phi: Float32, u: Float32, twice: Float32) -> Float32:

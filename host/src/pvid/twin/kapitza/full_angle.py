@@ -1,18 +1,18 @@
-"""Twin of weak_angle_f32.c: what the linear rows of a window lack, in every lane."""
+"""Twin of models/kapitza/full_angle_f32.c: what the linear rows of a window lack, in every lane."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import WeakConfig
+from pvid.settings.f32 import WeakConfig
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 f = np.float32
 
 Y, A, B, C1, C2 = 8, 9, 10, 11, 12
-_FUNCTIONS_A_STAGE, _SAMPLES_A_STAGE = 6, 4
+_FUNCTIONS_PER_STAGE, _SAMPLES_PER_STAGE = 6, 4
 _L2_MIN = f(0.05)
 _SETTLED_GROUPS, _SETTLED_STEP, _SETTLED_ERROR, _LOST_ERROR = 4, f(0.02), f(0.05), f(0.2)
 
@@ -21,7 +21,7 @@ _SIXTH, _PART_120, _PART_5040 = f(1) / f(6), f(1) / f(120), f(1) / f(5040)
 _HALF, _PART_24, _PART_720 = f(0.5), f(1) / f(24), f(1) / f(720)
 
 
-def _sine_lack(x: Float32) -> Float32:
+def _sine_remainder(x: Float32) -> Float32:
     x2 = x * x
     series: Float32 = _SIXTH - x2 * (_PART_120 - x2 * _PART_5040)
     return (x * x2) * series
@@ -67,8 +67,8 @@ class Angle:
     def stages(self) -> int:
         """Stages of a window."""
         design = self.config.design
-        fit = -(-design.functions // _FUNCTIONS_A_STAGE)
-        sweep = (design.window + _SAMPLES_A_STAGE - 2) // _SAMPLES_A_STAGE
+        fit = -(-design.functions // _FUNCTIONS_PER_STAGE)
+        sweep = (design.window + _SAMPLES_PER_STAGE - 2) // _SAMPLES_PER_STAGE
         return self.config.passes * (fit + 1 + sweep) + 1
 
     def correct(self, x: Float32, p: Float32, theta: Float32, phi: Float32, u: Float32) -> Float32:
@@ -79,33 +79,33 @@ class Angle:
         zero = p[3] if len(p) > 3 else np.zeros(lanes, np.float32)
         friction = p[4:6] if self.config.friction else np.zeros((2, lanes), np.float32)
         l2 = (p[1] - p[2]) - f(1)
-        sensible = l2 > _L2_MIN
-        l1 = p[2] / np.where(sensible, l2, f(1))
-        lack = np.zeros((functions, 3, lanes), np.float32)
+        physical = l2 > _L2_MIN
+        l1 = p[2] / np.where(physical, l2, f(1))
+        remainder = np.zeros((functions, 3, lanes), np.float32)
         for _ in range(self.config.passes):
-            a, b = self._fit(x, theta, friction, lack)
-            lack = self._sweep(zero, l1, l2, a, b, phi, u)
+            a, b = self._fit(x, theta, friction, remainder)
+            remainder = self._sweep(zero, l1, l2, a, b, phi, u)
         total = np.zeros(lanes, np.float32)
         for k in range(functions):
             for j in range(3):
-                total = total + lack[k, j] * lack[k, j]
-        on = self.on & sensible & np.isfinite(total)
+                total = total + remainder[k, j] * remainder[k, j]
+        on = self.on & physical & np.isfinite(total)
         out = x.copy()
-        out[Y] = x[Y] - np.where(on, lack[:, 0], f(0))
-        out[C1] = np.where(on, lack[:, 1], f(0))
-        out[C2] = np.where(on, lack[:, 2], f(0))
+        out[Y] = x[Y] - np.where(on, remainder[:, 0], f(0))
+        out[C1] = np.where(on, remainder[:, 1], f(0))
+        out[C2] = np.where(on, remainder[:, 2], f(0))
         return out
 
     @staticmethod
-    def _fit(x: Float32, theta: Float32, friction: Float32, lack: Float32) -> tuple[Float32, Float32]:
+    def _fit(x: Float32, theta: Float32, friction: Float32, remainder: Float32) -> tuple[Float32, Float32]:
         n = np.zeros((5, x.shape[2]), np.float32)
         for k in range(x.shape[1]):
             a, b, e = x[A, k], x[B, k], x[Y, k]
             for i in range(min(len(theta), 8)):
                 e = e - x[i, k] * theta[i]
-            e = e - lack[k, 0]
-            e = e - friction[0] * lack[k, 1]
-            e = e - friction[1] * lack[k, 2]
+            e = e - remainder[k, 0]
+            e = e - friction[0] * remainder[k, 1]
+            e = e - friction[1] * remainder[k, 2]
             n = n + np.stack([a * a, a * b, b * b, a * e, b * e])
         product = n[0] * n[2]
         determinant = product - n[1] * n[1]
@@ -124,7 +124,7 @@ class Angle:
         design, dt = self.config.design, self.dt
         w, d1, d2 = self.p
         chi2 = np.asarray(design.chi, np.float32)[:, 1]
-        motion, remainder = _Integral(dt), [_Integral(dt) for _ in range(3)]
+        motion, integral = _Integral(dt), [_Integral(dt) for _ in range(3)]
         out = np.zeros((design.functions, 3, len(a)), np.float32)
         for index in range(design.window - 1):
             first = index == 0
@@ -145,22 +145,22 @@ class Angle:
                 a2, v2 = a1 + angle, v1 + rate
                 acceleration1 = (l2 * force) - (g * a1)
                 acceleration2 = -(d2 * force)
-                sine, lift = angle - _sine_lack(angle), _versine(angle)
-                e[0, 0] = (g * _sine_lack(a1)) + (((lift * acceleration2) + (sine * (v2 * v2))) / l1)
-                e[0, 1] = (g * _sine_lack(a2)) + ((lift * acceleration1) - (sine * (v1 * v1)))
+                sine, lift = angle - _sine_remainder(angle), _versine(angle)
+                e[0, 0] = (g * _sine_remainder(a1)) + (((lift * acceleration2) + (sine * (v2 * v2))) / l1)
+                e[0, 1] = (g * _sine_remainder(a2)) + ((lift * acceleration1) - (sine * (v1 * v1)))
             e[1, 0] = -(v1 * self.inverse_l1_square)
             e[2, 0] = rate * self.inverse_l1_square
             e[2, 1] = -(l1 * e[2, 0])
             for j in range(self.channels):
                 difference = e[j, 1] - e[j, 0]
                 m1 = ((d1 - f(1)) * difference) - e[j, 0]
-                row = m1 + (g * remainder[j].step(first, d2 * difference))
+                row = m1 + (g * integral[j].step(first, d2 * difference))
                 if not first:
                     out[:, j] = out[:, j] + chi2[index][:, None] * row
         return out
 
-    def settle(self, lanes: Mask, p: Float32, worst: Float32, groups: int) -> Mask:
-        """pvid_weak_angle_settle_f32 in the given lanes; where it was switched on."""
+    def switch(self, lanes: Mask, p: Float32, worst: Float32, groups: int) -> Mask:
+        """pvid_weak_angle_switch_f32 in the given lanes; where it was switched on."""
         moved = np.zeros(p.shape[1], np.float32)
         for i in range(3):
             step = (p[i] / self.p[i]) - f(1)

@@ -1,11 +1,11 @@
-"""Twin of kapitza_q31.c: the pendulum's physical parameters from fixed-point estimates, in integers."""
+"""Twin of kapitza_physical_q31.c: the pendulum's physical parameters from fixed-point estimates, in integers."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native_q31 import ScaleQ31
+from pvid.settings.q31 import ScaleQ31
 from pvid.twin.q31.integer import WIDE, Int, bit_length, clamp, integers, root_of, round_shift, scale
 
 _D_BITS = 30  # of d1, d2 and L2
@@ -32,7 +32,7 @@ def _combined(x: Int, y: Int, r: Int) -> Int:
 
 
 def physical(estimates: npt.NDArray[np.void], unit: ScaleQ31) -> tuple[Int, Int, npt.NDArray[np.bool_]]:
-    """pvid_kapitza_physical_q31 of estimates [n], dtype ESTIMATE_DTYPE.
+    """pvid_kapitza_physical_q31 of estimates [n], dtype estimates.Q31.
 
     Returns
     -------

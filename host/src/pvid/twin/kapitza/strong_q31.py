@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.design.strong_q31 import RowShiftsQ31
+from pvid.settings.tables import RowShiftsQ31
 from pvid.twin.kapitza.weak_q31 import ModelQ31
 from pvid.twin.q31.estimator import ROW_LIMIT
 from pvid.twin.q31.integer import Int, clamp, integers, round_shift, times_q31
@@ -59,7 +59,7 @@ def rows(shifts: RowShiftsQ31, phi: Int, u: Int) -> tuple[Int, Int, Mask]:
     return n, y, taker.fits
 
 
-def told(terms: Int) -> Int:
+def sensitivity(terms: Int) -> Int:
     """w times the gradient in w of N^T theta, from N_i theta_i [11, lanes]."""
     return np.asarray(_POWERS_OF_W @ terms)
 

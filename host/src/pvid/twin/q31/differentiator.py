@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.design.fir import ORDERS
-from pvid.design.fir_q31 import Y_LOWEST, FirBankQ31
+from pvid.design.fir_q31 import Y_LOWEST
+from pvid.settings.tables import FirBankQ31
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.q31.integer import Int, round_shift
 

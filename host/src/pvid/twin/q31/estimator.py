@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason
-from pvid.core.native_q31 import ESTIMATE_DTYPE, EstimatorConfigQ31
+from pvid.settings.enums import Reason
+from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.twin import estimates
 from pvid.twin.kapitza.weak_q31 import ModelQ31
 from pvid.twin.q31 import cholesky
 from pvid.twin.q31.integer import (
@@ -76,9 +77,9 @@ class EstimatorQ31:
     p int64 [n_p, lanes]; sums int64 [n_sums, lanes]: M, b, rr times 4^-exponent, weight in Q16.
     """
 
-    _ROWS_A_STAGE = 8
-    _ENTRIES_A_STAGE = 18
-    _PIVOTS_A_STAGE = 2
+    _ROWS_PER_STAGE = 8
+    _ENTRIES_PER_STAGE = 18
+    _PIVOTS_PER_STAGE = 2
     _END_PARTS = 2
 
     def __init__(self, configs: Sequence[EstimatorConfigQ31], model: ModelQ31) -> None:
@@ -118,7 +119,7 @@ class EstimatorQ31:
         self.dead_zone = lane("dead_zone")
         self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
         self.energy = np.zeros(lanes, np.int64)
-        self.taken = np.zeros(lanes, np.int64)
+        self.group_weight = np.zeros(lanes, np.int64)
         self.expected = scaled(np.zeros(lanes, np.int64), 0)
         self.group_energy = self.energy
         self.size = self.energy
@@ -207,7 +208,7 @@ class EstimatorQ31:
         row = round_shift(np.where(fits, n, 0), self.exponent)
         upper, column = self._upper
         weight = np.where(fits, self.row_weight, 0)
-        self.taken = self.taken + weight
+        self.group_weight = self.group_weight + weight
         self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
         if self.is_rate:
             self.fresh = self.fresh + row * e
@@ -217,7 +218,7 @@ class EstimatorQ31:
         self.counters["rejected_saturated"] += ~fits
         return reason
 
-    def solve(self, ends_group: bool, refuge: tuple[Mask, Int] | None = None) -> Iterator[Reasons | None]:
+    def solve(self, ends_group: bool, fallback: tuple[Mask, Int] | None = None) -> Iterator[Reasons | None]:
         """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one.
 
         refuge: in which lanes p goes elsewhere if it may not step, and where [n_p, lanes].
@@ -228,7 +229,7 @@ class EstimatorQ31:
         if ends_group:
             self.group_energy = self.energy
             self.energy = np.zeros(self.lanes, np.int64)
-            self.taken = np.zeros(self.lanes, np.int64)
+            self.group_weight = np.zeros(self.lanes, np.int64)
             self.phase += 1
             self.was_due = self.phase >= self.divider
         elif self.is_rate:
@@ -239,7 +240,7 @@ class EstimatorQ31:
                 self.phase = 0
             for _ in range(self._stages_before_commit()):
                 yield None
-            reason = self._commit(refuge)
+            reason = self._commit(fallback)
             yield None if ends_group else reason
         if ends_group:
             self._forget(slice(0, self.model.n_sums // 2))
@@ -255,17 +256,17 @@ class EstimatorQ31:
     @property
     def assessment_stages(self) -> int:
         """Stages of an assessment: those that look, residual, two factors, kappa, columns and errors."""
-        return self._looking_stages() + 2 + 2 * self._factor_parts() + 2 * self.model.n_p
+        return self._shared_stages() + 2 + 2 * self._factor_parts() + 2 * self.model.n_p
 
     def _stages_before_commit(self) -> int:
         """Those that look, factor, force, solve, step, rows of M dtheta."""
-        follow = -(-self.model.n_theta // self._ROWS_A_STAGE)
-        return self._looking_stages() + self._factor_parts() + follow + 3
+        follow = -(-self.model.n_theta // self._ROWS_PER_STAGE)
+        return self._shared_stages() + self._factor_parts() + follow + 3
 
     def _factor_parts(self) -> int:
-        return 1 + -(-self.model.n_p // self._PIVOTS_A_STAGE)
+        return 1 + -(-self.model.n_p // self._PIVOTS_PER_STAGE)
 
-    def _looking_stages(self) -> int:
+    def _shared_stages(self) -> int:
         """Rows of M, C, rows of S, and whether there is more in it than noise."""
         return self._matrix_stages() + 1 + self.model.n_p + self._factor_parts()
 
@@ -274,7 +275,7 @@ class EstimatorQ31:
         stages = row = 0
         while row < self.model.n_theta:
             entries = 0
-            while row < self.model.n_theta and entries < self._ENTRIES_A_STAGE:
+            while row < self.model.n_theta and entries < self._ENTRIES_PER_STAGE:
                 entries += self.model.n_theta - row
                 row += 1
             stages += 1
@@ -352,7 +353,7 @@ class EstimatorQ31:
         g = cholesky.half_exponent(np.stack([s[a, a] for a in range(n_p)]))
         return clamp(scale(s, g[:, None] + g[None]), ONE), g
 
-    def _informed(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
+    def _above_noise(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
         """Whether S less what noise of this variance puts there, so many times over, is still positive."""
         model = self.model
         if model.noisy is None:
@@ -374,12 +375,12 @@ class EstimatorQ31:
                 rest[a, b] = rest[a, b] - (rows[0, b] * t[0] + rows[1, b] * t[1])
         return np.asarray((self.noise_margin == 0) | cholesky.factor(self._equilibrated_system(rest)[0]).ok)
 
-    def _commit(self, refuge: tuple[Mask, Int] | None) -> Reasons:
+    def _commit(self, fallback: tuple[Mask, Int] | None) -> Reasons:
         model = self.model
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        informed = self._informed(s, c, h, self.expected_variance)
+        above_noise = self._above_noise(s, c, h, self.expected_variance)
         prior = self._in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
         for a in range(model.n_p):
             s[a, a] = s[a, a] + prior[a]
@@ -388,23 +389,23 @@ class EstimatorQ31:
         own = round_shift(factor.first_pivot * q[0, 0], 31) >= scale(prior[0], 2 * g[0])
         excited = (factor.first_pivot >= self.kappa_min) & (own | (self.kappa_min == 0))
         reason = np.full(self.lanes, Reason.UPDATED, np.uint8)
-        reason[~(excited & informed)] = Reason.HELD_NOT_EXCITED
+        reason[~(excited & above_noise)] = Reason.HELD_NOT_EXCITED
         reason[~factor.ok] = Reason.HELD_PIVOT
 
         b = self.sums[model.moments : model.moments + model.n_theta]
-        rests = (reason == Reason.UPDATED) & self._at_rest(factor, c, scale(b, h), g)
+        in_dead_zone = (reason == Reason.UPDATED) & self._at_rest(factor, c, scale(b, h), g)
         force, force_h = cholesky.to_block(scale(self._driving(b), h), 30)
         self.fresh[:] = 0
         _, x, x_h = self._solve_for(factor, c, force, g)
         dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
         steps = reason == Reason.UPDATED
-        self.counters["at_rest"] += rests
-        p = self._limited(dp, steps & ~rests)
-        fleeing = np.zeros(self.lanes, np.bool_)
-        if refuge is not None:
-            fleeing = ~steps & refuge[0]
-            p = np.where(fleeing, refuge[1], p)
-        return self._follow(p, m, h, b, reason, fleeing, rests)
+        self.counters["at_rest"] += in_dead_zone
+        p = self._limited(dp, steps & ~in_dead_zone)
+        falls_back = np.zeros(self.lanes, np.bool_)
+        if fallback is not None:
+            falls_back = ~steps & fallback[0]
+            p = np.where(falls_back, fallback[1], p)
+        return self._follow(p, m, h, b, reason, falls_back, in_dead_zone)
 
     def _solve_for(self, factor: cholesky.Factor, c: Int, force: Int, g: Int) -> tuple[Int, Int, Int]:
         """(rhs, x, h): C^T force, scaled as the rows of q, and its solution x 2^h."""
@@ -419,8 +420,8 @@ class EstimatorQ31:
         rhs, x, exponent = self._solve_for(factor, c, force, g)
         f, more = cholesky.to_block(rhs, _REST_BITS)
         asked = scaled((f * x).sum(axis=0), exponent + more + 2 * down - 62)
-        found, told = self._row_variance(), self.expected_variance
-        noise = pick(found.exceeds(told), told, found)
+        found, expected = self._row_variance(), self.expected_variance
+        noise = pick(found.exceeds(expected), expected, found)
         zone = scaled(self.dead_zone * self.dead_zone, -32)
         bound = zone.times(noise.times(scaled(self.correlation, -16)))
         return (self.dead_zone > 0) & ~asked.exceeds(bound)
@@ -449,7 +450,7 @@ class EstimatorQ31:
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         return np.where(moving, x, self.p)
 
-    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons, fleeing: Mask, rests: Mask) -> Reasons:
+    def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons, falls_back: Mask, in_dead_zone: Mask) -> Reasons:
         """Moves p, theta, b and rr together: b -= M dtheta, rr -= dtheta^T (b_old + b_new)."""
         model = self.model
         theta = model.theta(p)
@@ -463,9 +464,9 @@ class EstimatorQ31:
         fall = (v * w).sum(axis=0)
         residual = self.sums[-2] - clamp(scale(fall, -(v_h + w_h)), HELD_LIMIT)
         overflow = (residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0)
-        reason[overflow & (reason == Reason.UPDATED) & ~rests] = Reason.HELD_PIVOT
-        stepping = (reason == Reason.UPDATED) & ~rests
-        moving = stepping | (fleeing & ~overflow)
+        reason[overflow & (reason == Reason.UPDATED) & ~in_dead_zone] = Reason.HELD_PIVOT
+        stepping = (reason == Reason.UPDATED) & ~in_dead_zone
+        moving = stepping | (falls_back & ~overflow)
         kept = self.sums[model.moments : -2]
         self.sums[model.moments : -2] = np.where(moving, b - moved, kept)
         self.sums[-2] = np.where(moving, np.maximum(residual, 0), self.sums[-2])
@@ -496,12 +497,12 @@ class EstimatorQ31:
         """What the sensors' noise explains of it."""
         return self.expected.shifted(-2 * self.exponent)
 
-    def expect(self, variance: Scaled) -> None:
-        """pvid_estimator_expect_q31: variance that the sensors' noise gives the rows since the last group."""
+    def set_expected(self, variance: Scaled) -> None:
+        """pvid_estimator_set_expected_q31: variance that the sensors' noise gives the rows since the last group."""
         weight = self.sums[-1]
-        told = (self.taken > 0) & (weight >= self.taken)
-        share = scaled(self.taken, 0).over(scaled(np.maximum(weight, 1), 0))
-        self.expected = pick(told, self.expected.plus(share.times(variance.minus(self.expected))), self.expected)
+        counted = (self.group_weight > 0) & (weight >= self.group_weight)
+        share = scaled(self.group_weight, 0).over(scaled(np.maximum(weight, 1), 0))
+        self.expected = pick(counted, self.expected.plus(share.times(variance.minus(self.expected))), self.expected)
 
     def _misfit(self) -> Int:
         """Residual variance over what the sensors explain of it, Q16; 0 where that is not known [lanes]."""
@@ -512,13 +513,13 @@ class EstimatorQ31:
         return np.where(known, clamp(misfit.fixed(16), 2**31 - 1), 0)
 
     def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimator_assess_q31 of every lane, dtype ESTIMATE_DTYPE [lanes]."""
+        """pvid_estimator_assess_q31 of every lane, dtype estimates.Q31 [lanes]."""
         return self.judged()[0]
 
     def judged(self) -> tuple[npt.NDArray[np.void], Mask]:
         """The assessment, and where the data say more than noise of the variance found would [lanes]."""
         n_p = self.model.n_p
-        out = np.zeros(self.lanes, ESTIMATE_DTYPE)
+        out = np.zeros(self.lanes, estimates.Q31)
         out["p"][:, :n_p] = self.p.T
         out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
         out["misfit"] = self._misfit()
@@ -529,7 +530,7 @@ class EstimatorQ31:
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        informed = self._informed(s, c, h, variance)
+        above_noise = self._above_noise(s, c, h, variance)
         alone = cholesky.factor(self._equilibrated_system(s)[0])
         out["kappa"] = alone.first_pivot
         out["least_pivot"] = alone.least_pivot
@@ -553,4 +554,4 @@ class EstimatorQ31:
                 part = np.sign(x) * np.minimum(((np.abs(x) // r) << 30) // r_b, ONE)
                 out["correlation"][:, a, b] = np.where(factor.ok, part, 0)
                 out["correlation"][:, b, a] = out["correlation"][:, a, b]
-        return out, informed
+        return out, above_noise

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native_q31 import GateConfigQ31
+from pvid.settings.q31 import GateConfigQ31
 from pvid.twin.q31.integer import integers
 from pvid.twin.q31.scaled import Scaled, pick, scaled
 
@@ -35,9 +35,9 @@ class GateQ31:
         if not self.is_on:
             return np.ones(self.judged.shape, np.bool_)
         asking = np.ones(self.judged.shape, np.bool_) if asked is None else asked
-        learning = self.judged < self.memory
-        passes = learning | ~square.exceeds(self.limit.times(self.scale))
-        judged = np.where(passes & learning, self.judged + 1, self.judged)
+        warming_up = self.judged < self.memory
+        passes = warming_up | ~square.exceeds(self.limit.times(self.scale))
+        judged = np.where(passes & warming_up, self.judged + 1, self.judged)
         part = scaled(np.ones_like(judged), 0).over(scaled(np.maximum(judged, 1), 0))
         change = square.minus(self.scale).times(part)
         scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))

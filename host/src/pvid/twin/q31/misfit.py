@@ -11,7 +11,7 @@ from pvid.twin.q31.scaled import Scaled, pick, scaled
 Mask = npt.NDArray[np.bool_]
 
 _BLOCK_S, _ROWS_MAX, _FEW = 4, 65535, 64
-_TOLD_DOWN, _TOLD_LIMIT = 3, 2**28
+_SENSITIVITY_SHIFT, _SENSITIVITY_LIMIT = 3, 2**28
 _MOST, _LEAST = Scaled(integers(549755814), integers(-37)), Scaled(integers(703687442), integers(-45))
 _TIMES = scaled(3, 0)
 _UNKNOWN = scaled(1, 120)
@@ -42,15 +42,15 @@ class MisfitQ31:
         self.left = self.block
         self.alarm = np.zeros(groups.shape, np.bool_)
 
-    def take(self, square: Int, told: Int) -> None:
+    def take(self, square: Int, sensitivity: Int) -> None:
         """A row of every lane: the square of its residual and p[0] times its gradient in p[0], [lanes]."""
-        held = clamp(round_shift(told, _TOLD_DOWN), _TOLD_LIMIT)
+        held = clamp(round_shift(sensitivity, _SENSITIVITY_SHIFT), _SENSITIVITY_LIMIT)
         self.few_energy = self.few_energy + square
         self.few_signal = self.few_signal + held * held
         self.left -= 1
         if self.left % _FEW == 0:
             self.energy = self.energy.plus(scaled(self.few_energy, 0))
-            self.signal = self.signal.plus(scaled(self.few_signal, 2 * _TOLD_DOWN))
+            self.signal = self.signal.plus(scaled(self.few_signal, 2 * _SENSITIVITY_SHIFT))
             self.few_energy = np.zeros_like(self.few_energy)
             self.few_signal = np.zeros_like(self.few_signal)
         if self.left == 0:
@@ -59,9 +59,9 @@ class MisfitQ31:
     def _judge(self) -> None:
         moves = self.signal.m > 0
         part = self.energy.over(Scaled(np.where(moves, self.signal.m, 1), self.signal.e))
-        taught = _UNKNOWN.exceeds(self.least_part)
-        louder = self.energy.exceeds(_TIMES.times(self.least_energy)) & part.exceeds(_TIMES.times(self.least_part))
-        self.alarm = moves & taught & ((louder & part.exceeds(_LEAST)) | part.exceeds(_MOST))
+        has_reference = _UNKNOWN.exceeds(self.least_part)
+        larger = self.energy.exceeds(_TIMES.times(self.least_energy)) & part.exceeds(_TIMES.times(self.least_part))
+        self.alarm = moves & has_reference & ((larger & part.exceeds(_LEAST)) | part.exceeds(_MOST))
         self.least_energy = pick(moves, self._least(self.least_energy, self.energy), self.least_energy)
         self.least_part = pick(moves, self._least(self.least_part, part), self.least_part)
         self.energy = self._nothing

@@ -1,4 +1,4 @@
-"""Twin of weak_finish_q31.c: a complete window becomes rows and steps, one stage a tick."""
+"""Twin of weak/finish_q31.c: a complete window becomes rows and steps, one stage a tick."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Reason
-from pvid.design.weak_q31 import COLUMN_TERMS, WeakTablesQ31
+from pvid.design.weak_q31 import COLUMN_TERMS
+from pvid.settings.enums import Reason
+from pvid.settings.tables import WeakTablesQ31
 from pvid.twin.q31 import cholesky
 from pvid.twin.q31.estimator import EstimatorQ31, length
 from pvid.twin.q31.gate import GateQ31
@@ -23,7 +24,7 @@ from pvid.twin.q31.integer import (
     square_root,
 )
 from pvid.twin.q31.scaled import Scaled, pick, scaled
-from pvid.twin.q31.trust import SURPLUS_BITS, TrustQ31
+from pvid.twin.q31.trust import VARIANCE_RATIO_BITS, TrustQ31
 from pvid.twin.q31.weak_window import Window
 from pvid.twin.weak_schedule import Mask, Work
 
@@ -31,10 +32,10 @@ COLUMNS = 12
 COLUMN_LIMIT = 2**28
 DIRECTION_BITS = 27
 _Y, _A, _B = 8, 9, 10
-_ASSEMBLED_A_STAGE = 3
-_ALONG_A_STAGE = 6
-_REMOVED_A_STAGE = 3
-_FITTED_A_STAGE = 3
+_ASSEMBLED_PER_STAGE = 3
+_ALONG_PER_STAGE = 6
+_REMOVED_PER_STAGE = 3
+_FITTED_PER_STAGE = 3
 _FACTOR_PARTS, _TRACE_PARTS, _WHITEN_PARTS = 2, 3, 3
 _FADE_PARTS = 2
 _GRAM_22, _GRAM_DOWN, _ROW_BITS = 3, 16, 12
@@ -205,14 +206,14 @@ def _stages_before_add(design: WeakTablesQ31) -> int:
     functions = design.functions
     whole = functions // 3
     triangles = 3 * whole + (_FACTOR_PARTS + _TRACE_PARTS + _WHITEN_PARTS) * (functions - whole)
-    assembled = -(-functions // _ASSEMBLED_A_STAGE)
+    assembled = -(-functions // _ASSEMBLED_PER_STAGE)
     return (
         1
         + functions
         + assembled
         + triangles
-        + 2 * (2 + -(-functions // _ALONG_A_STAGE) + -(-functions // _REMOVED_A_STAGE))
-        + -(-functions // _FITTED_A_STAGE)
+        + 2 * (2 + -(-functions // _ALONG_PER_STAGE) + -(-functions // _REMOVED_PER_STAGE))
+        + -(-functions // _FITTED_PER_STAGE)
     )
 
 
@@ -223,7 +224,7 @@ def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: Estimato
     return rows + solves + estimator.assessment_stages + 1
 
 
-def _surplus(energy: Int, design: WeakTablesQ31, expected: Scaled) -> Scaled:
+def _variance_ratio(energy: Int, design: WeakTablesQ31, expected: Scaled) -> Scaled:
     """Variance of a window's residuals over what is expected of it [lanes]."""
     return scaled(energy, 0).over(scaled(design.functions - 2, 0).times(expected))
 
@@ -236,7 +237,7 @@ def _passes(
     for k in range(design.functions):
         e = clamp(estimator.innovation(x[: estimator.model.n_theta, k], x[_Y, k])[0], COLUMN_LIMIT)
         energy = clamp(energy + e * e, WIDE)
-    passes = gate.passes(_surplus(energy, design, expected), ~saturated)
+    passes = gate.passes(_variance_ratio(energy, design, expected), ~saturated)
     if passes.any() != passes.all():
         raise PvidError("lanes of one twin must let the same windows in: their estimates differ too much")
     return bool(passes.all())
@@ -256,7 +257,7 @@ def stages(
     pivot: what the noise of the pivot's sensor adds to the variance of a row for each mean square of a second
     difference of F.
     """
-    expected = scaled(estimator.row_sd * estimator.row_sd, -16).plus(pivot.times(window.bend))
+    expected = scaled(estimator.row_sd * estimator.row_sd, -16).plus(pivot.times(window.curvature))
     by = whitening(design, estimator)
     x, saturated = rows(window.sums, by, design)
     for _ in range(_stages_before_add(design) - 1):
@@ -268,16 +269,16 @@ def stages(
         return
     yield None
     estimator.noise = noise_of(design, by, estimator)
-    yield from estimator.fade(trust.next_ageing())
+    yield from estimator.fade(trust.next_fade_factor())
     for k in range(design.functions):
         y = np.where(saturated, 2**31 - 1, x[_Y, k])
         added = estimator.add(x[: estimator.model.n_theta, k], y)
         yield None if (added == Reason.ACCUMULATED).all() else added
-    estimator.expect(expected)
+    estimator.set_expected(expected)
     reason = np.full(estimator.lanes, Reason.ACCUMULATED, np.uint8)
     for iteration in range(iterations):
-        refuge = trust.refuge if iteration == 0 else None
-        for solved in estimator.solve(ends_group=iteration == 0, refuge=refuge):
+        fallback = trust.fallback if iteration == 0 else None
+        for solved in estimator.solve(ends_group=iteration == 0, fallback=fallback):
             yield None
             if solved is not None:
                 reason = solved
@@ -286,6 +287,6 @@ def stages(
     size = estimator.size
     for _ in range(estimator.assessment_stages):
         yield None
-    candidate, informed = estimator.judged()
-    surplus = _surplus(estimator.group_energy, design, expected)
-    yield trust.judge(reason, size, informed, surplus.fixed(SURPLUS_BITS), candidate)
+    candidate, above_noise = estimator.judged()
+    variance_ratio = _variance_ratio(estimator.group_energy, design, expected)
+    yield trust.judge(reason, size, above_noise, variance_ratio.fixed(VARIANCE_RATIO_BITS), candidate)

@@ -1,11 +1,11 @@
-"""Twin of weak_front_q31.c: exact sums of counts, one rounding each for F and U."""
+"""Twin of weak/front_q31.c: exact sums of counts, one rounding each for F and U."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.design.weak_q31 import WeakTablesQ31
+from pvid.settings.tables import WeakTablesQ31
 from pvid.twin.q31.integer import Int, round_shift
 from pvid.twin.weak_schedule import Schedule
 

@@ -1,4 +1,4 @@
-"""Twin of weak_window_q31.c: the sums of every whole window of a stretch, all windows at once."""
+"""Twin of weak/window_q31.c: the sums of every whole window of a stretch, all windows at once."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pvid.design.weak_q31 import HIGH_TERMS, TERM_BITS, TERMS, WeakTablesQ31
+from pvid.design.weak_q31 import HIGH_TERMS, TERM_BITS, TERMS
+from pvid.settings.tables import WeakTablesQ31
 from pvid.twin.f32.weak_window import window_count
 from pvid.twin.q31.integer import Int, round_shift
 from pvid.twin.q31.scaled import Scaled, scaled
@@ -30,7 +31,7 @@ def angle_sums(f: Int, design: WeakTablesQ31) -> Int:
     return np.asarray(np.sum(f[index], axis=1, dtype=np.int64))
 
 
-def bends(f: Int, design: WeakTablesQ31) -> Scaled:
+def curvatures(f: Int, design: WeakTablesQ31) -> Scaled:
     """Mean square of the second differences of F that fell into each window [windows]."""
     hop = (design.window - 1) // 2
     squares, due = np.zeros(len(f), np.int64), np.zeros(len(f), np.int64)
@@ -48,7 +49,7 @@ class Window:
 
     sums: Int
     angle_sum: int
-    bend: Scaled
+    curvature: Scaled
 
 
 def _terms(index: int, now: Int, twice: Int, design: WeakTablesQ31) -> Int:

@@ -1,0 +1,55 @@
+#include "number/uncontracted.h"
+
+#include "pvid/gate.h"
+
+#include <stddef.h>
+
+#include "number/finite_f32.h"
+
+#define GROWTH 9.21034f   /* ln 1e4: of the scale within the time of patience */
+#define WIDEST 1.0e3f     /* the scale grows no faster than this */
+#define SCALE_MAX 1.0e30f /* of squares: far beyond any row that is taken in */
+
+pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *config, float rate_hz, float memory,
+                               float floor)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL));
+    if ((self == NULL) || (config == NULL)) {
+        return PVID_BAD_POINTER;
+    }
+    if (!pvid_within_f32(config->sigmas, 2.0f, 1.0e3f) && !pvid_within_f32(config->sigmas, 0.0f, 0.0f)) {
+        return PVID_BAD_GATE_SIGMAS;
+    }
+    if (!pvid_within_f32(config->patience_s, 0.0f, 1.0e12f)) {
+        return PVID_BAD_GATE_PATIENCE;
+    }
+    const float residuals = config->patience_s * rate_hz;
+    float growth = 0.0f;
+    if (config->patience_s > 0.0f) {
+        growth = (residuals > (GROWTH / WIDEST)) ? (GROWTH / residuals) : WIDEST;
+    }
+    self->limit = config->sigmas * config->sigmas;
+    self->memory = (memory >= 1.0f) ? memory : 1.0f;
+    self->floor = floor;
+    self->widening = 1.0f + growth;
+    self->judged = 0.0f;
+    self->scale = floor;
+    return PVID_OK;
+}
+
+bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square)
+{
+    if (!(self->limit > 0.0f) || !pvid_finite_f32(square)) {
+        return true;
+    }
+    const bool warming_up = self->judged < self->memory;
+    const bool passes = warming_up || (square <= (self->limit * self->scale));
+    float scale = self->scale * self->widening;
+    if (passes) {
+        self->judged = warming_up ? (self->judged + 1.0f) : self->judged;
+        scale = self->scale + ((square - self->scale) / self->judged);
+    }
+    scale = (scale > self->floor) ? scale : self->floor;
+    self->scale = (scale < SCALE_MAX) ? scale : SCALE_MAX;
+    return passes;
+}

@@ -1,0 +1,26 @@
+/* How the strong form judges itself by its residuals: see pvid/misfit.h. Private to the core. */
+#ifndef PVID_MISFIT_F32_H
+#define PVID_MISFIT_F32_H
+
+#include <stdbool.h>
+
+#include "pvid/misfit.h"
+
+/* Prepares `self` for rows that come at rate_hz (> 0) and are forgotten with a time constant of forgetting_s,
+ * 0: never. Both were checked by the estimator. */
+void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting_s);
+
+/* Ends a block: whether it is a misfit. */
+bool pvid_misfit_judge_f32(pvid_misfit_f32 *self);
+
+/* Takes a row in: its residual e and p[0] times its gradient in p[0]. Returns whether it was the last of a block, which
+ * is then to be judged. */
+static inline bool pvid_misfit_add_f32(pvid_misfit_f32 *self, float e, float sensitivity)
+{
+    self->energy += e * e;
+    self->signal += sensitivity * sensitivity;
+    self->left--;
+    return self->left == 0u;
+}
+
+#endif

@@ -1,0 +1,264 @@
+#include "number/uncontracted.h"
+
+#include "pvid/trust.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "number/count.h"
+#include "solve/estimator_f32.h"
+#include "number/finite_f32.h"
+#include "judge/publication.h"
+#include "judge/trust_tell.h"
+
+const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
+    .kappa_min = 3.0e-5f,
+    .se_max = 0.05f,
+    .misfit_max = 4.0f,
+    .groups_min = 3,
+    .revert_after = 16,
+    .renewal = 0.2f,
+};
+
+/* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
+#define ARRIVED 0.3f
+#define SMALL_STEP 1.0e-4f
+
+/* p has settled when its last step is smaller than this. */
+#define SETTLED_STEP 0.02f
+
+/* It is near where it goes when it has settled with standard errors, relative, below this. */
+#define NEAR 0.1f
+
+/* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
+#define FADE 0.3f
+#define FADE_GROUPS 4u
+
+/* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
+#define LONG_MEMORY 4096.0f
+
+/* One group that the model cannot explain at all must not outweigh thousands. */
+#define VARIANCE_RATIO_MAX 1.0e6f
+
+static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
+{
+    if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
+        return PVID_BAD_PUBLISH_KAPPA;
+    }
+    if (!pvid_within_f32(config->se_max, 1.0e-9f, 1.0e9f)) {
+        return PVID_BAD_SE_MAX;
+    }
+    if (!pvid_within_f32(config->misfit_max, 1.0f, 1.0e6f) && !pvid_within_f32(config->misfit_max, 0.0f, 0.0f)) {
+        return PVID_BAD_MISFIT_MAX;
+    }
+    if (!pvid_within_f32(config->renewal, 0.01f, 1.0e3f) && !pvid_within_f32(config->renewal, 0.0f, 0.0f)) {
+        return PVID_BAD_RENEWAL;
+    }
+    return PVID_OK;
+}
+
+static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 *estimator)
+{
+    memcpy(estimate->p, estimator->p, sizeof estimate->p);
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        estimate->se[a] = estimator->start_sd[a];
+        estimate->covariance[a][a] = estimator->start_sd[a] * estimator->start_sd[a];
+    }
+}
+
+void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    pvid_publication_write(&self->mark, self->estimate.p, self->copy.p, estimator->p, sizeof self->estimate.p,
+                           self->mark.number[0]);
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
+}
+
+pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
+                                const pvid_estimator_f32 *estimator)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
+        return PVID_BAD_POINTER;
+    }
+    const pvid_status status = config_is_valid(config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    memset(self, 0, sizeof *self);
+    self->config = *config;
+    const pvid_information_f32 *sums = &estimator->information;
+    float memory = LONG_MEMORY;
+    if (sums->retention < 1.0f) {
+        const float groups = (float)sums->block / (1.0f - sums->retention);
+        memory = (groups < LONG_MEMORY) ? groups : LONG_MEMORY;
+    }
+    self->long_memory = (uint16_t)((memory < (float)PVID_TRUST_LONG) ? (float)PVID_TRUST_LONG : memory);
+    publish_start(&self->estimate, estimator);
+    self->copy = self->estimate;
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    return PVID_OK;
+}
+
+const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self)
+{
+    return ((self->config.revert_after > 0u) && (self->uninformative >= self->config.revert_after)) ? self->estimate.p
+                                                                                                    : NULL;
+}
+
+/* ---- the alarm ---- */
+
+/* Returns whether the windows alone raise it. */
+static bool add_variance_ratio(pvid_trust_f32 *self, float variance_ratio)
+{
+    const float x =
+        (variance_ratio <= VARIANCE_RATIO_MAX) ? variance_ratio : VARIANCE_RATIO_MAX; /* NaN becomes the limit */
+    if (self->judged < self->long_memory) {
+        self->judged++;
+    }
+    self->long_mean += (x - self->long_mean) / (float)self->judged;
+    self->recent[self->next] = x;
+    self->next = (uint8_t)((self->next + 1u == PVID_TRUST_SHORT) ? 0u : (self->next + 1u));
+    float sum = 0.0f;
+    for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
+        sum += self->recent[i];
+    }
+    const float limit = self->config.misfit_max;
+    const bool short_exceeds = (self->judged >= PVID_TRUST_SHORT) && (sum > (1.5f * (limit * (float)PVID_TRUST_SHORT)));
+    const bool long_exceeds = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
+    return short_exceeds || long_exceeds;
+}
+
+static void restart_alarm(pvid_trust_f32 *self)
+{
+    self->judged = 0;
+    self->next = 0;
+    self->long_mean = 0.0f;
+    memset(self->recent, 0, sizeof self->recent);
+}
+
+/* Whether the residuals of all rows are within what chance makes of the limit. */
+static bool all_rows_agree(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
+                           const pvid_estimate_f32 *candidate)
+{
+    const float freedom = candidate->weight - (float)estimator->model->n_p;
+    const float chance = sqrtf(2.0f / ((freedom >= 1.0f) ? freedom : 1.0f));
+    return candidate->misfit <= (self->config.misfit_max * (1.0f + (3.0f * chance)));
+}
+
+float pvid_trust_largest_error_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
+{
+    float largest_error = 0.0f;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_f32(estimator->model, a)) {
+            const float relative = candidate->se[a] / candidate->p[a];
+            largest_error = (relative <= largest_error) ? largest_error : relative;
+        }
+    }
+    return largest_error;
+}
+
+/* ---- renewal ---- */
+
+void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    self->groups_to_fade = FADE_GROUPS;
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    restart_alarm(self);
+}
+
+float pvid_trust_fade_factor_f32(pvid_trust_f32 *self)
+{
+    if ((self->groups_to_fade == 0u) || !self->errors_small) {
+        return 1.0f;
+    }
+    self->groups_to_fade--;
+    return FADE;
+}
+
+/* Whether p is so far from where the rows came in. */
+static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    bool moved = false;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_f32(estimator->model, a)) {
+            const float part = (estimator->p[a] / self->anchor[a]) - 1.0f;
+            moved = moved || (part > self->config.renewal) || (part < -self->config.renewal);
+        }
+    }
+    return moved;
+}
+
+/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
+ * come in there; and a p that noise may have moved so far has not arrived anywhere. */
+static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool errors_small, bool agrees)
+{
+    const bool stale = errors_small && !agrees && has_moved(self, estimator);
+    if (stale || pvid_estimator_is_rounded_f32(estimator)) {
+        pvid_trust_renew_f32(self, estimator);
+    } else if (errors_small && agrees) {
+        memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    } else {
+        /* p is on its way yet, or about where it was */
+    }
+}
+
+/* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
+static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled, float variance_ratio,
+                        const pvid_estimate_f32 *candidate)
+{
+    const bool agrees = all_rows_agree(self, estimator, candidate);
+    const bool errors_small = pvid_trust_largest_error_f32(estimator, candidate) <= NEAR;
+    const bool renewing = self->groups_to_fade > 0u;
+    self->errors_small = errors_small;
+    bool short_exceeds = false;
+    if (renewing) {
+        restart_alarm(self);
+    } else if (self->converged) {
+        short_exceeds = add_variance_ratio(self, variance_ratio);
+    } else {
+        self->converged = settled && errors_small && (self->groups >= self->config.groups_min);
+    }
+    self->misfit = (self->config.misfit_max > 0.0f) && (!agrees || short_exceeds);
+    if (settled && !renewing && (self->config.renewal > 0.0f)) {
+        renew_if_stale(self, estimator, errors_small, agrees);
+    }
+}
+
+static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
+                           float size, bool above_noise, const pvid_estimate_f32 *candidate)
+{
+    if (reason != PVID_UPDATED) {
+        return reason;
+    }
+    if (!above_noise || !(candidate->kappa >= self->config.kappa_min) ||
+        !(candidate->least_pivot >= self->config.kappa_min)) {
+        return PVID_HELD_NOT_EXCITED;
+    }
+    const float error = pvid_trust_largest_error_f32(estimator, candidate);
+    const float small_enough = ARRIVED * error;
+    const bool arrived = size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
+    if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !arrived) {
+        return PVID_HELD_UNCERTAIN;
+    }
+    return PVID_UPDATED;
+}
+
+pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
+                                 bool above_noise, float variance_ratio, const pvid_estimate_f32 *candidate)
+{
+    pvid_count_up_16(&self->groups);
+    if (reason == PVID_ACCUMULATED) { /* no solve was due */
+        return reason;
+    }
+    pvid_trust_count_uninformative(&self->uninformative, reason, pvid_trust_fallback_f32(self) != NULL);
+    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, candidate);
+    const pvid_reason judged = verdict(self, estimator, reason, size, above_noise, candidate);
+    if (judged == PVID_UPDATED) {
+        uint32_t number = self->mark.number[0];
+        pvid_count_up(&number);
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
+        self->published = true;
+    }
+    return pvid_trust_report(&estimator->counters, judged, reason, self->misfit);
+}

@@ -1,0 +1,249 @@
+#include "pvid/trust_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "number/count.h"
+#include "solve/estimator_q31.h"
+#include "judge/publication.h"
+#include "judge/trust_tell.h"
+
+/* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
+#define ARRIVED 19661 /* 0.3, Q16 */
+#define SMALL_STEP (((int64_t)1 << PVID_SIZE_BITS) / 10000)
+
+/* p has settled when its last step is smaller than 2 %, and is near where it goes when it has with standard errors
+ * below a tenth. */
+#define SETTLED_STEP (((int64_t)1 << PVID_SIZE_BITS) / 50)
+#define NEAR (((int64_t)1 << ERROR_BITS) / 10)
+
+/* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
+#define FADE 644245094 /* 0.3, Q31 */
+#define FADE_GROUPS 4u
+
+#define CHANCE_MAX 92682 /* sqrt(2), Q16: of one degree of freedom */
+
+#define RENEWAL_MIN 655u /* 0.01, Q16 */
+#define RENEWAL_MAX ((uint32_t)1000 << 16)
+
+/* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
+#define LONG_MEMORY 4096u
+
+/* One group that the model cannot explain at all must not outweigh thousands. */
+#define VARIANCE_RATIO_MAX ((int64_t)1000000 << PVID_VARIANCE_RATIO_BITS)
+
+#define ERROR_BITS 24 /* of se_max */
+
+static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
+{
+    if ((config->kappa_min < 0) || (config->kappa_min > (PVID_ONE_Q30 - (PVID_ONE_Q30 / 1000)))) {
+        return PVID_BAD_PUBLISH_KAPPA;
+    }
+    if (config->se_max <= 0) {
+        return PVID_BAD_SE_MAX;
+    }
+    if ((config->misfit_max != 0u) && (config->misfit_max < ((uint32_t)1 << 16))) {
+        return PVID_BAD_MISFIT_MAX;
+    }
+    if ((config->renewal != 0u) && ((config->renewal < RENEWAL_MIN) || (config->renewal > RENEWAL_MAX))) {
+        return PVID_BAD_RENEWAL;
+    }
+    return PVID_OK;
+}
+
+void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
+{
+    pvid_publication_write(&self->mark, self->estimate.p, self->copy.p, estimator->p, sizeof self->estimate.p,
+                           self->mark.number[0]);
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
+}
+
+pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q31 *config,
+                                const pvid_estimator_q31 *estimator)
+{
+    PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
+    if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
+        return PVID_BAD_POINTER;
+    }
+    const pvid_status status = config_is_valid(config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    memset(self, 0, sizeof *self);
+    self->config = *config;
+    const uint64_t fading = ((uint64_t)1 << 31) - (uint64_t)estimator->information.retention;
+    const uint64_t groups = ((uint64_t)estimator->information.block << 31) / fading; /* of memory; all but never ends */
+    const uint64_t clamped = (groups < LONG_MEMORY) ? groups : LONG_MEMORY;
+    self->long_memory = (uint16_t)((clamped < PVID_TRUST_LONG) ? PVID_TRUST_LONG : clamped);
+    pvid_trust_place_q31(self, estimator);
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        self->estimate.se[a] = estimator->start_sd[a];
+        self->estimate.correlation[a][a] = PVID_ONE_Q30;
+    }
+    self->copy = self->estimate;
+    return PVID_OK;
+}
+
+const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self)
+{
+    return ((self->config.revert_after > 0u) && (self->uninformative >= self->config.revert_after)) ? self->estimate.p
+                                                                                                    : NULL;
+}
+
+/* ---- the alarm ---- */
+
+/* Returns whether the windows alone raise it. */
+static bool add_variance_ratio(pvid_trust_q31 *self, int64_t variance_ratio)
+{
+    const int64_t x = pvid_clamp_q31(variance_ratio, VARIANCE_RATIO_MAX);
+    if (self->judged < self->long_memory) {
+        self->judged++;
+    }
+    self->long_mean =
+        pvid_clamp_q31(self->long_mean + ((x - self->long_mean) / (int64_t)self->judged), VARIANCE_RATIO_MAX);
+    self->recent[self->next] = x;
+    self->next = (uint8_t)((self->next + 1u == PVID_TRUST_SHORT) ? 0u : (self->next + 1u));
+    int64_t sum = 0;
+    for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
+        sum += self->recent[i];
+    }
+    const int64_t limit = (int64_t)self->config.misfit_max << (PVID_VARIANCE_RATIO_BITS - 16);
+    const bool short_exceeds =
+        (self->judged >= PVID_TRUST_SHORT) && ((2 * sum) > (3 * (limit * (int64_t)PVID_TRUST_SHORT)));
+    const bool long_exceeds = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
+    return short_exceeds || long_exceeds;
+}
+
+static void restart_alarm(pvid_trust_q31 *self)
+{
+    self->judged = 0;
+    self->next = 0;
+    self->long_mean = 0;
+    memset(self->recent, 0, sizeof self->recent);
+}
+
+/* Whether the residuals of all rows are within what chance makes of the limit. */
+static bool all_rows_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
+                           const pvid_estimate_q31 *candidate)
+{
+    const uint32_t n_p = estimator->model->n_p;
+    const uint32_t freedom = (candidate->weight > n_p) ? (candidate->weight - n_p) : 1u;
+    const int64_t root = (int64_t)pvid_square_root_q31(((uint64_t)1 << 33) / freedom); /* of 2 / freedom, Q16 */
+    const int64_t chance = pvid_clamp_q31(root, CHANCE_MAX);
+    const int64_t limit = (int64_t)self->config.misfit_max * (((int64_t)1 << 16) + (3 * chance)); /* Q32 */
+    return ((int64_t)candidate->misfit * ((int64_t)1 << 16)) <= limit;
+}
+
+/* ---- the gate ---- */
+
+/* Largest standard error of the positive parameters, relative to them, Q24. */
+static int64_t largest_error(const pvid_estimator_q31 *estimator, const pvid_estimate_q31 *candidate)
+{
+    int64_t most = 0;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_q31(estimator->model, a)) {
+            const int64_t relative = ((int64_t)candidate->se[a] << ERROR_BITS) / candidate->p[a];
+            most = (relative > most) ? relative : most;
+        }
+    }
+    return most;
+}
+
+/* ---- renewal ---- */
+
+int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self)
+{
+    if ((self->groups_to_fade == 0u) || !self->errors_small) {
+        return 0;
+    }
+    self->groups_to_fade--;
+    return FADE;
+}
+
+/* Whether p is so far from where the rows came in. */
+static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
+{
+    bool moved = false;
+    for (size_t a = 0; a < estimator->model->n_p; a++) {
+        if (pvid_is_positive_q31(estimator->model, a)) {
+            const int64_t way = (int64_t)pvid_magnitude_q31((int64_t)estimator->p[a] - self->anchor[a]);
+            moved = moved || ((way * ((int64_t)1 << 16)) > ((int64_t)self->anchor[a] * self->config.renewal));
+        }
+    }
+    return moved;
+}
+
+/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
+ * come in there; and a p that noise may have moved so far has not arrived anywhere. */
+static void renew_if_stale(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool agrees)
+{
+    if (!agrees && has_moved(self, estimator)) {
+        self->groups_to_fade = FADE_GROUPS;
+        restart_alarm(self);
+        memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    }
+    if (agrees) {
+        memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    }
+}
+
+/* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
+static void raise_alarm(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool settled, int64_t variance_ratio,
+                        const pvid_estimate_q31 *candidate)
+{
+    const bool agrees = all_rows_agree(self, estimator, candidate);
+    const bool errors_small = largest_error(estimator, candidate) <= NEAR;
+    const bool renewing = self->groups_to_fade > 0u;
+    self->errors_small = errors_small;
+    bool short_exceeds = false;
+    if (renewing) {
+        restart_alarm(self);
+    } else if (self->converged) {
+        short_exceeds = add_variance_ratio(self, variance_ratio);
+    } else {
+        self->converged = settled && errors_small && (self->groups >= self->config.groups_min);
+    }
+    self->misfit = (self->config.misfit_max > 0u) && (!agrees || short_exceeds);
+    if (settled && errors_small && !renewing && (self->config.renewal > 0u)) {
+        renew_if_stale(self, estimator, agrees);
+    }
+}
+
+static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
+                           int64_t size, bool above_noise, const pvid_estimate_q31 *candidate)
+{
+    if (reason != PVID_UPDATED) {
+        return reason;
+    }
+    if (!above_noise || (candidate->kappa < self->config.kappa_min) ||
+        (candidate->least_pivot < self->config.kappa_min)) {
+        return PVID_HELD_NOT_EXCITED;
+    }
+    const int64_t error = largest_error(estimator, candidate);
+    const int64_t clamped = pvid_clamp_q31(error, (int64_t)1 << 44);
+    const int64_t small_enough = pvid_round_shift_q31(clamped * ARRIVED, 16u + (ERROR_BITS - PVID_SIZE_BITS));
+    const bool arrived = size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
+    if ((self->groups < self->config.groups_min) || (error > self->config.se_max) || !arrived) {
+        return PVID_HELD_UNCERTAIN;
+    }
+    return PVID_UPDATED;
+}
+
+pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
+                                 bool above_noise, int64_t variance_ratio, const pvid_estimate_q31 *candidate)
+{
+    pvid_count_up_16(&self->groups);
+    if (reason == PVID_ACCUMULATED) { /* no solve was due */
+        return reason;
+    }
+    pvid_trust_count_uninformative(&self->uninformative, reason, pvid_trust_fallback_q31(self) != NULL);
+    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, candidate);
+    const pvid_reason judged = verdict(self, estimator, reason, size, above_noise, candidate);
+    if (judged == PVID_UPDATED) {
+        uint32_t number = self->mark.number[0];
+        pvid_count_up(&number);
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
+        self->published = true;
+    }
+    return pvid_trust_report(&estimator->counters, judged, reason, self->misfit);
+}

@@ -1,0 +1,48 @@
+/* What every snapshot has in common: the copy without its pointers, and the seal. Private to the core. */
+#ifndef PVID_SNAPSHOT_SEAL_H
+#define PVID_SNAPSHOT_SEAL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "pvid/snapshot.h"
+
+typedef enum {
+    PVID_SNAPSHOT_KIND_STRONG_F32 = 1,
+    PVID_SNAPSHOT_KIND_WEAK_F32 = 2,
+    PVID_SNAPSHOT_KIND_WEAK_Q31 = 3,
+    PVID_SNAPSHOT_KIND_STRONG_Q31 = 4
+} pvid_snapshot_kind;
+
+/* What a snapshot must be of to be restored. */
+typedef struct {
+    pvid_snapshot_kind kind;
+    uint32_t layout; /* hash of sizes and places */
+    uint32_t config; /* hash of the configuration */
+    size_t bytes;    /* of the object, and of what stands behind it */
+} pvid_snapshot_identity;
+
+/* An object's bytes, and where its pointers stand among them, in ascending order. */
+typedef struct {
+    size_t bytes;
+    const uint32_t *pointers; /* [n_pointers] */
+    size_t n_pointers;
+} pvid_snapshot_shape;
+
+/* Writes a snapshot of an object and of the identity->bytes - shape->bytes bytes at `behind` (NULL where there are
+ * none); returns its length, or 0 with nothing written iff it does not fit into `room`. */
+size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_identity *identity, uint32_t generation,
+                          const void *object, const pvid_snapshot_shape *shape, const void *behind);
+
+/* Restores both if image[] holds an undamaged snapshot of this identity; pointers stay what they are. */
+pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity,
+                                           uint8_t object[], const pvid_snapshot_shape *shape, void *behind);
+
+/* Whether the pointer at `place` of the object was one when the snapshot was taken, or NULL. */
+bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place);
+
+/* Hash of words that say how an object lies in memory, and of the machine's byte order. */
+uint32_t pvid_snapshot_layout(const uint32_t words[], size_t n);
+
+#endif

@@ -1,0 +1,79 @@
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "keep/fingerprint_q31.h"
+#include "keep/snapshot.h"
+
+#define PLACE(field) ((uint32_t)offsetof(pvid_weak_q31, field))
+
+static const uint32_t layout[] = {
+    sizeof(pvid_weak_q31),
+    sizeof(void *),
+    PLACE(f),
+    PLACE(front),
+    PLACE(front.ring),
+    PLACE(window),
+    PLACE(finish),
+    PLACE(finish.gate),
+    PLACE(finish.factor),
+    PLACE(finish.solve),
+    PLACE(finish.solve.q),
+    PLACE(finish.solve.factor),
+    PLACE(term),
+    PLACE(sums),
+    PLACE(estimator),
+    PLACE(estimator.information.sums),
+    PLACE(estimator.p),
+    PLACE(estimator.fresh),
+    PLACE(estimator.counters),
+    PLACE(trust),
+    PLACE(trust.estimate),
+    PLACE(trust.copy),
+    PVID_MAX_P,
+    PVID_MAX_THETA_Q31,
+    PVID_MAX_TAPS,
+    PVID_MAX_DECIMATION,
+    PVID_MAX_FUNCTIONS,
+};
+
+static const uint32_t pointers[] = {PLACE(design), PLACE(estimator.model)};
+static const pvid_snapshot_shape shape = {sizeof(pvid_weak_q31), pointers, sizeof pointers / sizeof pointers[0]};
+
+static pvid_snapshot_identity identity_of(const pvid_weak_config_q31 *config)
+{
+    const pvid_snapshot_identity identity = {
+        .kind = PVID_SNAPSHOT_KIND_WEAK_Q31,
+        .layout = pvid_snapshot_layout(layout, sizeof layout / sizeof layout[0]),
+        .config = pvid_fingerprint_weak_q31(config),
+        .bytes = sizeof(pvid_weak_q31),
+    };
+    return identity;
+}
+
+/* Whether init has accepted a configuration. */
+static bool is_ready(const pvid_weak_q31 *self, const pvid_weak_config_q31 *config, const uint8_t image[])
+{
+    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready && (self->design == config->design));
+    return ready;
+}
+
+size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_config_q31 *config, uint32_t generation,
+                                   uint8_t image[], size_t room)
+{
+    if (!is_ready(self, config, image)) {
+        return 0;
+    }
+    const pvid_snapshot_identity identity = identity_of(config);
+    return pvid_snapshot_save(image, room, &identity, generation, self, &shape, NULL);
+}
+
+pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config,
+                                                    const uint8_t image[], size_t length)
+{
+    if (!is_ready(self, config, image)) {
+        return PVID_SNAPSHOT_NOT_READY;
+    }
+    const pvid_snapshot_identity identity = identity_of(config);
+    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
+}

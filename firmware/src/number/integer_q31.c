@@ -1,0 +1,107 @@
+#include "number/integer_q31.h"
+
+/* No sum of parts leaves its type: |high low| <= 2^31 - 2^15, and what is carried into it is below 2^16 where the
+ * product is positive. */
+int64_t pvid_product_in_halves_q31(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = pvid_floor_shift_32_q31(a, 16);
+    const int32_t b_high = pvid_floor_shift_32_q31(b, 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t first = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const uint32_t carried = (uint32_t)first & 0xFFFFu;
+    const int32_t second = ((int32_t)a_low * b_high) + (int32_t)carried;
+    const int32_t high = (a_high * b_high) + pvid_floor_shift_32_q31(first, 16) + pvid_floor_shift_32_q31(second, 16);
+    const uint32_t bottom = (((uint32_t)second & 0xFFFFu) << 16) | (low & 0xFFFFu);
+    const uint64_t both = ((uint64_t)(uint32_t)high << 32) | bottom; /* as they stand in two registers */
+    return (int64_t)both;
+}
+
+int64_t pvid_scale_q31(int64_t x, int32_t s)
+{
+    if (s >= 0) {
+        return pvid_round_shift_q31(x, (uint32_t)s);
+    }
+    if (x == 0) {
+        return 0;
+    }
+    const uint32_t left = (uint32_t)-s;
+    if ((left > 62u) || ((pvid_magnitude_q31(x) >> (62u - left)) != 0u)) {
+        return (x < 0) ? -PVID_WIDE : PVID_WIDE;
+    }
+    return x * ((int64_t)1 << left);
+}
+
+uint32_t pvid_bit_length_q31(uint64_t x)
+{
+    static const uint8_t length_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
+    const uint32_t high = (uint32_t)(x >> 32);
+    uint32_t rest = (high != 0u) ? high : (uint32_t)(x & 0xFFFFFFFFu);
+    uint32_t length = (high != 0u) ? 32u : 0u;
+    if (rest > 0xFFFFu) {
+        rest >>= 16;
+        length += 16u;
+    }
+    if (rest > 0xFFu) {
+        rest >>= 8;
+        length += 8u;
+    }
+    if (rest > 0xFu) {
+        rest >>= 4;
+        length += 4u;
+    }
+    return length + length_of[rest];
+}
+
+/* Digit by digit, in base 4: `rest` is what is left of x, `root` the digits found, moved along with them. The first
+ * half of the digits depends on the upper half of x alone. */
+uint32_t pvid_square_root_q31(uint64_t x)
+{
+    uint32_t upper_rest = (uint32_t)(x >> 32);
+    uint32_t upper_root = 0;
+    for (uint32_t digit = (uint32_t)1 << 30; digit > 0u; digit >>= 2) {
+        const uint32_t trial = upper_root + digit;
+        upper_root >>= 1;
+        if (upper_rest >= trial) {
+            upper_rest -= trial;
+            upper_root += digit;
+        }
+    }
+    uint64_t rest = ((uint64_t)upper_rest << 32) | (x & 0xFFFFFFFFu);
+    uint64_t root = (uint64_t)upper_root << 32;
+    for (uint64_t digit = (uint64_t)1 << 30; digit > 0u; digit >>= 2) {
+        const uint64_t trial = root + digit;
+        root >>= 1;
+        if (rest >= trial) {
+            rest -= trial;
+            root += digit;
+        }
+    }
+    return (uint32_t)root;
+}
+
+pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x)
+{
+    const uint32_t k = 31u - pvid_bit_length_q31(x);
+    const uint64_t quotient = ((uint64_t)1 << 61) / ((uint64_t)x << k);
+    const pvid_reciprocal_q31 result = {(int32_t)((quotient > INT32_MAX) ? (uint64_t)INT32_MAX : quotient), (uint8_t)k};
+    return result;
+}
+
+pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent)
+{
+    int32_t up = 62 - (int32_t)pvid_bit_length_q31((uint64_t)m);
+    if (((exponent - up) & 1) != 0) {
+        up--;
+    }
+    const pvid_root_q31 root = {(int32_t)pvid_square_root_q31((uint64_t)pvid_scale_q31(m, -up)), (exponent - up) / 2};
+    return root;
+}
+
+int64_t pvid_times_q31(int64_t a, int32_t b)
+{
+    const int64_t high = pvid_floor_shift_q31(a, 31);
+    const int32_t low = (int32_t)(a & (int64_t)INT32_MAX);
+    return (high * b) + pvid_round_shift_q31(pvid_product_q31(low, b), 31);
+}

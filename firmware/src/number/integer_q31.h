@@ -1,0 +1,98 @@
+/* Integer arithmetic that never wraps: shifts that round, saturation, roots, reciprocals. Private to the core.
+ *
+ * Fixed-point code shifts and narrows only through these functions. Unless said otherwise an int64 argument lies
+ * within +-PVID_WIDE, so that the sum of two still fits. All loops have a fixed number of turns. */
+#ifndef PVID_INTEGER_Q31_H
+#define PVID_INTEGER_Q31_H
+
+#include <stdint.h>
+
+#include "pvid/estimator_q31.h"
+
+#define PVID_WIDE ((int64_t)1 << 62)
+
+/* 1 in Q30. */
+#define PVID_ONE_Q30 ((int32_t)1 << 30)
+
+/* Greatest integer not above x 2^-s, s <= 63, any x. The two functions here are the
+ * only ones that shift a signed number right: C99 leaves
+ * it to the compiler what that does to a negative one, and every compiler for the targets repeats the sign.
+ * MISRA deviation: 10.1, the assertion below makes sure of it. */
+static inline int64_t pvid_floor_shift_q31(int64_t x, uint32_t s)
+{
+    return x >> s;
+}
+
+typedef char pvid_shift_repeats_the_sign[((-5 >> 1) == -3) ? 1 : -1];
+
+/* The same for 32 bits, s <= 31. */
+static inline int32_t pvid_floor_shift_32_q31(int32_t x, uint32_t s)
+{
+    return x >> s;
+}
+
+/* a b by four multiplications of 16 by 16 bits: half of what a core without a long multiplication takes for 64 by 64.
+ */
+int64_t pvid_product_in_halves_q31(int32_t a, int32_t b);
+
+/* a b. */
+static inline int64_t pvid_product_q31(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_6M__)
+    return pvid_product_in_halves_q31(a, b);
+#else
+    return (int64_t)a * b;
+#endif
+}
+
+/* a a. */
+static inline int64_t pvid_square_q31(int32_t a)
+{
+#if defined(__ARM_ARCH_6M__)
+    return pvid_product_in_halves_q31(a, a);
+#else
+    return (int64_t)a * a;
+#endif
+}
+
+/* x 2^-s rounded half up; any s >= 0, x < INT64_MAX. */
+static inline int64_t pvid_round_shift_q31(int64_t x, uint32_t s)
+{
+    if (s == 0u) {
+        return x;
+    }
+    return (s > 63u) ? 0 : pvid_floor_shift_q31(pvid_floor_shift_q31(x, s - 1u) + 1, 1);
+}
+
+/* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0; |x| < INT64_MAX. */
+int64_t pvid_scale_q31(int64_t x, int32_t s);
+
+/* x held within +-limit. */
+static inline int64_t pvid_clamp_q31(int64_t x, int64_t limit)
+{
+    return (x > limit) ? limit : ((x < -limit) ? -limit : x);
+}
+
+/* |x|, x > INT64_MIN. */
+static inline uint64_t pvid_magnitude_q31(int64_t x)
+{
+    return (x < 0) ? (uint64_t)-x : (uint64_t)x;
+}
+
+/* Number of bits of x: 0 for 0, 64 for 2^63 and above. */
+uint32_t pvid_bit_length_q31(uint64_t x);
+
+/* Greatest r with r^2 <= x, x <= 2^62. 32 turns. */
+uint32_t pvid_square_root_q31(uint64_t x);
+
+/* The reciprocal of 1 <= x < 2^31; m is short of the quotient by less than 2. */
+pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x);
+
+/* r 2^e = sqrt(m 2^exponent), r below 2^31 and of 30 bits at least unless m is 0; 0 <= m <= PVID_WIDE. The greatest
+ * such r where m < 2^60; beyond that m may lose its last bit. */
+pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent);
+
+/* a b 2^-31 rounded half up, |b| < 2^31. */
+int64_t pvid_times_q31(int64_t a, int32_t b);
+
+#endif

@@ -1,0 +1,52 @@
+/* Numbers of any size with 30 digits: what the gate weighs against each other spans more than an int64. Private to the
+ * core. */
+#ifndef PVID_SCALED_Q31_H
+#define PVID_SCALED_Q31_H
+
+#include <stdbool.h>
+
+#include "number/integer_q31.h"
+
+/* x 2^exponent, |x| <= PVID_WIDE. */
+pvid_scaled_q31 pvid_scaled_of_q31(int64_t x, int32_t exponent);
+
+/* Each to 30 digits: a + b, a b, a / b (b > 0). Exponents stay within some thousands. */
+pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
+pvid_scaled_q31 pvid_scaled_times_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
+pvid_scaled_q31 pvid_scaled_over_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
+
+/* a - b, as a + b. */
+static inline pvid_scaled_q31 pvid_scaled_minus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
+{
+    const pvid_scaled_q31 less = {-b.m, b.e};
+    return pvid_scaled_plus_q31(a, less);
+}
+
+/* a > b, b >= 0: the exponents decide unless they are neighbours. */
+static inline bool pvid_scaled_exceeds_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
+{
+    if ((a.m <= 0) || (b.m == 0)) {
+        return a.m > 0;
+    }
+    const uint32_t twice_a = (a.e > b.e) ? 1u : 0u;
+    const uint32_t twice_b = (b.e > a.e) ? 1u : 0u;
+    if ((a.e > (b.e + 1)) || (b.e > (a.e + 1))) {
+        return a.e > b.e;
+    }
+    return ((uint32_t)a.m << twice_a) > ((uint32_t)b.m << twice_b);
+}
+
+/* a 2^exponent. */
+static inline pvid_scaled_q31 pvid_scaled_shifted_q31(pvid_scaled_q31 a, int32_t exponent)
+{
+    const pvid_scaled_q31 result = {a.m, a.e + exponent};
+    return result;
+}
+
+/* a as an integer of `bits` bits after the point, rounded half up, saturated at +-PVID_WIDE. */
+static inline int64_t pvid_scaled_fixed_q31(pvid_scaled_q31 a, int32_t bits)
+{
+    return pvid_scale_q31(a.m, -(a.e + bits));
+}
+
+#endif

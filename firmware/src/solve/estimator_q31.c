@@ -1,0 +1,271 @@
+#include "solve/estimator_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "number/count.h"
+#include "solve/information_q31.h"
+#include "number/integer_q31.h"
+#include "number/scaled_q31.h"
+
+#define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
+#define TERM_DOWN 18                /* a shift that brings a row's limit times 30 bits there */
+#define FORMAT_MAX 64
+#define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
+#define DEAD_ZONE_MAX ((uint32_t)100 << 16)
+
+/* ---- configuration ---- */
+
+static bool format_is_valid(int8_t bits)
+{
+    return (bits >= -FORMAT_MAX) && (bits <= FORMAT_MAX);
+}
+
+static bool model_is_valid(const pvid_model_q31 *model)
+{
+    return !((model == NULL) || (model->theta == NULL) || (model->jacobian == NULL) || (model->formats == NULL) ||
+             (model->c_row == NULL) || (model->c_column == NULL) || (model->n_theta < 1u) ||
+             (model->n_theta > PVID_MAX_THETA_Q31) || (model->n_p < 1u) || (model->n_p > PVID_MAX_P) ||
+             (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31));
+}
+
+static bool formats_are_valid(const pvid_estimator_config_q31 *config)
+{
+    const pvid_model_q31 *model = config->model;
+    bool valid = format_is_valid(config->y_bits);
+    for (size_t i = 0; i < model->n_theta; i++) {
+        valid = valid && format_is_valid(config->n_bits[i]);
+    }
+    for (size_t i = 0; i < model->n_p; i++) {
+        valid = valid && format_is_valid(config->p_bits[i]);
+    }
+    return valid;
+}
+
+static pvid_status parameters_are_valid(const pvid_estimator_config_q31 *config)
+{
+    for (size_t i = 0; i < config->model->n_p; i++) {
+        if ((config->lower[i] >= config->upper[i]) || (config->lower[i] == INT32_MIN) ||
+            (pvid_is_positive_q31(config->model, i) && (config->lower[i] <= 0))) {
+            return PVID_BAD_BOUNDS;
+        }
+        if ((config->start[i] < config->lower[i]) || (config->start[i] > config->upper[i])) {
+            return PVID_BAD_START;
+        }
+        if (config->start_sd[i] <= 0) {
+            return PVID_BAD_START_SD;
+        }
+    }
+    return PVID_OK;
+}
+
+static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
+{
+    if (!model_is_valid(config->model)) {
+        return PVID_BAD_MODEL;
+    }
+    if (!formats_are_valid(config)) {
+        return PVID_BAD_FORMAT;
+    }
+    const pvid_status parameters = parameters_are_valid(config);
+    if (parameters != PVID_OK) {
+        return parameters;
+    }
+    if (config->row_sd <= 0) {
+        return PVID_BAD_ROW_SD;
+    }
+    if ((config->forgetting_groups != 0u) &&
+        ((config->forgetting_groups < 4u) || (config->forgetting_groups > ((uint32_t)1 << 24)))) {
+        return PVID_BAD_FORGETTING;
+    }
+    if ((config->gain < 0) || (config->gain > PVID_ONE_Q30)) {
+        return PVID_BAD_FEEDBACK;
+    }
+    if ((config->correlation < ((uint32_t)1 << 16)) || (config->correlation > ((uint32_t)1 << 31))) {
+        return PVID_BAD_CORRELATION;
+    }
+    if ((config->row_weight < 1u) || (config->row_weight > ((uint32_t)1 << 16))) {
+        return PVID_BAD_ROW_WEIGHT;
+    }
+    if ((config->step_limit < 1u) || (config->step_limit > 58982u)) {
+        return PVID_BAD_STEP_LIMIT;
+    }
+    if ((config->kappa_min < 0) || (config->kappa_min > (PVID_ONE_Q30 - (PVID_ONE_Q30 / 1000)))) {
+        return PVID_BAD_KAPPA_MIN;
+    }
+    if (config->noise_margin > NOISE_MARGIN_MAX) {
+        return PVID_BAD_NOISE_MARGIN;
+    }
+    if (config->dead_zone > DEAD_ZONE_MAX) {
+        return PVID_BAD_DEAD_ZONE;
+    }
+    return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
+}
+
+int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior)
+{
+    const int64_t ratio = ((int64_t)sd << 31) / start_sd;
+    const int32_t up = 31 - (int32_t)pvid_bit_length_q31((uint64_t)ratio);
+    const int64_t mantissa = pvid_clamp_q31(pvid_scale_q31(ratio, -up), (int64_t)1 << 31); /* 31 bits, rounded */
+    *prior = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(mantissa * mantissa, 31), INT32_MAX);
+    return (2 * ((31 + up) - exponent)) - 31;
+}
+
+void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[])
+{
+    for (size_t i = 0; i < self->model->n_theta; i++) {
+        const pvid_scaled_q31 clamped = pvid_scaled_of_q31(theta[i], 0);
+        self->theta[i] = theta[i];
+        self->mantissa[i] = clamped.m;
+        self->shift[i] = (int16_t)(self->align[i] - clamped.e);
+    }
+}
+
+static void init_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+{
+    const pvid_model_q31 *model = config->model;
+    int16_t c_bits[PVID_MAX_C_Q31];
+    model->formats(config->p_bits, self->theta_bits, c_bits);
+    for (size_t i = 0; i < model->n_theta; i++) {
+        self->align[i] = (int16_t)((self->theta_bits[i] + config->n_bits[i]) - config->y_bits);
+    }
+    for (size_t k = 0; k < model->n_c; k++) {
+        const int32_t n_bits = config->n_bits[model->c_row[k]];
+        const int32_t p_bits = config->p_bits[model->c_column[k]];
+        self->c_exponent[k] = (int16_t)(((config->y_bits - n_bits) - p_bits) - c_bits[k]);
+    }
+}
+
+static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+{
+    const pvid_status status = config_is_valid(config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    memset(self, 0, sizeof *self);
+    self->model = config->model;
+    pvid_information_init_q31(&self->information, config->model->n_theta, config->forgetting_groups,
+                              config->row_weight);
+    init_formats(self, config);
+    for (size_t i = 0; i < config->model->n_p; i++) {
+        self->p[i] = config->start[i];
+        self->start_sd[i] = config->start_sd[i];
+        self->lower[i] = config->lower[i];
+        self->upper[i] = config->upper[i];
+        self->prior_exponent[i] =
+            (int16_t)pvid_square_ratio_q31(config->row_sd, -PVID_ROW_SD_BITS, config->start_sd[i], &self->prior[i]);
+    }
+    int64_t theta[PVID_MAX_THETA_Q31];
+    config->model->theta(self->p, theta);
+    pvid_estimator_set_theta_q31(self, theta);
+    self->row_sd = config->row_sd;
+    self->gain = config->gain;
+    self->correlation = config->correlation;
+    self->step_limit = config->step_limit;
+    self->kappa_min = config->kappa_min;
+    self->noise_margin = config->noise_margin;
+    self->dead_zone = config->dead_zone;
+    self->divider = config->divider;
+    return PVID_OK;
+}
+
+pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+{
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
+}
+
+void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t value)
+{
+    if (!pvid_estimator_is_ready_q31(self)) {
+        return;
+    }
+    int64_t theta[PVID_MAX_THETA_Q31];
+    const int64_t above = (value < self->lower[index]) ? self->lower[index] : value;
+    self->p[index] = (int32_t)((above > self->upper[index]) ? self->upper[index] : above);
+    self->model->theta(self->p, theta);
+    pvid_estimator_set_theta_q31(self, theta);
+}
+
+/* ---- rows ---- */
+
+/* x 2^-shift within +-TERM_MAX, |x| <= 2^58. */
+static int64_t term_of(int64_t x, int32_t shift)
+{
+    return (shift >= TERM_DOWN) ? pvid_round_shift_q31(x, (uint32_t)shift)
+                                : pvid_clamp_q31(pvid_scale_q31(x, shift), TERM_MAX);
+}
+
+bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e)
+{
+    bool fits = (y >= -PVID_ROW_LIMIT_Q31) && (y <= PVID_ROW_LIMIT_Q31);
+    int64_t rest = y;
+    for (size_t i = 0; i < self->model->n_theta; i++) {
+        fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
+        const int32_t below = (n[i] > PVID_ROW_LIMIT_Q31) ? PVID_ROW_LIMIT_Q31 : n[i];
+        const int32_t clamped = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
+        term[i] = term_of(pvid_product_q31(clamped, self->mantissa[i]), self->shift[i]);
+        rest -= term[i];
+    }
+    *e = rest;
+    return fits && (*e >= -PVID_ROW_LIMIT_Q31) && (*e <= PVID_ROW_LIMIT_Q31);
+}
+
+bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e)
+{
+    int64_t term[PVID_MAX_THETA_Q31];
+    return pvid_estimator_terms_q31(self, n, y, term, e);
+}
+
+void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
+{
+    self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
+    self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
+    pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
+    pvid_count_up(&self->counters.rows);
+}
+
+pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
+{
+    if (!pvid_estimator_is_ready_q31(self)) {
+        return PVID_NOT_READY;
+    }
+    int64_t e;
+    if (!pvid_estimator_innovation_q31(self, n, y, &e)) {
+        pvid_count_up(&self->counters.rejected_saturated);
+        return PVID_REJECTED_SATURATED;
+    }
+    pvid_estimator_add_row_q31(self, n, (int32_t)e, pvid_square_q31((int32_t)e));
+    return PVID_ACCUMULATED;
+}
+
+/* ---- a solve at once ---- */
+
+static pvid_reason solve_at_once(pvid_estimator_q31 *self, bool ends_group)
+{
+    if (!pvid_estimator_is_ready_q31(self)) {
+        return PVID_NOT_READY;
+    }
+    pvid_estimator_solve_q31 solve;
+    pvid_estimator_begin_q31(self, &solve, ends_group);
+    bool done = false;
+    for (uint16_t left = pvid_estimator_stages_q31(self, ends_group); (left > 0u) && !done; left--) {
+        done = pvid_estimator_advance_q31(self, &solve);
+    }
+    return solve.reason;
+}
+
+pvid_reason pvid_estimator_update_q31(pvid_estimator_q31 *self)
+{
+    return solve_at_once(self, true);
+}
+
+pvid_reason pvid_estimator_iterate_q31(pvid_estimator_q31 *self)
+{
+    return solve_at_once(self, false);
+}

@@ -1,0 +1,164 @@
+#include "number/uncontracted.h"
+
+#include "pvid/information.h"
+
+#include <stddef.h>
+
+#include "number/unroll.h"
+
+/* exp(-x), 0 <= x <= 4, by the series of exp(x): the core has no libm but sqrtf. Accurate to a few
+ * ulp; called once, in init. */
+static float decay(float x)
+{
+    float sum = 1.0f;
+    for (size_t k = 24; k > 0u; k--) {
+        sum = 1.0f + ((x / (float)k) * sum);
+    }
+    return 1.0f / sum;
+}
+
+/* Rows between folds: long enough to be cheap, short enough for `low` to keep 17 bits of a term and
+ * for forgetting to be smooth (a sixteenth of its time constant). */
+#define BLOCK_MAX 64u
+
+void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model, float forgetting_groups)
+{
+    self->n_moments = model->n_moments;
+    self->n_theta = model->n_theta;
+    self->block = BLOCK_MAX;
+    self->age = 0;
+    self->retention = 1.0f;
+    self->row_weight = 1.0f;
+    self->rounding = 0.0f;
+    if (forgetting_groups > 0.0f) {
+        if (forgetting_groups < 16.0f * (float)BLOCK_MAX) {
+            self->block = (uint16_t)((forgetting_groups < 32.0f) ? 1.0f : (forgetting_groups / 16.0f));
+        }
+        self->retention = decay((float)self->block / forgetting_groups);
+    }
+    for (size_t i = 0; i < PVID_MAX_SUMS; i++) {
+        self->high[i] = 0.0f;
+        self->low[i] = 0.0f;
+    }
+}
+
+static size_t number_of_sums(const pvid_information_f32 *self)
+{
+    return (size_t)self->n_moments + self->n_theta + 2u;
+}
+
+/* All products of a row, the packed upper triangle by rows, then N y, y^2 and the weight. */
+static inline void accumulate_any(size_t n_theta, const float *restrict n, float y, float row_weight,
+                                  float *restrict low)
+{
+    for (size_t i = 0; i < n_theta; i++) {
+        for (size_t j = i; j < n_theta; j++) {
+            *low += n[i] * n[j];
+            low++;
+        }
+    }
+    for (size_t i = 0; i < n_theta; i++) {
+        low[i] += y * n[i];
+    }
+    low[n_theta] += y * y;
+    low[n_theta + 1u] += row_weight;
+}
+
+#define EIGHT 8u
+
+/* The same for the weak form's number of entries, a constant: the compiler writes the loops out. */
+static inline void accumulate_eight(const float *restrict n, float y, float row_weight, float *restrict low)
+{
+    PVID_UNROLL
+    for (size_t i = 0; i < EIGHT; i++) {
+        PVID_UNROLL
+        for (size_t j = i; j < EIGHT; j++) {
+            *low += n[i] * n[j];
+            low++;
+        }
+    }
+    PVID_UNROLL
+    for (size_t i = 0; i < EIGHT; i++) {
+        low[i] += y * n[i];
+    }
+    low[EIGHT] += y * y;
+    low[EIGHT + 1u] += row_weight;
+}
+
+void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
+                              float sums[PVID_MAX_SUMS])
+{
+    if (model->accumulate != NULL) {
+        model->accumulate(n, y, self->high, self->low, sums);
+    } else {
+        if (model->n_theta == EIGHT) {
+            accumulate_eight(n, y, self->row_weight, self->low);
+        } else {
+            accumulate_any(model->n_theta, n, y, self->row_weight, self->low);
+        }
+        if (sums != NULL) {
+            pvid_information_read_f32(self, sums);
+        }
+    }
+}
+
+/* Sums worked on together: lets the compiler use registers of four floats where there are any. */
+#define LANES 4u
+
+/* Knuth's two-sum after forgetting: new high + new low = retention (high + low), but for the two products. */
+static inline void fold(float *restrict high, float *restrict low, float retention)
+{
+    const float kept_high = *high * retention;
+    const float kept_low = *low * retention;
+    const float total = kept_high + kept_low;
+    const float part = total - kept_high;
+    *high = total;
+    *low = (kept_high - (total - part)) + (kept_low - part);
+}
+
+void pvid_information_end_group_f32(pvid_information_f32 *self)
+{
+    self->age++;
+    if (self->age < self->block) {
+        return;
+    }
+    self->age = 0;
+    const size_t sums = number_of_sums(self);
+    const float retention = self->retention;
+    const size_t in_lanes = sums - (sums % LANES);
+    for (size_t i = 0; i < in_lanes; i += LANES) {
+        PVID_UNROLL
+        for (size_t j = i; j < i + LANES; j++) {
+            fold(&self->high[j], &self->low[j], retention);
+        }
+    }
+    for (size_t i = in_lanes; i < sums; i++) {
+        fold(&self->high[i], &self->low[i], retention);
+    }
+    self->rounding *= retention;
+}
+
+void pvid_information_fade_f32(pvid_information_f32 *self, float factor)
+{
+    const size_t sums = number_of_sums(self);
+    for (size_t i = 0; i < sums; i++) {
+        self->high[i] *= factor;
+        self->low[i] *= factor;
+    }
+    self->rounding *= factor;
+}
+
+void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS])
+{
+    const size_t n = number_of_sums(self);
+    for (size_t i = 0; i < n; i++) {
+        sums[i] = self->high[i] + self->low[i];
+    }
+}
+
+void pvid_information_tail_f32(const pvid_information_f32 *self, float tail[2])
+{
+    const size_t yy = (size_t)self->n_moments + self->n_theta;
+    tail[0] = self->high[yy] + self->low[yy];
+    tail[1] = self->high[yy + 1u] + self->low[yy + 1u];
+}

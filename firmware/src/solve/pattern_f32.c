@@ -1,0 +1,105 @@
+#include "number/uncontracted.h"
+
+#include "solve/pattern_f32.h"
+
+void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const float x[], float out[])
+{
+    const uint8_t *c_row = model->c_row;
+    const uint8_t *c_column = model->c_column;
+    const size_t n_c = model->n_c;
+    const size_t n_p = model->n_p;
+    float sum[PVID_MAX_P] = {0.0f};
+    for (size_t k = 0; k < n_c; k++) {
+        sum[c_column[k]] += c[k] * x[c_row[k]];
+    }
+    for (size_t a = 0; a < n_p; a++) {
+        out[a] = sum[a];
+    }
+}
+
+/* t[n] += M e_j a. Above the diagonal the entries of column j stand n - 1, n - 2, .. apart; from it
+ * on they are row j, one after the other. */
+static inline void add_column(size_t n, const float *restrict m, size_t j, float a, float *restrict t)
+{
+    size_t at = j;
+    for (size_t i = 0; i < j; i++) {
+        t[i] += m[at] * a;
+        at += (n - 1u) - i;
+    }
+    const float *restrict row = &m[at - j];
+    for (size_t i = j; i < n; i++) {
+        t[i] += row[i] * a;
+    }
+}
+
+size_t pvid_pattern_start_f32(const pvid_model_f32 *model, size_t a)
+{
+    size_t k = 0;
+    while ((k < model->n_c) && (model->c_column[k] < a)) {
+        k++;
+    }
+    return k;
+}
+
+size_t pvid_pattern_end_f32(const pvid_model_f32 *model, size_t start)
+{
+    const uint8_t *c_column = model->c_column;
+    const size_t n_c = model->n_c;
+    size_t k = start;
+    while ((k < n_c) && (c_column[k] == c_column[start])) {
+        k++;
+    }
+    return k;
+}
+
+void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t last,
+                                  const float m[], float t[])
+{
+    const uint8_t *c_row = model->c_row;
+    const size_t n_theta = model->n_theta;
+    for (size_t k = first; k < last; k++) {
+        add_column(n_theta, m, c_row[k], c[k], t);
+    }
+}
+
+void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], size_t start, const float t[],
+                                  float s[])
+{
+    const uint8_t *c_row = model->c_row;
+    const uint8_t *c_column = model->c_column;
+    const size_t n_c = model->n_c;
+    const size_t n_p = model->n_p;
+    float row[PVID_MAX_P] = {0.0f};
+    for (size_t k = start; k < n_c; k++) {
+        row[c_column[k]] += c[k] * t[c_row[k]];
+    }
+    for (size_t b = c_column[start]; b < n_p; b++) {
+        s[b] = row[b];
+    }
+}
+
+float pvid_pattern_dot_f32(const pvid_model_f32 *model, const float c[], size_t start, const float x[])
+{
+    const uint8_t *c_row = model->c_row;
+    const size_t end = pvid_pattern_end_f32(model, start);
+    float sum = 0.0f;
+    for (size_t k = start; k < end; k++) {
+        sum += c[k] * x[c_row[k]];
+    }
+    return sum;
+}
+
+float pvid_pattern_times_f32(size_t n, const float m[], size_t i, const float x[])
+{
+    size_t at = i;
+    float sum = 0.0f;
+    for (size_t j = 0; j < i; j++) {
+        sum += m[at] * x[j];
+        at += (n - 1u) - j;
+    }
+    for (size_t j = i; j < n; j++) {
+        sum += m[at] * x[j];
+        at++;
+    }
+    return sum;
+}

@@ -1,0 +1,398 @@
+#include "number/uncontracted.h"
+
+/* The solve and the assessment in stages, for a model without functions of its own. */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "solve/cholesky_f32.h"
+#include "solve/estimator_f32.h"
+#include "number/finite_f32.h"
+#include "solve/pattern_f32.h"
+#include "pvid/estimator.h"
+
+enum {
+    STAGE_READ,        /* the sums and C */
+    STAGE_PROJECT,     /* n_p times: M c_a, a few non-zeros of c_a at a time, then row a of S and F */
+    STAGE_ABOVE_NOISE, /* is there more in S than noise puts there? */
+    STAGE_FACTOR,
+    STAGE_STEP,   /* dp, and where p and theta go with it */
+    STAGE_MOVE_B, /* a few rows of M dtheta at a time */
+    STAGE_COMMIT,
+    STAGE_FOLD,
+    STAGE_DONE,
+    STAGE_KAPPA, /* of an assessment, after STAGE_ABOVE_NOISE */
+    STAGE_WIDEN,
+    STAGE_INVERT, /* n_p times: a column */
+    STAGE_SCALE
+};
+
+/* What a step leaves wrong in rr, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
+#define ROUNDING 2.4e-7f
+
+#define ROWS_PER_STAGE 4u
+#define COLUMNS_PER_STAGE 3u
+
+static void hold_solve(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, pvid_reason reason)
+{
+    pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
+    solve->reason = reason;
+}
+
+static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    pvid_information_read_f32(&self->information, solve->sums);
+    self->model->jacobian(self->p, solve->c);
+}
+
+/* A part of M c_a, or, once it is complete, row a of S and F; returns whether anything is left. */
+static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const pvid_model_f32 *model = self->model;
+    const size_t a = solve->index;
+    const size_t next = solve->next;
+    const size_t end = pvid_pattern_end_f32(model, solve->start);
+    if (next == solve->start) {
+        memset(solve->column, 0, sizeof solve->column);
+    }
+    if (next < end) {
+        const size_t last = ((end - next) > COLUMNS_PER_STAGE) ? (next + COLUMNS_PER_STAGE) : end;
+        pvid_pattern_add_columns_f32(model, solve->c, next, last, solve->sums, solve->column);
+        solve->next = (uint8_t)last;
+        return true;
+    }
+    pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->column, solve->s[a]);
+    solve->force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
+    solve->start = (uint8_t)end;
+    solve->index++;
+    return solve->index < model->n_p;
+}
+
+/* What the noise is taken to be: what it was said to be while p may still be far off, which makes residuals of its
+ * own; what it was found to be once the result is judged. */
+static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const float weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
+    const bool judging = solve->estimate != NULL;
+    solve->variance = judging ? pvid_estimator_variance_f32(self, solve->sums, 0.0f) : self->row_variance;
+    solve->above_noise =
+        pvid_estimator_is_above_noise_f32(self, (const float (*)[PVID_MAX_P])solve->s, solve->variance, weight);
+}
+
+static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const pvid_model_f32 *model = self->model;
+    const uint8_t gated = pvid_excited_parameters_f32(model);
+    const float (*s)[PVID_MAX_P] = (const float (*)[PVID_MAX_P])solve->s;
+    for (size_t a = 0; a < model->n_p; a++) {
+        solve->s[a][a] += self->prior[a];
+    }
+    solve->reason = PVID_UPDATED;
+    bool solvable = pvid_cholesky_factor_f32(&solve->factor, gated, s);
+    const float kappa = solve->factor.first_pivot;
+    if (gated < model->n_p) {
+        solvable = pvid_cholesky_factor_f32(&solve->factor, model->n_p, s) && solvable;
+    }
+    if (!solvable) {
+        hold_solve(self, solve, PVID_HELD_PIVOT);
+    } else if (!solve->above_noise || !pvid_estimator_is_excited_f32(self, kappa, solve->s[0][0])) {
+        hold_solve(self, solve, PVID_HELD_NOT_EXCITED);
+    }
+}
+
+static bool solve_in_dead_zone(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
+{
+    return (self->dead_zone > 0.0f) &&
+           pvid_estimator_is_in_dead_zone_f32(self, &solve->factor, solve->force,
+                                              pvid_estimator_variance_f32(self, solve->sums, 0.0f));
+}
+
+static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const pvid_model_f32 *model = self->model;
+    float rhs[PVID_MAX_P];
+    for (size_t a = 0; a < model->n_p; a++) {
+        rhs[a] = (solve->gain * solve->force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
+        self->innovation[a] = 0.0f;
+    }
+    memcpy(solve->p, self->p, sizeof solve->p);
+    if ((solve->reason == PVID_UPDATED) && solve_in_dead_zone(self, solve)) {
+        pvid_count_up(&self->counters.at_rest);
+        solve->in_dead_zone = true;
+    } else if (solve->reason == PVID_UPDATED) {
+        float dp[PVID_MAX_P];
+        pvid_cholesky_solve_f32(&solve->factor, rhs, dp);
+        const float size = pvid_estimator_step_size_f32(self, dp);
+        if (pvid_finite_f32(size)) {
+            solve->size = size;
+            pvid_estimator_apply_step_f32(self, dp, size, solve->p);
+        } else {
+            hold_solve(self, solve, PVID_HELD_PIVOT);
+        }
+    }
+    if ((solve->reason != PVID_UPDATED) && (solve->fallback != NULL)) {
+        memcpy(solve->p, solve->fallback, sizeof solve->p);
+    }
+    model->theta(solve->p, solve->theta);
+    for (size_t i = 0; i < model->n_theta; i++) {
+        solve->theta_step[i] = solve->theta[i] - self->theta[i];
+    }
+    solve->fall = 0.0f;
+    solve->scale = 0.0f;
+}
+
+/* Rows first.. of M dtheta, and of the fall of rr by dtheta^T (b_old + b_new); returns the next row. */
+static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, size_t first)
+{
+    const size_t n = self->model->n_theta;
+    const float *b = &solve->sums[self->model->n_moments];
+    const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
+    for (size_t i = first; i < last; i++) {
+        const float moved = pvid_pattern_times_f32(n, solve->sums, i, solve->theta_step);
+        solve->moved[i] = moved;
+        solve->fall += solve->theta_step[i] * (b[i] + (b[i] - moved));
+        solve->scale += solve->sums[pvid_pattern_diagonal_f32(n, i)] * (solve->theta_step[i] * solve->theta_step[i]);
+    }
+    return last;
+}
+
+/* Moves p, theta, b and rr together: b -= M dtheta. A sum that would overflow shows in `fall`. */
+static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const bool steps = solve->reason == PVID_UPDATED;
+    if (solve->in_dead_zone || (!steps && (solve->fallback == NULL))) {
+        return;
+    }
+    const size_t n = self->model->n_theta;
+    float *low = &self->information.low[self->model->n_moments];
+    if (!pvid_finite_f32(solve->fall) || !pvid_finite_f32(low[n] - solve->fall)) {
+        if (steps) {
+            hold_solve(self, solve, PVID_HELD_PIVOT);
+        }
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        low[i] -= solve->moved[i];
+        self->theta[i] = solve->theta[i];
+    }
+    low[n] -= solve->fall;
+    const float lost = self->information.rounding + (ROUNDING * solve->scale);
+    self->information.rounding = (lost <= PVID_RESIDUAL_MAX) ? lost : PVID_RESIDUAL_MAX;
+    memcpy(self->p, solve->p, sizeof self->p);
+    if (steps) {
+        pvid_count_up(&self->counters.updates);
+    }
+}
+
+/* What follows once a stage that is not repeated is over. */
+static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
+{
+    switch (solve->stage) {
+    case STAGE_ABOVE_NOISE:
+        return (solve->estimate == NULL) ? (uint8_t)STAGE_FACTOR : (uint8_t)STAGE_KAPPA;
+    case STAGE_COMMIT:
+        return solve->ends_group ? (uint8_t)STAGE_FOLD : (uint8_t)STAGE_DONE;
+    case STAGE_SCALE:
+        return STAGE_DONE;
+    default:
+        return (uint8_t)(solve->stage + 1u);
+    }
+}
+
+static void reset_solve(pvid_estimator_solve_f32 *solve)
+{
+    solve->reason = PVID_ACCUMULATED;
+    solve->index = 0;
+    solve->start = 0;
+    solve->next = 0;
+    solve->stage = STAGE_READ;
+    solve->gain = 1.0f;
+    solve->variance = 0.0f;
+    solve->size = 0.0f;
+    solve->ends_group = false;
+    solve->in_dead_zone = false;
+    solve->fallback = NULL;
+    solve->estimate = NULL;
+}
+
+void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
+{
+    reset_solve(solve);
+    solve->ends_group = ends_group;
+    if (!pvid_is_relative_f32(self->model)) {
+        return;
+    }
+    if (ends_group) {
+        solve->energy = self->energy;
+        self->energy = 0.0f;
+        self->group_weight = 0.0f;
+        solve->gain = self->gain;
+        solve->stage = (uint8_t)(pvid_estimator_is_due_f32(self) ? STAGE_READ : STAGE_FOLD);
+    } else if (self->gain < 1.0f) {
+        solve->stage = STAGE_DONE; /* the law of g < 1 is a rate, not an iteration */
+    }
+}
+
+void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
+                                         pvid_estimate_f32 *estimate)
+{
+    reset_solve(solve);
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
+    solve->estimate = estimate;
+}
+
+static void kappa_stage(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
+{
+    pvid_estimate_f32 *estimate = solve->estimate;
+    estimate->weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
+    estimate->residual_sd = sqrtf(solve->variance);
+    estimate->misfit = pvid_estimator_misfit_f32(self, solve->sums);
+    pvid_estimator_find_kappa_f32(self, (const float (*)[PVID_MAX_P])solve->s, estimate);
+}
+
+/* The stages that a solve and an assessment share; returns whether the stage is to be repeated. */
+static bool advance_shared(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    switch (solve->stage) {
+    case STAGE_READ:
+        read_stage(self, solve);
+        return false;
+    case STAGE_PROJECT:
+        return project_stage(self, solve);
+    default:
+        above_noise_stage(self, solve);
+        return false;
+    }
+}
+
+static bool finish_stage(pvid_estimator_solve_f32 *solve, bool repeat)
+{
+    if (!repeat) {
+        solve->index = 0;
+        solve->stage = next_stage(solve);
+    }
+    return solve->stage == STAGE_DONE;
+}
+
+bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const pvid_model_f32 *model = self->model;
+    bool repeat = false;
+    if (!pvid_is_relative_f32(model) && (solve->stage != STAGE_DONE)) {
+        solve->reason = pvid_estimator_solve_sums_f32(self, solve->ends_group);
+        solve->stage = STAGE_DONE;
+    }
+    switch (solve->stage) {
+    case STAGE_READ:
+    case STAGE_PROJECT:
+    case STAGE_ABOVE_NOISE:
+        repeat = advance_shared(self, solve);
+        break;
+    case STAGE_FACTOR:
+        factor_stage(self, solve);
+        break;
+    case STAGE_STEP:
+        step_stage(self, solve);
+        break;
+    case STAGE_MOVE_B:
+        solve->index = (uint8_t)move_b_stage(self, solve, solve->index);
+        repeat = solve->index < model->n_theta;
+        break;
+    case STAGE_COMMIT:
+        commit_stage(self, solve);
+        break;
+    case STAGE_FOLD:
+        pvid_information_end_group_f32(&self->information);
+        break;
+    default:
+        return true;
+    }
+    return finish_stage(solve, repeat);
+}
+
+bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const float wide = solve->variance * self->correlation;
+    bool repeat = false;
+    switch (solve->stage) {
+    case STAGE_READ:
+    case STAGE_PROJECT:
+    case STAGE_ABOVE_NOISE:
+        repeat = advance_shared(self, solve);
+        break;
+    case STAGE_KAPPA:
+        kappa_stage(self, solve);
+        break;
+    case STAGE_WIDEN:
+        solve->solvable = pvid_estimator_factor_wide_f32(self, solve->s, wide, &solve->factor);
+        break;
+    case STAGE_INVERT:
+        if (solve->solvable) {
+            pvid_cholesky_inverse_column_f32(&solve->factor, solve->index, solve->estimate->covariance);
+        }
+        solve->index++;
+        repeat = solve->index < self->model->n_p;
+        break;
+    case STAGE_SCALE:
+        pvid_estimator_scale_f32(self, wide, solve->solvable, solve->estimate);
+        break;
+    default:
+        return true;
+    }
+    return finish_stage(solve, repeat);
+}
+
+/* READ and PROJECT. */
+static size_t projection_stages(const pvid_model_f32 *model)
+{
+    size_t stages = 1u;
+    size_t place = 0; /* in a column of C */
+    for (size_t k = 0; k < model->n_c; k++) {
+        const bool first = (k == 0u) || (model->c_column[k] != model->c_column[k - 1u]);
+        place = first ? 0u : (place + 1u);
+        stages += first ? 1u : 0u;
+        stages += ((place % COLUMNS_PER_STAGE) == 0u) ? 1u : 0u;
+    }
+    return stages;
+}
+
+uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
+{
+    const pvid_model_f32 *model = self->model;
+    if (!pvid_is_relative_f32(model)) {
+        return 1;
+    }
+    const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
+    return (uint16_t)(projection_stages(model) + 4u + follow + (ends_group ? 1u : 0u));
+}
+
+uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self)
+{
+    return (uint16_t)(projection_stages(self->model) + 4u + self->model->n_p);
+}
+
+/* All stages of a solve at once. */
+static pvid_reason solve_in_stages(pvid_estimator_f32 *self, bool ends_group)
+{
+    if (!pvid_estimator_is_ready_f32(self)) {
+        return PVID_NOT_READY;
+    }
+    pvid_estimator_solve_f32 solve;
+    pvid_estimator_begin_f32(self, &solve, ends_group);
+    bool done = false;
+    for (uint16_t left = pvid_estimator_stages_f32(self, ends_group); (left > 0u) && !done; left--) {
+        done = pvid_estimator_advance_f32(self, &solve);
+    }
+    return solve.reason;
+}
+
+pvid_reason pvid_estimator_update_f32(pvid_estimator_f32 *self)
+{
+    return solve_in_stages(self, true);
+}
+
+pvid_reason pvid_estimator_iterate_f32(pvid_estimator_f32 *self)
+{
+    return solve_in_stages(self, false);
+}

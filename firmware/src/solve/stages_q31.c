@@ -1,0 +1,596 @@
+/* The solve and the assessment in stages. */
+#include <string.h>
+
+#include "number/count.h"
+#include "solve/estimator_q31.h"
+#include "number/scaled_q31.h"
+
+enum {
+    STAGE_MATRIX,   /* a few rows of M at a time, scaled */
+    STAGE_JACOBIAN, /* C at p, scaled */
+    STAGE_FORCE,
+    STAGE_PROJECT,     /* n_p times: a row of S */
+    STAGE_ABOVE_NOISE, /* is there more in S than noise puts there? In parts: less that, then a few pivots at a time */
+    STAGE_FACTOR,      /* S + H0 and its factor, likewise */
+    STAGE_SOLVE,       /* dp */
+    STAGE_STEP,        /* where p and theta go with it */
+    STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
+    STAGE_COMMIT,
+    STAGE_FOLD, /* in parts */
+    STAGE_DONE,
+    STAGE_RESIDUAL, /* of an assessment, before STAGE_ABOVE_NOISE */
+    STAGE_KAPPA,    /* and after it: S, its factor, and what that says */
+    STAGE_WIDEN,    /* S with what the start said, and its factor */
+    STAGE_INVERT,   /* n_p times: a column */
+    STAGE_ERRORS    /* likewise */
+};
+
+#define ROWS_PER_STAGE 8u
+#define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
+#define PIVOTS_PER_STAGE 2u
+#define REST_BITS 28 /* of F: products with a solution of 30 bits add up in 62 */
+
+static void hold_solve(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
+{
+    pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
+    solve->reason = reason;
+}
+
+/* Returns the next row. */
+static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t row)
+{
+    if (row == 0u) {
+        pvid_system_exponents_q31(&self->information, solve->h);
+    }
+    return pvid_system_scale_rows_q31(&self->information, solve->h, row, solve->m);
+}
+
+/* What drives the step, g b + (1 - g) sum N e since the last solve, scaled as the rows of C. */
+static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    const int64_t *b = pvid_b_of_q31(&self->information);
+    int64_t force[PVID_MAX_THETA_Q31];
+    for (size_t i = 0; i < n; i++) {
+        int64_t driving = b[i];
+        if (solve->gain == 0) {
+            driving = self->fresh[i];
+        } else if (solve->gain < PVID_ONE_Q30) {
+            driving = pvid_times_q31(b[i], (int32_t)(2 * (int64_t)solve->gain)) +
+                      pvid_times_q31(self->fresh[i], (int32_t)(2 * (int64_t)(PVID_ONE_Q30 - solve->gain)));
+        }
+        force[i] = pvid_scale_q31(driving, solve->h[i]);
+        self->fresh[i] = 0;
+    }
+    solve->force_exponent = pvid_to_block_q31((uint32_t)n, force, 30, solve->force);
+}
+
+static void project_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    int64_t *row = solve->s[solve->index];
+    solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->c, solve->start, row);
+}
+
+/* S as it is to be factored. */
+static void begin_factor(pvid_estimator_solve_q31 *solve, uint8_t n_p, const int64_t s[][PVID_MAX_P])
+{
+    pvid_system_equilibrate_q31(n_p, s, solve->g, solve->q);
+    pvid_cholesky_begin_q31(&solve->factor, n_p);
+}
+
+/* Parts of a stage that factors: one prepares the matrix, then the parameters are eliminated, from the last, a few at a
+ * time. */
+static size_t factor_parts(size_t n_p)
+{
+    return 1u + ((n_p + (PIVOTS_PER_STAGE - 1u)) / PIVOTS_PER_STAGE);
+}
+
+static void eliminate_part(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part)
+{
+    const size_t first = (part - 1u) * PIVOTS_PER_STAGE;
+    const size_t end = ((n_p - first) > PIVOTS_PER_STAGE) ? (first + PIVOTS_PER_STAGE) : n_p;
+    for (size_t eliminated = first; eliminated < end; eliminated++) {
+        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q, (n_p - 1u) - eliminated);
+    }
+}
+
+static bool checks_noise(const pvid_estimator_q31 *self)
+{
+    return (self->noise_margin > 0u) && (self->model->noisy[1] > 0u);
+}
+
+static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
+{
+    const uint8_t n_p = self->model->n_p;
+    solve->above_noise = true;
+    if (!checks_noise(self)) {
+        return;
+    }
+    if (part == 0u) {
+        int64_t rest[PVID_MAX_P][PVID_MAX_P];
+        pvid_system_without_noise_q31(self, solve, rest);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])rest);
+        return;
+    }
+    eliminate_part(solve, n_p, part);
+    solve->above_noise = solve->factor.positive;
+}
+
+static void add_prior(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        const int32_t exponent = (int32_t)self->prior_exponent[a] + (2 * (int32_t)self->information.exponent);
+        const int64_t prior = pvid_system_prior_q31(self->prior[a], exponent, solve->f[a]);
+        solve->s[a][a] += prior;
+        solve->first_prior = (a == 0u) ? prior : solve->first_prior;
+    }
+}
+
+/* Whether the data speak of p[0]: what of its information no other parameter can imitate is a part kappa of its
+ * diagonal entry, and more than the start brought along. */
+static bool is_excited(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    const int32_t kappa = solve->factor.first_pivot;
+    const int64_t prior = pvid_scale_q31(solve->first_prior, 2 * solve->g[0]);
+    const bool own = pvid_round_shift_q31((int64_t)kappa * solve->q[0][0], 31) >= prior;
+    return (kappa >= self->kappa_min) && (own || (self->kappa_min == 0));
+}
+
+static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
+{
+    const uint8_t n_p = self->model->n_p;
+    if (part == 0u) {
+        add_prior(self, solve);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
+        return;
+    }
+    eliminate_part(solve, n_p, part);
+    if ((part + 1u) < factor_parts(n_p)) {
+        return;
+    }
+    solve->reason = PVID_UPDATED;
+    if (!solve->factor.positive) {
+        hold_solve(self, solve, PVID_HELD_PIVOT);
+    } else if (!solve->above_noise || !is_excited(self, solve)) {
+        hold_solve(self, solve, PVID_HELD_NOT_EXCITED);
+    }
+}
+
+/* rhs = C^T force, scaled as the rows of q, and x, its solution; returns the exponent of x. */
+static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve_q31 *solve, const int32_t force[],
+                         int64_t rhs[PVID_MAX_P], int32_t x[])
+{
+    memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
+    for (size_t k = 0; k < model->n_c; k++) {
+        rhs[model->c_column[k]] += pvid_product_q31(solve->c[k], force[model->c_row[k]]);
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        rhs[a] = pvid_scale_q31(rhs[a], solve->g[a]);
+    }
+    return pvid_cholesky_solve_q31(&solve->factor, rhs, x);
+}
+
+/* F^T (S + H0)^-1 F, F of all data, in the unit of the sums of squares. */
+static pvid_scaled_q31 newton_decrement_square(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    const int64_t *b = pvid_b_of_q31(&self->information);
+    int64_t wide[PVID_MAX_THETA_Q31];
+    int32_t force[PVID_MAX_THETA_Q31];
+    for (size_t i = 0; i < n; i++) {
+        wide[i] = pvid_scale_q31(b[i], solve->h[i]);
+    }
+    const int32_t down = pvid_to_block_q31((uint32_t)n, wide, 30, force);
+    int64_t rhs[PVID_MAX_P];
+    int32_t x[PVID_MAX_P];
+    int32_t f[PVID_MAX_P];
+    const int32_t of_x = solve_for(self->model, solve, force, rhs, x);
+    const int32_t of_f = pvid_to_block_q31(self->model->n_p, rhs, REST_BITS, f);
+    int64_t sum = 0;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        sum += pvid_product_q31(f[a], x[a]);
+    }
+    return pvid_scaled_of_q31(sum, ((of_x + of_f + (2 * down)) - PVID_S_BITS) - 30);
+}
+
+/* Whether p is within the dead zone of estimator.h. */
+static bool solve_in_dead_zone(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    if (self->dead_zone == 0u) {
+        return false;
+    }
+    const pvid_scaled_q31 found = pvid_estimator_variance_q31(self);
+    const pvid_scaled_q31 expected = pvid_estimator_expected_variance_q31(self);
+    const pvid_scaled_q31 noise = pvid_scaled_exceeds_q31(found, expected) ? expected : found;
+    const pvid_scaled_q31 wide = pvid_scaled_times_q31(noise, pvid_scaled_of_q31(self->correlation, -16));
+    const pvid_scaled_q31 zone = pvid_scaled_of_q31((int64_t)self->dead_zone * self->dead_zone, -32);
+    return !pvid_scaled_exceeds_q31(newton_decrement_square(self, solve), pvid_scaled_times_q31(zone, wide));
+}
+
+static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const pvid_model_q31 *model = self->model;
+    if (solve->reason != PVID_UPDATED) {
+        return;
+    }
+    solve->in_dead_zone = solve_in_dead_zone(self, solve);
+    int64_t rhs[PVID_MAX_P];
+    int32_t x[PVID_MAX_P];
+    const int32_t exponent = solve_for(model, solve, solve->force, rhs, x) + solve->force_exponent;
+    for (size_t a = 0; a < model->n_p; a++) {
+        const int32_t shift = ((solve->f[a] + solve->g[a]) - exponent) + PVID_S_BITS + 30;
+        solve->dp[a] = pvid_clamp_q31(pvid_scale_q31(x[a], shift), STEP_MAX);
+    }
+}
+
+/* How far dp goes, as a part of what each parameter is measured by: its own value where it is positive, else the
+ * standard deviation of its start. */
+static int64_t size_of(const pvid_estimator_q31 *self, const int64_t dp[])
+{
+    int64_t size = 0;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        const int32_t reference = pvid_is_positive_q31(self->model, a) ? self->p[a] : self->start_sd[a];
+        const int64_t own = (int64_t)(pvid_magnitude_q31(dp[a]) << PVID_SIZE_BITS) / reference;
+        size = (own > size) ? own : size;
+    }
+    return size;
+}
+
+/* p[n_p] = where the step leads: shortened to the step limit, within the bounds. */
+static void take_step(pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int64_t size, int32_t p[])
+{
+    const int64_t limit = (int64_t)self->step_limit << (PVID_SIZE_BITS - 16);
+    const bool limited = size > limit;
+    const int32_t factor = (size > limit) ? (int32_t)pvid_clamp_q31((limit << 31) / size, INT32_MAX) : 0;
+    bool bounded = false;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        int64_t x = self->p[a] + (limited ? pvid_times_q31(solve->dp[a], factor) : solve->dp[a]);
+        if (x > self->upper[a]) {
+            x = self->upper[a];
+            bounded = true;
+        }
+        if (x < self->lower[a]) {
+            x = self->lower[a];
+            bounded = true;
+        }
+        p[a] = (int32_t)x;
+    }
+    if (limited) {
+        pvid_count_up(&self->counters.limited);
+    }
+    if (bounded) {
+        pvid_count_up(&self->counters.bounded);
+    }
+}
+
+/* theta_step and its exponent: dtheta scaled as the columns of m. */
+static void scale_theta_step(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    int64_t step[PVID_MAX_THETA_Q31];
+    int32_t largest = INT32_MIN;
+    for (size_t j = 0; j < n; j++) {
+        step[j] = solve->theta[j] - self->theta[j];
+        const int32_t length = (pvid_length_q31(step[j]) - self->align[j]) + solve->h[j];
+        largest = (length > largest) ? length : largest;
+    }
+    solve->step_exponent = largest - 29;
+    for (size_t j = 0; j < n; j++) {
+        const int64_t scaled = pvid_scale_q31(step[j], (solve->step_exponent + self->align[j]) - solve->h[j]);
+        solve->theta_step[j] = (int32_t)pvid_clamp_q31(scaled, PVID_ONE_Q30 / 2);
+    }
+}
+
+static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    memcpy(solve->p, self->p, sizeof solve->p);
+    if (solve->in_dead_zone) {
+        pvid_count_up(&self->counters.at_rest);
+    } else if (solve->reason == PVID_UPDATED) {
+        solve->size = size_of(self, solve->dp);
+        take_step(self, solve, solve->size, solve->p);
+    } else if (solve->has_fallback) {
+        memcpy(solve->p, solve->fallback, sizeof solve->p);
+    }
+    self->model->theta(solve->p, solve->theta);
+    scale_theta_step(self, solve);
+}
+
+/* Rows first.. of M dtheta; returns the next row. */
+static size_t move_b_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t first)
+{
+    const size_t n = self->model->n_theta;
+    const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
+    for (size_t i = first; i < last; i++) {
+        size_t at = i;
+        int64_t sum = 0;
+        for (size_t j = 0; j < i; j++) {
+            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
+            at += (n - 1u) - j;
+        }
+        for (size_t j = i; j < n; j++) {
+            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
+            at++;
+        }
+        solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_CLAMP_LIMIT);
+    }
+    return last;
+}
+
+/* dtheta^T (b_old + b_new), by which rr falls. */
+static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    int64_t both[PVID_MAX_THETA_Q31] = {0};
+    int32_t mantissa[PVID_MAX_THETA_Q31];
+    const int64_t *b = pvid_b_of_q31(&self->information);
+    for (size_t j = 0; j < n; j++) {
+        both[j] = pvid_scale_q31((2 * pvid_clamp_q31(b[j], PVID_CLAMP_LIMIT)) - solve->moved[j], solve->h[j]);
+    }
+    const int32_t exponent = pvid_to_block_q31((uint32_t)n, both, 30, mantissa);
+    int64_t fall = 0;
+    for (size_t j = 0; j < n; j++) {
+        fall += pvid_product_q31(solve->theta_step[j], mantissa[j]);
+    }
+    return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->step_exponent + exponent)), PVID_CLAMP_LIMIT);
+}
+
+/* Moves p, theta, b and rr together: b -= M dtheta. */
+static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const bool steps = solve->reason == PVID_UPDATED;
+    if (solve->in_dead_zone || (!steps && !solve->has_fallback)) {
+        return;
+    }
+    const size_t n = self->model->n_theta;
+    pvid_information_q31 *information = &self->information;
+    int64_t *sums = &information->sums[((size_t)information->n_sums - 2u) - n]; /* b, rr */
+    int64_t b[PVID_MAX_THETA_Q31];
+    bool fits = true;
+    for (size_t i = 0; i < n; i++) {
+        b[i] = pvid_clamp_q31(sums[i], PVID_CLAMP_LIMIT);
+        fits = fits && (pvid_magnitude_q31(b[i] - solve->moved[i]) <= (uint64_t)PVID_CLAMP_LIMIT);
+    }
+    const int64_t residual = sums[n] - fall_of(self, solve);
+    if (!fits || (residual > PVID_CLAMP_LIMIT)) {
+        if (steps) {
+            hold_solve(self, solve, PVID_HELD_PIVOT);
+        }
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        sums[i] = b[i] - solve->moved[i];
+    }
+    sums[n] = (residual > 0) ? residual : 0;
+    pvid_estimator_set_theta_q31(self, solve->theta);
+    memcpy(self->p, solve->p, sizeof self->p);
+    if (steps) {
+        pvid_count_up(&self->counters.updates);
+    }
+}
+
+/* Counts a group; whether a solve is due. */
+static bool is_due(pvid_estimator_q31 *self)
+{
+    self->phase++;
+    if (self->phase < self->divider) {
+        return false;
+    }
+    self->phase = 0;
+    return true;
+}
+
+static void reset_solve(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    solve->reason = PVID_ACCUMULATED;
+    solve->stage = STAGE_MATRIX;
+    solve->index = 0;
+    solve->start = 0;
+    solve->ends_group = false;
+    solve->judging = false;
+    solve->above_noise = true;
+    solve->has_fallback = false;
+    solve->in_dead_zone = false;
+    solve->gain = PVID_ONE_Q30;
+    solve->size = 0;
+    solve->variance = pvid_estimator_expected_variance_q31(self); /* while p may still be far off */
+}
+
+void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group)
+{
+    reset_solve(self, solve);
+    solve->ends_group = ends_group;
+    if (ends_group) {
+        solve->energy = self->energy;
+        self->energy = 0;
+        self->group_weight = 0;
+        solve->gain = self->gain;
+        solve->stage = (uint8_t)(is_due(self) ? STAGE_MATRIX : STAGE_FOLD);
+    } else if (self->gain < PVID_ONE_Q30) {
+        solve->stage = STAGE_DONE; /* the law of g < 1 is a rate, not an iteration */
+    }
+}
+
+void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                         pvid_estimate_q31 *estimate)
+{
+    reset_solve(self, solve);
+    solve->judging = true;
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
+}
+
+/* What follows once a stage is over. */
+static uint8_t next_stage(const pvid_estimator_solve_q31 *solve)
+{
+    switch (solve->stage) {
+    case STAGE_JACOBIAN:
+        return solve->judging ? (uint8_t)STAGE_PROJECT : (uint8_t)STAGE_FORCE;
+    case STAGE_PROJECT:
+        return solve->judging ? (uint8_t)STAGE_RESIDUAL : (uint8_t)STAGE_ABOVE_NOISE;
+    case STAGE_RESIDUAL:
+        return STAGE_ABOVE_NOISE;
+    case STAGE_ABOVE_NOISE:
+        return solve->judging ? (uint8_t)STAGE_KAPPA : (uint8_t)STAGE_FACTOR;
+    case STAGE_COMMIT:
+        return solve->ends_group ? (uint8_t)STAGE_FOLD : (uint8_t)STAGE_DONE;
+    case STAGE_ERRORS:
+        return STAGE_DONE;
+    default:
+        return (uint8_t)(solve->stage + 1u);
+    }
+}
+
+/* Takes the index after a stage, and says where the stage is over; returns whether nothing is left. */
+static bool finish_stage(pvid_estimator_solve_q31 *solve, size_t next, size_t all)
+{
+    solve->index = (uint8_t)next;
+    if (next >= all) {
+        solve->index = 0;
+        solve->stage = next_stage(solve);
+    }
+    return solve->stage == STAGE_DONE;
+}
+
+/* The stages that a solve and an assessment share. */
+static bool advance_shared(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t index = solve->index;
+    size_t next = index + 1u;
+    size_t all = 1;
+    switch (solve->stage) {
+    case STAGE_MATRIX:
+        next = matrix_stage(self, solve, index);
+        all = self->model->n_theta;
+        break;
+    case STAGE_JACOBIAN:
+        pvid_system_jacobian_q31(self, solve->h, solve->c, solve->f);
+        break;
+    case STAGE_PROJECT:
+        project_stage(self, solve);
+        all = self->model->n_p;
+        break;
+    default: /* STAGE_ABOVE_NOISE */
+        above_noise_stage(self, solve, index);
+        all = factor_parts(self->model->n_p);
+        break;
+    }
+    return finish_stage(solve, next, all);
+}
+
+bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t index = solve->index;
+    size_t next = index + 1u;
+    size_t all = 1;
+    switch (solve->stage) {
+    case STAGE_FORCE:
+        scale_force(self, solve);
+        break;
+    case STAGE_FACTOR:
+        factor_stage(self, solve, index);
+        all = factor_parts(self->model->n_p);
+        break;
+    case STAGE_SOLVE:
+        solve_stage(self, solve);
+        break;
+    case STAGE_STEP:
+        step_stage(self, solve);
+        break;
+    case STAGE_MOVE_B:
+        next = move_b_stage(self, solve, index);
+        all = self->model->n_theta;
+        break;
+    case STAGE_COMMIT:
+        commit_stage(self, solve);
+        break;
+    case STAGE_FOLD:
+        pvid_information_end_group_q31(&self->information, index, self->fresh);
+        all = PVID_INFORMATION_END_PARTS;
+        break;
+    case STAGE_DONE:
+        return true;
+    default:
+        return advance_shared(self, solve);
+    }
+    return finish_stage(solve, next, all);
+}
+
+static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
+{
+    if (part == 0u) {
+        begin_factor(solve, (uint8_t)n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
+        return;
+    }
+    if (part < factor_parts(n_p)) {
+        eliminate_part(solve, n_p, part);
+    } else if (solve->factor.positive) {
+        estimate->kappa = solve->factor.first_pivot;
+        estimate->least_pivot = pvid_cholesky_least_pivot_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q);
+    }
+}
+
+static void widen_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
+{
+    const uint8_t n_p = self->model->n_p;
+    if (part == 0u) {
+        pvid_estimator_widen_q31(self, solve);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
+    } else {
+        eliminate_part(solve, n_p, part);
+    }
+}
+
+bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
+                                       pvid_estimate_q31 *estimate)
+{
+    const size_t n_p = self->model->n_p;
+    const size_t index = solve->index;
+    size_t all = n_p;
+    switch (solve->stage) {
+    case STAGE_RESIDUAL:
+        pvid_estimator_residual_q31(self, solve, estimate);
+        all = 1;
+        break;
+    case STAGE_KAPPA:
+        kappa_stage(solve, n_p, index, estimate);
+        all = factor_parts(n_p) + 1u;
+        break;
+    case STAGE_WIDEN:
+        widen_stage(self, solve, index);
+        all = factor_parts(n_p);
+        break;
+    case STAGE_INVERT:
+        pvid_estimator_invert_q31(solve, index);
+        break;
+    case STAGE_ERRORS:
+        pvid_estimator_errors_q31(self, solve, index, estimate);
+        break;
+    case STAGE_DONE:
+        return true;
+    default:
+        return advance_shared(self, solve);
+    }
+    return finish_stage(solve, index + 1u, all);
+}
+
+/* M, C, S, and whether there is more in it than noise. */
+static size_t shared_stages(const pvid_model_q31 *model)
+{
+    return pvid_system_row_stages_q31(model->n_theta) + 1u + model->n_p + factor_parts(model->n_p);
+}
+
+uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_group)
+{
+    const pvid_model_q31 *model = self->model;
+    const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
+    const size_t fold = ends_group ? PVID_INFORMATION_END_PARTS : 0u;
+    /* and four that come once: force, solve, step, commit */
+    return (uint16_t)(shared_stages(model) + factor_parts(model->n_p) + follow + fold + 4u);
+}
+
+uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self)
+{
+    const pvid_model_q31 *model = self->model;
+    return (uint16_t)(shared_stages(model) + 2u + (2u * factor_parts(model->n_p)) + (2u * model->n_p));
+}

@@ -1,0 +1,165 @@
+/* The system S dp = F in integers: M, C and S scaled by powers of two such that 30 bits hold all that matters. */
+#include "solve/estimator_q31.h"
+#include "number/scaled_q31.h"
+
+/* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
+#define ENTRIES_PER_STAGE 18u
+
+void pvid_system_exponents_q31(const pvid_information_q31 *information, int16_t h[])
+{
+    const uint32_t n = information->n_theta;
+    for (uint32_t i = 0; i < n; i++) {
+        h[i] = (int16_t)pvid_half_exponent_q31(information->sums[pvid_moment_q31(n, i, i)]);
+    }
+}
+
+/* One past the last row of a stage that starts with `row`. */
+static size_t rows_end(size_t n_theta, size_t row)
+{
+    size_t entries = 0;
+    size_t end = row;
+    while ((end < n_theta) && (entries < ENTRIES_PER_STAGE)) {
+        entries += n_theta - end;
+        end++;
+    }
+    return end;
+}
+
+size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const int16_t h[], size_t row, int32_t m[])
+{
+    const size_t n = information->n_theta;
+    const size_t end = rows_end(n, row);
+    size_t at = (size_t)pvid_moment_q31((uint32_t)n, (uint32_t)row, (uint32_t)row);
+    for (size_t i = row; i < end; i++) {
+        for (size_t j = i; j < n; j++) {
+            m[at] = (int32_t)pvid_clamp_q31(pvid_scale_q31(information->sums[at], h[i] + h[j]), PVID_ONE_Q30);
+            at++;
+        }
+    }
+    return end;
+}
+
+size_t pvid_system_row_stages_q31(size_t n_theta)
+{
+    size_t stages = 0;
+    for (size_t row = 0; (row < n_theta) && (stages < n_theta); row = rows_end(n_theta, row)) {
+        stages++; /* of a row at least */
+    }
+    return stages;
+}
+
+void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[], int32_t c[], int16_t f[])
+{
+    const pvid_model_q31 *model = self->model;
+    int64_t value[PVID_MAX_C_Q31];
+    int32_t exponent[PVID_MAX_C_Q31];
+    int32_t largest[PVID_MAX_P];
+    model->jacobian(self->p, value);
+    for (size_t a = 0; a < model->n_p; a++) {
+        largest[a] = PVID_ZERO_EXPONENT_Q31;
+    }
+    for (size_t k = 0; k < model->n_c; k++) {
+        exponent[k] = (int32_t)self->c_exponent[k] + h[model->c_row[k]];
+        const int32_t length = pvid_length_q31(value[k]) + exponent[k];
+        const size_t a = model->c_column[k];
+        largest[a] = (length > largest[a]) ? length : largest[a];
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        f[a] = (int16_t)(largest[a] - 29);
+    }
+    for (size_t k = 0; k < model->n_c; k++) {
+        c[k] = (int32_t)pvid_clamp_q31(pvid_scale_q31(value[k], f[model->c_column[k]] - exponent[k]), PVID_ONE_Q30 / 2);
+    }
+}
+
+/* t += m e_j a for the symmetric m whose upper triangle is packed by rows. */
+static void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int64_t t[])
+{
+    size_t at = j;
+    for (size_t i = 0; i < j; i++) {
+        t[i] += pvid_product_q31(m[at], a);
+        at += (n - 1u) - i;
+    }
+    for (size_t i = j; i < n; i++) {
+        t[i] += pvid_product_q31(m[at], a);
+        at++;
+    }
+}
+
+size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], const int32_t c[], size_t start,
+                               int64_t s[])
+{
+    const size_t end = pvid_column_end_q31(model, start);
+    int64_t t[PVID_MAX_THETA_Q31] = {0}; /* m c_a */
+    for (size_t k = start; k < end; k++) {
+        add_column(model->n_theta, m, model->c_row[k], c[k], t);
+    }
+    for (size_t i = 0; i < model->n_theta; i++) {
+        t[i] = pvid_round_shift_q31(t[i], PVID_S_BITS);
+    }
+    for (size_t b = model->c_column[start]; b < model->n_p; b++) {
+        s[b] = 0;
+    }
+    for (size_t k = start; k < model->n_c; k++) {
+        s[model->c_column[k]] += pvid_product_q31(c[k], (int32_t)t[model->c_row[k]]);
+    }
+    return end;
+}
+
+int64_t pvid_system_prior_q31(int32_t prior, int32_t prior_exponent, int32_t f)
+{
+    const int64_t scaled = pvid_scale_q31(prior, prior_exponent + (2 * f) + PVID_S_BITS);
+    return (scaled > (PVID_WIDE / 2)) ? (PVID_WIDE / 2) : scaled;
+}
+
+void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int16_t g[], int32_t q[][PVID_MAX_P])
+{
+    for (size_t a = 0; a < n_p; a++) {
+        g[a] = (int16_t)pvid_half_exponent_q31(s[a][a]);
+    }
+    for (size_t a = 0; a < n_p; a++) {
+        for (size_t b = a; b < n_p; b++) {
+            q[a][b] = (int32_t)pvid_clamp_q31(pvid_scale_q31(s[a][b], g[a] + g[b]), PVID_ONE_Q30);
+        }
+    }
+}
+
+/* The noise of so many rows in units of m: its products 00, 01, 11 of the two noisy entries of N. */
+static void scale_noise(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int32_t noise[])
+{
+    const uint8_t *noisy = self->model->noisy;
+    const int64_t weight = self->information.sums[self->information.n_sums - 1u];
+    const pvid_scaled_q31 rows = pvid_scaled_times_q31(pvid_scaled_of_q31(weight, -16), solve->variance);
+    const pvid_scaled_q31 much = pvid_scaled_times_q31(pvid_scaled_of_q31(self->noise_margin, -16), rows);
+    for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
+        const int32_t h = solve->h[noisy[i / 2u]] + solve->h[noisy[(i + 1u) / 2u]];
+        const pvid_scaled_q31 own = pvid_scaled_times_q31(much, self->noise[i]);
+        noise[i] = (int32_t)pvid_clamp_q31(pvid_scaled_fixed_q31(own, -h), INT32_MAX);
+    }
+}
+
+void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
+                                   int64_t rest[][PVID_MAX_P])
+{
+    const pvid_model_q31 *model = self->model;
+    int32_t noise[PVID_NOISE_TRACES_Q31];
+    int32_t c[PVID_MAX_P][2] = {0}; /* the noisy rows of C, by parameters */
+    scale_noise(self, solve, noise);
+    for (size_t k = 0; k < model->n_c; k++) {
+        for (size_t i = 0; i < 2u; i++) {
+            if (model->c_row[k] == model->noisy[i]) {
+                c[model->c_column[k]][i] = solve->c[k];
+            }
+        }
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        int64_t t[2];
+        for (size_t i = 0; i < 2u; i++) {
+            const int64_t sum = ((int64_t)noise[i] * c[a][0]) + ((int64_t)noise[i + 1u] * c[a][1]);
+            t[i] = pvid_round_shift_q31(sum, PVID_S_BITS);
+        }
+        for (size_t b = a; b < model->n_p; b++) {
+            rest[a][b] = solve->s[a][b] - ((c[b][0] * t[0]) + (c[b][1] * t[1]));
+        }
+    }
+}

@@ -1,0 +1,102 @@
+#include "number/uncontracted.h"
+
+#include "pvid/differentiator.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "strong/differentiator_f32.h"
+#include "number/finite_f32.h"
+#include "strong/fir_window.h"
+
+const float pvid_five_points_f32[PVID_ORDERS * 2] = {
+    0.0f,          0.0f,          /* order 0: the centre itself */
+    8.0f / 12.0f,  -1.0f / 12.0f, /* order 1 */
+    16.0f / 12.0f, -1.0f / 12.0f, /* order 2 */
+    -1.0f,         0.5f,          /* order 3 */
+    -4.0f,         1.0f,          /* order 4 */
+};
+
+static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
+{
+    const pvid_status window = pvid_fir_window(bank->half, bank->stride);
+    if (window != PVID_OK) {
+        return window;
+    }
+    if (bank->weights == NULL) {
+        return PVID_BAD_BANK;
+    }
+    for (uint32_t i = 0; i < (uint32_t)PVID_ORDERS * bank->half; i++) {
+        if (!pvid_finite_f32(bank->weights[i])) {
+            return PVID_BAD_BANK;
+        }
+    }
+    return PVID_OK;
+}
+
+static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank, float sample_rate_hz)
+{
+    const pvid_status status = bank_is_valid(bank);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if (!pvid_within_f32(sample_rate_hz, 1.0e-3f, 1.0e6f)) {
+        return PVID_BAD_SAMPLE_RATE;
+    }
+    /* One by one: the padding of a copied struct would be that of the caller's, and end in snapshots. */
+    self->bank.half = bank->half;
+    self->bank.stride = bank->stride;
+    self->bank.weights = bank->weights;
+    self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);
+    const float rate = sample_rate_hz / (float)bank->stride;
+    float power = 1.0f;
+    for (size_t i = 0; i < (PVID_ORDERS - 1u); i++) {
+        power *= rate;
+        self->rate_power[i] = power;
+    }
+    pvid_differentiator_reset_f32(self);
+    return PVID_OK;
+}
+
+pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
+                                         float sample_rate_hz)
+{
+    const bool given = (self != NULL) && (bank != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, bank, sample_rate_hz) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
+}
+
+void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
+{
+    self->head = 0;
+    self->filled = 0;
+    for (size_t i = 0; i < self->length; i++) {
+        self->history[i] = 0.0f;
+    }
+}
+
+bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, float out[PVID_ORDERS])
+{
+    const bool ready = self->bank.weights != NULL;
+    PVID_ASSERT(ready);
+    if (!ready || !pvid_fir_push_f32(self, sample)) {
+        return false;
+    }
+    const size_t half = self->bank.half;
+    const float *weight = self->bank.weights;
+    pvid_fir_walk walk = pvid_fir_centre_f32(self);
+    const float middle = self->history[walk.newer];
+    pvid_fir_outwards(&walk);
+    pvid_fir_sums_f32 sums =
+        pvid_fir_begin_f32(weight, half, middle, self->history[walk.newer], self->history[walk.older]);
+    for (size_t i = 1; i < half; i++) {
+        pvid_fir_outwards(&walk);
+        pvid_fir_add_f32(&sums, &weight[i], half, self->history[walk.newer], self->history[walk.older]);
+    }
+    pvid_fir_end_f32(self, &sums, out);
+    return true;
+}

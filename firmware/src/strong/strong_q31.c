@@ -1,0 +1,211 @@
+#include "pvid/strong_q31.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "number/count.h"
+#include "solve/estimator_q31.h"
+#include "number/integer_q31.h"
+#include "judge/misfit_q31.h"
+#include "number/scaled_q31.h"
+
+#define SHIFT_MAX 62u
+#define DRIVE_TICKS_MAX ((uint32_t)1 << 30)
+#define DRIVE_MAX ((int64_t)PVID_DERIVATIVE_LIMIT_Q31 * PVID_DERIVATIVE_LIMIT_Q31) /* a mean of such squares */
+
+/* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
+#define GATE_MEMORY_PARTS 4u
+#define GATE_FLOOR_BITS 20 /* 1e-6 of its square */
+
+/* The gate's least scale: a part of row_sd^2, and no less than what rounding leaves of a row's dozen terms. */
+static pvid_scaled_q31 gate_floor(const pvid_estimator_q31 *estimator)
+{
+    const pvid_scaled_q31 rounding = pvid_scaled_of_q31(1, 0);
+    return pvid_scaled_plus_q31(
+        pvid_scaled_shifted_q31(pvid_estimator_expected_variance_q31(estimator), -GATE_FLOOR_BITS), rounding);
+}
+
+static bool shifts_are_valid(const uint8_t shift[], size_t n)
+{
+    bool valid = true;
+    for (size_t i = 0; i < n; i++) {
+        valid = valid && (shift[i] <= SHIFT_MAX);
+    }
+    return valid;
+}
+
+static bool row_is_valid(const pvid_strong_row_q31 *row)
+{
+    return (row->n_a <= SHIFT_MAX) && (row->n_e <= SHIFT_MAX) && (row->part <= SHIFT_MAX) && (row->y <= SHIFT_MAX) &&
+           shifts_are_valid(row->n_phi2, 4) && shifts_are_valid(row->n_phi0, 5);
+}
+
+/* Whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_strong_q31 *self)
+{
+    const bool ready = (self != NULL) && (self->estimator.model != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static pvid_status prepare(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
+{
+    if (!row_is_valid(&config->row) || (config->u_shift > SHIFT_MAX)) {
+        return PVID_BAD_SHIFT;
+    }
+    if (config->u_multiplier <= 0) {
+        return PVID_BAD_U_MULTIPLIER;
+    }
+    if ((config->drive_min < 0) || (config->drive_min > PVID_DERIVATIVE_LIMIT_Q31)) {
+        return PVID_BAD_DRIVE_MIN;
+    }
+    if ((config->drive_ticks < 1u) || (config->drive_ticks > DRIVE_TICKS_MAX)) {
+        return PVID_BAD_DRIVE_TICKS;
+    }
+    memset(self, 0, sizeof *self);
+    pvid_status status = pvid_differentiator_init_q31(&self->differentiator, &config->bank);
+    if (status != PVID_OK) {
+        return status;
+    }
+    self->row = config->row;
+    self->u_multiplier = config->u_multiplier;
+    self->u_shift = config->u_shift;
+    self->phi_offset = config->phi_offset;
+    self->y_offset = config->y_offset;
+    self->drive_min = (int64_t)config->drive_min * config->drive_min;
+    self->drive_forgetting = (int32_t)(INT32_MAX / config->drive_ticks);
+    pvid_estimator_config_q31 estimator = config->estimator;
+    estimator.model = &pvid_kapitza_strong_q31;
+    status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    pvid_misfit_init_q31(&self->misfit, config->drive_ticks, config->estimator.forgetting_groups);
+    return pvid_gate_init_q31(&self->gate, &config->gate, config->drive_ticks / GATE_MEMORY_PARTS,
+                              gate_floor(&self->estimator));
+}
+
+pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
+{
+    const bool given = (self != NULL) && (config != NULL);
+    PVID_ASSERT(given);
+    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
+    if ((status != PVID_OK) && (self != NULL)) {
+        memset(self, 0, sizeof *self); /* not ready */
+    }
+    return status;
+}
+
+static void restart(pvid_strong_q31 *self)
+{
+    pvid_differentiator_reset_q31(&self->differentiator);
+}
+
+void pvid_strong_gap_q31(pvid_strong_q31 *self)
+{
+    if (is_ready(self)) {
+        restart(self);
+    }
+}
+
+void pvid_strong_freeze_q31(pvid_strong_q31 *self, bool frozen)
+{
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
+}
+
+static bool is_within(int64_t x, int32_t limit)
+{
+    return (x >= -(int64_t)limit) && (x <= limit);
+}
+
+static pvid_reason refuse(pvid_strong_q31 *self)
+{
+    pvid_count_up(&self->estimator.counters.rejected_saturated);
+    return PVID_REJECTED_SATURATED;
+}
+
+/* u[k] = y_A^(k+2)/l1; false where one is beyond the expected range. */
+static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int32_t u[])
+{
+    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
+        const int64_t exact = pvid_round_shift_q31(pvid_product_q31(d_y[k], self->u_multiplier), self->u_shift);
+        if (!is_within(exact, PVID_DERIVATIVE_LIMIT_Q31)) {
+            return false;
+        }
+        u[k] = (int32_t)exact;
+    }
+    return true;
+}
+
+/* Whether a row with an innovation of this square fits the estimate as well as rows usually do. */
+static bool passes(pvid_strong_q31 *self, int64_t square)
+{
+    return (self->gate.limit.m == 0) || pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(square, 0));
+}
+
+/* A row: judged, let in or not, and solved with. */
+static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
+{
+    pvid_estimator_q31 *estimator = &self->estimator;
+    int64_t term[PVID_KAPITZA_STRONG_THETA];
+    int64_t e;
+    if (!pvid_estimator_terms_q31(estimator, n, y, term, &e)) {
+        return refuse(self);
+    }
+    const int32_t innovation = (int32_t)e;
+    const int64_t square = pvid_square_q31(innovation);
+    if (pvid_misfit_add_q31(&self->misfit, square, pvid_kapitza_strong_sensitivity_q31(term))) {
+        self->alarm = pvid_misfit_judge_q31(&self->misfit);
+    }
+    if (!passes(self, square)) {
+        pvid_count_up(&estimator->counters.rejected_outlier);
+        return PVID_REJECTED_OUTLIER;
+    }
+    pvid_estimator_add_row_q31(estimator, n, innovation, square);
+    const pvid_reason reason = pvid_estimator_update_q31(estimator);
+    if ((reason != PVID_UPDATED) || !self->alarm) {
+        return reason;
+    }
+    pvid_count_up(&estimator->counters.misfits);
+    return PVID_MISFIT;
+}
+
+pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
+{
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
+    const int64_t angle = (int64_t)phi - self->phi_offset;
+    const int64_t height = (int64_t)y - self->y_offset;
+    if (!is_within(angle, self->differentiator.bank.phi_max) || !is_within(height, self->differentiator.bank.y_max)) {
+        restart(self);
+        return refuse(self);
+    }
+    int32_t d_phi[PVID_ORDERS];
+    int32_t d_y[PVID_Y_ORDERS_Q31];
+    if (!pvid_differentiator_step_q31(&self->differentiator, (int32_t)angle, (int32_t)height, d_phi, d_y)) {
+        return PVID_WARMING_UP;
+    }
+    int32_t u[PVID_Y_ORDERS_Q31];
+    if (!accelerations(self, d_y, u)) {
+        return refuse(self);
+    }
+    const int64_t fresh = pvid_times_q31(pvid_square_q31(u[0]) - self->drive, self->drive_forgetting);
+    self->drive = pvid_clamp_q31(self->drive + fresh, DRIVE_MAX);
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    if (self->drive < self->drive_min) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    int32_t n[PVID_KAPITZA_STRONG_THETA];
+    int32_t row_y;
+    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n)) {
+        return refuse(self);
+    }
+    return take_row(self, n, row_y);
+}

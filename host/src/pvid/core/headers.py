@@ -1,0 +1,181 @@
+"""The C core's public headers as cffi reads them: its structs, enumerations and functions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from cffi import FFI
+
+from pvid.base.errors import PvidError
+
+HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the build makes with them
+
+Tables = dict[str, npt.NDArray[Any]]
+
+# Fields of a configuration that the identifier fills in, and one whose unit Python's name leaves out.
+_FILLED_LATER = ("angle", "model", "update_rate_hz")
+_NAMES = {"sample_rate_hz": "sample_rate"}
+
+
+def default_library() -> Path:
+    """Where the build leaves the shared library; PVID_NATIVE_LIBRARY overrides it."""
+    named = os.environ.get("PVID_NATIVE_LIBRARY")
+    return Path(named) if named else _built()
+
+
+def _built() -> Path:
+    return Path(__file__).resolve().parents[4] / "build" / "host" / "host" / "native" / "libpvid_native.so"
+
+
+@dataclass
+class Filled:
+    """A struct of C with the tables that it points to, by field: they must live as long as the struct."""
+
+    struct: Any  # a reference to it
+    tables: Tables
+    owners: list[Any]
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """One number or pointer in a struct of C: `name` with its path (estimator.start[2]), its C type and its place."""
+
+    name: str
+    kind: Any
+    holder: Any
+    key: str | int
+
+    @property
+    def value(self) -> Any:
+        """Its value."""
+        return self.holder[self.key] if isinstance(self.key, int) else getattr(self.holder, self.key)
+
+    def set(self, value: Any) -> None:
+        """Overwrites the value."""
+        if isinstance(self.key, int):
+            self.holder[self.key] = value
+        else:
+            setattr(self.holder, self.key, value)
+
+    @property
+    def group(self) -> str:
+        """The name without the place in an array."""
+        return self.name.partition("[")[0]
+
+    @property
+    def place(self) -> int:
+        """The place in an array, 0 outside one."""
+        return self.key if isinstance(self.key, int) else 0
+
+
+class Headers:
+    """The declarations of one build of the core. `ffi`: cffi's interface to them."""
+
+    def __init__(self, text: str) -> None:
+        self.ffi = FFI()
+        self.ffi.cdef(text)
+
+    @staticmethod
+    def of(library: Path) -> Headers:
+        """Those that `library` was built with; of a library without them, those of the build in this checkout.
+
+        Raises
+        ------
+        PvidError
+            When there are none.
+        """
+        beside = library.with_name(HEADERS)
+        path = beside if beside.exists() else _built().with_name(HEADERS)
+        try:
+            return _parsed(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise PvidError(f"cannot read {path}: {error.strerror}; build it with ./tools/pvid") from error
+
+    def enum(self, name: str) -> dict[str, int]:
+        """The enumerators of a C enumeration, by value."""
+        elements = self.ffi.typeof(name).elements
+        return {elements[value]: value for value in sorted(elements)}
+
+    def dtype(self, kind: Any) -> np.dtype[Any]:
+        """numpy's type of the same layout as a C type, given by name or as cffi's."""
+        ctype = self.ffi.typeof(kind) if isinstance(kind, str) else kind
+        size = self.ffi.sizeof(ctype)
+        match ctype.kind:
+            case "struct":
+                names, fields = zip(*ctype.fields, strict=True)
+                formats = [self.dtype(field.type) for field in fields]
+                offsets = [field.offset for field in fields]
+                return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+            case "array":
+                inner = self.dtype(ctype.item)
+                return np.dtype((inner.base, (ctype.length, *inner.shape)))
+            case "pointer":
+                return np.dtype(np.uintp)
+            case "enum":
+                return np.dtype(f"u{size}")
+        if ctype.cname in ("float", "double"):
+            return np.dtype(f"f{size}")
+        return np.dtype(np.bool_ if ctype.cname == "_Bool" else f"{'u' if ctype.cname[0] == 'u' else 'i'}{size}")
+
+    def pointer(self, array: Any) -> Any:
+        """The address of an array's first element, which C takes for any pointer; the caller keeps the array."""
+        return self.ffi.cast("void *", array.ctypes.data)
+
+    def viewed(self, struct: Any) -> npt.NDArray[np.void]:
+        """A copy of a struct as a numpy record, shape ()."""
+        ctype = self.ffi.typeof(struct)
+        return np.frombuffer(self.ffi.buffer(self.ffi.addressof(struct)), self.dtype(ctype), 1)[0].copy()  # type: ignore[no-any-return]
+
+    def filled(self, kind: str, settings: Any) -> Filled:
+        """A struct of C with the settings' attributes of its fields' names."""
+        owner = self.ffi.new(f"{kind} *")
+        filled = Filled(owner[0], {}, [owner])
+        self._fill(filled, owner[0], settings)
+        return filled
+
+    def _fill(self, whole: Filled, struct: Any, settings: Any) -> None:
+        for name, field in self.ffi.typeof(struct).fields:
+            if name in _FILLED_LATER:
+                continue
+            value, kind = getattr(settings, _NAMES.get(name, name)), field.type.kind
+            if kind == "pointer" and isinstance(value, np.ndarray):
+                whole.tables[name] = np.ascontiguousarray(value, self.dtype(field.type.item))
+                setattr(struct, name, self.pointer(whole.tables[name]))
+            elif kind == "pointer":
+                owner = self.ffi.new(field.type)
+                whole.owners.append(owner)
+                setattr(struct, name, owner)
+                self._fill(whole, owner[0], value)
+            elif kind == "struct" and not isinstance(value, tuple):
+                self._fill(whole, getattr(struct, name), value)
+            elif kind == "array":
+                getattr(struct, name)[0 : len(value)] = np.asarray(value).tolist()
+            else:
+                setattr(struct, name, value)
+
+    def scalars(self, struct: Any, prefix: str = "") -> Iterator[Scalar]:
+        """All numbers and pointers of a configuration, those of the structs within it and of its design as well."""
+        for name, field in self.ffi.typeof(struct).fields:
+            path, kind = f"{prefix}{name}", field.type.kind
+            pointed = kind == "pointer" and field.type.item.kind == "struct" and name not in _FILLED_LATER
+            if kind == "struct":
+                yield from self.scalars(getattr(struct, name), f"{path}.")
+            elif pointed:
+                yield from self.scalars(getattr(struct, name)[0], f"{path}.")
+            elif kind == "array":
+                array = getattr(struct, name)
+                yield from (Scalar(f"{path}[{i}]", field.type.item, array, i) for i in range(field.type.length))
+            else:
+                yield Scalar(path, field.type, struct, name)
+
+
+@cache
+def _parsed(text: str) -> Headers:
+    return Headers(text)

@@ -1,0 +1,107 @@
+"""Enumerations of the public C headers. Printed by tools/print_enums.py: do not edit."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Literal
+
+Form = Literal["weak", "strong"]
+Core = Literal["f32", "q31"]
+
+
+class _Named(IntEnum):
+    @property
+    def text(self) -> str:
+        """The name in words."""
+        return self.name.lower().replace("_", " ")
+
+
+class Reason(_Named):
+    """Outcome of a tick (pvid_reason)."""
+
+    UPDATED = 0
+    WARMING_UP = 1
+    ACCUMULATED = 2
+    HELD_NOT_EXCITED = 3
+    HELD_PIVOT = 4
+    REJECTED_NOT_FINITE = 5
+    REJECTED_OUTLIER = 6
+    REJECTED_SATURATED = 7
+    HELD_UNCERTAIN = 8
+    HELD_OUT_OF_RANGE = 9
+    MISFIT = 10
+    HELD_FROZEN = 11
+    NOT_READY = 12
+
+
+class Status(_Named):
+    """Answer of an init (pvid_status)."""
+
+    OK = 0
+    BAD_MODEL = 1
+    BAD_SAMPLE_RATE = 2
+    BAD_BANK = 3
+    BAD_LENGTH = 4
+    BAD_START = 5
+    BAD_START_SD = 6
+    BAD_BOUNDS = 7
+    BAD_ROW_SD = 8
+    BAD_UPDATE_RATE = 9
+    BAD_FORGETTING = 10
+    BAD_FEEDBACK = 11
+    BAD_LAW = 12
+    BAD_DIVIDER = 13
+    BAD_STEP_LIMIT = 14
+    BAD_KAPPA_MIN = 15
+    BAD_CORRELATION = 16
+    BAD_DRIVE_MIN = 17
+    BAD_ROW_WEIGHT = 18
+    BAD_DESIGN = 19
+    BAD_ITERATIONS = 20
+    BAD_NOISE_MARGIN = 21
+    BAD_PUBLISH_KAPPA = 22
+    BAD_SE_MAX = 23
+    BAD_MISFIT_MAX = 24
+    BAD_PIVOT_NOISE = 25
+    BAD_ANGLE_LIMIT = 26
+    BAD_ANGLE = 27
+    BAD_GATE_SIGMAS = 28
+    BAD_GATE_PATIENCE = 29
+    BAD_DEAD_ZONE = 30
+    BAD_HALF = 31
+    BAD_STRIDE = 32
+    BAD_CENTRE = 33
+    BAD_TAPS = 34
+    BAD_DECIMATION = 35
+    BAD_WINDOW = 36
+    BAD_FUNCTIONS = 37
+    BAD_LAG = 38
+    BAD_OVERLAP = 39
+    BAD_FULL_SCALE = 40
+    BAD_SHIFT = 41
+    BAD_U_MULTIPLIER = 42
+    BAD_DRIVE_TICKS = 43
+    BAD_FORMAT = 44
+    BAD_RENEWAL = 45
+    BAD_POINTER = 46
+
+
+class Law(_Named):
+    """How the estimate follows the data (pvid_law)."""
+
+    STATIONARY = 0
+    PSEUDOVELOCITY = 1
+
+
+class SnapshotStatus(_Named):
+    """Answer of a snapshot's restore (pvid_snapshot_status)."""
+
+    RESTORED = 0
+    NONE = 1
+    CUT_SHORT = 2
+    DAMAGED = 3
+    OTHER_VERSION = 4
+    OTHER_KIND = 5
+    OTHER_LAYOUT = 6
+    OTHER_CONFIG = 7
+    NOT_READY = 8

@@ -1,0 +1,173 @@
+"""Tables and formats that a design computes and an identifier is configured with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+Int16 = npt.NDArray[np.int16]
+Int32 = npt.NDArray[np.int32]
+Int64 = npt.NDArray[np.int64]
+
+
+class Folded:
+    """What folded tables [5, half], whose points are `stride` samples apart, span."""
+
+    weights: npt.NDArray[Any]
+    stride: int
+
+    @property
+    def half(self) -> int:
+        """Points on each side of the centre."""
+        return int(self.weights.shape[1])
+
+    @property
+    def window(self) -> int:
+        """Samples from the first point to the last, both included."""
+        return 2 * self.delay + 1
+
+    @property
+    def delay(self) -> int:
+        """Samples from the newest one back to the instant the derivatives refer to."""
+        return self.half * self.stride
+
+
+@dataclass(frozen=True, eq=False)
+class FirBankQ31(Folded):
+    """pvid_fir_bank_q31 and its formats.
+
+    Attributes
+    ----------
+    weights : int32 [5, half], folded
+    stride : samples from point to point
+    centre : weight of the centre sample in order 0
+    phi_max, y_max : full scale of the counts
+    phi_shift, y_shift : of orders 0..4 of phi and 2..4 of y
+    denominator : angles and heights come out in 1/denominator counts
+    phi_bits, y_bits : formats of the derivatives, all orders alike
+    tau_bits : time unit tau = 2^tau_bits points
+    margins : bits that the largest derivative of each order leaves below its limit, of phi and y
+    """
+
+    weights: Int32
+    stride: int
+    centre: int
+    phi_max: int
+    y_max: int
+    phi_shift: tuple[int, ...]
+    y_shift: tuple[int, ...]
+    denominator: int
+    phi_bits: int
+    y_bits: int
+    tau_bits: int
+    margins: dict[str, float]
+
+
+@dataclass(frozen=True)
+class RowShiftsQ31:
+    """pvid_strong_row_q31."""
+
+    n_a: int
+    n_e: int
+    n_phi2: tuple[int, ...]
+    n_phi0: tuple[int, ...]
+    part: int
+    y: int
+
+
+@dataclass(frozen=True, eq=False)
+class StrongDesignQ31:
+    """What pvid_strong_config_q31 needs beside the estimator's settings. A value is its integer times 2^-bits.
+
+    Attributes
+    ----------
+    bank : the integer bank of both channels
+    row : shifts of a row
+    u_multiplier, u_shift : from the derivatives of y to u, u', u''
+    u_bits : format of u [1/tau^2]
+    n_bits, y_bits : formats of N_1..N_11 and Y in units of angle_unit, 1/tau^2 and so on
+    angle_unit : one unit of phi [rad]
+    dt : the time unit tau [s]
+    """
+
+    bank: FirBankQ31
+    row: RowShiftsQ31
+    u_multiplier: int
+    u_shift: int
+    u_bits: int
+    n_bits: tuple[int, ...]
+    y_bits: int
+    angle_unit: float
+    dt: float
+
+    @property
+    def margins(self) -> dict[str, float]:
+        """For each derivative the bits that its largest value leaves free."""
+        return self.bank.margins
+
+    def integers(self, phi: Float, u: Float) -> tuple[Int64, Int64]:
+        """What the core takes for derivatives that are known otherwise: phi [n, 5] and u, u', u'' [n, 3], in SI."""
+        own_phi = np.rint(phi * self.dt ** np.arange(5) / self.angle_unit)
+        own_u = np.rint(u * self.dt ** np.arange(2, 5) * 2.0**self.u_bits)
+        return own_phi.astype(np.int64), own_u.astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class WeakTablesQ31:
+    """pvid_weak_design_q31: tables, shifts and formats. A value is its integer times 2^-bits.
+
+    Attributes
+    ----------
+    taps, decimation, window, functions, lag : as in the float design
+    phi_max, y_max : full scale of the counts, about their offsets
+    smooth, second : int32 [(taps - 1) / 2]
+    smooth_bits : format of smooth
+    phi_shift, u_shift : from the FIR sums to F and U
+    uf_shift : from U F to its 20 bits
+    integral_shift : int [3], of the integrals of UF, F, U in dt^2/12
+    high_shift : int [2], of UIUF_HIGH, UIF_HIGH
+    product_shift : int [5], of what these leave of UIUF, UIF, UIU, UI1, UT
+    sum_shift : of every product chi * term before it is added
+    chi : int16 [window, 3, functions]
+    multiplier : int32 [15], shift : int [15], from a term's sum to its share of a column
+    gram : int32 [6, functions (functions + 1) / 2]; gram_bits : int [6]
+    column_bits : int [11], formats of N1..N8, Y, a, b
+    u_bits : format of U [1/dt^2]
+    f_unit : one unit of F [rad]; dt [s]
+    overlap : as in the float design
+    margins : for each quantity the bits that its largest value leaves free
+    """
+
+    taps: int
+    decimation: int
+    window: int
+    functions: int
+    lag: int
+    phi_max: int
+    y_max: int
+    u_max: int
+    smooth: Int32
+    second: Int32
+    smooth_bits: int
+    phi_shift: int
+    u_shift: int
+    uf_shift: int
+    integral_shift: tuple[int, ...]
+    high_shift: tuple[int, ...]
+    product_shift: tuple[int, ...]
+    sum_shift: int
+    chi: Int16
+    multiplier: Int32
+    shift: tuple[int, ...]
+    gram: Int32
+    gram_bits: tuple[int, ...]
+    column_bits: tuple[int, ...]
+    u_bits: int
+    f_unit: float
+    dt: float
+    overlap: float
+    margins: dict[str, float]

@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""Builds the documentation of host/docs and the reference of the C headers into build/site; exits 1 at any warning.
+
+    build/venv/bin/python tools/docs.py             checks the generated parts and all links, builds the site
+    build/venv/bin/python tools/docs.py --update    writes the generated parts first
+
+mkdocs checks links and anchors between the pages of the site; this program those of the README files and of .github,
+which GitHub shows. Nothing is loaded from the network. Needs mkdocs-material and doxygen.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import MISSING, Field, fields
+from pathlib import Path
+
+from pvid.link import frames
+from pvid.rig.file import Identifier, Nominal, RigFile, Sensor
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "host" / "docs"
+SITE = ROOT / "build" / "site"
+# Pages outside the site, whose links are checked here.
+OUTSIDE = ("README.md", "firmware/README.md", "host/README.md", ".github/*.md")
+
+# ---- generated parts
+
+
+def meanings(owner: type) -> dict[str, str]:
+    """The meaning of each field, from the section "Attributes" of the class's docstring."""
+    text = (owner.__doc__ or "").split("Attributes\n", 1)[1].split("\n", 1)[1]
+    entries = re.findall(r"(?m)^    (\w[\w, ]*) : ((?:.*\n?)(?:^        .*\n?)*)", text)
+    return {name.strip(): " ".join(meaning.split()) for names, meaning in entries for name in names.split(",")}
+
+
+def shown_range(key: Field[object]) -> str:
+    """Range of a key as the page shows it."""
+    if "choices" in key.metadata:
+        return ", ".join(f"`{choice}`" for choice in key.metadata["choices"])
+    if key.type == "bool":
+        return "`true`, `false`"
+    return f"{key.metadata['low']:g} to {key.metadata['high']:g}"
+
+
+def shown_default(key: Field[object]) -> str:
+    """Default of a key; what follows from others is explained in its meaning."""
+    if key.default is MISSING:
+        return "required" if key.name == "l1" else "`l1`/3"
+    if key.default is None:
+        return "see the meaning"
+    if isinstance(key.default, bool):
+        return f"`{str(key.default).lower()}`"
+    return f"`{key.default:.4g}`" if isinstance(key.default, float) else f"`{key.default}`"
+
+
+def rig_file_tables() -> str:
+    """The tables of rig-file.md."""
+    lines = []
+    tables: tuple[tuple[str, type], ...] = (
+        ("Top level", RigFile),
+        ("[sensor]", Sensor),
+        ("[nominal]", Nominal),
+        ("[identifier]", Identifier),
+    )
+    for title, owner in tables:
+        meaning = meanings(owner)
+        lines += ["", f"## {title}", "", "| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
+        for key in fields(owner):
+            if not key.metadata and key.type != "bool":
+                continue  # one of the tables
+            cells = (f"`{key.name}`", key.metadata.get("unit", ""), shown_range(key), shown_default(key))
+            lines.append(f"| {' | '.join(cells)} | {meaning[key.name].replace('|', '&#124;')} |")
+    return "\n".join(lines[1:])
+
+
+def schema_block() -> str:
+    """The schema of link-and-log.md."""
+    return f"```\n{frames.SCHEMA_TEXT}\n```"
+
+
+# page, marker, text
+GENERATED = (("rig-file.md", "rig-file", rig_file_tables), ("link-and-log.md", "schema", schema_block))
+
+
+def generated_parts(update: bool) -> Iterator[str]:
+    """Writes the generated parts, or names those that differ."""
+    for name, marker, text_of in GENERATED:
+        page = DOCS / name
+        old = page.read_text(encoding="utf-8")
+        opening, closing = f"<!-- {marker} -->\n", f"<!-- /{marker} -->"
+        head, rest = old.split(opening, 1)
+        new = f"{head}{opening}{text_of()}\n{closing}{rest.split(closing, 1)[1]}"
+        if update:
+            page.write_text(new, encoding="utf-8")
+        elif new != old:
+            yield f"host/docs/{name}: {marker} is out of date: tools/docs.py --update"
+
+
+# ---- links that mkdocs does not check
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of the headings of a page, as GitHub makes them."""
+    headings = re.findall(r"(?m)^#+ (.*)$", re.sub(r"(?ms)^```.*?^```", "", page.read_text(encoding="utf-8")))
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
+def broken_links(page: Path) -> Iterator[str]:
+    """Links of a page that lead nowhere."""
+    text = re.sub(r"(?ms)^```.*?^```", "", page.read_text(encoding="utf-8"))
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        to = (page.parent / path).resolve() if path else page
+        if not to.exists():
+            yield f"{page.relative_to(ROOT)}: no {target}"
+        elif anchor and anchor not in anchors(to):
+            yield f"{page.relative_to(ROOT)}: {target} has no such heading"
+
+
+# ---- the site
+
+
+def build_site() -> bool:
+    """Builds the pages into build/site."""
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "true"}
+    command = [sys.executable, "-P", "-m", "mkdocs", "build", "--strict", "--quiet", "--clean"]
+    return not subprocess.run([*command, "--config-file", "host/mkdocs.yml"], cwd=ROOT, env=environment).returncode
+
+
+def build_reference() -> bool:
+    """Builds the reference of the C headers into build/site/api."""
+    settings = (ROOT / "host" / "Doxyfile").read_text(encoding="utf-8")
+    settings += f'OUTPUT_DIRECTORY = "{SITE}"\nINPUT_FILTER = "\\"{sys.executable}\\" -P tools/doxygen_filter.py"\n'
+    done = subprocess.run(["doxygen", "-"], cwd=ROOT, input=settings, capture_output=True, text=True)
+    print(done.stderr, end="", file=sys.stderr)
+    return not done.returncode and (SITE / "api" / "index.html").exists()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--update", action="store_true", help="write the generated parts")
+    update = parser.parse_args().update
+    faults = list(generated_parts(update))
+    for pattern in OUTSIDE:
+        for page in sorted(ROOT.glob(pattern)):
+            faults += broken_links(page)
+    print("\n".join(faults), end="\n" if faults else "")
+    built = build_site() and build_reference()
+    if faults or not built:
+        return 1
+    print("All checks passed! build/site/index.html, build/site/api/index.html")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
