@@ -104,11 +104,11 @@ def test_without_constants_nothing_physical_is_claimed(model: Model) -> None:
     assert np.isnan(unknown.physical_errors(p, np.stack([np.eye(model.n_mapped)] * 2))).all()
 
 
-# ---- the pendulum (MATH.md section 1)
+# ---- the pendulum (theory.md 1)
 
 
 def test_linear_parameters_of_the_standard_rig() -> None:
-    """MATH.md 6 states them."""
+    """theory.md 6 states them."""
     p = linear(9.5, 0.12, 0.08, 0.3)
     np.testing.assert_allclose(p, [9.5 / 0.3, 8.875, 5.625], rtol=1e-15)
 

@@ -113,7 +113,7 @@ def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Pat
         while not browser.title.startswith("pvid log /dev") and time.monotonic() < limit:
             browser.get(address)
             time.sleep(1)
-        while not browser.execute_script("return !!document.querySelector('#yPlot .scatterlayer .js-line')"):
+        while not browser.execute_script("return !!document.querySelector('#signal1 .scatterlayer .js-line')"):
             assert time.monotonic() < limit, "the plots were never drawn"
             time.sleep(0.2)
         size = browser.execute_script("return [document.body.scrollWidth, document.documentElement.scrollHeight]")

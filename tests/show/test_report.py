@@ -23,10 +23,10 @@ from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run, write_run
 from pvid.run.identify import identify
 from pvid.run.residuals import Residuals, residuals_of
-from pvid.run.simulated_angle import simulated_angle
 from pvid.show import report
 from pvid.show.report import recording_of, write_report
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.sim.simulated_angle import simulated_angle
 
 TICKS = 30_000
 # designed for the truth: what a wrong guess costs is not asked here
@@ -199,7 +199,7 @@ def test_a_report_of_an_estimate_outside_the_physical_region(log: Path, tmp_path
     assert (
         "estimate: outside the physical region: w = 11.560 ± 0.010 1/s², d1 = 0.250 ± 0.010, d2 = 0.200 ± 0.010" in text
     )
-    assert "no pendulum has these parameters" in text
+    assert "no mechanism has these parameters" in text
     assert "mode at" not in text and "nan" not in text
 
 

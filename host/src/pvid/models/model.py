@@ -57,9 +57,23 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Channel(Quantity):
-    """A recorded signal; `usual_names` is a regular expression of the columns that are likely to hold it."""
+    """A recorded signal.
 
+    Attributes
+    ----------
+    short : in one word
+    shown_in : a unit for pages and terminals, and how many of it are one of SI; ("", 1): that of SI
+    usual_names : regular expression of the names of columns that are likely to hold it
+    """
+
+    short: str = ""
+    shown_in: tuple[str, float] = ("", 1.0)
     usual_names: str = "(?!)"
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit for pages and terminals."""
+        return self.shown_in[0] or super().shown_unit
 
 
 @dataclass(frozen=True)

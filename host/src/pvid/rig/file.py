@@ -206,7 +206,7 @@ class ModelTable:
 
     Attributes
     ----------
-    name : of the model, one of pvid.models
+    name : the mechanism, one of the folders of pvid.models
     """
 
     name: str = field(default=DEFAULT, metadata={"choices": tuple(MODELS)})

@@ -119,7 +119,7 @@ def report_for_tones(
     if rig.sample_rate is None:
         raise PvidError("sample_rate is missing in the rig file, and the tables hang on it")
     design = weak_design_of(rig, rig.sample_rate)
-    nominal = Pendulum(l1=rig.l1, l2=rig.nominal.l2, rho2=rig.nominal.rho2, g=rig.nominal.g)
+    nominal = Pendulum.nominal(rig)
     drive, settings = Drive(tuple(tones)), rig.identifier
     prediction = predict_rig(
         design, nominal, drive, sensors_of(rig), duration, release, settings.zero, settings.forgetting_s

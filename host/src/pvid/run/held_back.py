@@ -64,7 +64,7 @@ class HeldBack:
     """
 
     def __init__(self, run: Run, rig: RigFile) -> None:
-        """`rig` has the run's survey as its nominal pendulum; its own sizes are not used."""
+        """`rig` has the run's survey as its nominal; its own sizes are not used."""
         identifier = replace(rig.identifier, window_s=0.0, test_functions=HOST.functions, decimation=0, smoothing_s=0.0)
         wide = sized_for(replace(rig, identifier=replace(identifier, pass_hz=_WIDEST_HZ)), run)
         self.run, self.rig = run, rig
@@ -93,7 +93,7 @@ class HeldBack:
         Raises
         ------
         PvidError
-            When they do not lead to a pendulum.
+            When they lead to no plausible parameters.
         """
         asked = (rig.identifier.full_angle, rig.identifier.damping)
         if asked not in self.equations:
@@ -108,7 +108,7 @@ class HeldBack:
             moments = _moments_of(rows.whitened(self.start))
             p = least_squares(moments[self.kept].sum(axis=0), p)
             if not self.rig.mechanism.model.is_plausible(p):
-                raise PvidError("the run's least squares lead to no pendulum")
+                raise PvidError("the run's least squares lead to no plausible parameters")
         return Equations(full_angle, p, moments)
 
     def residuals(self, rig: RigFile) -> Float:
@@ -117,7 +117,7 @@ class HeldBack:
         Raises
         ------
         PvidError
-            When a half holds too few windows of these settings, or leads to no pendulum.
+            When a half holds too few windows of these settings, or leads to no plausible parameters.
         """
         model = self.equations_of(rig)
         design = weak_design_of(rig, self.run.sample_rate)
@@ -136,7 +136,7 @@ class HeldBack:
                 raise PvidError(f"windows of {design.window_s:.3g} s are too long for a half of the run")
             p = least_squares(moments[seen].sum(axis=0), model.p)
             if not self.rig.mechanism.model.is_plausible(p):
-                raise PvidError("half of the run leads to no pendulum")
+                raise PvidError("half of the run leads to no plausible parameters")
             held = self.halves == 1 - half
             predicted[held] = energy_at(model.moments[held], p)
         return predicted[self.kept & (self.halves >= 0)]

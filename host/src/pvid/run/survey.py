@@ -7,7 +7,7 @@ Of the minima found the one with the smallest chi^2 is taken. There the rows are
 friction, where the rig file asks for it, and what still exceeds the encoder's noise becomes a white disturbance of the
 joints: rows are weighted by both from then on.
 
-`fitted` returns the rig file with the outcome as its nominal pendulum: what a board would be given after a first run.
+`fitted` returns the rig file with the outcome as its nominal: what a board would be given after a first run.
 """
 
 from __future__ import annotations
@@ -69,12 +69,12 @@ class Survey:
 
 
 def fitted(rig: RigFile, run: Run) -> RigFile:
-    """The rig file with the run's survey as its nominal pendulum, the disturbance found, and a window that the run
+    """The rig file with the run's survey as its nominal, the disturbance found, and a window that the run
     holds often enough.
 
     The encoder's resolution is what the run shows where the rig file does not give it. All else is unchanged where the
-    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds no
-    pendulum the guess stays.
+    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds nothing
+    plausible the guess stays.
     """
     rig = resolved(rig, run)
     if rig.identifier.form != "weak" or not rig.identifier.survey:
@@ -98,7 +98,7 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
 def survey(rig: RigFile, run: Run) -> Survey | None:
-    """Searches a run for p; None where no start leads to a pendulum."""
+    """Searches a run for p; None where no start leads to plausible parameters."""
     if not np.isfinite(run.phi).any():
         return None
     outcomes: list[tuple[RigFile, Fit]] = []
@@ -131,7 +131,7 @@ def survey(rig: RigFile, run: Run) -> Survey | None:
 
 
 def with_nominal(rig: RigFile, p: Float) -> RigFile:
-    """The rig file with p's pendulum as its nominal."""
+    """The rig file with p as its nominal."""
     mechanism = rig.mechanism
     guess = [_rounded(float(x), 4) for x in mechanism.physical(p)]
     return replace(rig, nominal=Nominal(**dict(zip(mechanism.model.physical_names, guess, strict=True))))

@@ -365,7 +365,7 @@ class _Bench:
             return tuple(out)
         try:
             reference = self.held_back.innovations(rig, 0.0)
-        except PvidError:  # its equations lead to no pendulum
+        except PvidError:  # its equations lead to no plausible parameters
             return tuple(out)
         hop_s = weak_design_of(rig, self.run.sample_rate).hop_s
         for forgetting_s in _FORGETTING_S:
@@ -381,8 +381,8 @@ class _Bench:
         if self.held_back is None:
             return f"nothing is identified from this run ({own}), and nothing can be tuned: {self.not_held_back}"
         return (
-            f"none of {len(self.tried)} settings identifies a pendulum from this run (the rig file's own: {own}): is "
-            "the pivot driven, and are the columns phi and y what they should be?"
+            f"none of {len(self.tried)} settings identifies the mechanism from this run (the rig file's own: {own}): "
+            "is the pivot driven, and are the columns phi and y what they should be?"
         )
 
 

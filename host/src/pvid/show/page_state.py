@@ -156,13 +156,14 @@ class LiveState(threading.Thread):
             "kappa": _numbers(np.where(kappa > 0, kappa, np.nan)),
         }
 
-    def _motion(self) -> dict[str, Any]:
-        t, phi, y = self._history.samples()
-        angle, drive = envelope(t, phi, _BINS), envelope(t, 1e3 * y, _BINS)
-        return {
-            "phi": {"t": _numbers(angle[0]), "x": _numbers(angle[1])},
-            "y": {"t": _numbers(drive[0]), "x": _numbers(drive[1])},
-        }
+    def _motion(self) -> list[dict[str, Any]]:
+        """Of each channel its curve over the last seconds."""
+        t, *signals = self._history.samples()
+        curves = []
+        for one, x in zip(self._history.model.channels, signals, strict=True):
+            times, values = envelope(t, one.shown_in[1] * x, _BINS)
+            curves.append({"label": one.label, "t": _numbers(times), "x": _numbers(values)})
+        return curves
 
 
 def _numbers(x: Float) -> list[float | None]:

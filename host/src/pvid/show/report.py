@@ -38,10 +38,10 @@ from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advice import advice, advice_on_refusal, behind
 from pvid.run.identify import identify
 from pvid.run.residuals import Residuals, residuals_of
-from pvid.run.simulated_angle import simulated_angle
 from pvid.run.survey import fitted
 from pvid.settings.enums import Reason
 from pvid.show.axis_limits import interesting
+from pvid.sim.simulated_angle import simulated_angle
 
 Float = npt.NDArray[np.float64]
 
@@ -279,7 +279,7 @@ def _overlay(recording: Recording, angle: Axes, difference: Axes) -> None:
     difference.set_ylabel("difference\n[mrad]")
     (angle if simulated is None else difference).set_xlabel(_clock(recording))
     if simulated is None:
-        why = "no pendulum has these parameters" if recording.estimate else "nothing is identified to simulate with"
+        why = "no mechanism has these parameters" if recording.estimate else "nothing is identified to simulate with"
         angle.set_title(f"Measured angle ({why})")
         difference.set_visible(False)
     else:

@@ -146,12 +146,13 @@ class LiveView:
             Text(line.ljust(length), style="cyan")
             + Text(f"  {residual:.3g} {residual_words(history.hello)}" if line else "  none yet"),
         )
-        t, phi, y = history.samples()
+        t, *signals = history.samples()
         if len(t):
-            rows.add_row(
-                "motion",
-                f"angle {_span(phi)} rad, pivot {_span(1e3 * y)} mm ({t[-1] - t[0]:.0f} s)",
+            shown = (
+                f"{one.short} {_span(one.shown_in[1] * x)} {one.shown_unit}"
+                for one, x in zip(history.model.channels, signals, strict=True)
             )
+            rows.add_row("motion", f"{', '.join(shown)} ({t[-1] - t[0]:.0f} s)")
         rows.add_row("state", Text(history.reason or "no estimate yet", style="bold"))
         rows.add_row("", Text(reason_words(history.reason), style="dim"))
         return rows

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -18,6 +18,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.models.kapitza import MODEL
 from pvid.models.kapitza.physical import linear
+from pvid.rig.file import RigFile
 from pvid.rig.run import MIN_ROWS, Run
 
 FloatArray = npt.NDArray[np.float64]
@@ -102,6 +103,11 @@ class Pendulum:
         ratio2 = d1 - d2 - 1.0
         l2 = l1 * ratio2 / d2
         return cls(l1=l1, l2=l2, rho2=l2 / math.sqrt(ratio2), g=w * l1)
+
+    @classmethod
+    def nominal(cls, rig: RigFile) -> Pendulum:
+        """The one of a rig file's rough guess."""
+        return cls(**asdict(rig.nominal), **(rig.mechanism.constants or {}))
 
     def tilted(self, tilt_rad: float) -> Pendulum:
         """The same pendulum with its plane tilted by ``tilt_rad`` from the vertical: g* = g cos(tilt)."""

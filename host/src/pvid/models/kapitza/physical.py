@@ -1,4 +1,4 @@
-"""Physical parameters of the pendulum and p = (w, d1, d2), either way (MATH.md section 1)."""
+"""Physical parameters of the pendulum and p = (w, d1, d2), either way (theory.md 1)."""
 
 from __future__ import annotations
 
