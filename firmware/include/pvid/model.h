@@ -20,12 +20,14 @@
 #include <stdint.h>
 
 #include "pvid/config.h"
+#include "pvid/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 typedef struct pvid_model_f32 pvid_model_f32;
+typedef struct pvid_estimator_f32 pvid_estimator_f32; /* estimator.h */
 
 struct pvid_model_f32 {
     uint8_t n_theta;    /* entries of theta and N, 1..PVID_MAX_THETA */
@@ -52,16 +54,15 @@ struct pvid_model_f32 {
      * theta^T M theta - 2 theta^T b.
      * NULL: by the pattern of C, with b kept relative to theta(p); see estimator.h. */
     float (*project)(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[]);
-    /* accumulate and project in one, without the energy, with the same bits: saves writing the sums out and reading
-     * them again where a solve follows every row. NULL: one after the other. */
-    void (*absorb)(const float p[], const float n[], float y, const float high[], float low[], float s[][PVID_MAX_P],
-                   float f[]);
     /* Information that the sensor's noise alone makes at p, as if it were signal: what noise of unit variance
      * adds to C^T M C for each unit of weight, s[i][j] for i <= j < n_p, from the traces that the estimator
      * was given. NULL: not known; then nobody asks. */
     void (*noise)(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P]);
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
+    /* pvid_estimator_step_f32 in one go, with the same bits, given innovate's answers at p (needed while g < 1): saves
+     * writing sums and S out and reading them again where a solve follows every row. NULL: one after the other. */
+    pvid_reason (*step)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[]);
 };
 
 #ifdef __cplusplus
