@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 /* Where a replay writes; NULL: not recorded. Rows stand one after the other, without padding. */
 typedef struct {

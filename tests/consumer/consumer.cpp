@@ -13,6 +13,7 @@
 #include "pvid/arithmetic.h"
 
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 #include <cstdio>
 

@@ -17,7 +17,7 @@ from linear_rig import LINEAR_RIG
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.core.native import Native
-from pvid.core.sources import INCLUDES, core_sources, source
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, source
 from pvid.design.weak_q31 import weak_tables_q31
 from pvid.rig.file import RigFile
 from pvid.rig.run import write_run
@@ -73,6 +73,26 @@ def test_no_object_has_floating_point(prefix: str, tmp_path: Path) -> None:
         assert not FLOAT_INSTRUCTION.search(listing), one.name
 
 
+def pvid_text(header: str) -> str:
+    """What a compiler reads of pvid's own headers after #include "pvid/HEADER"."""
+    command = ["gcc", "-std=c99", *PUBLIC_INCLUDES, "-E", "-x", "c", "-"]
+    done = subprocess.run(command, input=f'#include "pvid/{header}"', capture_output=True, text=True, check=True)
+    kept, own = [], False
+    for line in done.stdout.splitlines():
+        marker = re.match(r'# \d+ "([^"]*)"', line)
+        if marker:
+            own = str(FIRMWARE) in marker[1]
+        elif own:
+            kept.append(line)
+    return "\n".join(kept)
+
+
+def test_public_headers_contain_no_floating_point_type() -> None:
+    floating = re.compile(r"\b(?:float|double)\b")
+    assert "pvid_weak_step_q31" in pvid_text("pvid_q31.h") and not floating.search(pvid_text("pvid_q31.h"))
+    assert floating.search(pvid_text("pvid.h")) and "_q31" not in pvid_text("pvid.h").replace("_q31theta", "")
+
+
 def test_the_search_for_floating_point_finds_it(tmp_path: Path) -> None:
     """The test above can fail: float32's own solve is full of it."""
     compiled = tmp_path / "float.o"
@@ -124,6 +144,7 @@ def test_unsupported_request_is_reported(
 PROGRAM = """
 #include <stdio.h>
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "table.h"
 int main(void)
 {
@@ -143,7 +164,7 @@ int main(void)
 def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: Path, native: Native) -> None:
     """A program made from the generated header and the sources alone computes the bits of the shared library."""
     _, rig_path = recorded
-    command = ["weak-table", "--core", "q31", "--rig", str(rig_path), "--name", "standard"]
+    command = ["tables", "--core", "q31", "--rig", str(rig_path), "--name", "standard"]
     header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
     (tmp_path / "table.h").write_text(header)
     (tmp_path / "main.c").write_text(PROGRAM)

@@ -42,6 +42,7 @@ FUNCTIONS = (
     "pvid_weak_estimate_f32",
 )
 USER = """#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 static pvid_weak_f32 weak; static pvid_weak_config_f32 weak_config;
 static pvid_strong_f32 strong; static pvid_strong_config_f32 strong_config;
 static pvid_weak_q31 weak_q31; static pvid_weak_config_q31 weak_config_q31;

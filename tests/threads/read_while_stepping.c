@@ -10,6 +10,7 @@
 #include "../unit/plant.h"
 #include "../unit/weak_table.h"
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 #define PUTS 100000u
 #define WORDS (sizeof(pvid_estimate_f32) / sizeof(float))

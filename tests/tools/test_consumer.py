@@ -76,7 +76,7 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def version() -> str:
-    text = (ROOT / "firmware" / "include" / "pvid" / "pvid.h").read_text(encoding="utf-8")
+    text = (ROOT / "firmware" / "include" / "pvid" / "version.h").read_text(encoding="utf-8")
     return ".".join(re.findall(r"#define PVID_VERSION_\w+ (\d+)", text))
 
 
@@ -177,7 +177,7 @@ def test_a_header_of_sizes_travels_too(tmp_path: Path) -> None:
 
 def test_installed_files(prefix: Path) -> None:
     files = {path.relative_to(prefix).as_posix() for path in prefix.rglob("*") if path.is_file()}
-    headers = {f"include/pvid/{path.name}" for path in public_headers()}
+    headers = {f"include/{path.as_posix().rpartition('/include/')[2]}" for path in public_headers()}
     assert headers == {name for name in files if name.endswith(".h")}  # public headers only, all of them
     assert {"lib/libpvid.a", "lib/pkgconfig/pvid.pc"} <= files
     assert {f"lib/cmake/pvid/pvid-config{part}.cmake" for part in ("", "-version")} <= files

@@ -38,7 +38,7 @@ def test_operators_signs_and_constants_of_the_code_alone(
 ) -> None:
     path = tmp_path / "f.c"
     path.write_text(CODE, encoding="utf-8")
-    monkeypatch.setattr(mutate, "SOURCES", tmp_path)
+    monkeypatch.setattr(mutate, "files_of_core", lambda: [path])
     found = {(m.line()[0], m.old.strip(), m.new.strip()) for m in mutate.mutants_of(path)}
     assert found == {
         (5, "<", "<="),
@@ -59,7 +59,7 @@ def test_a_draw_is_the_same_again_and_an_edit_elsewhere_leaves_it(
     mutate: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "f.c").write_text(CODE, encoding="utf-8")
-    monkeypatch.setattr(mutate, "SOURCES", tmp_path)
+    monkeypatch.setattr(mutate, "files_of_core", lambda: [tmp_path / "f.c"])
     before = [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
     assert before == [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
     assert before != [(m.old, m.new, m.line()[1]) for m in mutate.ranked(2)["f.c"]]

@@ -11,6 +11,7 @@
 #include "solve/estimator_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "strong_table_q31.h"
 #include "weak_table_q31.h"
 

@@ -10,7 +10,7 @@
 
 #include "bounds.h"
 #include "keep/fingerprint_q31.h"
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "weak_table_q31.h"
 
 #define LENGTH(array) (sizeof(array) / sizeof((array)[0]))

@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 static pvid_fir_bank_q31 five_points(uint16_t stride)
 {

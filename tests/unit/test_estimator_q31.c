@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 #define ONE_Q20 (1 << 20) /* of rows */
 #define ONE_Q26 (1 << 26) /* of p, whose bounds end at 2^30 then */

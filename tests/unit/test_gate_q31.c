@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "number/scaled_q31.h"
 
 static pvid_gate_q31 gate;

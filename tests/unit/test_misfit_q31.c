@@ -4,7 +4,7 @@
 
 #include "misfit_cases.h"
 #include "judge/misfit_q31.h"
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "number/scaled_q31.h"
 
 #define UNIT 1000000 /* of e and of what is told */

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 static pvid_publication_f32 shared;
 static pvid_publication_q31 shared_q31;

@@ -12,6 +12,7 @@
 #include "solve/estimator_f32.h"
 #include "plant.h"
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 #include "full_angle_f32.h"
 #include "weak/finish_f32.h"
 #include "weak/finish_q31.h"

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 /* Shifts of 0: what fits is exact. */
 static void a_row_is_the_formula(void **state)

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
 
 #define PER_CENT(x) ((x) / 100.0)
 

@@ -8,7 +8,8 @@
 #include <cmocka.h>
 
 #include "plant.h"
-#include "pvid/pvid.h"
+#include "pvid/little_endian.h"
+#include "pvid/pvid_q31.h"
 #include "weak_table_q31.h"
 
 #define PHI_LSB 3.834951969714103e-4 /* rad, of weak_table_q31.toml */

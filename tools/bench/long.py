@@ -49,7 +49,7 @@ def _rows(report: ElementTree.Element) -> list[tuple[str, ...]]:
     for case in report.iter("testcase"):
         room = case.get("classname", "").split(".")[1]
         cases[room, case.get("name", "").partition("[")[0]].append(case)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for (room, name), of_it in sorted(cases.items()):
         ticks = {one.get("value", "") for case in of_it for one in case.iter("property") if one.get("name") == "ticks"}
         failed = sum(case.find("failure") is not None or case.find("error") is not None for case in of_it)

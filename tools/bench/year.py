@@ -96,7 +96,7 @@ def emulated_year(
             append=True,
             samples=samples,
             begin=lambda passage=passage: configure(passage),  # type: ignore[misc]
-            anew=True,
+            restart=True,
         ).run()
     verdict = Verdict()
     reader = LogReader(log)

@@ -7,7 +7,8 @@
 #include <stdint.h>
 
 #include "link.h"
-#include "pvid/pvid.h"
+#include "pvid/config.h"
+#include "pvid/status.h"
 #include "stream_rig.h"
 
 #if STREAM_CORE == 1 /* PVID_CORE_Q31 */

@@ -123,6 +123,14 @@
 #define PVID_ASSERT(condition) ((void)(condition))
 #endif
 
+/* ---- sizes that are no settings ---- */
+
+#define PVID_ORDERS 5        /* derivatives of a channel, orders 0 to 4 */
+#define PVID_NOISE_TRACES 3  /* numbers that describe the noise inside the rows; see model.h */
+#define PVID_TRUST_SHORT 8   /* groups in the alarm's short mean; see trust.h */
+#define PVID_TRUST_LONG 16   /* and, at least, in its long mean */
+#define PVID_READ_ATTEMPTS 8 /* of a read before it returns false: one fails only if a put happens meanwhile */
+
 #if !defined(PVID_PLAIN_NAMES)
 #include "pvid/sized.h"
 #endif

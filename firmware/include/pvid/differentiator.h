@@ -10,7 +10,7 @@
  *   float d[PVID_ORDERS];
  *   if (pvid_differentiator_step_f32(&phi, sample, d)) use d[0] .. d[4];
  *
- * Not thread-safe; one object per channel. Tables come from `pvid fir-table`.
+ * Not thread-safe; one object per channel. Tables come from `pvid tables --form fir`.
  */
 #ifndef PVID_DIFFERENTIATOR_H
 #define PVID_DIFFERENTIATOR_H
@@ -24,8 +24,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define PVID_ORDERS 5
 
 /* A bank in folded form. With x[0] the centre sample and x[+-i] the samples i * stride away,
  *   q_i = (x[i] - x[0]) + (x[-i] - x[0]),   d_i = x[i] - x[-i],   i = 1..half,
@@ -43,15 +41,8 @@ typedef struct {
 /* Central differences on five points: errors of order h^4 (orders 0, 1, 2) and h^2 (3, 4). */
 extern const float pvid_five_points_f32[PVID_ORDERS * 2];
 
-/* Only the functions below write to it; static allocation is why it is public. */
-typedef struct {
-    pvid_fir_bank_f32 bank;
-    float rate_power[PVID_ORDERS - 1]; /* rate^1..rate^4 [1/s^k] */
-    uint16_t length;                   /* samples in the window */
-    uint16_t head;                     /* place of the oldest sample */
-    uint16_t filled;                   /* samples since the reset, at most length */
-    float history[PVID_MAX_WINDOW];
-} pvid_differentiator_f32;
+/* State: detail/differentiator_state.h. Only the functions below write to it. */
+typedef struct pvid_differentiator_f32 pvid_differentiator_f32;
 
 /* Prepares `self` for samples taken at sample_rate_hz. Fails iff the bank is not as described above (PVID_BAD_HALF,
  * PVID_BAD_STRIDE, PVID_BAD_BANK for the weights) or the rate is not in 1e-3..1e6 Hz (PVID_BAD_SAMPLE_RATE). */
@@ -68,5 +59,7 @@ bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, f
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/differentiator_state.h"
 
 #endif

@@ -18,7 +18,6 @@
 #include <stdint.h>
 
 #include "pvid/config.h"
-#include "pvid/differentiator.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus
@@ -54,14 +53,8 @@ typedef struct {
 extern const PVID_TABLE int32_t pvid_five_points_q31[PVID_ORDERS * 2];
 #define PVID_FIVE_POINTS_CENTRE_Q31 12
 
-/* Only the functions below write to it. */
-typedef struct {
-    pvid_fir_bank_q31 bank;
-    uint16_t length;                     /* samples in the window */
-    uint16_t head;                       /* place of the oldest sample */
-    uint16_t filled;                     /* samples since the reset, at most length */
-    int32_t history[PVID_MAX_WINDOW][2]; /* phi, y */
-} pvid_differentiator_q31;
+/* State: detail/differentiator_state_q31.h. Only the functions below write to it. */
+typedef struct pvid_differentiator_q31 pvid_differentiator_q31;
 
 /* Prepares `self`. Fails iff the bank is not as described above; the status names the field. Where counts within full
  * scale could overflow it that is PVID_BAD_FULL_SCALE for a product with a weight, PVID_BAD_SHIFT for their sum. */
@@ -78,5 +71,7 @@ bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, in
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/differentiator_state_q31.h"
 
 #endif

@@ -9,15 +9,11 @@
 #include <stdint.h>
 
 #include "pvid/estimator.h"
+#include "pvid/fnv_word.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define PVID_FNV_START 0x811C9DC5u
-
-/* hash continued over one 32-bit word, low byte first, whatever the machine's byte order. */
-uint32_t pvid_fnv_word(uint32_t hash, uint32_t word);
 
 /* hash continued over the estimator's state after a tick that ended with `reason`. */
 uint32_t pvid_fnv_estimator_f32(uint32_t hash, const pvid_estimator_f32 *estimator, pvid_reason reason);

@@ -3,7 +3,7 @@
 #define PVID_FNV_Q31_H
 
 #include "pvid/estimator_q31.h"
-#include "pvid/fnv.h"
+#include "pvid/fnv_word.h"
 
 #ifdef __cplusplus
 extern "C" {

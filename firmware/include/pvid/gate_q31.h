@@ -23,16 +23,8 @@ typedef struct {
                                  1..2^30; 0: never */
 } pvid_gate_config_q31;
 
-/* State; only the functions below write to it. */
-typedef struct {
-    pvid_scaled_q31 limit;    /* sigmas^2; 0: no gate */
-    pvid_scaled_q31 floor;    /* least scale */
-    pvid_scaled_q31 widening; /* factor on the scale at an outlier */
-    pvid_scaled_q31 scale;    /* mean square of what passed */
-    pvid_scaled_q31 part;     /* of it that the next one replaces: 1 / judged */
-    uint32_t memory;          /* residuals that the scale remembers */
-    uint32_t judged;          /* residuals taken in; stops at memory */
-} pvid_gate_q31;
+/* State: detail/gate_state_q31.h. Only the functions below write to it. */
+typedef struct pvid_gate_q31 pvid_gate_q31;
 
 /* Prepares `self` for residuals of which the scale remembers `memory` (0 counts as 1) and whose mean square is never
  * taken to be below `floor` (> 0, at most 2^100). Fails iff a field of config is not as described there; the status
@@ -46,5 +38,7 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/gate_state_q31.h"
 
 #endif

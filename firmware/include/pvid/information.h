@@ -25,18 +25,8 @@ extern "C" {
 /* The root of a row's sum of squares may not exceed this: 2^32 such rows still fit into float32. */
 #define PVID_ROW_LIMIT 1.0e14f
 
-typedef struct {
-    uint16_t n_moments;
-    uint16_t n_theta;
-    uint16_t block;   /* groups of rows between folds, 1.. */
-    uint16_t age;     /* groups since the last fold, 0..block-1 */
-    float retention;  /* factor on the past at a fold, in (0, 1]; 1 keeps everything */
-    float row_weight; /* what a row adds to weight; 1 where the model accumulates by itself */
-    float rounding;   /* what float32 may have taken from or added to yy where it is kept relative to an estimate that
-                         moved; fades with the sums [units of yy] */
-    float high[PVID_MAX_SUMS];
-    float low[PVID_MAX_SUMS];
-} pvid_information_f32;
+/* State: detail/information_state.h. Only the functions below write to it. */
+typedef struct pvid_information_f32 pvid_information_f32;
 
 /* Empty sums for `model`; forgetting_groups is the time constant of forgetting in groups of rows,
  * 0 for none (else at least 4). */
@@ -64,5 +54,7 @@ void pvid_information_tail_f32(const pvid_information_f32 *self, float tail[2]);
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/information_state.h"
 
 #endif

@@ -13,17 +13,9 @@
 
 #include "pvid/estimator_q31.h"
 
-/* State; only the strong form writes to it. */
-typedef struct {
-    int64_t few_energy;           /* of the last rows, at most 64: sum of e^2 */
-    int64_t few_signal;           /* likewise: sum of (p[0] dY/dp[0] / 8)^2 */
-    pvid_scaled_q31 energy;       /* of the block's rows before them */
-    pvid_scaled_q31 signal;       /* of (p[0] dY/dp[0])^2 */
-    pvid_scaled_q31 growth;       /* of the quietest ones, a block, 1..2: forgetting */
-    pvid_scaled_q31 least_energy; /* of a block */
-    pvid_scaled_q31 least_part;   /* q of a block */
-    uint16_t block;               /* rows of a block, 1.. */
-    uint16_t left;                /* rows until it is judged, 1.. */
-} pvid_misfit_q31;
+/* State: detail/misfit_state_q31.h. Only the strong form writes to it. */
+typedef struct pvid_misfit_q31 pvid_misfit_q31;
+
+#include "pvid/detail/misfit_state_q31.h"
 
 #endif

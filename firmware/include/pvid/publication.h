@@ -29,21 +29,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pvid/detail/publication_mark.h"
 #include "pvid/estimator.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Attempts of a read before it returns false. An attempt fails only if a put happens during the copy. */
-#define PVID_READ_ATTEMPTS 8
-
 /* Only the functions below write to it. */
-typedef struct {
-    uint32_t version;   /* odd while `estimate` is being written; wraps at 2^32 */
-    uint32_t number[2]; /* of estimates published so far, for `estimate` and for `copy`; stops at 2^32 - 1 */
-} pvid_publication_mark;
-
 typedef struct {
     pvid_publication_mark mark;
     pvid_estimate_f32 estimate;

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #include "pvid/estimator_q31.h"
-#include "pvid/publication.h"
+#include "pvid/detail/publication_mark.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -32,71 +32,33 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "pvid/snapshot_slots.h"
 #include "pvid/strong.h"
-#include "pvid/strong_q31.h"
 #include "pvid/weak.h"
-#include "pvid/weak_q31.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Whether a snapshot could be restored, and why not. */
-typedef enum {
-    PVID_SNAPSHOT_RESTORED = 0,
-    PVID_SNAPSHOT_NONE,          /* no snapshot begins here */
-    PVID_SNAPSHOT_CUT_SHORT,     /* fewer bytes than its header states */
-    PVID_SNAPSHOT_DAMAGED,       /* the checksum is wrong */
-    PVID_SNAPSHOT_OTHER_VERSION, /* of another release */
-    PVID_SNAPSHOT_OTHER_KIND,    /* of another form or core */
-    PVID_SNAPSHOT_OTHER_LAYOUT,  /* of a build with other sizes, pointers or byte order */
-    PVID_SNAPSHOT_OTHER_CONFIG,  /* of another configuration, or of other tables */
-    PVID_SNAPSHOT_NOT_READY      /* the identifier was not initialised with config, or a pointer is NULL */
-} pvid_snapshot_status;
-
-#define PVID_SNAPSHOT_HEADER 28u
-
-/* Bytes of a snapshot: room that is always enough for one of that kind. */
-#define PVID_SNAPSHOT_BYTES(object) (PVID_SNAPSHOT_HEADER + (object) + 4u)
+/* Room for a snapshot of an identifier [bytes]. */
 #define PVID_SNAPSHOT_STRONG_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_f32))
-#define PVID_SNAPSHOT_STRONG_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_q31))
 #define PVID_SNAPSHOT_WEAK_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32))
 #define PVID_SNAPSHOT_WEAK_ANGLE_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32) + sizeof(pvid_weak_angle_f32))
-#define PVID_SNAPSHOT_WEAK_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_q31))
-
-/* Which of two slots to read and which to write. */
-typedef struct {
-    int8_t newest;       /* slot of the newest valid snapshot, 0 or 1; -1: there is none */
-    uint8_t next;        /* slot to write to */
-    uint32_t generation; /* for the next snapshot */
-} pvid_snapshot_choice;
-
-/* Looks at two slots of `size` bytes each. Valid: whole and undamaged; of whose identifier, restore asks. Generations
- * are compared modulo 2^32. Costs the checksums of both. */
-pvid_snapshot_choice pvid_snapshot_choose(const uint8_t slot_0[], const uint8_t slot_1[], size_t size);
 
 /* Writes a snapshot of `self` to image[] and returns its length [bytes], or 0 with nothing written iff it does not fit
  * into `room` [bytes] or `self` is not initialised. config: the configuration that `self` was initialised with. Cost: a
  * copy and a checksum of the object and a hash of the tables, as long as some ticks: call it where a tick can wait. */
 size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                      uint32_t generation, uint8_t image[], size_t room);
-size_t pvid_snapshot_save_strong_q31(const pvid_strong_q31 *self, const pvid_strong_config_q31 *config,
-                                     uint32_t generation, uint8_t image[], size_t room);
 /* PVID_SNAPSHOT_WEAK_ANGLE_F32 where the angle's storage is in use, else PVID_SNAPSHOT_WEAK_F32. */
 size_t pvid_snapshot_save_weak_f32(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t generation,
-                                   uint8_t image[], size_t room);
-size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_config_q31 *config, uint32_t generation,
                                    uint8_t image[], size_t room);
 
 /* Restores `self`, which has been initialised with config, from the snapshot at image[0 .. length - 1] (it may be
  * followed by anything). Whatever the answer but PVID_SNAPSHOT_RESTORED, `self` is left as it was. */
 pvid_snapshot_status pvid_snapshot_restore_strong_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                                       const uint8_t image[], size_t length);
-pvid_snapshot_status pvid_snapshot_restore_strong_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config,
-                                                      const uint8_t image[], size_t length);
 pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,
-                                                    const uint8_t image[], size_t length);
-pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config,
                                                     const uint8_t image[], size_t length);
 
 #ifdef __cplusplus

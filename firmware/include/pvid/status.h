@@ -1,6 +1,8 @@
-/* pvid/status.h - what the library answers: init statuses and the reason codes of a tick. */
+/* pvid/status.h - the status of an init, the reason code of a tick, counters and laws, in either arithmetic. */
 #ifndef PVID_STATUS_H
 #define PVID_STATUS_H
+
+#include <stdint.h>
 
 /* Return value of every init. Each code names the refused field of the configuration. After a refused init the object
  * is all zeros, like a static object before its init: step returns PVID_NOT_READY, all other functions do nothing. (An
@@ -76,5 +78,28 @@ typedef enum {
     PVID_HELD_FROZEN,         /* window not used, because the identifier is frozen */
     PVID_NOT_READY            /* nothing was done: no init yet, a refused init, or NULL instead of an object */
 } pvid_reason;
+
+/* The law by which an estimator moves p; see estimator.h. */
+typedef enum {
+    PVID_LAW_STATIONARY = 0, /* with the feedback of F: converges to the least-squares estimate */
+    PVID_LAW_PSEUDOVELOCITY  /* equation (5) alone */
+} pvid_law;
+
+/* How often something has happened since init. */
+typedef struct {
+    uint32_t rows;    /* rows taken in */
+    uint32_t updates; /* steps of p */
+    uint32_t limited; /* of those, shortened to step_limit */
+    uint32_t bounded; /* of those, stopped at a bound */
+    uint32_t held_not_excited;
+    uint32_t held_pivot;
+    uint32_t rejected_not_finite;
+    uint32_t rejected_saturated;
+    uint32_t held_uncertain;    /* groups after which nothing was published: see trust.h */
+    uint32_t held_out_of_range; /* windows dropped because the angle was too large */
+    uint32_t misfits;           /* groups published, or updates told, under the alarm */
+    uint32_t rejected_outlier;  /* rows or windows that the gate kept out: see gate.h */
+    uint32_t at_rest;           /* solves within the dead zone: p stayed */
+} pvid_counters;                /* each stops at 2^32 - 1 */
 
 #endif

@@ -36,19 +36,8 @@ typedef struct {
     pvid_estimator_config_f32 estimator; /* model and update_rate_hz are filled in by init */
 } pvid_strong_config_f32;
 
-typedef struct {
-    pvid_differentiator_f32 phi;
-    pvid_differentiator_f32 y;
-    float inverse_l1;       /* [1/m] */
-    float drive;            /* mean square of u over about a second [1/s^4] */
-    float drive_forgetting; /* part of it that a tick replaces */
-    float drive_min;        /* mean square below which no row is taken in */
-    bool frozen;
-    bool alarm; /* the last block of rows was a misfit: see misfit.h */
-    pvid_gate_f32 gate;
-    pvid_misfit_f32 misfit;
-    pvid_estimator_f32 estimator;
-} pvid_strong_f32;
+/* State: detail/strong_state.h. Only the functions below write to it. */
+typedef struct pvid_strong_f32 pvid_strong_f32;
 
 /* Prepares `self`. Fails iff a field of config is out of its range; the status names it. */
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config);
@@ -72,5 +61,7 @@ void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen);
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/strong_state.h"
 
 #endif

@@ -3,7 +3,7 @@
  * The same identifier as strong.h for cores without a floating-point unit:
  *
  *   static pvid_strong_q31 identifier;
- *   (config from the header that `pvid strong-table` writes)
+ *   (config from the header that `pvid tables --form strong` writes)
  *   if (pvid_strong_init_q31(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_strong_step_q31(&identifier, phi_counts, y_counts);
  *
@@ -46,23 +46,8 @@ typedef struct {
     pvid_estimator_config_q31 estimator; /* model is filled in by init */
 } pvid_strong_config_q31;
 
-/* State; only the functions below write to it. */
-typedef struct {
-    pvid_differentiator_q31 differentiator;
-    pvid_strong_row_q31 row;
-    int32_t u_multiplier;
-    uint8_t u_shift;
-    int32_t phi_offset;
-    int32_t y_offset;
-    int64_t drive;            /* mean square of u over about drive_ticks */
-    int64_t drive_min;        /* mean square below which no row is taken in */
-    int32_t drive_forgetting; /* part of it that a tick replaces, Q31 */
-    bool frozen;
-    bool alarm; /* the last block of rows was a misfit: see misfit.h */
-    pvid_gate_q31 gate;
-    pvid_misfit_q31 misfit;
-    pvid_estimator_q31 estimator;
-} pvid_strong_q31;
+/* State: detail/strong_state_q31.h. Only the functions below write to it. */
+typedef struct pvid_strong_q31 pvid_strong_q31;
 
 /* Prepares `self`. Fails iff a field of config is out of its range or counts within full scale could overflow the bank
  * (differentiator_q31.h); the status names the field: PVID_BAD_SHIFT for those of the row and u_shift. */
@@ -84,5 +69,7 @@ void pvid_strong_freeze_q31(pvid_strong_q31 *self, bool frozen);
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/strong_state_q31.h"
 
 #endif

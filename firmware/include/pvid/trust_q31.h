@@ -8,8 +8,7 @@
 #include <stdint.h>
 
 #include "pvid/estimator_q31.h"
-#include "pvid/publication.h"
-#include "pvid/trust.h"
+#include "pvid/detail/publication_mark.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -29,26 +28,8 @@ typedef struct {
                          0.01..1e3; 0: never */
 } pvid_trust_config_q31;
 
-/* State; only the functions below write to it. */
-typedef struct {
-    pvid_trust_config_q31 config;
-    uint16_t groups;        /* taken in; stops at its end */
-    uint16_t uninformative; /* groups in a row that said too little */
-    uint16_t judged;        /* residuals in long_mean; stops at long_memory; none before p is near */
-    uint16_t long_memory;
-    uint8_t next;           /* place of the next residual in recent */
-    uint8_t groups_to_fade; /* groups before which the past is still to fade */
-    bool errors_small;      /* whether p's standard errors are small at present: while they are not nothing fades */
-    bool converged;         /* whether p has settled with small standard errors yet */
-    bool published;         /* whether an estimate has been trusted yet */
-    bool misfit;
-    int32_t anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
-    int64_t long_mean;          /* of residual variances relative to what is expected, PVID_VARIANCE_RATIO_BITS */
-    int64_t recent[PVID_TRUST_SHORT];
-    pvid_publication_mark mark;
-    pvid_estimate_q31 estimate; /* the published one, for the context that calls step */
-    pvid_estimate_q31 copy;     /* its second copy, for other contexts: see publication.h */
-} pvid_trust_q31;
+/* State: detail/trust_state_q31.h. Only the functions below write to it. */
+typedef struct pvid_trust_q31 pvid_trust_q31;
 
 /* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as described
  * there; the status names it. */
@@ -75,5 +56,7 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/trust_state_q31.h"
 
 #endif

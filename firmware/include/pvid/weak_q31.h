@@ -3,7 +3,7 @@
  * The same identifier as weak.h, in the same stages and the same schedule, for cores without a floating-point unit:
  *
  *   static pvid_weak_q31 identifier;
- *   (config from the header that `pvid weak-table --core q31` writes)
+ *   (config from the header that `pvid tables --core q31` writes)
  *   if (pvid_weak_init_q31(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_weak_step_q31(&identifier, phi_counts, y_counts);
  *
@@ -27,7 +27,6 @@
 #include "pvid/gate_q31.h"
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/trust_q31.h"
-#include "pvid/weak_job.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -40,9 +39,11 @@ extern "C" {
 #define PVID_WEAK_TERMS_Q31 15
 
 #define PVID_WEAK_GRAMS 6
-#define PVID_WEAK_COLUMNS_Q31 12 /* N1..N8, Y, a, b and one that stays 0 */
 
-/* Tables and formats of a design: constant data, made by `pvid weak-table --core q31`, kept by reference. See weak.h
+/* State: detail/weak_state_q31.h. Only the functions below write to it. */
+typedef struct pvid_weak_q31 pvid_weak_q31;
+
+/* Tables and formats of a design: constant data, made by `pvid tables --core q31`, kept by reference. See weak.h
  * for what the tables are. */
 typedef struct {
     uint16_t taps;       /* smoothing window [samples], odd, 5..PVID_MAX_TAPS */
@@ -84,97 +85,6 @@ typedef struct {
     pvid_gate_config_q31 gate;           /* on the residuals of a window */
 } pvid_weak_config_q31;
 
-/* The front end: a ring of counts, and the FIR job of the last complete block in slices. */
-typedef struct {
-    pvid_weak_job job;
-    int32_t middle[2];
-    int64_t sum[2];
-    int32_t ring[PVID_MAX_TAPS + PVID_MAX_DECIMATION - 1][2]; /* phi, y [counts about their offsets] */
-} pvid_weak_front_q31;
-
-/* One of the two windows. */
-typedef struct {
-    uint16_t index;                          /* of the present decimated sample in the window, 0..W-2 */
-    bool whole;                              /* the window has been filling from its first sample */
-    uint8_t buffer;                          /* which of the three it fills */
-    int64_t before[PVID_WEAK_INTEGRALS_Q31]; /* the integrands at the last sample */
-    int64_t once[PVID_WEAK_INTEGRALS_Q31];   /* twice their integrals */
-    int64_t twice[PVID_WEAK_INTEGRALS_Q31];  /* four times the integrals of these */
-    int64_t f_sum;
-    int64_t u_sum;
-    int64_t u_square_sum;
-    int64_t curvature_square_sum; /* of the second differences of F that fell into the window */
-    uint16_t curvatures;          /* how many did */
-} pvid_weak_window_q31;
-
-/* Second differences F(t) - 2 F(t - lag) + F(t - 2 lag), one every `lag` decimated samples. */
-typedef struct {
-    uint8_t wait;      /* samples until the next */
-    uint8_t known;     /* samples in `before`, 0..2 */
-    bool due;          /* the present sample ends one */
-    int32_t before[2]; /* F one lag and two lags ago */
-    int64_t square;    /* of the one that is due */
-} pvid_weak_curvature_q31;
-
-#define PVID_WEAK_FACTOR_Q31 ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
-
-/* The complete window that is being turned into rows and steps. */
-typedef struct {
-    uint8_t stage;
-    uint8_t index; /* of the function within the stage */
-    uint8_t iteration;
-    uint8_t buffer;
-    bool whitened;     /* the Gram matrix could be factored */
-    bool saturated;    /* a column did not fit: none of the window's rows is taken in */
-    int16_t gram_bits; /* format of the Gram matrix at p, even */
-    int32_t combination[PVID_WEAK_GRAMS];
-    int16_t exponent[PVID_MAX_FUNCTIONS];            /* of the rows of the Gram matrix */
-    pvid_reciprocal_q31 inverse[PVID_MAX_FUNCTIONS]; /* of the factor's diagonal */
-    int32_t factor[PVID_WEAK_FACTOR_Q31];            /* R0, then its Cholesky factor, Q30 */
-    int32_t inverted[PVID_MAX_FUNCTIONS];            /* a row of the factor's inverse, Q15, then a block of it */
-    int16_t inverted_exponent;
-    pvid_scaled_q31 trace[PVID_NOISE_TRACES_Q31]; /* noise in the columns, a row of unit noise variance */
-    pvid_reciprocal_q31 length;                   /* of the column that is being projected out */
-    int32_t direction[PVID_MAX_FUNCTIONS];        /* of it, Q30; length 1 or 0 */
-    int64_t along[PVID_WEAK_COLUMNS_Q31];         /* the columns' components along it, Q30 */
-    pvid_reason reason;                           /* of the last solve, then of the window */
-    int64_t size;                                 /* of the last step, relative, Q22 */
-    int64_t energy; /* of the window's rows: before they are added where the gate looks at it, then since */
-    pvid_gate_q31 gate;
-    pvid_scaled_q31 expected; /* variance of a row's noise */
-    int32_t fade_factor;      /* factor on the past before this window's rows, Q31; 0: none */
-    pvid_estimator_solve_q31 solve;
-    pvid_estimate_q31 candidate; /* for publication */
-} pvid_weak_finish_q31;
-
-/* State; only the functions below write to it. */
-typedef struct {
-    const pvid_weak_design_q31 *design;
-    int32_t phi_offset;
-    int32_t y_offset;
-    int64_t drive_min; /* (W - 1)^2 times the variance of U below which a window is dropped */
-    int8_t zero_bits;  /* format of c */
-    bool zero_unknown;
-    uint8_t iterations;
-    uint8_t functions_per_tick; /* functions a tick */
-    uint8_t stages_per_tick;    /* stages of a complete window a tick */
-    uint8_t active;             /* the window that takes the present decimated sample in; 2: both have */
-    uint8_t function;           /* functions of that window that have, 0..K-1 */
-    bool warm;                  /* a window has been completed since the restart */
-    bool frozen;                /* windows are gathered and dropped */
-    int32_t f;                  /* the present decimated sample */
-    int32_t u;
-    pvid_scaled_q31 pivot_noise;
-    pvid_weak_front_q31 front;
-    pvid_weak_curvature_q31 curvature;
-    pvid_weak_window_q31 window[2];
-    pvid_weak_finish_q31 finish;
-    int32_t term[PVID_WEAK_TERMS_Q31]; /* of the window in work */
-    int32_t sums[3][PVID_MAX_FUNCTIONS][PVID_WEAK_TERMS_Q31];
-    pvid_estimator_q31 estimator;
-    pvid_trust_q31 trust;
-} pvid_weak_q31;
-
 /* Prepares `self`. Fails iff a field of config or of its design is out of its range (the status names it), a table is
  * missing or would overflow (PVID_BAD_DESIGN, and PVID_BAD_SHIFT where fewer bits would do), or a window cannot be
  * worked off before the next one is complete (PVID_BAD_ITERATIONS, as in weak.h).
@@ -211,5 +121,7 @@ void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen);
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/weak_state_q31.h"
 
 #endif

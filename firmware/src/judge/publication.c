@@ -1,6 +1,7 @@
 #include "judge/publication.h"
 
 #include "number/count.h"
+#include "pvid/publication.h"
 #include "pvid/publication_q31.h"
 
 /* How words are shared. Atomic where the compiler has such accesses and the processor such instructions; elsewhere

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pvid/publication.h"
+#include "pvid/detail/publication_mark.h"
 
 /* Writes `bytes` bytes of `fresh` to both copies, in the order that readers need. bytes: a multiple of 4.
  * number: estimates published so far, this one included. */

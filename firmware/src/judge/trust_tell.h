@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 #include "number/count.h"
-#include "pvid/estimator.h"
+#include "pvid/status.h"
 
 /* Groups in a row that say too little for a step: none once p has stepped, or is back where it was published. */
 static inline void pvid_trust_count_uninformative(uint16_t *uninformative, pvid_reason reason, bool is_back)

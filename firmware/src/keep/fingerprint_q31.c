@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-#include "pvid/fnv.h"
+#include "pvid/fnv_word.h"
 
 static uint32_t words(uint32_t hash, const int32_t values[], size_t n)
 {

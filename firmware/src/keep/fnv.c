@@ -1,4 +1,4 @@
-#include "pvid/fnv.h"
+#include "pvid/fnv_word.h"
 
 #include <stddef.h>
 

@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "pvid/crc32.h"
-#include "pvid/fnv.h"
+#include "pvid/fnv_word.h"
 #include "pvid/little_endian.h"
-#include "pvid/pvid.h"
+#include "pvid/version.h"
 
 #define MAGIC 0x53535650u /* "PVSS" */
 #define VERSION                                                                                                        \

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pvid/snapshot.h"
+#include "pvid/snapshot_slots.h"
 
 typedef enum {
     PVID_SNAPSHOT_KIND_STRONG_F32 = 1,

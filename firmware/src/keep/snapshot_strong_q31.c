@@ -3,6 +3,7 @@
 
 #include "keep/fingerprint_q31.h"
 #include "keep/snapshot.h"
+#include "pvid/snapshot_q31.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_strong_q31, field))
 

@@ -5,6 +5,7 @@
 
 #include "keep/fingerprint_f32.h"
 #include "keep/snapshot.h"
+#include "pvid/snapshot.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_weak_f32, field))
 

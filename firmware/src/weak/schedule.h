@@ -12,7 +12,7 @@
 
 #include "pvid/config.h"
 #include "pvid/status.h"
-#include "pvid/weak_job.h"
+#include "pvid/detail/weak_job.h"
 
 /* Most stages of a complete window that a tick may take. One is the rule; more only where a hop has fewer free ticks
  * than a window has stages: short windows, low decimation, the correction's sweeps. The longest tick grows with them.

@@ -29,7 +29,7 @@ _LEFT_OUT = ("segment", "run", "log_time", "tick")
 _TELEPLOT_ROWS = 8  # a row of samples is at most 3 points of 46 bytes
 
 
-class Tee:
+class LiveStream:
     """An observer that sends samples and estimates to `udp://host:port` or `teleplot://host:port`.
 
     udp: `{"timestamp": 1.7e9, "tick": 5, "estimates": {"w": 31.6, ...}}`, one for each row.

@@ -14,16 +14,12 @@
 #include <stdbool.h>
 
 #include "pvid/estimator.h"
+#include "pvid/kapitza_parameters.h"
 #include "pvid/model.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define PVID_KAPITZA_P 3
-#define PVID_KAPITZA_STRONG_THETA 11
-
-enum { PVID_KAPITZA_W = 0, PVID_KAPITZA_D1 = 1, PVID_KAPITZA_D2 = 2 };
 
 typedef struct {
     float g;    /* part of gravity in the plane of motion [m/s^2] */

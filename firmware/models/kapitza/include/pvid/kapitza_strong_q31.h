@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #include "pvid/differentiator_q31.h"
-#include "pvid/kapitza.h"
+#include "pvid/kapitza_parameters.h"
 #include "pvid/model_q31.h"
 
 #ifdef __cplusplus

@@ -12,24 +12,12 @@
 #ifndef PVID_KAPITZA_WEAK_H
 #define PVID_KAPITZA_WEAK_H
 
-#include "pvid/kapitza.h"
+#include "pvid/kapitza_parameters.h"
 #include "pvid/model.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define PVID_KAPITZA_WEAK_THETA 8
-#define PVID_KAPITZA_WEAK_P 4
-#define PVID_KAPITZA_ZEROED_THETA 5
-#define PVID_KAPITZA_FRICTION_THETA 10
-#define PVID_KAPITZA_FRICTION_P 6
-
-/* Indices in p after PVID_KAPITZA_D2: the encoder's zero, friction at the pivot and at the joint [m^2/s]. */
-enum { PVID_KAPITZA_C = 3, PVID_KAPITZA_C1 = 4, PVID_KAPITZA_C2 = 5 };
-
-/* Whether the bounds of pvid/config.h have room for friction. */
-#define PVID_KAPITZA_HAS_FRICTION ((PVID_MAX_P >= 6) && (PVID_MAX_MOMENTS >= 55))
 
 /* The weak form with the encoder's zero unknown: 8 entries of theta, 4 free parameters, 36 moments. */
 extern const pvid_model_f32 pvid_kapitza_weak_f32;

@@ -2,7 +2,7 @@
 #ifndef PVID_KAPITZA_WEAK_Q31_H
 #define PVID_KAPITZA_WEAK_Q31_H
 
-#include "pvid/kapitza_weak.h"
+#include "pvid/kapitza_parameters.h"
 #include "pvid/model_q31.h"
 
 #ifdef __cplusplus

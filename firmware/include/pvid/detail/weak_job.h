@@ -1,9 +1,9 @@
-/* pvid/weak_job.h - how the front end of the weak form, in either arithmetic, keeps its place.
+/* pvid/detail/weak_job.h - how the front end of the weak form, in either arithmetic, keeps its place.
  *
  * Samples stand in a ring; every `decimation` samples a block is complete, and the FIR job at its centre is done in
  * slices, outwards from there, while the next samples arrive. */
-#ifndef PVID_WEAK_JOB_H
-#define PVID_WEAK_JOB_H
+#ifndef PVID_DETAIL_WEAK_JOB_H
+#define PVID_DETAIL_WEAK_JOB_H
 
 #include <stdint.h>
 

@@ -1,0 +1,17 @@
+/* pvid/detail/differentiator_state_q31.h - the state behind differentiator_q31.h. Not API: it may change with any
+ * release. */
+#ifndef PVID_DETAIL_DIFFERENTIATOR_STATE_Q31_H
+#define PVID_DETAIL_DIFFERENTIATOR_STATE_Q31_H
+
+#include "pvid/differentiator_q31.h"
+
+/* Only the functions of differentiator_q31.h write to it. */
+struct pvid_differentiator_q31 {
+    pvid_fir_bank_q31 bank;
+    uint16_t length;                     /* samples in the window */
+    uint16_t head;                       /* place of the oldest sample */
+    uint16_t filled;                     /* samples since the reset, at most length */
+    int32_t history[PVID_MAX_WINDOW][2]; /* phi, y */
+};
+
+#endif

@@ -1,0 +1,80 @@
+/* pvid/detail/estimator_state.h - the state behind estimator.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_ESTIMATOR_STATE_H
+#define PVID_DETAIL_ESTIMATOR_STATE_H
+
+#include "pvid/estimator.h"
+
+/* How rows are kept and p is solved for: in stages, by the pattern of C, or directly, by the model's own functions. */
+enum { PVID_ENGINE_STAGED = 1, PVID_ENGINE_DIRECT = 2 };
+
+/* Only the functions of estimator.h write to it. */
+struct pvid_estimator_f32 {
+    const pvid_model_f32 *model;
+    pvid_information_f32 information;
+    float p[PVID_MAX_P];
+    float theta[PVID_MAX_THETA];  /* f(p); only for models without functions of their own */
+    float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
+    float prior[PVID_MAX_P];      /* diagonal of H0 */
+    float start_sd[PVID_MAX_P];
+    float lower[PVID_MAX_P];
+    float upper[PVID_MAX_P];
+    float row_variance;
+    float gain; /* g */
+    float correlation;
+    float step_limit;
+    float kappa_min;
+    float noise_margin;
+    float dead_zone;                /* squared */
+    float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; written by the module that makes the rows */
+    float energy;                   /* sum of e^2 of the rows since the last group's end, at the p they met */
+    float group_weight;             /* their weight; these two only for models without functions of their own */
+    float expected;                 /* mean over the rows in the sums of the variance that the sensors' noise gives them
+                                       [units of Y^2]: no residual variance is taken for smaller. 0: nobody has said */
+    uint16_t divider;
+    uint16_t phase; /* groups since the last solve */
+    uint8_t engine; /* by the model: set by init */
+    pvid_counters counters;
+};
+
+/* D S D = U U^T with D a diagonal of powers of two and U upper triangular: elimination runs from
+ * the last index to the first, so that the last pivot is that of p[0]. */
+typedef struct {
+    uint8_t n;
+    float scale[PVID_MAX_P];         /* D: diagonal entries of D S D lie in [1, 4) */
+    float u[PVID_MAX_P][PVID_MAX_P]; /* upper triangle; the diagonal holds 1 / U_ii */
+    float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
+} pvid_cholesky_f32;
+
+/* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be
+ * read when it is complete, fallback may be set after begin. */
+struct pvid_estimator_solve_f32 {
+    pvid_reason reason;
+    const float *fallback;       /* [n_p] where p goes if it may not step; NULL: it stays */
+    pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
+    float size;                  /* largest |dp/p| of the step before its limit; 0 while p is held */
+    float energy;                /* sum of e^2 of the group's rows at the p they met */
+    float variance;              /* of a row's noise */
+    bool above_noise;            /* the data say more than noise does */
+    bool solvable;
+    uint8_t stage;
+    uint8_t index; /* of the row within the stage */
+    uint8_t start; /* of the column of C in work among its non-zeros */
+    uint8_t next;  /* non-zero to be multiplied next */
+    bool ends_group;
+    bool in_dead_zone; /* within the dead zone: no step is taken */
+    float gain;
+    float fall;  /* of rr */
+    float scale; /* sum of M_ii dtheta_i^2: the size of the terms that cancel to it */
+    float sums[PVID_MAX_SUMS];
+    float c[PVID_MAX_THETA * PVID_MAX_P];
+    float column[PVID_MAX_THETA]; /* M times a column of C */
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float force[PVID_MAX_P];
+    float p[PVID_MAX_P]; /* where p, theta and b = B - M theta go: b -= moved */
+    float theta[PVID_MAX_THETA];
+    float theta_step[PVID_MAX_THETA];
+    float moved[PVID_MAX_THETA];
+    pvid_cholesky_f32 factor;
+};
+
+#endif

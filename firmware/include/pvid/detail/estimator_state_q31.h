@@ -1,0 +1,122 @@
+/* pvid/detail/estimator_state_q31.h - the state behind estimator_q31.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_ESTIMATOR_STATE_Q31_H
+#define PVID_DETAIL_ESTIMATOR_STATE_Q31_H
+
+#include "pvid/estimator_q31.h"
+
+/* Layout of the sums: n_theta (n_theta + 1) / 2 of M (upper triangle by rows), n_theta of b, rr, weight (Q16). */
+#define PVID_MAX_MOMENTS_Q31 ((PVID_MAX_THETA_Q31 * (PVID_MAX_THETA_Q31 + 1)) / 2)
+#define PVID_MAX_SUMS_Q31 (PVID_MAX_MOMENTS_Q31 + PVID_MAX_THETA_Q31 + 2)
+
+/* r 2^e, a square root: r of 30 or 31 bits, or 0. */
+typedef struct {
+    int32_t r;
+    int32_t e;
+} pvid_root_q31;
+
+/* What is known of the noise inside the rows, beside that of Y: PVID_NOISE_TRACES numbers of model.h. */
+#define PVID_NOISE_TRACES_Q31 3
+
+/* The sums M, b, rr and weight. */
+typedef struct {
+    uint8_t n_theta;
+    uint8_t exponent; /* M, b and rr stand divided by 4^exponent */
+    uint16_t n_sums;
+    uint16_t block;    /* groups of rows between acts of forgetting */
+    uint16_t age;      /* groups since the last one */
+    int32_t retention; /* factor on the past, Q31; 2^31 - 1: everything is kept */
+    uint32_t row_weight;
+    int64_t sums[PVID_MAX_SUMS_Q31];
+} pvid_information_q31;
+
+/* Only the functions of estimator_q31.h write to it. */
+struct pvid_estimator_q31 {
+    const pvid_model_q31 *model;
+    pvid_information_q31 information;
+    int32_t p[PVID_MAX_P];
+    int64_t theta[PVID_MAX_THETA_Q31];    /* f(p) */
+    int32_t mantissa[PVID_MAX_THETA_Q31]; /* of theta, 30 bits, */
+    int16_t shift[PVID_MAX_THETA_Q31];    /* and what N_i mantissa_i is shifted right by to be in units of Y */
+    int64_t fresh[PVID_MAX_THETA_Q31];    /* sum N e since the last solve; only while g < 1 */
+    int16_t align[PVID_MAX_THETA_Q31];    /* N_i theta_i 2^-align is in units of Y */
+    int16_t theta_bits[PVID_MAX_THETA_Q31];
+    int16_t c_exponent[PVID_MAX_C_Q31]; /* C_k 2^c_exponent: units of Y per N and p */
+    int32_t prior[PVID_MAX_P];          /* H0 = prior 2^-prior_exponent */
+    int16_t prior_exponent[PVID_MAX_P];
+    int32_t start_sd[PVID_MAX_P];
+    int32_t lower[PVID_MAX_P];
+    int32_t upper[PVID_MAX_P];
+    int32_t row_sd;
+    int32_t gain;
+    uint32_t correlation;
+    uint32_t step_limit;
+    int32_t kappa_min;
+    uint32_t noise_margin;
+    uint32_t dead_zone;
+    pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by the module that makes the rows */
+    int64_t energy;       /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
+    int64_t group_weight; /* their weight, Q16 */
+    pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them
+                                 [units of Y's integer squared]: residual variances are at least this. 0: not set */
+    uint16_t divider;
+    uint16_t phase; /* groups since the last solve */
+    pvid_counters counters;
+};
+
+/* 1/x = m 2^(k - 61), 2^30 <= m < 2^31, of an integer x. */
+typedef struct {
+    int32_t m;
+    uint8_t k;
+} pvid_reciprocal_q31;
+
+/* S = U U^T, both in Q30; elimination runs from the last index to the first, so that the last pivot is that of
+ * index 0. */
+typedef struct {
+    uint8_t n;
+    bool positive;                           /* no pivot so far was rounding */
+    int32_t u[PVID_MAX_P][PVID_MAX_P];       /* above the diagonal */
+    pvid_reciprocal_q31 inverse[PVID_MAX_P]; /* 1 / U_jj in Q30 is m 2^(k - 31) */
+    int32_t first_pivot;                     /* pivot of index 0 over its diagonal entry, Q30 */
+    int64_t pivot[PVID_MAX_P];               /* Q60 */
+} pvid_cholesky_q31;
+
+/* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be read when it is
+ * complete, fallback may be set after begin. */
+struct pvid_estimator_solve_q31 {
+    pvid_reason reason;
+    uint8_t stage;
+    uint8_t index; /* of the row within the stage */
+    uint8_t start; /* of the column of C in work among its non-zeros */
+    bool ends_group;
+    bool judging;     /* an assessment */
+    bool above_noise; /* the data say more than noise does */
+    bool has_fallback;
+    bool in_dead_zone;                      /* within the dead zone: no step is taken */
+    int32_t fallback[PVID_MAX_P];           /* where p goes if it may not step */
+    int64_t size;                           /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
+    int64_t energy;                         /* sum of e^2 of the group's rows at the p they met */
+    pvid_scaled_q31 variance;               /* of a row's noise, divided by 4^exponent as the sums are */
+    pvid_root_q31 wide;                     /* root of the variance that standard errors are made of */
+    int32_t column[PVID_MAX_P][PVID_MAX_P]; /* of an inverted factor, and */
+    pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
+    int32_t gain;
+    int32_t m[PVID_MAX_MOMENTS_Q31]; /* M_ij = m_ij 2^(h_i + h_j) */
+    int16_t h[PVID_MAX_THETA_Q31];
+    int32_t c[PVID_MAX_C_Q31]; /* C_k = c_k 2^(f_column - h_row) */
+    int16_t f[PVID_MAX_P];
+    int32_t force[PVID_MAX_THETA_Q31]; /* what drives the step, by rows: 2^(force_exponent + h_row) */
+    int32_t force_exponent;
+    int64_t s[PVID_MAX_P][PVID_MAX_P]; /* C^T M C + H0, in units of 2^(f_a + f_b + 32) */
+    int64_t first_prior;               /* H0 of p[0], in the units of s */
+    int16_t g[PVID_MAX_P];
+    int32_t q[PVID_MAX_P][PVID_MAX_P]; /* s_ab 2^-(g_a + g_b), which is factored */
+    pvid_cholesky_q31 factor;
+    int64_t dp[PVID_MAX_P];
+    int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved */
+    int64_t theta[PVID_MAX_THETA_Q31];
+    int32_t theta_step[PVID_MAX_THETA_Q31]; /* theta_step_j 2^(step_exponent - h_j) in units of Y per N */
+    int32_t step_exponent;
+    int64_t moved[PVID_MAX_THETA_Q31];
+};
+
+#endif

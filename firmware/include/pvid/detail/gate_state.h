@@ -1,0 +1,17 @@
+/* pvid/detail/gate_state.h - the state behind gate.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_GATE_STATE_H
+#define PVID_DETAIL_GATE_STATE_H
+
+#include "pvid/gate.h"
+
+/* Only the functions of gate.h write to it. */
+struct pvid_gate_f32 {
+    float limit;    /* sigmas^2; 0: no gate */
+    float memory;   /* residuals that the scale remembers */
+    float floor;    /* least scale */
+    float widening; /* factor on the scale at an outlier */
+    float judged;   /* residuals taken in; stops at memory */
+    float scale;    /* mean square of what passed */
+};
+
+#endif

@@ -1,0 +1,18 @@
+/* pvid/detail/misfit_state.h - the state behind misfit.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_MISFIT_STATE_H
+#define PVID_DETAIL_MISFIT_STATE_H
+
+#include "pvid/misfit.h"
+
+/* Only the strong form writes to it. */
+struct pvid_misfit_f32 {
+    float growth;       /* of the quietest ones, a block, >= 1: forgetting */
+    float energy;       /* of the block so far: sum of e^2 */
+    float signal;       /* likewise: sum of (p[0] dY/dp[0])^2 */
+    float least_energy; /* of a block */
+    float least_part;   /* q of a block */
+    uint16_t block;     /* rows of a block, 1.. */
+    uint16_t left;      /* rows until it is judged, 1.. */
+};
+
+#endif

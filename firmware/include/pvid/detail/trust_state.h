@@ -1,0 +1,28 @@
+/* pvid/detail/trust_state.h - the state behind trust.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_TRUST_STATE_H
+#define PVID_DETAIL_TRUST_STATE_H
+
+#include "pvid/trust.h"
+
+/* Only the functions of trust.h write to it. */
+struct pvid_trust_f32 {
+    pvid_trust_config_f32 config;
+    uint16_t groups;        /* taken in; stops at its end */
+    uint16_t uninformative; /* groups in a row that said too little */
+    uint16_t judged;        /* residuals in long_mean; stops at long_memory; none before p is near */
+    uint16_t long_memory;
+    uint8_t next;      /* place of the next residual in recent */
+    bool errors_small; /* whether p's standard errors are small at present: while they are not nothing fades */
+    bool converged;    /* whether p has settled with small standard errors yet */
+    bool published;    /* whether an estimate has been trusted yet */
+    bool misfit;
+    uint8_t groups_to_fade;   /* groups before which the past is still to fade */
+    float anchor[PVID_MAX_P]; /* where p stood when the rows in the sums came in, or when they last agreed with it */
+    float long_mean;          /* of residual variances relative to what is expected */
+    float recent[PVID_TRUST_SHORT];
+    pvid_publication_mark mark;
+    pvid_estimate_f32 estimate; /* the published one, for the context that calls step */
+    pvid_estimate_f32 copy;     /* its second copy, for other contexts: see publication.h */
+};
+
+#endif

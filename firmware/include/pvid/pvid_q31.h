@@ -1,0 +1,26 @@
+/* pvid_q31.h - identifies the parameters of a mechanism in integers alone, for cores without a floating-point unit.
+ *
+ * Nothing of it holds or includes a floating-point type. Start at weak_q31.h or strong_q31.h (counts of the sensors in,
+ * parameters out) or at estimator_q31.h and model_q31.h (rows of a model of yours in). In float32: pvid.h. */
+#ifndef PVID_PVID_Q31_H
+#define PVID_PVID_Q31_H
+
+#include "pvid/crc32.h"
+#include "pvid/differentiator_q31.h"
+#include "pvid/estimator_q31.h"
+#include "pvid/fnv_q31.h"
+#include "pvid/gate_q31.h"
+#include "pvid/kapitza_q31.h"
+#include "pvid/kapitza_strong_q31.h"
+#include "pvid/kapitza_weak_q31.h"
+#include "pvid/misfit_q31.h"
+#include "pvid/model_q31.h"
+#include "pvid/publication_q31.h"
+#include "pvid/snapshot_q31.h"
+#include "pvid/status.h"
+#include "pvid/strong_q31.h"
+#include "pvid/trust_q31.h"
+#include "pvid/version.h"
+#include "pvid/weak_q31.h"
+
+#endif
