@@ -24,7 +24,7 @@ from pvid.board.replay_image import (
 )
 from pvid.core.native import Native
 
-LONG_TICKS = 40_000
+FORMS_AND_CORES = [(form, core) for form in ("strong", "weak") for core in ("f32", "q31")]
 LONG = ("mps2-an386", "virt-rv32imac")
 TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
 
@@ -46,14 +46,15 @@ def assert_same_hashes(report: ReplayReport, replay: ReplayRun, native: Native) 
     assert report.hash == int(expected[-1])
 
 
-@pytest.mark.parametrize("form", ["strong", "weak"])
-def test_the_host_computes_the_bits_of_the_twin(form: str, native: Native) -> None:
-    for ticks in (sizes.TICKS, LONG_TICKS):
-        replay = standard_run(form, ticks)
+@pytest.mark.ticks(short=4000, long=40_000)
+@pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)
+def test_the_host_computes_the_bits_of_the_twin(form: str, core: str, native: Native, ticks: int) -> None:
+    for length in (sizes.TICKS, ticks):
+        replay = standard_run(form, length, core)
         assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
 
 
-@pytest.mark.parametrize(("form", "core"), [(form, core) for form in ("strong", "weak") for core in ("f32", "q31")])
+@pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)
 def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measured: Measured, native: Native) -> None:
     boards = set()
     for configuration, (_, report) in measured.items():
@@ -64,10 +65,11 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
     assert boards == {board.name for board in BOARDS.values() if board.toolchain != "avr"} | avrs
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["strong", "weak"])
 @pytest.mark.parametrize("name", LONG)
 def test_long_runs_end_with_the_bits_of_the_host(name: str, form: str, native: Native) -> None:
-    replay = standard_run(form, LONG_TICKS)
+    replay = standard_run(form, 40_000)
     image, _ = build_image(BOARDS[name], replay)
     assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), replay, native)
 
@@ -81,6 +83,32 @@ def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> No
     assert report.instructions_mean == pytest.approx(114_000, rel=0.05)  # clock cycles
     with pytest.raises(PvidError, match="overflowed"):
         build_image(BOARDS["atmega328p"], replay)
+
+
+def mean_of(measured: Measured, board: str, form: str, core: str) -> int:
+    """Instructions a tick."""
+    return measured[sizes.Configuration(BOARDS[board], form, core)][0].mean
+
+
+@pytest.mark.parametrize("board", ["microbit", "virt-rv32imac"])
+def test_integers_cost_a_fifth_of_soft_float_at_most(board: str, measured: Measured) -> None:
+    assert 5 * mean_of(measured, board, "weak", "q31") <= mean_of(measured, board, "weak", "f32")
+
+
+def test_the_strong_form_in_integers_costs_less_than_soft_float_at_every_row(measured: Measured) -> None:
+    for board, ratio in (("microbit", 1.2), ("virt-rv32imac", 2.0)):
+        assert ratio * mean_of(measured, board, "strong", "q31") <= mean_of(measured, board, "strong", "f32"), board
+
+
+@pytest.mark.parametrize("board", ["microbit", "virt-rv32imac"])
+def test_the_strong_form_costs_half_of_soft_float_with_a_solve_at_every_fourth_row(board: str, native: Native) -> None:
+    reports = {}
+    for core in ("q31", "f32"):
+        replay = standard_run("strong", 1500, core, divider=4)  # all alike from the 500th on
+        image, _ = build_image(BOARDS[board], replay)
+        reports[core] = play(BOARDS[board], image, TIMEOUT_S)
+        assert reports[core].hash == int(native_hashes(replay, native)[-1])
+    assert 2 * reports["q31"].instructions_mean <= reports["f32"].instructions_mean
 
 
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:

@@ -167,7 +167,7 @@ def test_identifiers_and_files_that_pages_name_exist() -> None:
 
 def test_cited_sections_of_the_theory_exist() -> None:
     headings = set(re.findall(r"(?m)^## (\d)\. ", text_of(DOCS / "theory.md")))
-    equations = set(re.findall(r"(?m) \((\d+)\)$", text_of(DOCS / "theory.md")))
+    equations = set(re.findall(r"(?m)^    \((\d+)\)  ", text_of(DOCS / "theory.md")))
     assert headings == set("123456")
     assert equations == {str(number) for number in range(1, 13)} - {"3"}  # (3), the ties, is in a sentence
     wrong = []

@@ -227,6 +227,7 @@ def drawn(browser: webdriver.Chrome, plot: str) -> list[dict[str, Any]]:
     return list(browser.execute_script(script, plot))
 
 
+@pytest.mark.long
 def test_the_page_moves_in_a_browser_and_asks_nobody_else(
     tmp_path: Path, board: Path, browser: webdriver.Chrome
 ) -> None:

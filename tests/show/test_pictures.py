@@ -1,6 +1,6 @@
 """What a person sees of a recording fits the screen: an 80 x 24 terminal, a window of 1280 x 800, a page of paper.
 
-PVID_PICTURES=folder ./tools/test tests/show/test_pictures.py      leaves the pictures there, to be looked at
+PVID_PICTURES=folder ./tools/pvid bench long --only show      leaves the pictures there, to be looked at
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def photograph(browser: webdriver.Chrome, path: Path) -> None:
 
 
 def test_terminal_view_always_fits_80_by_24(
-    sent: list[tuple[int, link.Message]], pictures: Path, tmp_path: Path
+    sent: list[tuple[int, link.Message]], pictures: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     def told(message: link.Message) -> link.Message:
         if isinstance(message, link.Estimate) and worst:
@@ -85,6 +85,8 @@ def test_terminal_view_always_fits_80_by_24(
         assert len(lines) <= 24 and max(map(len, lines)) <= 80
         assert not worst or "friction, large angles" in " ".join(lines)
         assert "parameters identifiable" in "".join(lines) or worst
+        if not request.config.getoption("--long"):
+            continue
         (tmp_path / "terminal.svg").write_text(console.export_svg(title="pvid log"))
         with chromium(tmp_path / f"chromium{worst}", 1000, 620) as browser:
             browser.get((tmp_path / "terminal.svg").as_uri())
@@ -99,6 +101,7 @@ _TEXTS = """
 """
 
 
+@pytest.mark.long
 def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Path, tmp_path: Path) -> None:
     with (
         page("127.0.0.1:0", log, "/dev/ttyACM0 -> run.pvlog") as address,

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from pvid.core.native import Native
 from pvid.rig.file import Differentiator, RigFile
@@ -72,7 +73,7 @@ class Group:
     of one twin.
     """
 
-    def __init__(self, config: StrongConfig, natives: list[Native], run: Run, first_row: int) -> None:
+    def __init__(self, config: StrongConfig, natives: list[Native], run: Run, first_row: int, rows: int) -> None:
         self.natives = natives
         starts = [standard_start(seed) for seed in range(STARTS)]
         whole = variants(config.estimator)
@@ -84,7 +85,7 @@ class Group:
             [native.identifier(replace(config, estimator=lane)) for native in natives] for lane in whole
         ]
         warming_up = window(config)
-        phi, y = (x[first_row - warming_up :] for x in (run.phi, run.y))
+        phi, y = (x[first_row - warming_up : first_row + rows] for x in (run.phi, run.y))
         n, row_y, row_reason = StrongTwin(config).rows(phi, y)
         assert (row_reason[:warming_up] == Reason.WARMING_UP).all()
         assert (row_reason[warming_up:] == Reason.ACCUMULATED).all()
@@ -135,16 +136,17 @@ class Group:
                 assert first_difference(record, p, sums, reason) is None, native.build
 
 
+@pytest.mark.ticks(short=3000, long=40_000)
 def test_twenty_starts_and_whole_identifiers_equal_the_twin_in_every_build(
-    matrix: dict[str, Native], standard_20_bits: Simulation
+    matrix: dict[str, Native], standard_20_bits: Simulation, ticks: int
 ) -> None:
     """Both differentiators, both laws, with and without forgetting: 168 lanes of one twin, compared at every row."""
     configs = [configuration(of) for of in DIFFERENTIATORS]
     natives = [matrix[name] for name in BUILDS]
     first_row = max(window(config) for config in configs)
-    groups = [Group(config, natives, standard_20_bits.run, first_row) for config in configs]
+    groups = [Group(config, natives, standard_20_bits.run, first_row, ticks) for config in configs]
     rows, lanes = len(groups[0].row_y), len(groups[0].lanes)
-    assert rows >= 40_000
+    assert rows == ticks
     twin = StrongTwin(configs[0], [lane for group in groups for lane in group.lanes])
     gate = GateOfSome(twin, np.array([whole for group in groups for whole in group.is_whole]))
     for first in range(0, rows, PIECE):

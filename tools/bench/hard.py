@@ -136,7 +136,7 @@ def _cases() -> Iterator[Case]:
         yield Case(f"encoder of {bits} bits", bits=bits)
     for noise in (1, 2, 4, 8, 16, 32, 64, 128, 256, 512):
         yield Case(f"14 bits, noise of {noise} LSB", noise_lsb=noise)
-    yield Case("14 bits, noise of 64 LSB, phi_lsb says 0.58", noise_lsb=64, told=False)
+    yield Case("14 bits, noise of 64 LSB, phi_lsb set for 0.58", noise_lsb=64, told=False)
     for bits, factors in ((14, (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)), (12, (0.2, 0.1, 0.05))):
         for factor in factors:
             largest = LARGEST * factor / standard_sensors(bits).phi_lsb
