@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "link.h"
+#include "pvid/config.h"
 #include "pvid/status.h"
 #include "stream_rig.h"
 

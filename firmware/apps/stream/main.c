@@ -22,6 +22,7 @@
 #include "link.h"
 #include "port.h"
 #include "receiver.h"
+#include "pvid/fnv_word.h"
 #include "pvid/little_endian.h"
 #include "sensor.h"
 

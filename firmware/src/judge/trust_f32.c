@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "number/count.h"
+#include "solve/assess_f32.h"
 #include "solve/estimator_f32.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"

@@ -4,6 +4,9 @@
 
 #include "pvid/estimator.h"
 
+/* How rows are kept and p is solved for: in stages, by the pattern of C, or directly, by the model's own functions. */
+enum { PVID_ENGINE_STAGED = 1, PVID_ENGINE_DIRECT = 2 };
+
 /* Only the functions of estimator.h write to it. */
 struct pvid_estimator_f32 {
     const pvid_model_f32 *model;
@@ -29,6 +32,7 @@ struct pvid_estimator_f32 {
                            limit of the residual variance. 0: unknown */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
+    uint8_t engine; /* by the model: set by init */
     pvid_counters counters;
 };
 
