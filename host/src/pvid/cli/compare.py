@@ -45,9 +45,8 @@ def command(
     run = read_input(run_path, rig, columns)
     rig = fitted(rig, run)
     native = Native()
-    own = "q31" if rig.identifier.core == "q31" else "f32"
     outcomes: list[Outcome] = []
-    for arithmetic in ["f32", "q31"] if core == "all" else [core or own]:
+    for arithmetic in ["f32", "q31"] if core == "all" else [core or rig.identifier.core_traits.in_c]:
         for one in [law] if law else ["stationary", "pseudovelocity"]:
             chosen = replace(rig, identifier=replace(rig.identifier, law=one, core=arithmetic))  # type: ignore[arg-type]
             with progress_bar(f"{one} law, {arithmetic}", len(run.t)) as advance:

@@ -20,11 +20,8 @@ from pvid.cli.result import print_result, print_warning, write_figure
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare import Comparison, compare_run
-from pvid.run.compare_q31 import compare_run_q31
+from pvid.run.compare import Comparison, compare_rig
 from pvid.run.identify import Identification, identify
-from pvid.setup.f32 import config_of
-from pvid.setup.q31 import config_for_run
 from pvid.sim.pendulum import Pendulum, simulate, standard_sensors, standard_start
 
 BOARD = BOARDS["mps2-an386"]
@@ -61,15 +58,6 @@ class Played:
         return self.comparison.equal and self.verdict.equal
 
 
-def _compare(
-    rig: RigFile, run: Run, native: Native, start: npt.ArrayLike, progress: Callable[[int], None]
-) -> Comparison:
-    samples = played_samples(rig, run)
-    if rig.identifier.core == "q31":
-        return compare_run_q31(native, config_for_run(rig, run, start), *samples, progress=progress)
-    return compare_run(native, config_of(rig, run.sample_rate, start), *samples, progress=progress)
-
-
 def play_demo(
     on: Target,
     rigs: Sequence[RigFile],
@@ -95,7 +83,7 @@ def play_demo(
         for number, rig in enumerate(rigs):
             results.append(identify(run, rig, native, start=start))
             before = number * len(run.t)
-            comparisons.append(_compare(rig, run, native, start, lambda done, before=before: progress(before + done)))  # type: ignore[misc]
+            comparisons.append(compare_rig(native, rig, run, start, lambda done, n=before: progress(n + done)))  # type: ignore[misc]
         verdicts = [stream.result() for stream in streams]
     return [
         Played(replace(result, on=on.name) if verdict.equal else result, comparison, verdict)

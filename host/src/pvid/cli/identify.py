@@ -47,7 +47,7 @@ def command(
     bits at every tick that it reported and at the end.
     """
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
-    run = read_input(run_path, rig, columns, whole=rig.identifier.core == "f64")
+    run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)
     given, rig = rig, resolved(rig, run)
     notes = resolution_note(given, rig)
     print_notes(notes)

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
 from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
+from pvid.cases import CASES, Case
 from pvid.cli.input import read_input, with_overrides
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import to_c_header
 from pvid.design.weak_sizing import SizesOfDesign, raised_bounds
 from pvid.rig.file import RigFile, load
-from pvid.settings.q31 import WeakConfigQ31
+from pvid.rig.run import Run
+from pvid.settings.forms import FORMS
 from pvid.setup.f32 import weak_design_of
-from pvid.setup.q31 import config_for_run, strong_config_q31, weak_config_q31
-from pvid.setup.strong_header_q31 import strong_header_q31
-from pvid.setup.weak_header_q31 import to_c_header_q31
 
-_CORES = {"weak": ("f32", "q31"), "strong": ("q31",), "fir": ("f32",)}
-_NAMES = {"weak": "weak_tables", "strong": "strong_config", "fir": "fir_bank"}
 _FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1}
 
 
 @click.command(name="tables")
-@click.option("--form", type=click.Choice(list(_CORES)), default="weak", show_default=True, help="Form of the tables.")
+@click.option(
+    "--form", type=click.Choice([*FORMS, "fir"]), default="weak", show_default=True, help="Form of the tables."
+)
 @click.option("--core", type=click.Choice(["f32", "q31"]), help="Arithmetic.  [default: f32; strong: q31]")
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file (TOML); weak and strong only.")
 @click.option("--run", "run_path", type=click.Path(path_type=Path), help="Size the weak tables for this recorded run.")
@@ -56,12 +56,14 @@ def command(
     The sizes of the weak tables follow the modes of the rig file's guess, or with --run the modes of a recorded run, as
     in identify. For q31 the bits to spare at full scale are printed on standard error.
     """
-    core = core or _CORES[form][0]
-    if core not in _CORES[form]:
-        hint = "its weights are a bank of filters: use --form fir" if form == "strong" else "use --core f32"
+    cores = [known for of, known in _KINDS if of == form]
+    core = core or cores[0]
+    if (form, core) not in _KINDS:
+        hint = "its weights are a bank of filters: use --form fir" if form in FORMS else "use --core f32"
         raise PvidError(f"no tables for --form {form} --core {core}: {hint}")
-    name = name or _NAMES[form]
-    if form == "fir":
+    kind = _KINDS[form, core]
+    name = name or kind.name
+    if kind.text is None:
         if rig_path is not None or run_path is not None:
             raise PvidError("--form fir does not depend on a rig: omit --rig and --run")
         given = {key: value for key, value in fir.items() if value is not None}
@@ -70,11 +72,19 @@ def command(
         raise PvidError("--points, --degree, --difference and --stride are for --form fir")
     if rig_path is None:
         raise PvidError(f"--form {form} needs --rig FILE")
-    if form == "strong":
-        if run_path is not None:
+    rig, run = with_overrides(load(rig_path), form=form), None
+    made_by = f"pvid tables --form {form} --core {core} --rig {rig_path.name}"
+    if run_path is not None:
+        if not rig.identifier.form_traits.uses_windows:
             raise PvidError("--run is for --form weak")
-        return _print_header(_strong(rig_path, name), check)
-    return _print_header(_weak(rig_path, run_path, core, name), check)
+        from pvid.run.survey import fitted
+
+        run = read_input(run_path, rig)
+        rig = replace(fitted(rig, run), sample_rate=run.sample_rate)
+        made_by += f" --run {run_path.name}"
+    if rig.sample_rate is None:
+        raise PvidError(f"{rig_path}: sample_rate is required to compute the tables")
+    return _print_header(kind.text(CASES[form, core], rig, run, name, f"{made_by} --name {name}"), check)
 
 
 @click.command(name="schema")
@@ -92,25 +102,9 @@ def _fir(name: str, points: int, degree: int, difference: bool, stride: int) -> 
     return bank_header(bank, name, f"pvid tables --form fir {kind} --stride {stride} --name {name}")
 
 
-def _weak(rig_path: Path, run_path: Path | None, core: str, name: str) -> str:
-    rig = with_overrides(load(rig_path), form="weak")
-    made_by = f"pvid tables --form weak --core {core} --rig {rig_path.name}"
-    run = None
-    if run_path is not None:
-        from pvid.run.survey import fitted
-
-        run = read_input(run_path, rig)
-        rig = replace(fitted(rig, run), sample_rate=run.sample_rate)
-        made_by += f" --run {run_path.name}"
-    made_by += f" --name {name}"
-    rate = _sample_rate(rig, rig_path)
-    if core == "q31":
-        config = weak_config_q31(rig, rate) if run is None else config_for_run(rig, run)
-        assert isinstance(config, WeakConfigQ31)  # by the form
-        _print_margins(config.design.margins)
-        _print_raised(config.design)
-        return to_c_header_q31(config, rig.l1, name, made_by)
-    tables = weak_design_of(rig, rate)
+def _weak_design(case: Case, rig: RigFile, run: Run | None, name: str, made_by: str) -> str:
+    """The tables of the weak form in float32."""
+    tables = weak_design_of(rig, rig.sample_rate or 0.0)
     write_stderr(
         f"taps {tables.taps}, decimation {tables.decimation}, windows of {tables.window} samples "
         f"({tables.window_s:g} s), {tables.functions} test functions; {tables.flash_bytes} bytes of flash; "
@@ -120,18 +114,28 @@ def _weak(rig_path: Path, run_path: Path | None, core: str, name: str) -> str:
     return to_c_header(tables, name, made_by)
 
 
-def _strong(rig_path: Path, name: str) -> str:
-    rig = load(rig_path)
-    config = strong_config_q31(rig, _sample_rate(rig, rig_path))
+def _configuration(case: Case, rig: RigFile, run: Run | None, name: str, made_by: str) -> str:
+    """The whole configuration in fixed point."""
+    config: Any = case.settings(rig, rig.sample_rate or 0.0) if run is None else case.settings_for_run(rig, run)
     _print_margins(config.design.margins)
-    made_by = f"pvid tables --form strong --core q31 --rig {rig_path.name} --name {name}"
-    return strong_header_q31(config, rig.l1, name, made_by)
+    if rig.identifier.form_traits.uses_windows:
+        _print_raised(config.design)
+    return case.header(config, rig.l1, name, made_by)
 
 
-def _sample_rate(rig: RigFile, path: Path) -> float:
-    if rig.sample_rate is None:
-        raise PvidError(f"{path}: sample_rate is required to compute the tables")
-    return rig.sample_rate
+class _Kind(NamedTuple):
+    """A header: its default name in C and what makes it from a rig; None: no rig does."""
+
+    name: str
+    text: Callable[[Case, RigFile, Run | None, str, str], str] | None
+
+
+_KINDS = {
+    ("weak", "f32"): _Kind("weak_tables", _weak_design),
+    ("weak", "q31"): _Kind("weak_tables", _configuration),
+    ("strong", "q31"): _Kind("strong_config", _configuration),
+    ("fir", "f32"): _Kind("fir_bank", None),
+}
 
 
 def _print_margins(margins: dict[str, float]) -> None:

@@ -146,8 +146,7 @@ class Values:
                 self._hello = item
             case Configure() | ConfigureQ31():
                 self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
-                offset = item.phi_offset if isinstance(item, ConfigureQ31) else 0
-                self._offset = offset * (self._hello.phi_lsb if self._hello else 0.0)
+                self._offset = getattr(item, "phi_offset", 0) * (self._hello.phi_lsb if self._hello else 0.0)
             case Raw() | RawCount():
                 yield self._samples(record, item)
             case Estimate() | EstimateQ31():
@@ -210,10 +209,8 @@ class Values:
 
     @np.errstate(all="ignore")  # a board may send any number
     def _samples(self, record: Record, item: Raw | RawCount) -> Rows:
-        phi_y = item.values.astype(np.float64)
-        if isinstance(item, RawCount):
-            hello = self._hello
-            phi_y *= np.array([np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb])
+        hello = self._hello
+        phi_y = item.in_si(np.array([np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]))
         columns = self._where(record, record.tick + np.arange(len(phi_y), dtype=np.int64))
         return Rows("samples", {**columns, "phi": phi_y[:, 0], "y": phi_y[:, 1]})
 
@@ -231,8 +228,7 @@ class Values:
             for i, name in enumerate(PHYSICAL):
                 if np.isfinite(physical).all():
                     numbers[name], numbers[f"{name}_se"] = physical[i], of_physical[i]
-        fixed = isinstance(item, EstimateQ31)
-        numbers["kappa"] = item.kappa / 2**30 if fixed else item.kappa
+        numbers["kappa"] = item.kappa / item.FULL_KAPPA
         numbers["residual"] = item.residual_sd / self._row_sd
         reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)
         return self._one("estimates", record, **{**numbers, "updates": item.updates, "reason": reason})
@@ -250,14 +246,4 @@ def in_si(
 
     Of the fixed-point core: NaN before the board has told its units; `phi_offset` [rad] is added to its c.
     """
-    upper = np.triu_indices(MAX_P)
-    matrix = np.zeros((MAX_P, MAX_P))
-    if isinstance(item, Estimate):
-        matrix[upper] = item.covariance
-        return np.array(item.p), matrix + np.triu(matrix, 1).T
-    unit = np.full(MAX_P, np.nan) if hello is None else np.array(hello.p_unit)
-    matrix[upper] = np.array(item.correlation) / 2**30
-    se = np.array(item.se) * unit
-    p = np.array(item.p) * unit
-    p[3] += phi_offset
-    return p, (matrix + np.triu(matrix, 1).T) * np.outer(se, se)
+    return item.in_si(np.full(MAX_P, np.nan) if hello is None else np.array(hello.p_unit), phi_offset)

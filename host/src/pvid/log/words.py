@@ -7,6 +7,7 @@ import math
 from pvid.link.frames import Code, Core, Form, Hello, Status
 from pvid.log.reader import Account
 from pvid.settings.enums import Reason
+from pvid.settings.forms import FORMS
 
 # Values.TABLES["estimates"] has the same names.
 PARAMETERS = {
@@ -112,5 +113,5 @@ def kappa_share(kappa: float) -> float:
 
 def residual_words(hello: Hello | None) -> str:
     """What the residuals are so many times of."""
-    weak = hello is not None and hello.form == Form.WEAK
+    weak = hello is not None and FORMS[hello.form_name].uses_windows
     return "times the encoder's noise" if weak else "times the row_sd that was configured"

@@ -17,30 +17,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import MOST_BYTES, TOO_LONG, toml_document
+from pvid.settings.enums import Form
+from pvid.settings.forms import CORES, FORMS, AnyCore, CoreTraits, FormTraits
 
 _Parsed = TypeVar("_Parsed")
 
-Form = Literal["weak", "strong"]
 Law = Literal["stationary", "pseudovelocity"]
-Core = Literal["f32", "q31", "f64"]
+Core = AnyCore
 Differentiator = Literal["savitzky-golay", "finite-difference"]
 
 # The strong form is least wrong with degree 12 and 20 bits on a window this long.
 _STRONG_WINDOW_S = 0.241
-
-# What the gate keeps out where the file does not say [times the usual]: windows are alike, rows follow the motion.
-_GATE: dict[Form, float] = {"weak": 4.0, "strong": 6.0}
-
-# Until it believes in a change [time constants of forgetting]: windows of a changed mechanism pass no sooner; of its
-# rows enough do wherever their residuals cross zero.
-_PATIENCE: dict[Form, float] = {"weak": 3.0, "strong": 6.0}
 
 
 # What is no zero but smaller is a slip, and what is divided by it overflows.
@@ -175,6 +169,31 @@ class Identifier:
         _check_fields(self, "[identifier] ")
 
     @property
+    def form_traits(self) -> FormTraits:
+        """What depends on the form."""
+        return FORMS[self.form]
+
+    @property
+    def core_traits(self) -> CoreTraits:
+        """What depends on the core."""
+        return CORES[self.core]
+
+    @property
+    def corrects_angles(self) -> bool:
+        """Whether the form can be corrected for large angles in this core."""
+        return self.form_traits.uses_windows and self.core_traits.corrects_angles
+
+    @property
+    def n_core(self) -> int:
+        """Parameters of the mechanism and, where it is estimated, the encoder's zero."""
+        return 4 if self.zero and self.form_traits.estimates_zero else 3
+
+    def in_weak_form(self, **changed: Any) -> Identifier:
+        """The same in the weak form; the length of a differentiator's window is none of its windows'."""
+        window_s = self.window_s if self.form_traits.uses_windows else 0.0
+        return replace(self, form="weak", window_s=window_s, **changed)
+
+    @property
     def strong_window_s(self) -> float:
         """Length of the differentiator's window [s]."""
         return self.window_s if self.window_s > 0.0 else _STRONG_WINDOW_S
@@ -185,14 +204,14 @@ class Identifier:
         does not say; none then with equation (5), which is to stay as the paper has it."""
         if self.outlier_gate is not None:
             return self.outlier_gate
-        return _GATE[self.form] if self.law == "stationary" else 0.0
+        return self.form_traits.gate if self.law == "stationary" else 0.0
 
     @property
     def patience_s(self) -> float:
         """Until the gate believes in a change [s], 0: never."""
         if self.outlier_patience_s is not None:
             return self.outlier_patience_s
-        return min(_PATIENCE[self.form] * self.forgetting_s, 1e12) if self.gate > 0.0 else 0.0
+        return min(self.form_traits.patience * self.forgetting_s, 1e12) if self.gate > 0.0 else 0.0
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ def _trial(case: Case, native: Native) -> Identification | None:
     """The case in the weak form and float32, its residuals held against the sensors' noise alone; None where the
     settings are refused."""
     identifier = case.rig.identifier
-    float32 = replace(identifier, core="f32", form="weak", law="stationary", window_s=_weak_window(case.rig))
+    float32 = identifier.in_weak_form(core="f32", law="stationary")
     try:
         return identify(case.run, _settled(Case(case.run, replace(case.rig, identifier=float32))), native, points=1)
     except PvidError:
@@ -172,10 +172,6 @@ def _settled(case: Case) -> RigFile:
     """The rig with what the run's survey finds, but for the disturbance that explains the rest."""
     rig = fitted(case.rig, case.run)
     return replace(rig, identifier=replace(rig.identifier, disturbance=case.rig.identifier.disturbance))
-
-
-def _weak_window(rig: RigFile) -> float:
-    return rig.identifier.window_s if rig.identifier.form == "weak" else 0.0
 
 
 def _is_good(result: Identification | None) -> bool:
@@ -417,14 +413,15 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
             "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
             Case(replace(run, y=-run.y), rig),
         )
+    in_float = "" if rig.identifier.core_traits.corrects_angles else " with --core f32"
     largest = now.largest_angle if now is not None else _swing(run)[1]
     if not rig.identifier.full_angle:
         yield Cure(
             f"angles go to {largest:.2g} rad, and sin phi is not phi there: use --set identifier.full_angle=true"
-            + (" with --core f32" if rig.identifier.core == "q31" else ""),
+            + in_float,
             with_identifier(full_angle=True),
         )
-    elif rig.identifier.form == "weak" and rig.identifier.core != "q31":
+    elif rig.identifier.corrects_angles:
         yield Cure(
             "the run follows the equations of small angles, as a simulation of them does: use "
             "--set identifier.full_angle=false",
@@ -432,8 +429,7 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
         )
     if not rig.identifier.damping and rig.identifier.zero:
         yield Cure(
-            "there is friction in the joints: use --set identifier.damping=true"
-            + (" with --core f32" if rig.identifier.core == "q31" else ""),
+            "there is friction in the joints: use --set identifier.damping=true" + in_float,
             with_identifier(damping=True),
         )
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.cases import case_of
 from pvid.core.native import Native
 from pvid.models.kapitza.modes import modes_hz
 from pvid.oracle import strong as oracle
@@ -20,12 +22,11 @@ from pvid.run.excitation import excitation_of
 from pvid.run.linear_rows import linear_error
 from pvid.run.survey import fitted
 from pvid.run.verdict import DISAGREES, verdict
-from pvid.settings.enums import Law, Reason
+from pvid.settings.enums import Form, Law, Reason
 from pvid.settings.f32 import StrongConfig, WeakConfig
-from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.settings.forms import FORMS
 from pvid.setup.f32 import bank_of, config_of, weak_design_of
-from pvid.setup.q31 import beyond_range, config_for_run, counts_of, covariance_of, p_of, se_of
-from pvid.setup.ranges_q31 import Beyond, with_ranges_of
+from pvid.setup.ranges_q31 import Beyond
 
 Float = npt.NDArray[np.float64]
 
@@ -172,7 +173,7 @@ class Identification:
     lost: int
     hash: int | None
     core: str
-    form: str
+    form: Form
     law: str
     on: str
     trajectory: Trajectory
@@ -253,13 +254,13 @@ class Identification:
     @property
     def verdict(self) -> str:
         """Why nothing was identified, in words."""
-        if self.form == "strong" and self.updates and self.status in _GOOD:
+        if not FORMS[self.form].publishes and self.updates and self.status in _GOOD:
             return f"the standard error of w is {100 * self.se['w'] / abs(self.value['w']):.0f} % of it"
         return f"{self.status}: {self.beyond_words}" if self.status == SATURATED else self.status
 
 
-def _is_answer(form: str, trusted_s: float | None, updates: int, status: str, se_w: float, w: float) -> bool:
-    if form == "weak":
+def _is_answer(form: Form, trusted_s: float | None, updates: int, status: str, se_w: float, w: float) -> bool:
+    if FORMS[form].publishes:
         return trusted_s is not None
     return updates > 0 and status in _GOOD and se_w <= WORST_SE * abs(w)
 
@@ -288,77 +289,92 @@ def identify(
     if start is None:
         rig = fitted(rig, run)
     config = config_of(rig, run.sample_rate, start)
-    needed = _ticks_needed(config)
-    if len(run.t) < needed:
+    if len(run.t) < config.ticks_needed:
         raise PvidError(
-            f"the run has {len(run.t)} samples and the {rig.identifier.form} form needs {needed} for its first answer: "
-            f"nothing can be identified; record longer or shorten window_s"
+            f"the run has {len(run.t)} samples and the {rig.identifier.form} form needs {config.ticks_needed} for its "
+            f"first answer: nothing can be identified; record longer or shorten window_s"
         )
     every = max(1, len(run.t) // points)
-    if rig.identifier.core == "f32":
-        return _in_float32(run, rig, config, every, native)
     if rig.identifier.core == "f64":
-        if isinstance(config, StrongConfig):
-            return _in_float64(run, rig, config, every)
-        return _weak_in_float64(run, rig, config)
-    rig = with_ranges_of(rig, run)
-    return _in_q31(run, rig, config_for_run(rig, run, start), every, native)
+        return _IN_FLOAT64[rig.identifier.form](run, rig, config, every)
+    return _in_core(run, rig, start, every, native)
 
 
-def _ticks_needed(config: StrongConfig | WeakConfig) -> int:
-    if isinstance(config, WeakConfig):
-        # one window, and as much again as its rows and steps may take
-        return config.design.taps + config.design.decimation * (config.design.window + config.hop)
-    return 2 * config.delay + 1
-
-
-def _in_float32(
-    run: Run, rig: RigFile, config: StrongConfig | WeakConfig, every: int, native: Native
-) -> Identification:
+def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, native: Native) -> Identification:
+    """By the C core of the rig file's form and arithmetic."""
+    case = case_of(rig.identifier)
+    rig = case.with_ranges(rig, run)
+    config, samples = case.settings_for_run(rig, run, start), case.samples(rig, run)
     identifier = native.identifier(config)
-    record = identifier.run(run.phi, run.y, sums=False, estimate_every=every)
-    counters = identifier.counters
-    last = identifier.estimate if identifier.publishes else identifier.assess()
+    record = identifier.run(*samples, sums=False, estimate_every=every)
+    counters, last = identifier.counters, identifier.estimate
+    n_all = record.p.shape[1]
+    n_p = min(n_all, NAMED)
+    p = case.p_of(config, last["p"][:n_all])
+    friction, p = tuple(map(float, p[NAMED:])), p[:n_p]
+    if n_p > 3:
+        p[3] += case.zero_shift(rig, run, samples[0])
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
+    status, linear = _final_status(record.reason), None
+    if case.linear_rows_only and case.publishes:
+        linear = np.zeros(3)
+        if rig.identifier.full_angle and len(trusted):
+            found = linear_error(rig, run, p)
+            if found is None or np.abs(found).max() > WORST_LINEAR:
+                trusted, status = trusted[:0], Reason.HELD_OUT_OF_RANGE.text
+            else:
+                linear = found
     any_trusted = len(trusted) > 0
-    publishes = identifier.publishes
-    estimates = record.estimate
-    trajectory = _trajectory(
-        run.t[::every],
-        estimates["p"][:, :3].astype(np.float64),
-        estimates["covariance"][:, :3, :3].astype(np.float64),
-        rig,
-        estimates["kappa"].astype(np.float64),
-    )
-    n_p = min(record.p.shape[1], NAMED)
     publications = Publications.none()
-    if publishes:
+    if case.publishes:
+        published = case.p_of(config, record.published[trusted])[:, :3]
+        se = case.se_of(config, record.published_se[trusted])[:, :3]
         publications = Publications(
             t=run.t[trusted],
-            p=record.published[trusted, :3].astype(np.float64),
-            se=record.published_se[trusted, :3].astype(np.float64),
+            p=published,
+            se=se if linear is None else np.hypot(se, linear * published),
             alarm=record.reason[trusted] == Reason.MISFIT,
         )
+    beyond = case.beyond(config, *samples, counters["rejected_saturated"])
+    estimates = case.p_of(config, record.estimate["p"][:, :n_all])[:, :n_p]
+    covariance, covariances = (
+        _with_linear_error(case.covariance_of(config, one)[..., :n_p, :n_p], at, linear)
+        for one, at in ((last, p), (record.estimate, estimates))
+    )
     return _identification(
         rig,
         run,
-        p=last["p"][:n_p].astype(np.float64),
-        friction=tuple(map(float, last["p"][NAMED : record.p.shape[1]])),
-        covariance=last["covariance"][:n_p, :n_p].astype(np.float64),
-        kappa=float(last["kappa"]),
-        trusted_s=float(run.t[trusted[-1]]) if any_trusted and publishes else None,
+        p=p,
+        friction=friction,
+        covariance=covariance,
+        kappa=float(case.kappa_of(last)),
+        trusted_s=float(run.t[trusted[-1]]) if any_trusted and case.publishes else None,
         first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
         reasons=_counted(record.reason),
-        chi2=_judged(identifier.misfit) if identifier.publishes else None,
+        beyond=beyond,
+        beyond_words=None if beyond is None else beyond.words(rig.sensor),
+        chi2=_judged(identifier.misfit) if case.publishes else None,
         alarm=any_trusted and bool(record.reason[trusted[-1]] == Reason.MISFIT),
-        status=_final_status(record.reason),
+        status=status,
         ticks=len(run.t),
         updates=counters["updates"],
         lost=counters["rejected_not_finite"] + counters["rejected_saturated"],
         running_hash=identifier.running_hash,
-        trajectory=trajectory,
+        trajectory=_trajectory(
+            run.t[::every], estimates[:, :3], covariances[:, :3, :3], rig, case.kappa_of(record.estimate)
+        ),
         publications=publications,
+        linear=linear,
     )
+
+
+def _with_linear_error(covariance: Float, p: Float, linear: Float | None) -> Float:
+    """Covariance [..., n_p, n_p] at p [..., n_p] with the error that linear rows make, relative of w, d1, d2 [3]."""
+    if linear is None:
+        return covariance
+    error = np.zeros_like(p)
+    error[..., :3] = p[..., :3] * linear
+    return np.asarray(covariance + error[..., :, None] * error[..., None, :])
 
 
 def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Identification:
@@ -418,7 +434,7 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
     )
 
 
-def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identification:
+def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> Identification:
     """The trajectory has one point a window."""
     if config.estimator.law is not Law.STATIONARY or config.estimator.divider != 1:
         raise PvidError("core f64 has the weak form's stationary law with a solve at every window only: use f32")
@@ -489,73 +505,10 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig) -> Identificati
     )
 
 
-def _in_q31(
-    run: Run, rig: RigFile, config: StrongConfigQ31 | WeakConfigQ31, every: int, native: Native
-) -> Identification:
-    phi, y = counts_of(rig, run)
-    identifier = native.identifier(config)
-    record = identifier.run(phi, y, sums=False, estimate_every=every)
-    last = identifier.estimate if identifier.publishes else identifier.assess()
-    n_p = record.p.shape[1]
-    p = p_of(config, last["p"][:n_p])
-    if n_p > 3:  # where the counts lie between the LSB's multiples: 0 when the run was recorded as counts
-        p[3] += float(np.nanmean(run.phi - phi * rig.sensor.phi_lsb))
-    trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
-    status, linear = _final_status(record.reason), np.zeros(3)
-    if isinstance(config, WeakConfigQ31) and rig.identifier.full_angle and len(trusted):
-        found = linear_error(rig, run, p)
-        if found is None or np.abs(found).max() > WORST_LINEAR:
-            trusted, status = trusted[:0], Reason.HELD_OUT_OF_RANGE.text
-        else:
-            linear = found
-    any_trusted = len(trusted) > 0
-    counters = identifier.counters
-    publications = Publications.none()
-    if identifier.publishes:
-        published = p_of(config, record.published[trusted])[:, :3]
-        publications = Publications(
-            t=run.t[trusted],
-            p=published,
-            se=np.hypot(se_of(config, record.published_se[trusted])[:, :3], linear * published),
-            alarm=record.reason[trusted] == Reason.MISFIT,
-        )
-    beyond = beyond_range(config, phi, y, counters["rejected_saturated"])
-    estimates = p_of(config, record.estimate["p"][:, :n_p])
-    return _identification(
-        rig,
-        run,
-        p=p,
-        covariance=_with_linear_error(covariance_of(config, last), p, linear),
-        kappa=float(last["kappa"]) / 2**30,
-        trusted_s=float(run.t[trusted[-1]]) if any_trusted and identifier.publishes else None,
-        first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
-        reasons=_counted(record.reason),
-        beyond=beyond,
-        beyond_words=beyond.words(rig.sensor),
-        chi2=_judged(identifier.misfit) if identifier.publishes else None,
-        alarm=any_trusted and bool(record.reason[trusted[-1]] == Reason.MISFIT),
-        status=status,
-        ticks=len(run.t),
-        updates=counters["updates"],
-        lost=counters["rejected_saturated"],
-        running_hash=identifier.running_hash,
-        trajectory=_trajectory(
-            run.t[::every],
-            estimates[:, :3],
-            _with_linear_error(covariance_of(config, record.estimate), estimates, linear)[:, :3, :3],
-            rig,
-            record.estimate["kappa"] / 2**30,
-        ),
-        publications=publications,
-        linear=linear,
-    )
-
-
-def _with_linear_error(covariance: Float, p: Float, linear: Float) -> Float:
-    """Covariance [..., n_p, n_p] at p [..., n_p] with the error that linear rows make, relative of w, d1, d2 [3]."""
-    error = np.zeros_like(p)
-    error[..., :3] = p[..., :3] * linear
-    return np.asarray(covariance + error[..., :, None] * error[..., None, :])
+_IN_FLOAT64: dict[str, Callable[[Run, RigFile, Any, int], Identification]] = {
+    "weak": _weak_in_float64,
+    "strong": _in_float64,
+}
 
 
 def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
@@ -667,7 +620,7 @@ def _identification(
     names = (*LINEAR, ZERO)[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
     unexplained, parts_disagree, skew, judged = None, False, 0.0, True
-    if rig.identifier.form == "weak" and trusted_s is not None:
+    if rig.identifier.form_traits.publishes and trusted_s is not None:
         unbiased = np.append(p, friction)
         if linear is not None:  # the verdict's rows are corrected
             unbiased[:3] /= 1 + linear
@@ -692,7 +645,11 @@ def _identification(
         se = {name: float(np.sqrt(one.noise**2 + one.y_gain**2 + one.l1**2)) for name, one in parts.items()}
     elif beyond is not None and beyond.share >= _BEYOND_FATAL:
         status = SATURATED
-    elif rig.identifier.form == "weak" and status == Reason.HELD_NOT_EXCITED.text and not excitation_of(run, rig).weak:
+    elif (
+        rig.identifier.form_traits.uses_windows
+        and status == Reason.HELD_NOT_EXCITED.text
+        and not excitation_of(run, rig).weak
+    ):
         status = UNEXPLAINED
     return Identification(
         value=value,

@@ -80,7 +80,7 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     pendulum the guess stays.
     """
     rig = resolved(rig, run)
-    if rig.identifier.form != "weak" or not rig.identifier.survey:
+    if not rig.identifier.form_traits.uses_windows or not rig.identifier.survey:
         return rig
     found = survey(rig, run)
     if found is not None:
@@ -122,7 +122,7 @@ def survey(rig: RigFile, run: Run) -> Survey | None:
     agreeing = _agreeing(outcomes, fit)
     rows = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).thinned(_WINDOWS)
     asked = rig.identifier
-    if (asked.full_angle or asked.damping) and asked.core != "q31":
+    if (asked.full_angle or asked.damping) and asked.core_traits.corrects_angles:
         rows, fit = _corrected(rows, fit, asked.full_angle, asked.damping)
     ratio = _disturbance(rows, fit)
     if ratio > 0:

@@ -178,8 +178,7 @@ def tune(run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]
         When nothing can be identified from the run, with the rig file's own settings or others.
     """
     given, rig = rig, resolved(rig, run)
-    if rig.identifier.form != "weak":  # its window is a differentiator's
-        rig = replace(rig, identifier=replace(rig.identifier, form="weak", window_s=0.0))
+    rig = replace(rig, identifier=rig.identifier.in_weak_form())
     bench = _Bench(run, rig, native, progress)
     default = bench.default()
     chosen = default
@@ -271,8 +270,7 @@ class _Bench:
     """Judges settings on one run, each once."""
 
     def __init__(self, run: Run, rig: RigFile, native: Native, progress: Callable[[int], None]) -> None:
-        if rig.identifier.core == "f64":
-            rig = _with(rig, core="f32")
+        rig = _with(rig, core=rig.identifier.core_traits.in_c)
         self.run, self.given, self.native, self.progress = run, rig, native, progress
         self.held_back: HeldBack | None = None
         self.not_held_back = ""
@@ -315,7 +313,7 @@ class _Bench:
 
         With an angle beyond what the correction is good for, linear equations are no alternative.
         """
-        if rig.identifier.core == "q31":
+        if not rig.identifier.core_traits.corrects_angles:
             return
         small = largest_angle(self.run, None) <= VALID_ANGLE
         for full_angle in (True, False) if small else (True,):

@@ -24,7 +24,7 @@ from pvid.base.errors import PvidError
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
 from pvid.core.native import Native
-from pvid.link.frames import Estimate, Form, Hello
+from pvid.link.frames import Estimate, Hello
 from pvid.log.reader import LogReader
 from pvid.log.rig import run_of_log
 from pvid.log.rig_settings import rig_for
@@ -134,13 +134,13 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         return None
     told = {name: np.array(column) for name, column in columns.items()}
     t = (told["log_time"] - (told["log_time"][0] if began is None else began)) / 1e9
-    n_core = 4 if rig.identifier.zero and rig.identifier.form == "weak" else 3
+    n_core = rig.identifier.n_core
     counts = zip(*np.unique(told["reason"], return_counts=True), strict=True)
     if hello is None:
         title = path.name
     else:
-        form = "weak" if hello.form == Form.WEAK else "strong"
-        rig = replace(rig, identifier=replace(rig.identifier, form=form))  # type: ignore[arg-type]
+        form = hello.form_name
+        rig = replace(rig, identifier=replace(rig.identifier, form=form))
         title = f"{path.name}: board {hello.board}, {form} form, {hello.sample_rate:g} samples per second"
     return Recording(
         title=title,
@@ -170,7 +170,7 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     native = Native()
     run = replace(run, notes=(*run.notes, *resolution_note(rig, resolved(rig, run))))
     whole = run.whole()  # residuals and spectra have no place for a missing sample
-    given = whole if rig.identifier.core == "f64" else run
+    given = run if rig.identifier.core_traits.takes_gaps else whole
     try:
         result = identify(given, rig, native)
     except PvidError as error:
@@ -261,7 +261,7 @@ def _last(recording: Recording) -> list[str]:
 
 def _overlay(recording: Recording, angle: Axes, difference: Axes) -> None:
     """Measured against simulated angle, and their difference, over the last seconds of the run."""
-    n_core = 4 if recording.rig.identifier.zero and recording.rig.identifier.form == "weak" else 3
+    n_core = recording.rig.identifier.n_core
     p, friction = recording.p[:n_core], tuple(map(float, recording.p[n_core:]))
     run = recording.run
     simulated = simulated_angle(run, p, recording.rig.l1, friction) if recording.estimate else None
@@ -311,7 +311,7 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     axes[0].set_title("Convergence")
     kappa = axes[3]
     kappa.semilogy(t, np.where(recording.kappa > 0, recording.kappa, np.nan), color="C2", label="kappa")
-    if recording.rig.identifier.form == "weak":
+    if recording.rig.identifier.form_traits.publishes:
         kappa.axhline(KAPPA_MIN, color="C3", linestyle="--", label="nothing is published below")
     kappa.set_ylabel("kappa: how far apart\nthe data tell the parameters [1]")
     kappa.set_xlabel(f"time {recording.clock} [s]")
