@@ -11,7 +11,7 @@
 #include "solve/estimator_f32.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
-#include "judge/trust_tell.h"
+#include "judge/verdict.h"
 
 const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .kappa_min = 3.0e-5f,

@@ -6,7 +6,7 @@
 #include "number/count.h"
 #include "solve/estimator_q31.h"
 #include "judge/publication.h"
-#include "judge/trust_tell.h"
+#include "judge/verdict.h"
 
 /* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
 #define ARRIVED 19661 /* 0.3, Q16 */

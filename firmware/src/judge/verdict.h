@@ -1,6 +1,6 @@
 /* Counting and reporting of verdicts, for both cores. Private to the core. */
-#ifndef PVID_PRIVATE_TRUST_TELL_H
-#define PVID_PRIVATE_TRUST_TELL_H
+#ifndef PVID_PRIVATE_VERDICT_H
+#define PVID_PRIVATE_VERDICT_H
 
 #include <stdbool.h>
 
