@@ -77,9 +77,9 @@ TABLES: dict[str, dict[str, Column]] = {
         "updates": Column("1", "i8", "solves so far"),
         **{name: Column(unit, "f8", "estimate") for name, unit in {**PARAMETERS, **PHYSICAL}.items()},
         **_errors({**PARAMETERS, **PHYSICAL}),
-        "kappa": Column("1", "f8", "how far apart the data tell the parameters, 0 to 1"),
+        "kappa": Column("1", "f8", "identifiability of p[0]: 1 - R^2, 0 to 1"),
         "residual": Column("1", "f8", "standard deviation of a row's residual over the one it was configured with"),
-        "reason": Column("", "U24", "what became of the last group of rows"),
+        "reason": Column("", "U24", "reason of the last group of rows"),
     },
     "status": {
         **_WHERE,

@@ -123,7 +123,7 @@ class LiveView:
             shown, spread = with_error(value, error)
             table.add_row(symbol, meaning, shown, f"± {spread} {unit}", relative)
         if not self.history.newest:
-            table.add_row("none yet", "the first estimate comes when a window of samples is full")
+            table.add_row("none yet", "the first estimate follows when a window of samples is full")
         elif not self.history.is_physical:
             table.add_row("g*, l2, rho2", "outside the physical region")
         return table
