@@ -71,7 +71,7 @@ def scale_lines(config: ConfigQ31, l1: float, name: str) -> list[str]:
     """NAME_SCALE for a rod of l1 [m]."""
     scale = scale_of(config, l1)
     return [
-        "/* for pvid_kapitza_physical_q31; a macro, so that who does not ask for it is not told it is unused */",
+        "/* for pvid_kapitza_physical_q31; a macro, to avoid unused-variable warnings */",
         f"#define {name.upper()}_SCALE {{{scale.l1}, {scale.g_multiplier}, {scale.g_shift}, "
         f"{scale.d1_bits}, {scale.d2_bits}}}",
     ]
