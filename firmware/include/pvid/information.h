@@ -1,6 +1,6 @@
 /* pvid/information.h - the sums M, B, yy of least squares, kept so that they neither stall nor drift.
  *
- *   M = sum N N^T (distinct entries only),  B = sum N Y,  yy = sum Y^2,  weight = sum 1     (MATH.md 4)
+ *   M = sum N N^T (distinct entries only),  B = sum N Y,  yy = sum Y^2,  weight = sum 1     (theory.md 4)
  *
  * A plain float32 sum stops growing after 2^24 equal terms. Here each sum has two levels: terms go
  * into `low`, and after `block` groups of rows `low` is folded into `high`; what the fold cannot

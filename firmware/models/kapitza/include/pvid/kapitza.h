@@ -2,7 +2,7 @@
  *
  * Massless rod 1 of known length l1 hangs from the pivot A, body 2 from its end (centre of mass at
  * l2, radius of gyration rho2). The pivot's motion y_A(t) along Oy and the relative angle phi are
- * measured. Free parameters (MATH.md 1):
+ * measured. Free parameters (theory.md 1):
  *
  *   p = (w, d1, d2),  w = g/l1 [1/s^2],  d1 = 1 + L2 (1 + L1),  d2 = L1 L2,  L1 = l1/l2,  L2 = (l2/rho2)^2
  *
@@ -36,8 +36,8 @@ void pvid_kapitza_linear_f32(const pvid_kapitza_f32 *physical, float l1, float p
 bool pvid_kapitza_physical_f32(const pvid_estimate_f32 *estimate, float l1, pvid_kapitza_f32 *value,
                                pvid_kapitza_f32 *se);
 
-/* One row of the strong form (MATH.md 2) from phi[k] = d^k phi / dt^k, k = 0..4, and
- * u = y_A''/l1, u', u'' [1/s^2 ..]. Writes Y and N[11] in the order of MATH.md, with one liberty:
+/* One row of the strong form (theory.md 2) from phi[k] = d^k phi / dt^k, k = 0..4, and
+ * u = y_A''/l1, u', u'' [1/s^2 ..]. Writes Y and N[11] in the order of theory.md, with one liberty:
  * the binomial coefficients 3, 3 and 4, 6, 4 stand in theta instead of N,
  *
  *   theta = (w, w^2, d1, 3 d1 w, 3 d1 w^2, d1 w^3, d2, 4 d2 w, 6 d2 w^2, 4 d2 w^3, d2 w^4),

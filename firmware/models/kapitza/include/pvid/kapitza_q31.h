@@ -1,6 +1,6 @@
 /* pvid/kapitza_q31.h - the pendulum's physical parameters from a fixed-point estimate, in integers alone.
  *
- *   g = w l1,   l2 = l1 (d1 - d2 - 1)/d2,   rho2 = l1 sqrt(d1 - d2 - 1)/d2          (MATH.md 1)
+ *   g = w l1,   l2 = l1 (d1 - d2 - 1)/d2,   rho2 = l1 sqrt(d1 - d2 - 1)/d2          (theory.md 1)
  *
  * Lengths and g are int32 with 24 bits after the point: metres up to 127 m in steps of 60 nm, m/s^2 likewise.
  */

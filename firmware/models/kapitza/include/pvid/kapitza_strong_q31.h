@@ -1,4 +1,4 @@
-/* pvid/kapitza_strong_q31.h - the strong form of Kapitza's pendulum in integers (MATH.md 2).
+/* pvid/kapitza_strong_q31.h - the strong form of Kapitza's pendulum in integers (theory.md 2).
  *
  * A row is made of derivatives in one time unit: all orders of phi in one format, u, u', u'' in another, so that
  * products whose orders add up to the same stand in the same format. Each entry of the row is shifted to a format of

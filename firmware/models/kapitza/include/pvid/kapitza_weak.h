@@ -1,6 +1,6 @@
 /* pvid/kapitza_weak.h - Kapitza's pendulum in the weak form: five or eight entries of theta.
  *
- * The weak form (MATH.md 5) multiplies the equation of motion by test functions and integrates by
+ * The weak form (theory.md 5) multiplies the equation of motion by test functions and integrates by
  * parts, so that no derivative of the angle is left. It is still linear, Y = N^T theta, with
  *
  *   theta = (d1, d1 w, d2, d2 w, d2 w^2, d2 c, d2 c w, d2 c w^2),   p = (w, d1, d2, c)
