@@ -108,7 +108,7 @@ def to_c_header_q31(config: WeakConfigQ31, l1: float, name: str, made_by: str) -
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
-            '#include "pvid/kapitza_q31.h"',
+            f'#include "pvid/{MODEL.name}_q31.h"',
             '#include "pvid/weak_q31.h"',
             "",
             f"#if PVID_MAX_TAPS < {d.taps} || PVID_MAX_DECIMATION < {d.decimation} || \\",
