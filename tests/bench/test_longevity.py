@@ -407,5 +407,5 @@ def test_the_table_of_held_out_signals_counts_what_is_silent(results: Path) -> N
     assert marker == "longevity-held-out"
     assert header == ("form", "cells", "right", "alarm", "silently wrong", "not finite", "wrong after")
     assert rows[0] == ("weak", "8", "8", "0", "0", "0", "")
-    assert rows[1] == ("strong", "14", "10", "2", "2", "0", f"{HELD_OUT[1].title}; {HELD_OUT[0].title}"), rows[1]
+    assert rows[1] == ("strong", "14", "10", "2", "2", "0", f"{HELD_OUT[0].title}; {HELD_OUT[1].title}")
     assert [row[:2] for row in rows[2:]] == [("weak q31", "0"), ("strong q31", "0"), ("strong fine", "0")]

@@ -57,7 +57,7 @@ def test_gcc_fuses_nothing_at_its_default_standard(tmp_path: Path) -> None:
 
 def test_gcc_warns_of_nothing_when_it_vectorises() -> None:
     options = ["-std=c99", "-O3", "-march=haswell", "-Wall", "-Wextra", *INCLUDES, "-S", "-o", "/dev/null"]
-    for name in ("system_q31.c", "stages_q31.c", "window_f32.c"):
+    for name in ("system_q31.c", "staged_q31.c", "window_f32.c"):
         done = subprocess.run(["gcc", *options, str(source(name))], capture_output=True, text=True, check=True)
         assert done.stderr == ""
 

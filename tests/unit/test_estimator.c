@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "solve/assess_f32.h"
 #include "solve/estimator_f32.h"
 #include "pvid/pvid.h"
 

@@ -1,4 +1,4 @@
-/* The strong form in float32 against MATH.md's formulas written out in double. */
+/* The strong form in float32 against theory.md's formulas written out in double. */
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -42,7 +42,7 @@ static int make_rows(void **state)
 
 static const float p[3] = {31.7f, 8.9f, 5.6f};
 
-/* N of MATH.md 2, its theta, and C by columns. */
+/* N of theory.md 2, its theta, and C by columns. */
 static void paper_row(int i, double n[N], double *y)
 {
     const double z0 = (double)phi[i][0], z2 = (double)phi[i][2], z3 = (double)phi[i][3], z4 = (double)phi[i][4];
@@ -232,7 +232,7 @@ static void physical_parameters_come_back(void **state)
     pvid_estimate_f32 estimate;
     memset(&estimate, 0, sizeof estimate);
     pvid_kapitza_linear_f32(&truth, 0.3f, estimate.p);
-    assert_float_equal(estimate.p[0], 31.666667f, 1.0e-5f); /* MATH.md 6; a few ulp */
+    assert_float_equal(estimate.p[0], 31.666667f, 1.0e-5f); /* theory.md 6; a few ulp */
     assert_float_equal(estimate.p[1], 8.875f, 5.0e-6f);
     assert_float_equal(estimate.p[2], 5.625f, 5.0e-6f);
     estimate.covariance[0][0] = 1.0e-4f;
@@ -276,27 +276,48 @@ static void outside_the_physical_region_nothing_is_written(void **state)
     }
 }
 
-static void absorbing_a_row_is_adding_it_and_projecting(void **state)
+/* The model's own step, which writes eleven entries and three parameters out, against the estimator's. */
+static void own_step_has_the_bits_of_row_projection_and_solve(void **state)
 {
     (void)state;
-    float high[PVID_MAX_SUMS], low[PVID_MAX_SUMS], same_low[PVID_MAX_SUMS], sums[PVID_MAX_SUMS];
-    for (int k = 0; k < PVID_MAX_SUMS; k++) {
-        high[k] = 1.0e6f * noise();
-        low[k] = 10.0f * noise();
-        same_low[k] = low[k];
-    }
-    for (int i = 0; i < ROWS; i++) {
-        float s[PVID_MAX_P][PVID_MAX_P], expected_s[PVID_MAX_P][PVID_MAX_P];
-        float f[PVID_MAX_P], expected_f[PVID_MAX_P];
-        pvid_kapitza_strong_f32.accumulate(rows[i], values[i], high, low, sums);
-        (void)pvid_kapitza_strong_f32.project(p, sums, &sums[pvid_kapitza_strong_f32.n_moments], expected_s,
-                                              expected_f);
-        pvid_kapitza_strong_f32.absorb(p, rows[i], values[i], high, same_low, s, f);
-        assert_memory_equal(same_low, low, (pvid_kapitza_strong_f32.n_moments + N + 2u) * sizeof low[0]);
-        assert_memory_equal(f, expected_f, 3 * sizeof f[0]);
+    pvid_model_f32 plain = pvid_kapitza_strong_f32;
+    plain.step = NULL;
+    float theta[N];
+    plain.theta(p, theta);
+    const float feedback_hz[] = {0.0f, 10.0f, 10.0f, 0.0f};
+    const float dead_zone[] = {0.0f, 0.0f, 5.0f, 30.0f};
+    for (int k = 0; k < 4; k++) {
+        pvid_estimator_f32 own, other;
+        pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
         for (int a = 0; a < 3; a++) {
-            assert_memory_equal(&s[a][a], &expected_s[a][a], (3 - (size_t)a) * sizeof s[0][0]);
+            config.start[a] = 1.1f * p[a];
+            config.start_sd[a] = p[a];
+            config.lower[a] = 0.01f * p[a];
+            config.upper[a] = 100.0f * p[a];
         }
+        config.row_sd = 3000.0f;
+        config.update_rate_hz = 1000.0f;
+        config.forgetting_s = 1.0f;
+        config.feedback_hz = feedback_hz[k];
+        config.dead_zone = dead_zone[k];
+        config.divider = (uint16_t)(1 + (k % 2));
+        config.model = &pvid_kapitza_strong_f32;
+        assert_int_equal(pvid_estimator_init_f32(&own, &config), PVID_OK);
+        config.model = &plain;
+        assert_int_equal(pvid_estimator_init_f32(&other, &config), PVID_OK);
+        for (int i = 0; i < 20 * ROWS; i++) {
+            const float *row = rows[i % ROWS];
+            float y = config.row_sd * noise();
+            for (int j = 0; j < N; j++) {
+                y += row[j] * theta[j];
+            }
+            assert_int_equal(pvid_estimator_step_f32(&own, row, y), pvid_estimator_step_f32(&other, row, y));
+            own.model = other.model;
+            assert_memory_equal(&own, &other, sizeof own);
+            own.model = &pvid_kapitza_strong_f32;
+        }
+        assert_true(own.counters.updates > 0);
+        assert_true((own.counters.at_rest > 0) == (dead_zone[k] > 0.0f));
     }
 }
 
@@ -307,7 +328,7 @@ int main(void)
         cmocka_unit_test(jacobian_is_the_derivative_of_theta),
         cmocka_unit_test(projection_by_shifts_is_the_dense_product),
         cmocka_unit_test(innovation_is_the_residual_and_its_gradient),
-        cmocka_unit_test(absorbing_a_row_is_adding_it_and_projecting),
+        cmocka_unit_test(own_step_has_the_bits_of_row_projection_and_solve),
         cmocka_unit_test(physical_parameters_come_back),
         cmocka_unit_test(outside_the_physical_region_nothing_is_written),
     };

@@ -22,6 +22,7 @@
 #include "link.h"
 #include "port.h"
 #include "receiver.h"
+#include "pvid/fnv_word.h"
 #include "pvid/little_endian.h"
 #include "sensor.h"
 
@@ -78,7 +79,7 @@ static struct {
 
 static struct {
     uint32_t clock_us; /* when the clock was last read */
-    uint32_t due_ns;   /* elapsed time whose samples are still to be taken */
+    uint32_t due_ns;   /* elapsed time whose samples are still due */
     uint32_t count;    /* samples in `frame`: the last ones before stream.ticks */
     uint8_t frame[IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * RAW_SAMPLES)]; /* payload of a frame of samples */
 } field;
@@ -207,7 +208,7 @@ static void announce(void)
     } else if (sampling()) {
         answer(IDENTIFIER_CONFIGURE, stream.configuration, sizeof stream.configuration);
     } else {
-        /* the PC knows what it configured */
+        /* the PC has sent this configuration */
     }
 }
 
@@ -283,7 +284,7 @@ static bool sample_due(bool room)
     return true;
 }
 
-/* ---- what comes from the PC */
+/* ---- requests from the PC */
 
 static void start_over(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES])
 {

@@ -9,8 +9,8 @@
  *       .c_row = row, .c_column = column, .theta = my_theta, .jacobian = my_jacobian };
  *
  * Optional functions: `accumulate` if entries of M repeat (fewer sums than n_theta (n_theta + 1) / 2); `project`
- * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set; `absorb` may
- * be added to them. `noise` enables the noise check (noise_margin of estimator.h).
+ * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set; `step` may be
+ * added to them. `noise` enables the noise check (noise_margin of estimator.h).
  */
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
@@ -18,12 +18,14 @@
 #include <stdint.h>
 
 #include "pvid/config.h"
+#include "pvid/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 typedef struct pvid_model_f32 pvid_model_f32;
+typedef struct pvid_estimator_f32 pvid_estimator_f32; /* estimator.h */
 
 struct pvid_model_f32 {
     uint8_t n_theta; /* entries of theta and N, 1..PVID_MAX_THETA */
@@ -49,16 +51,15 @@ struct pvid_model_f32 {
      * C^T (b - M theta(p)). Returns theta^T M theta - 2 theta^T b. NULL: by the pattern of C, with b relative to
      * theta(p); see estimator.h. */
     float (*project)(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[]);
-    /* accumulate and project in one call, with the same bits, without the returned value. NULL: one after the
-     * other. */
-    void (*absorb)(const float p[], const float n[], float y, const float high[], float low[], float s[][PVID_MAX_P],
-                   float f[]);
     /* Information of the sensors' noise alone at p: what noise of unit variance adds to C^T M C per unit of
      * weight, s[i][j] for i <= j < n_p, from the noise traces of the rows. NULL: unknown; the noise check is
      * skipped. */
     void (*noise)(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P]);
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
+    /* pvid_estimator_step_f32 in one call, with the same bits, given innovate's results at p (needed while g < 1):
+     * saves storing and reloading sums and S where a solve follows every row. NULL: one after the other. */
+    pvid_reason (*step)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[]);
 };
 
 #ifdef __cplusplus

@@ -1,19 +1,13 @@
 #include "number/uncontracted.h"
 
-/* What is known of p: standard errors, kappa, residual. */
+#include "solve/assess_f32.h"
+
 #include <math.h>
 #include <stddef.h>
-#include <string.h>
 
-#include "solve/cholesky_f32.h"
-#include "solve/estimator_f32.h"
 #include "number/finite_f32.h"
-#include "pvid/estimator.h"
 
-/* Rounding floor of yy - 2 B^T theta + theta^T M theta, relative to yy: a few ulp of each term. */
-#define RESIDUAL_FLOOR 4.8e-7f
-
-float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy)
+float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy, float floor)
 {
     const pvid_model_f32 *model = self->model;
     const float *tail = &sums[model->n_moments + model->n_theta];
@@ -22,7 +16,6 @@ float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float su
     if (!(freedom >= 1.0f)) {
         return self->row_variance;
     }
-    const float floor = pvid_is_relative_f32(model) ? (self->expected * freedom) : (RESIDUAL_FLOOR * yy);
     const float sum = (yy + energy) + self->information.rounding;
     const float residual = (sum <= PVID_RESIDUAL_MAX) ? sum : PVID_RESIDUAL_MAX;
     return ((residual > floor) ? residual : floor) / freedom;
@@ -146,54 +139,5 @@ void pvid_estimator_scale_f32(const pvid_estimator_f32 *self, float wide, bool k
     }
     if (!known) {
         assess_as_start(self, estimate);
-    }
-}
-
-static void assess_in_stages(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate)
-{
-    pvid_estimator_solve_f32 solve;
-    pvid_estimator_begin_assessment_f32(self, &solve, estimate);
-    bool done = false;
-    for (uint16_t left = pvid_estimator_assessment_stages_f32(self); (left > 0u) && !done; left--) {
-        done = pvid_estimator_assess_advance_f32(self, &solve);
-    }
-}
-
-static void assess_at_once(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate)
-{
-    const pvid_model_f32 *model = self->model;
-    float sums[PVID_MAX_SUMS];
-    float s[PVID_MAX_P][PVID_MAX_P];
-    float f[PVID_MAX_P];
-    memset(estimate, 0, sizeof *estimate);
-    memcpy(estimate->p, self->p, sizeof estimate->p);
-    pvid_information_read_f32(&self->information, sums);
-    estimate->weight = sums[model->n_moments + model->n_theta + 1u];
-    const float energy = model->project(self->p, sums, &sums[model->n_moments], s, f);
-    const float variance = pvid_estimator_variance_f32(self, sums, energy);
-    const float wide = variance * self->correlation;
-    estimate->residual_sd = sqrtf(variance);
-    pvid_estimator_find_kappa_f32(self, (const float (*)[PVID_MAX_P])s, estimate);
-    pvid_cholesky_f32 factor;
-    const bool known = pvid_estimator_factor_wide_f32(self, s, wide, &factor);
-    if (known) {
-        pvid_cholesky_inverse_f32(&factor, estimate->covariance);
-    }
-    pvid_estimator_scale_f32(self, wide, known, estimate);
-}
-
-void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate)
-{
-    if (estimate == NULL) {
-        return;
-    }
-    if (!pvid_estimator_is_ready_f32(self)) {
-        memset(estimate, 0, sizeof *estimate);
-        return;
-    }
-    if (pvid_is_relative_f32(self->model)) {
-        assess_in_stages(self, estimate);
-    } else {
-        assess_at_once(self, estimate);
     }
 }

@@ -10,6 +10,7 @@
 #include "solve/estimator_f32.h"
 #include "number/finite_f32.h"
 #include "kapitza_row_f32.h"
+#include "kapitza_step_f32.h"
 #include "judge/misfit_f32.h"
 
 /* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
@@ -116,7 +117,7 @@ static inline bool differentiate(pvid_strong_f32 *self, float phi, float y, floa
     return true;
 }
 
-/* A row: judged, let in or not, and solved with. */
+/* Judges a row, adds it if the gate accepts it, and solves. */
 static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAPITZA_STRONG_THETA], float y)
 {
     pvid_estimator_f32 *estimator = &self->estimator;
@@ -129,7 +130,7 @@ static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAP
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    const pvid_reason reason = pvid_estimator_step_innovation_f32(estimator, n, y, e, gradient);
+    const pvid_reason reason = pvid_kapitza_step_f32(estimator, n, y, e, gradient);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;
     }

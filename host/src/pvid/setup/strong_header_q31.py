@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pvid.models.kapitza import MODEL
 from pvid.settings.q31 import StrongConfigQ31
 from pvid.setup.weak_header_q31 import estimator_lines, gate_line, integer_array, integer_list, scale_lines, unit_lines
 
@@ -35,7 +36,7 @@ def strong_header_q31(config: StrongConfigQ31, l1: float, name: str, made_by: st
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
-            '#include "pvid/kapitza_q31.h"',
+            f'#include "pvid/{MODEL.name}_q31.h"',
             '#include "pvid/strong_q31.h"',
             "",
             f"#if PVID_MAX_WINDOW < {bank.window}",

@@ -8,10 +8,10 @@ from dataclasses import fields
 import numpy as np
 import numpy.typing as npt
 
+from pvid.models.kapitza import MODEL
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
 from pvid.setup.q31 import ConfigQ31, scale_of, units_of
 
-_P_UNITS = ("1/s^2", "", "", "rad")
 _TABLES = ("smooth", "second", "chi", "multiplier", "gram")
 
 
@@ -62,8 +62,8 @@ def gate_line(gate: GateConfigQ31) -> str:
 def unit_lines(config: ConfigQ31) -> list[str]:
     """What one unit of each parameter is, as lines of a comment."""
     return [
-        f" *   p[{i}] = {label}: one unit is {unit:.17g} {text}".rstrip()
-        for i, (label, unit, text) in enumerate(zip(("w", "d1", "d2", "c"), units_of(config), _P_UNITS, strict=False))
+        f" *   p[{i}] = {one.name}: one unit is {unit:.17g} {one.unit}".rstrip()
+        for i, (one, unit) in enumerate(zip(MODEL.parameters, units_of(config), strict=False))
     ]
 
 
@@ -71,7 +71,7 @@ def scale_lines(config: ConfigQ31, l1: float, name: str) -> list[str]:
     """NAME_SCALE for a rod of l1 [m]."""
     scale = scale_of(config, l1)
     return [
-        "/* for pvid_kapitza_physical_q31; a macro, so that who does not ask for it is not told it is unused */",
+        "/* for pvid_kapitza_physical_q31; a macro, to avoid unused-variable warnings */",
         f"#define {name.upper()}_SCALE {{{scale.l1}, {scale.g_multiplier}, {scale.g_shift}, "
         f"{scale.d1_bits}, {scale.d2_bits}}}",
     ]
@@ -108,7 +108,7 @@ def to_c_header_q31(config: WeakConfigQ31, l1: float, name: str, made_by: str) -
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
-            '#include "pvid/kapitza_q31.h"',
+            f'#include "pvid/{MODEL.name}_q31.h"',
             '#include "pvid/weak_q31.h"',
             "",
             f"#if PVID_MAX_TAPS < {d.taps} || PVID_MAX_DECIMATION < {d.decimation} || \\",

@@ -1,15 +1,20 @@
 #include "number/uncontracted.h"
 
-/* The solve and the assessment in stages, for a model without functions of its own. */
+/* The engine of models that are known by theta, C and the pattern of C: rows relative to p, the solve and the
+ * assessment in stages. */
+#include "solve/staged_f32.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-#include "solve/cholesky_f32.h"
-#include "solve/estimator_f32.h"
+#include "number/count.h"
 #include "number/finite_f32.h"
+#include "solve/assess_f32.h"
+#include "solve/direct_f32.h"
 #include "solve/pattern_f32.h"
-#include "pvid/estimator.h"
+#include "solve/row_f32.h"
+#include "solve/step_f32.h"
 
 enum {
     STAGE_READ,        /* the sums and C */
@@ -21,17 +26,60 @@ enum {
     STAGE_COMMIT,
     STAGE_FOLD,
     STAGE_DONE,
-    STAGE_KAPPA, /* of an assessment, after STAGE_ABOVE_NOISE */
+    STAGE_DIRECT, /* all of a solve, by the direct engine */
+    STAGE_KAPPA,  /* of an assessment, after STAGE_ABOVE_NOISE */
     STAGE_WIDEN,
     STAGE_INVERT, /* n_p times: a column */
     STAGE_SCALE
 };
 
-/* What a step leaves wrong in rr, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
+/* Rounding error of rr per step, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
 #define ROUNDING 2.4e-7f
 
 #define ROWS_PER_STAGE 4u
 #define COLUMNS_PER_STAGE 3u
+
+/* ---- rows ---- */
+
+/* e = y - N^T theta and, while g < 1, gradient = C^T N, by theta and the pattern of C. */
+static inline float innovate(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
+{
+    const pvid_model_f32 *model = self->model;
+    if (self->gain < 1.0f) {
+        float c[PVID_MAX_THETA * PVID_MAX_P];
+        model->jacobian(self->p, c);
+        pvid_pattern_transpose_times_f32(model, c, n, gradient);
+    }
+    float e = y;
+    for (size_t i = 0; i < model->n_theta; i++) {
+        e -= n[i] * self->theta[i];
+    }
+    return e;
+}
+
+pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float y)
+{
+    const pvid_reason reason = pvid_row_accept_f32(self, n, y, pvid_row_squares_f32(self->model->n_theta, n, y));
+    if (reason != PVID_ACCUMULATED) {
+        return reason;
+    }
+    float gradient[PVID_MAX_P];
+    const float e = innovate(self, n, y, gradient);
+    if (!((e * e) <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT))) {
+        pvid_count_up(&self->counters.rejected_saturated);
+        return PVID_REJECTED_SATURATED;
+    }
+    if (self->gain < 1.0f) {
+        pvid_row_accumulate_innovation_f32(self, gradient, e);
+    }
+    self->energy += e * e;
+    self->group_weight += self->information.row_weight;
+    pvid_information_add_f32(&self->information, self->model, n, e, NULL);
+    pvid_count_up(&self->counters.rows);
+    return PVID_ACCUMULATED;
+}
+
+/* ---- the solve ---- */
 
 static void hold_solve(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, pvid_reason reason)
 {
@@ -68,13 +116,19 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
     return solve->index < model->n_p;
 }
 
-/* What the noise is taken to be: what it was said to be while p may still be far off, which makes residuals of its
- * own; what it was found to be once the result is judged. */
+/* s^2 of a row. */
+static float variance_of(const pvid_estimator_f32 *self, const float sums[])
+{
+    return pvid_estimator_variance_f32(self, sums, 0.0f, self->expected * pvid_estimator_freedom_f32(self, sums));
+}
+
+/* Variance of the noise: the configured one for a solve, because a distant p adds residuals of its own; the
+ * measured one for an assessment. */
 static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const float weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
     const bool judging = solve->estimate != NULL;
-    solve->variance = judging ? pvid_estimator_variance_f32(self, solve->sums, 0.0f) : self->row_variance;
+    solve->variance = judging ? variance_of(self, solve->sums) : self->row_variance;
     solve->above_noise =
         pvid_estimator_is_above_noise_f32(self, (const float (*)[PVID_MAX_P])solve->s, solve->variance, weight);
 }
@@ -103,8 +157,7 @@ static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
 static bool solve_in_dead_zone(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
 {
     return (self->dead_zone > 0.0f) &&
-           pvid_estimator_is_in_dead_zone_f32(self, &solve->factor, solve->force,
-                                              pvid_estimator_variance_f32(self, solve->sums, 0.0f));
+           pvid_estimator_is_in_dead_zone_f32(self, &solve->factor, solve->force, variance_of(self, solve->sums));
 }
 
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
@@ -192,6 +245,7 @@ static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
         return (solve->estimate == NULL) ? (uint8_t)STAGE_FACTOR : (uint8_t)STAGE_KAPPA;
     case STAGE_COMMIT:
         return solve->ends_group ? (uint8_t)STAGE_FOLD : (uint8_t)STAGE_DONE;
+    case STAGE_DIRECT:
     case STAGE_SCALE:
         return STAGE_DONE;
     default:
@@ -219,10 +273,9 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
 {
     reset_solve(solve);
     solve->ends_group = ends_group;
-    if (!pvid_is_relative_f32(self->model)) {
-        return;
-    }
-    if (ends_group) {
+    if (self->engine == PVID_ENGINE_DIRECT) {
+        solve->stage = STAGE_DIRECT;
+    } else if (ends_group) {
         solve->energy = self->energy;
         self->energy = 0.0f;
         self->group_weight = 0.0f;
@@ -279,10 +332,6 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
 {
     const pvid_model_f32 *model = self->model;
     bool repeat = false;
-    if (!pvid_is_relative_f32(model) && (solve->stage != STAGE_DONE)) {
-        solve->reason = pvid_estimator_solve_sums_f32(self, solve->ends_group);
-        solve->stage = STAGE_DONE;
-    }
     switch (solve->stage) {
     case STAGE_READ:
     case STAGE_PROJECT:
@@ -304,6 +353,9 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
         break;
     case STAGE_FOLD:
         pvid_information_end_group_f32(&self->information);
+        break;
+    case STAGE_DIRECT:
+        solve->reason = pvid_direct_solve_f32(self, solve->ends_group);
         break;
     default:
         return true;
@@ -360,7 +412,7 @@ static size_t projection_stages(const pvid_model_f32 *model)
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
 {
     const pvid_model_f32 *model = self->model;
-    if (!pvid_is_relative_f32(model)) {
+    if (self->engine == PVID_ENGINE_DIRECT) {
         return 1;
     }
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
@@ -370,29 +422,4 @@ uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_gro
 uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self)
 {
     return (uint16_t)(projection_stages(self->model) + 4u + self->model->n_p);
-}
-
-/* All stages of a solve at once. */
-static pvid_reason solve_in_stages(pvid_estimator_f32 *self, bool ends_group)
-{
-    if (!pvid_estimator_is_ready_f32(self)) {
-        return PVID_NOT_READY;
-    }
-    pvid_estimator_solve_f32 solve;
-    pvid_estimator_begin_f32(self, &solve, ends_group);
-    bool done = false;
-    for (uint16_t left = pvid_estimator_stages_f32(self, ends_group); (left > 0u) && !done; left--) {
-        done = pvid_estimator_advance_f32(self, &solve);
-    }
-    return solve.reason;
-}
-
-pvid_reason pvid_estimator_update_f32(pvid_estimator_f32 *self)
-{
-    return solve_in_stages(self, true);
-}
-
-pvid_reason pvid_estimator_iterate_f32(pvid_estimator_f32 *self)
-{
-    return solve_in_stages(self, false);
 }

@@ -1,0 +1,107 @@
+#include "number/uncontracted.h"
+
+/* pvid_direct_step_f32 for the strong form, at every tick: its eleven entries and three parameters written out, the
+ * same bits in half the instructions. */
+#include "kapitza_step_f32.h"
+
+#include <stddef.h>
+
+#include "kapitza_sums_f32.h"
+#include "number/unroll.h"
+#include "solve/cholesky_f32.h"
+#include "solve/direct_f32.h"
+#include "solve/row_f32.h"
+#include "solve/step_f32.h"
+
+/* pvid_row_squares_f32 of 11 entries. */
+static inline float sum_of_squares_strong(const float n[], float y)
+{
+    float squares = y * y;
+    PVID_UNROLL
+    for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
+        squares += n[i] * n[i];
+    }
+    return squares;
+}
+
+static inline float step_size_three(const pvid_estimator_f32 *self, const float dp[])
+{
+    const uint32_t first = pvid_estimator_relative_step_f32(self, 0, dp[0]);
+    const uint32_t second = pvid_estimator_relative_step_f32(self, 1, dp[1]);
+    const uint32_t third = pvid_estimator_relative_step_f32(self, 2, dp[2]);
+    const uint32_t larger = (second > first) ? second : first;
+    return pvid_from_bits_f32((third > larger) ? third : larger);
+}
+
+static inline void apply_step_three(pvid_estimator_f32 *self, const float dp[], float size)
+{
+    const float part = pvid_estimator_step_factor_f32(self, size);
+    bool bounded = false;
+    self->p[0] = pvid_estimator_bounded_f32(self, 0, part * dp[0], &bounded);
+    self->p[1] = pvid_estimator_bounded_f32(self, 1, part * dp[1], &bounded);
+    self->p[2] = pvid_estimator_bounded_f32(self, 2, part * dp[2], &bounded);
+    if (bounded) {
+        pvid_count_up(&self->counters.bounded);
+    }
+}
+
+/* pvid_direct_move_f32 for three parameters and no dead zone: the same, written out, so that S, its factor and dp stay
+ * in registers. */
+static pvid_reason move_three(pvid_estimator_f32 *self, float gain, float s[][PVID_MAX_P], float rhs[])
+{
+    float dp[PVID_MAX_P];
+    pvid_cholesky_f32 factor;
+    pvid_direct_complete_f32(self, 0, gain, s, rhs);
+    pvid_direct_complete_f32(self, 1, gain, s, rhs);
+    pvid_direct_complete_f32(self, 2, gain, s, rhs);
+    if (!pvid_cholesky_factor_three_f32(&factor, (const float (*)[PVID_MAX_P])s)) {
+        return pvid_direct_hold_f32(&self->counters.held_pivot, PVID_HELD_PIVOT);
+    }
+    if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
+        return pvid_direct_hold_f32(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
+    }
+    pvid_cholesky_solve_three_f32(&factor, rhs, dp);
+    const float size = step_size_three(self, dp);
+    if (!pvid_finite_f32(size)) {
+        return pvid_direct_hold_f32(&self->counters.held_pivot, PVID_HELD_PIVOT);
+    }
+    apply_step_three(self, dp, size);
+    pvid_count_up(&self->counters.updates);
+    return PVID_UPDATED;
+}
+
+/* Adds a row to the sums and solves with them. */
+static inline pvid_reason add_and_solve(pvid_estimator_f32 *self, const float n[], float y)
+{
+    pvid_information_f32 *information = &self->information;
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float force[PVID_MAX_P];
+    if (self->dead_zone > 0.0f) {
+        float sums[PVID_MAX_SUMS];
+        pvid_kapitza_accumulate_f32(n, y, information->high, information->low, sums);
+        const float energy = pvid_kapitza_project_f32(self->p, sums, &sums[PVID_KAPITZA_STRONG_MOMENTS], s, force);
+        return pvid_direct_move_f32(self, self->gain, sums, energy, s, force);
+    }
+    pvid_kapitza_absorb_f32(self->p, n, y, information->high, information->low, s, force);
+    return move_three(self, self->gain, s, force);
+}
+
+pvid_reason pvid_kapitza_step_f32(pvid_estimator_f32 *self, const float n[], float y, float e, const float gradient[])
+{
+    pvid_reason reason = pvid_row_accept_f32(self, n, y, sum_of_squares_strong(n, y));
+    if (reason != PVID_ACCUMULATED) {
+        return reason;
+    }
+    if (self->gain < 1.0f) {
+        pvid_row_accumulate_innovation_f32(self, gradient, e);
+    }
+    pvid_count_up(&self->counters.rows);
+    if (pvid_estimator_is_due_f32(self)) {
+        reason = add_and_solve(self, n, y);
+    } else {
+        float sums[PVID_MAX_SUMS];
+        pvid_kapitza_accumulate_f32(n, y, self->information.high, self->information.low, sums);
+    }
+    pvid_information_end_group_f32(&self->information);
+    return reason;
+}

@@ -1,0 +1,50 @@
+/* What both engines do with a row before it is added to the sums. Private to the core, inlined. */
+#ifndef PVID_ROW_F32_H
+#define PVID_ROW_F32_H
+
+#include "number/count.h"
+#include "number/finite_f32.h"
+#include "solve/estimator_f32.h"
+
+/* y^2 + N^T N, in the order of the entries; four at a time, for the loop costs as much as they do. */
+static inline float pvid_row_squares_f32(size_t n_theta, const float n[], float y)
+{
+    float squares = y * y;
+    size_t i = 0;
+    for (size_t fours = n_theta / 4u; fours > 0u; fours--) {
+        squares += n[i] * n[i];
+        squares += n[i + 1u] * n[i + 1u];
+        squares += n[i + 2u] * n[i + 2u];
+        squares += n[i + 3u] * n[i + 3u];
+        i += 4u;
+    }
+    for (; i < n_theta; i++) {
+        squares += n[i] * n[i];
+    }
+    return squares;
+}
+
+/* Counts a row that is refused. Its sum of squares is within the limit only if every entry is a number of reasonable
+ * size: one comparison for all of them. The entry that breaks the rule is sought only afterwards. */
+static inline pvid_reason pvid_row_accept_f32(pvid_estimator_f32 *self, const float n[], float y, float squares)
+{
+    if (squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {
+        return PVID_ACCUMULATED;
+    }
+    bool finite = pvid_finite_f32(y);
+    for (size_t i = 0; i < self->model->n_theta; i++) {
+        finite = finite && pvid_finite_f32(n[i]);
+    }
+    pvid_count_up(finite ? &self->counters.rejected_saturated : &self->counters.rejected_not_finite);
+    return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
+}
+
+/* innovation += C^T N e */
+static inline void pvid_row_accumulate_innovation_f32(pvid_estimator_f32 *self, const float gradient[], float e)
+{
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        self->innovation[a] += gradient[a] * e;
+    }
+}
+
+#endif
