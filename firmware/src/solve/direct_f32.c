@@ -17,7 +17,7 @@
 
 /* ---- rows ---- */
 
-/* What comes before a row is added to the sums. */
+/* Before a row is added to the sums: checks it and accumulates its innovation. */
 static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y, float e, const float gradient[])
 {
     const pvid_reason reason = pvid_row_accept_f32(self, n, y, pvid_row_squares_f32(self->model->n_theta, n, y));

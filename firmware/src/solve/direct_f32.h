@@ -1,5 +1,4 @@
-/* The engine of models that project their sums by themselves, and what their own `step` shares with it. Private to the
- * core. */
+/* The engine of models with their own `project`, and the parts shared with their `step`. Private to the core. */
 #ifndef PVID_DIRECT_F32_H
 #define PVID_DIRECT_F32_H
 
@@ -20,14 +19,14 @@ pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, const flo
 
 /* ---- inlined ---- */
 
-/* The model's `innovate`, while g < 1; else nothing depends on it. */
+/* The model's innovation while g < 1; otherwise it is not needed, and 0. */
 static inline float pvid_direct_innovation_f32(const pvid_estimator_f32 *self, const float n[], float y,
                                                float gradient[])
 {
     return (self->gain < 1.0f) ? self->model->innovate(self->p, n, y, gradient) : 0.0f;
 }
 
-/* Counts why p stays where it is. */
+/* Counts and returns why p is held. */
 static inline pvid_reason pvid_direct_hold_f32(uint32_t *counter, pvid_reason reason)
 {
     pvid_count_up(counter);

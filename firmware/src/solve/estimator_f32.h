@@ -1,4 +1,4 @@
-/* What every part of the estimator asks of it. Private to the core. */
+/* Shared by all parts of the estimator. Private to the core. */
 #ifndef PVID_ESTIMATOR_F32_H
 #define PVID_ESTIMATOR_F32_H
 

@@ -9,7 +9,7 @@
 #include "number/scaled_q31.h"
 
 #define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
-#define TERM_DOWN 18                /* a shift that brings a row's limit times 30 bits there */
+#define TERM_DOWN 18                /* right shift of a row's limit times 30 bits to that range */
 #define FORMAT_MAX 64
 #define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
 #define DEAD_ZONE_MAX ((uint32_t)100 << 16)

@@ -12,7 +12,7 @@
 #include "number/integer_q31.h"
 #include "pvid/estimator_q31.h"
 
-#define PVID_CLAMP_LIMIT (2 * PVID_SUM_LIMIT) /* of |b|, rr and what a step may add to them */
+#define PVID_CLAMP_LIMIT (2 * PVID_SUM_LIMIT) /* of |b|, rr and their change by a step */
 #define PVID_ROW_SD_BITS 8                    /* format of row_sd beyond Y's */
 #define PVID_SIZE_BITS 22                     /* of the size of a step: |dp| in it still is an int64 */
 #define PVID_S_BITS 32                        /* of the unit of s; see pvid_estimator_solve_q31 */
@@ -47,7 +47,7 @@ static inline const int64_t *pvid_b_of_q31(const pvid_information_q31 *informati
 /* (sd 2^exponent / start_sd)^2 = prior 2^-(returned), prior of 31 bits; 0 < sd < 2^31. */
 int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior);
 
-/* *e = Y - N^T theta of a row; whether N, Y and e fit, that is whether the row may be taken in. |e| < 2^45. */
+/* *e = Y - N^T theta of a row; returns whether N, Y and e fit, that is whether the row may be added. |e| < 2^45. */
 bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e);
 
 /* The same, and term[n_theta]: each N_i theta_i, |term| <= 2^40. */
@@ -56,15 +56,15 @@ bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[],
 /* Takes a row in that fits, with its innovation e and e^2. */
 void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
 
-/* Sets theta = f(p), and what rows are multiplied with. */
+/* Sets theta = f(p) and its mantissas and shifts for rows. */
 void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
 
 /* s^2 of a row: residual sum of squares over degrees of freedom, no less than the sensors' noise explains, row_sd^2
  * while there are none; divided by 4^exponent as the sums are. */
 pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self);
 
-/* Takes note of the variance >= 0 that the sensors' noise gives the rows taken in since the last group's end [units of
- * Y's integer squared]; call it when all of a group are, and before its solve begins. */
+/* Sets the variance >= 0 that the sensors' noise gives the rows of the current group [units of Y's integer
+ * squared]; call it when the group is complete, before its solve begins. */
 void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
 
 /* row_sd^2 as that. */
@@ -88,11 +88,11 @@ void pvid_estimator_errors_q31(const pvid_estimator_q31 *self, const pvid_estima
 
 /* ---- the system ---- */
 
-/* s less what noise of solve->variance puts into C^T M C, so many times over as the margin says. */
+/* s minus the margin times the information in C^T M C of noise of solve->variance. */
 void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
                                    int64_t rest[][PVID_MAX_P]);
 
-/* h: powers of two that bring M's diagonal into [2^28, 2^30). */
+/* h: powers of two that scale M's diagonal to [2^28, 2^30). */
 void pvid_system_exponents_q31(const pvid_information_q31 *information, int16_t h[]);
 
 /* m: the packed M with these exponents, its rows from `row` on, a few; returns the next row. */
@@ -108,7 +108,7 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
 /* H0 = prior 2^-prior_exponent in the unit of s. */
 int64_t pvid_system_prior_q31(int32_t prior, int32_t prior_exponent, int32_t f);
 
-/* q: s with the diagonal that Cholesky wants, q_ab = s_ab 2^-(g_a + g_b). */
+/* q: s with an equilibrated diagonal for Cholesky, q_ab = s_ab 2^-(g_a + g_b). */
 void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int16_t g[], int32_t q[][PVID_MAX_P]);
 
 /* Calls of pvid_system_scale_rows_q31 that scale all of M. */

@@ -183,7 +183,7 @@ class Case(ABC):
     def configured(self, config: Any, frame: frames.Configuration) -> Settings:
         """The settings with what a Configure frame says."""
         if not isinstance(frame, self.configure_frame):
-            raise PvidError("the board's image holds another core than the rig file asks for")
+            raise PvidError("the board's image contains another core than the rig file sets")
         n_p = len(config.estimator.start)
         given = {name: getattr(frame, name) for name in ("divider", *self._single)}
         places = {name: self._array(getattr(frame, name)[:n_p]) for name in _PER_PARAMETER}

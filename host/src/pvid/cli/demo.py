@@ -22,7 +22,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import Comparison, compare_rig
 from pvid.run.identify import Identification, identify
-from pvid.sim.pendulum import Pendulum, simulate, standard_sensors, standard_start
+from pvid.sim.pendulum import simulate, standard_sensors, standard_start
 
 BOARD = BOARDS["mps2-an386"]
 
@@ -92,13 +92,18 @@ def play_demo(
 
 
 @click.command(name="demo")
-@click.option("--figure", type=FigurePath(), default=Path("pvid-demo.png"), help="Where the figure goes.")
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
+@click.option(
+    "--figure",
+    type=FigurePath(),
+    default=Path("pvid-demo.png"),
+    help="File of the figure (png, svg, pdf).  [default: pvid-demo.png]",
+)
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and the start.")
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
 @click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
 def command(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
-    """Simulates the standard rig and streams it into the firmware on an emulated board; compares every bit."""
+    """Simulates the standard rig, streams it to the firmware on an emulated board and compares every bit."""
     on = target()
     if on.lacking is not None:
         write_stderr(f"{on.lacking}: the firmware runs on {on.where}")
@@ -117,7 +122,7 @@ def command(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
         f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
         f"start {', '.join(f'{100 * (s / p - 1):+.0f} %' for s, p in zip(start, simulation.p, strict=True))} off"
     )
-    truths = _truths(simulation.pendulum)
+    truths = simulation.pendulum.truths
     with progress_bar(f"streaming to {on.name}, comparing with the twins", len(rigs) * len(run.t)) as advance:
         parts = play_demo(on, rigs, run, Native(), start, advance)
     for played in parts:
@@ -129,11 +134,6 @@ def command(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
         click.echo(f"streamed to {on.where}: {playback.done} ticks, {played.verdict.text} to here{hashed}")
     write_figure(parts[0].result, figure, truths)
     return DONE if all(played.equal for played in parts) else DIFFERENT
-
-
-def _truths(pendulum: Pendulum) -> dict[str, float]:
-    w, d1, d2 = pendulum.linear
-    return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2, "c": 0.0}
 
 
 def _print_comparison(comparison: Comparison, label: str = "C core against the numpy twin") -> None:

@@ -11,6 +11,7 @@ from pvid.base.errors import PvidError
 from pvid.link.frames import Hello
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.values import Values, is_rate
+from pvid.rig.columns import SIGNALS
 from pvid.rig.file import RigFile
 from pvid.rig.run import MIN_ROWS, Run
 
@@ -54,9 +55,9 @@ def refuse_to_append(path: Path, rig: RigFile | None) -> None:
     except OSError as error:
         raise PvidError(f"cannot read {path}: {error.strerror}") from error
     if stream.account.bytes and not stream.is_log and not stream.account.frames:
-        raise PvidError(f"{path} is no log of pvid, and nothing is added to it")
+        raise PvidError(f"{path} is not a log of pvid: nothing is appended")
     if rig is not None and stream.rig is not None and RigFile.parse(stream.rig) != rig:
-        raise PvidError(f"{path} was recorded with another rig file: a log has one, and what is new needs a new log")
+        raise PvidError(f"{path} was recorded with another rig file: record to a new log")
 
 
 def hello_of_log(path: Path) -> Hello | None:
@@ -77,9 +78,9 @@ def run_of_log(path: Path) -> Run:
     """
     hello = hello_of_log(path)
     if hello is None:
-        raise PvidError(f"{path}: the board never said who it is, and its sample rate is not known")
+        raise PvidError(f"{path}: the log contains no description of the board, so its sample rate is unknown")
     if not is_rate(hello.sample_rate):
-        raise PvidError(f"{path}: the board's sample rate is {hello.sample_rate:g} Hz, as it says, and that is none")
+        raise PvidError(f"{path}: the board reported a sample rate of {hello.sample_rate:g} Hz, which is invalid")
     values = Values(hello=hello)
     best: list[npt.NDArray[np.float64]] = []
     parts: list[npt.NDArray[np.float64]] = []
@@ -89,7 +90,7 @@ def run_of_log(path: Path) -> Run:
         for rows in values.rows(record):
             if rows.table != "samples":
                 continue
-            columns = np.stack([rows.columns[name] for name in ("t", "phi", "y")])
+            columns = np.stack([rows.columns[name] for name in SIGNALS])
             columns[1:, ~(np.abs(columns[1:]) <= _LARGEST).all(axis=0)] = np.nan
             if record.tick != expected:
                 parts, length = [], 0

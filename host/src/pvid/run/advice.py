@@ -16,7 +16,6 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.models.kapitza.modes import modes_hz
 from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile, Unset
 from pvid.rig.run import Run
@@ -183,8 +182,8 @@ def _is_explained(result: Identification | None) -> bool:
 
 
 def _answers(trial: Identification | None) -> bool:
-    """With parameters that some pendulum has."""
-    return trial is not None and trial.identified and "g" in trial.value
+    """With parameters that some mechanism has."""
+    return trial is not None and trial.identified and all(name in trial.value for name in trial.model.physical_names)
 
 
 def _is_better(trial: Identification | None, now: Identification | None) -> bool:
@@ -417,7 +416,7 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
     largest = now.largest_angle if now is not None else _swing(run)[1]
     if not rig.identifier.full_angle:
         yield Cure(
-            f"angles go to {largest:.2g} rad, and sin phi is not phi there: use --set identifier.full_angle=true"
+            f"angles reach {largest:.2g} rad, where sin phi differs from phi: use --set identifier.full_angle=true"
             + in_float,
             with_identifier(full_angle=True),
         )
@@ -447,7 +446,8 @@ def _at_rate(case: Case, factor: float) -> Case:
 def _clock(case: Case, native: Native) -> Cure | None:
     """A clock that runs too slow or too fast. Any explains a run, with another gravity: one is tried that brings what
     phi does most to the nominal slow mode, and gravity tells which is right."""
-    slow = (modes_hz(nominal_start(case.rig)) or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
+    modes = case.rig.mechanism.model.modes_hz(nominal_start(case.rig))
+    slow = (modes or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
     tried = slow / _dominant_hz(case.run)
     if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
         return None
@@ -502,7 +502,7 @@ def _wider_ranges(result: Identification) -> str:
     names = [name for name in ("phi", "y", "acceleration") if getattr(result.beyond, name)]
     return (
         f"{result.beyond_words}: raise {' and '.join(f'{name}_range' for name in names)} in the rig file, "
-        f"or leave out the key, and the run sets it"
+        f"or omit the key to derive it from the run"
     )
 
 
@@ -527,29 +527,29 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
         yield excitation.weak
     elif result.largest_angle > VALID_ANGLE:
         yield (
-            f"angles go to {result.largest_angle:.2g} rad, and the equations are corrected up to {VALID_ANGLE:g} rad: "
+            f"angles reach {result.largest_angle:.2g} rad, and the equations are corrected up to {VALID_ANGLE:g} rad: "
             f"release the pendulum from a smaller angle, or drive it less near its modes"
         )
     elif result.identified:
         return
     elif excitation.fading > _FADING:
         yield (
-            f"the swing dies away (to {100 / excitation.fading:.0f} % of what it was at first): friction in the joints "
+            f"the swing decays (to {100 / excitation.fading:.0f} % of its start): friction in the joints "
             f"leaves too little motion: reduce it, or drive the pivot harder"
             + ("" if case.rig.identifier.damping else ", and use --set identifier.damping=true")
         )
     elif result.status == Reason.HELD_UNCERTAIN.text:
-        yield "the standard errors are still too wide: record longer, drive the pivot harder, or use a finer encoder"
+        yield "the standard errors are too large: record longer, drive the pivot harder, or use a finer encoder"
     else:
         yield (
-            "the run does not follow the equations of a pendulum on a moving pivot, with any unit, sign or clock "
-            "that was tried: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
-            "sampled at the same time, and does nothing rub or hit?"
+            "the run does not follow the equations of a pendulum on a moving pivot with any of the tested units, "
+            "signs and clocks: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
+            "sampled at the same time, and is the motion free of impacts and dry friction?"
         )
 
 
 def _not_corrected(result: Identification) -> str:
     return (
-        f"angles go to {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
+        f"angles reach {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
         f"--core f32, or smaller angles"
     )

@@ -76,7 +76,7 @@ def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
 def _weak(run: Run, rig: RigFile, p: Float) -> Residuals:
     config: WeakConfig = weak_config(rig, run.sample_rate)
     design = weak_design_of(rig, run.sample_rate)
-    n_core = 4 if rig.identifier.zero else 3
+    n_core = rig.n_core
     settings = WeakSettings(
         start=p[:n_core],
         row_sd=config.estimator.row_sd,
@@ -97,7 +97,7 @@ def _strong(run: Run, rig: RigFile, p: Float) -> Residuals:
     u = d_y[:, 2:5] / rig.l1
     driven = oracle.driven(u[:, 0], run.sample_rate, config.drive_min)
     if not driven.any():
-        raise PvidError("the pivot stands still: there are no rows")
+        raise PvidError("the pivot rests: there are no rows")
     n, y = oracle.strong_rows(d_phi[driven], u[driven])
     e = (y - n @ oracle.theta(p[:3]))[-_MOST_ROWS:]
     t = run.t[2 * bank.delay :][driven][-_MOST_ROWS:]

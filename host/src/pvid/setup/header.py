@@ -7,11 +7,11 @@ from typing import Any
 
 from pvid.core.headers import Headers, default_library
 from pvid.design.c_tables import array, struct_initializer
+from pvid.models.kapitza import MODEL
 from pvid.settings.forms import FORMS
 from pvid.settings.kinds import FixedSettings, Settings
 from pvid.setup.q31 import scale_of, units_of
 
-_P_UNITS = ("1/s^2", "", "", "rad")
 _COMMENTS = {
     "smooth": "value, folded",
     "second": "second derivative, folded",
@@ -89,10 +89,10 @@ def _bounds(config: Any) -> dict[str, int]:
 def fixed_notes(config: FixedSettings) -> list[str]:
     """The ranges of the counts, and what one unit of each parameter is."""
     phi_max, y_max = config.full_scale
-    units = zip(("w", "d1", "d2", "c"), units_of(config), _P_UNITS, strict=False)
+    units = zip(MODEL.parameters, units_of(config), strict=False)
     return [
         f"phi within +-{phi_max} counts, y within +-{y_max} counts about their offsets: no overflow then.",
-        *(f"  p[{i}] = {label}: one unit is {unit:.17g} {text}" for i, (label, unit, text) in enumerate(units)),
+        *(f"  p[{i}] = {one.name}: one unit is {unit:.17g} {one.unit}" for i, (one, unit) in enumerate(units)),
     ]
 
 
@@ -101,6 +101,6 @@ def scale_lines(config: FixedSettings, l1: float, name: str) -> list[str]:
     scale = scale_of(config, l1)
     values = (scale.l1, scale.g_multiplier, scale.g_shift, scale.d1_bits, scale.d2_bits)
     return [
-        "/* for pvid_kapitza_physical_q31; a macro, to avoid a warning where it is not used */",
+        "/* for pvid_kapitza_physical_q31; a macro, to avoid unused-variable warnings */",
         f"#define {name.upper()}_SCALE {{{', '.join(map(str, values))}}}",
     ]
