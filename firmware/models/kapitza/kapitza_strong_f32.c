@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-/* The strong form of Kapitza's pendulum (host/docs/theory.md 2) as a model: row, theta, C. */
+/* The strong form of Kapitza's pendulum (theory.md 2) as a model: row, theta, C. */
 #include "pvid/kapitza.h"
 
 #include <stddef.h>

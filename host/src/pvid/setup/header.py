@@ -101,6 +101,6 @@ def scale_lines(config: FixedSettings, l1: float, name: str) -> list[str]:
     scale = scale_of(config, l1)
     values = (scale.l1, scale.g_multiplier, scale.g_shift, scale.d1_bits, scale.d2_bits)
     return [
-        "/* for pvid_kapitza_physical_q31; a macro, to avoid unused-variable warnings */",
+        f"/* for pvid_{MODEL.name}_physical_q31; a macro, to avoid unused-variable warnings */",
         f"#define {name.upper()}_SCALE {{{', '.join(map(str, values))}}}",
     ]
