@@ -212,14 +212,14 @@ static void own_functions_are_all_or_none(void **state)
     const pvid_model_f32 *strong = &pvid_kapitza_strong_f32;
     ASSERT_MODEL(model = *strong, PVID_OK);
     ASSERT_MODEL((model = *strong, own.row_weight = 0.5f), PVID_BAD_ROW_WEIGHT); /* it accumulates by itself */
-    ASSERT_MODEL((model = *strong, model.step = NULL), PVID_OK);
+    ASSERT_MODEL((model = *strong, model.take_row = NULL), PVID_OK);
     ASSERT_MODEL((model = *strong, model.accumulate = NULL), PVID_BAD_MODEL);
     ASSERT_MODEL((model = *strong, model.project = NULL), PVID_BAD_MODEL);
     ASSERT_MODEL((model = *strong, model.innovate = NULL), PVID_BAD_MODEL);
     ASSERT_MODEL((model = *strong, model.n_theta = PVID_MAX_THETA + 1), PVID_BAD_MODEL);
     ASSERT_MODEL((model = *strong, model.n_moments = PVID_MAX_MOMENTS), PVID_OK);
     ASSERT_MODEL((model = *strong, model.n_moments = PVID_MAX_MOMENTS + 1), PVID_BAD_MODEL);
-    ASSERT_MODEL(model.step = strong->step, PVID_BAD_MODEL);
+    ASSERT_MODEL(model.take_row = strong->take_row, PVID_BAD_MODEL);
     ASSERT_MODEL(model.innovate = strong->innovate, PVID_BAD_MODEL);
 }
 

@@ -17,6 +17,7 @@
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "pvid/config.h"
@@ -60,9 +61,11 @@ struct pvid_model_f32 {
     void (*noise)(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P]);
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
-    /* pvid_estimator_step_f32 in one go, with the same bits, given innovate's answers at p (needed while g < 1): saves
-     * writing sums and S out and reading them again where a solve follows every row. NULL: one after the other. */
-    pvid_reason (*step)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[]);
+    /* pvid_estimator_step_f32 in one go, or pvid_estimator_add_f32 where the row does not end a group, with the same
+     * bits, given innovate's answers at p (needed while g < 1): saves writing sums and S out and reading them again
+     * where a solve follows every row. NULL: one after the other. */
+    pvid_reason (*take_row)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[],
+                            bool ends_group);
 };
 
 #ifdef __cplusplus

@@ -10,7 +10,7 @@
 #include "solve/estimator_f32.h"
 #include "number/finite_f32.h"
 #include "kapitza_row_f32.h"
-#include "kapitza_step_f32.h"
+#include "kapitza_strong_f32.h"
 #include "judge/misfit_f32.h"
 
 /* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
@@ -130,7 +130,7 @@ static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAP
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    const pvid_reason reason = pvid_kapitza_step_f32(estimator, n, y, e, gradient);
+    const pvid_reason reason = pvid_kapitza_take_row_f32(estimator, n, y, e, gradient, true);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;
     }
