@@ -3,7 +3,7 @@
 #define PVID_ASSESS_F32_H
 
 #include "solve/cholesky_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* Whether S - margin Sn, Sn the information that noise of the given variance alone would make, is still
  * positive: what the data say goes beyond what noise says. True where the model does not know Sn.

@@ -4,7 +4,7 @@
 #define PVID_DIRECT_F32_H
 
 #include "number/count.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* `take_row` of model.h, for a model without one. */
 pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], float y, float e,

@@ -10,7 +10,7 @@
 #include "number/finite_f32.h"
 #include "number/unroll.h"
 #include "solve/direct_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "solve/staged_f32.h"
 
 const pvid_estimator_config_f32 pvid_estimator_defaults_f32 = {

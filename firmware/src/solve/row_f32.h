@@ -4,7 +4,7 @@
 
 #include "number/count.h"
 #include "number/finite_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* y^2 + N^T N, in the order of the entries. */
 static inline float pvid_row_squares_f32(size_t n_theta, const float n[], float y)

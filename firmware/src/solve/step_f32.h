@@ -6,7 +6,7 @@
 
 #include "number/count.h"
 #include "number/finite_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* How far a step goes in parameter a, as a part of what it is measured by: its own value where it is positive, else the
  * standard deviation of its start. As bits: those of |x| order as |x| does, infinity and NaN last. */

@@ -7,7 +7,7 @@
 
 #include "number/count.h"
 #include "strong/differentiator_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "kapitza_row_f32.h"
 #include "kapitza_strong_f32.h"
