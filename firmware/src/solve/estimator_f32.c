@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
 #include "solve/direct_f32.h"
@@ -153,13 +154,8 @@ static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config
 
 pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])

@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "solve/information_q31.h"
 #include "number/integer_q31.h"
@@ -152,13 +153,8 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
 
 pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t value)

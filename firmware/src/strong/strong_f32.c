@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "strong/differentiator_f32.h"
 #include "solve/state_f32.h"
@@ -59,13 +60,8 @@ static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *
 
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen)
