@@ -28,8 +28,30 @@ LONGEST = (
 )
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="The long forms of the tests that have one (pvid bench long).")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and in `pvid bench long`")
+    config.addinivalue_line("markers", "long: in `pvid bench long` alone")
+    config.addinivalue_line("markers", "slow: left out of `./tools/test quick`")
+
+
+@pytest.fixture
+def ticks(request: pytest.FixtureRequest) -> int:
+    """The length of a run [ticks], of the test's mark of that name."""
+    mark = request.node.get_closest_marker("ticks")
+    length = int(mark.kwargs["long" if request.config.getoption("--long") else "short"])
+    request.node.user_properties.append(("ticks", length))
+    return length
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Puts the longest files first; within a file, and among the others, nothing moves."""
+    if not config.getoption("--long"):
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
     places = {f"test_{name}.py": place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path.name, len(places)))
 

@@ -56,7 +56,7 @@ unlock() { exec 9>&-; }
 
 # The packages of PROFILE that are missing, judged by what they bring, so that a tool installed in another way
 # counts. Profiles: pvid (to run), demo (to build for the Cortex-M boards and emulate them besides), targets (the same
-# for every board), test (to test, all of that and more).
+# for every board), test (to test, all of that and more), long (the long forms of the tests: a browser besides).
 missing_packages() {
     local missing=()
     need() { # need PACKAGE CHECK...
@@ -77,6 +77,11 @@ missing_packages() {
     need libc6-dev test -e /usr/include/stdio.h
     need cmake command -v cmake
     need ninja-build command -v ninja
+    if [[ $1 == long ]]; then
+        need chromium command -v chromium
+        need chromium-driver command -v chromedriver
+        set -- test
+    fi
     if [[ $1 == test || $1 == targets || $1 == demo ]]; then
         # No C library for ARM and RISC-V: firmware/ports does without.
         need gcc-arm-none-eabi command -v arm-none-eabi-gcc
@@ -94,8 +99,6 @@ missing_packages() {
     fi
     if [[ $1 == test ]]; then
         need binutils command -v readelf
-        need chromium command -v chromium
-        need chromium-driver command -v chromedriver
         need clang command -v clang
         need clang-tidy command -v clang-tidy
         need cppcheck command -v cppcheck
@@ -289,7 +292,7 @@ core_is_built() {
 # prepare PROFILE: as above.
 prepare() {
     local profile=$1 python_profile="pvid"
-    [[ $1 != test ]] || python_profile="test"
+    [[ $1 != test && $1 != long ]] || python_profile="test"
     if ! is_ours; then
         use_as_it_is "$python_profile"
         return

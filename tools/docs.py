@@ -20,7 +20,7 @@ from dataclasses import MISSING, Field, fields
 from pathlib import Path
 
 from pvid.link import frames
-from pvid.rig.file import Identifier, Nominal, RigFile, Sensor
+from pvid.rig.file import Identifier, ModelTable, Nominal, RigFile, Sensor
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -66,6 +66,7 @@ def rig_file_tables() -> str:
         ("[sensor]", Sensor),
         ("[nominal]", Nominal),
         ("[identifier]", Identifier),
+        ("[model]", ModelTable),
     )
     for title, owner in tables:
         meaning = meanings(owner)
@@ -127,20 +128,24 @@ def broken_links(page: Path) -> Iterator[str]:
 # ---- the site
 
 
-def build_site() -> bool:
-    """Builds the pages into build/site."""
+def build_site(settings: Path = ROOT / "host" / "mkdocs.yml", site: Path = SITE) -> list[str]:
+    """Builds the pages into a folder; returns the warnings. (With --quiet, mkdocs would count none.)"""
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "true"}
-    command = [sys.executable, "-P", "-m", "mkdocs", "build", "--strict", "--quiet", "--clean"]
-    return not subprocess.run([*command, "--config-file", "host/mkdocs.yml"], cwd=ROOT, env=environment).returncode
+    command = [sys.executable, "-P", "-m", "mkdocs", "build", "--strict", "--clean", "--site-dir", str(site)]
+    done = subprocess.run([*command, "--config-file", str(settings)], env=environment, capture_output=True, text=True)
+    if not done.returncode:
+        return []
+    return [line for line in done.stderr.splitlines() if not line.startswith("INFO")] or ["mkdocs failed"]
 
 
-def build_reference() -> bool:
-    """Builds the reference of the C headers into build/site/api."""
+def build_reference() -> list[str]:
+    """Builds the reference of the C headers into build/site/api; returns the warnings."""
     settings = (ROOT / "host" / "Doxyfile").read_text(encoding="utf-8")
     settings += f'OUTPUT_DIRECTORY = "{SITE}"\nINPUT_FILTER = "\\"{sys.executable}\\" -P tools/doxygen_filter.py"\n'
     done = subprocess.run(["doxygen", "-"], cwd=ROOT, input=settings, capture_output=True, text=True)
-    print(done.stderr, end="", file=sys.stderr)
-    return not done.returncode and (SITE / "api" / "index.html").exists()
+    if not done.returncode and (SITE / "api" / "index.html").exists():
+        return []
+    return done.stderr.splitlines() or ["doxygen failed"]
 
 
 def main() -> int:
@@ -151,12 +156,9 @@ def main() -> int:
     for pattern in OUTSIDE:
         for page in sorted(ROOT.glob(pattern)):
             faults += broken_links(page)
-    print("\n".join(faults), end="\n" if faults else "")
-    built = build_site() and build_reference()
-    if faults or not built:
-        return 1
-    print("All checks passed! build/site/index.html, build/site/api/index.html")
-    return 0
+    faults += build_site() or build_reference()
+    print("\n".join(faults) or "All checks passed! build/site/index.html, build/site/api/index.html")
+    return 1 if faults else 0
 
 
 if __name__ == "__main__":

@@ -588,9 +588,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=0, help=f"mutants; without it {COUNT}, and the report is written")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--anew", action="store_true", help="ask those again, too, that were killed before")
+    parser.add_argument("--restart", action="store_true", help="ask those again, too, that were killed before")
     given = parser.parse_args()
-    if given.anew:
+    if given.restart:
         MEMORY.unlink(missing_ok=True)
     results = campaign(given.count or COUNT, given.seed, memory=MEMORY)
     told = tally(results)

@@ -1,4 +1,4 @@
-/* Made by `pvid link-schema`: do not edit. The fields are explained in host/src/pvid/link/frames.py. */
+/* Made by `pvid schema`: do not edit. The fields are explained in host/src/pvid/link/frames.py. */
 #ifndef PVID_SCHEMA_H
 #define PVID_SCHEMA_H
 

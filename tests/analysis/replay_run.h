@@ -5,33 +5,33 @@
 
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
+#include "stream_rig.h"
 
-#define REPLAY_Q31 (STREAM_CORE == 1)
-#define REPLAY_WEAK (STREAM_FORM == 1)
+#define REPLAY_TYPE STREAM_TYPE
+#define REPLAY_INIT STREAM_INIT
+#define REPLAY_STEP STREAM_STEP
+#define REPLAY_HASH STREAM_HASH
+#define REPLAY_IS_FLOAT (STREAM_CORE == 0)
 #define REPLAY_FORM "some"
 #define REPLAY_TICKS 5000u
 #define REPLAY_MEASURE_FROM 1000u
 #define REPLAY_REPORT_EVERY 500u
 #define REPLAY_MISSING (-32767 - 1)
 
-#if REPLAY_Q31
+#if REPLAY_IS_FLOAT
+#define REPLAY_SAMPLE float
+#define REPLAY_FAULTS pvid_arithmetic_faults_f32()
+#define replay_phi_lsb 3.8e-4f
+#define replay_y_lsb 5.0e-6f
+#else
+#define REPLAY_SAMPLE int32_t
+#define REPLAY_FAULTS 0u
 #define replay_phi_lsb 1
 #define replay_y_lsb 1
-#else
-static const float replay_phi_lsb = 3.8e-4f;
-static const float replay_y_lsb = 5.0e-6f;
 #endif
 
 extern const int16_t replay_samples[REPLAY_TICKS][2];
 
-#if REPLAY_Q31 && REPLAY_WEAK
-extern const pvid_weak_config_q31 replay_config;
-#elif REPLAY_Q31
-extern const pvid_strong_config_q31 replay_config;
-#elif REPLAY_WEAK
-extern const pvid_weak_config_f32 replay_config;
-#else
-extern const pvid_strong_config_f32 replay_config;
-#endif
+extern const STREAM_CONFIG replay_config;
 
 #endif

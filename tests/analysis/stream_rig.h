@@ -3,6 +3,33 @@
 #ifndef STREAM_RIG_H
 #define STREAM_RIG_H
 
+#if (STREAM_CORE == 1) && (STREAM_FORM == 1)
+#define STREAM_TYPE pvid_weak_q31
+#define STREAM_CONFIG pvid_weak_config_q31
+#define STREAM_INIT pvid_weak_init_q31
+#define STREAM_STEP pvid_weak_step_q31
+#elif STREAM_CORE == 1
+#define STREAM_TYPE pvid_strong_q31
+#define STREAM_CONFIG pvid_strong_config_q31
+#define STREAM_INIT pvid_strong_init_q31
+#define STREAM_STEP pvid_strong_step_q31
+#elif STREAM_FORM == 1
+#define STREAM_TYPE pvid_weak_f32
+#define STREAM_CONFIG pvid_weak_config_f32
+#define STREAM_INIT pvid_weak_init_f32
+#define STREAM_STEP pvid_weak_step_f32
+#else
+#define STREAM_TYPE pvid_strong_f32
+#define STREAM_CONFIG pvid_strong_config_f32
+#define STREAM_INIT pvid_strong_init_f32
+#define STREAM_STEP pvid_strong_step_f32
+#endif
+#if STREAM_CORE == 1
+#define STREAM_HASH pvid_fnv_estimator_q31
+#else
+#define STREAM_HASH pvid_fnv_estimator_f32
+#endif
+
 #define STREAM_SETTINGS 0x12345678u
 #define STREAM_N_P 4u
 #define STREAM_SAMPLE_RATE 1000.0f

@@ -4,15 +4,8 @@
 
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
+#include "stream_rig.h"
 
-#if (STREAM_CORE == 1) && (STREAM_FORM == 1)
-extern const pvid_weak_config_q31 stream_config;
-#elif STREAM_CORE == 1
-extern const pvid_strong_config_q31 stream_config;
-#elif STREAM_FORM == 1
-extern const pvid_weak_config_f32 stream_config;
-#else
-extern const pvid_strong_config_f32 stream_config;
-#endif
+extern const STREAM_CONFIG stream_config;
 
 #endif

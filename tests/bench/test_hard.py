@@ -68,7 +68,7 @@ def test_estimate_without_information_is_not_published(label: str) -> None:
     [
         "friction of 0.0001 m^2/s, 14 bits",
         "full equations, 0.107 rad, 14 bits",
-        "14 bits, noise of 64 LSB, phi_lsb says 0.58",
+        "14 bits, noise of 64 LSB, phi_lsb set for 0.58",
     ],
 )
 def test_unmodelled_effects_raise_the_alarm(label: str) -> None:

@@ -44,7 +44,6 @@ from pvid.base.errors import PvidError
 from pvid.board import replay_image
 from pvid.board.boards import board
 from pvid.core.native import Native
-from pvid.run import compare_q31
 from pvid.run.compare import first_difference
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
@@ -198,8 +197,7 @@ def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: c
         expected = [(WeakTwin(config, [alone]).run(phi, y), 0) for alone in lanes]
     for estimator, (twin, lane) in zip(lanes, expected, strict=True):
         record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-        theirs = (twin.p[:, :, lane], twin.sums[:, :, lane], twin.reason[:, lane])
-        assert first_difference(record, *theirs, twin.published[:, :, lane]) is None
+        assert first_difference(record, twin.lane(lane)) is None
 
 
 @pytest.mark.parametrize(
@@ -213,8 +211,7 @@ def test_the_strong_form_equals_its_twin(scenario: str, ticks: int, native: Nati
     expected = StrongTwin(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
         record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-        theirs = (expected.p[:, :, lane], expected.sums[:, :, lane], expected.reason[:, lane])
-        assert first_difference(record, *theirs) is None
+        assert first_difference(record, expected.lane(lane)) is None
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -227,7 +224,7 @@ def test_the_weak_form_equals_its_twin_in_fixed_point(scenario: str, native: Nat
         expected = twin.run(phi, y)
         for lane, config in enumerate(alike):
             record = native.identifier(config).run(phi, y, hashes=False)
-            assert compare_q31.first_difference(record, expected, lane) is None
+            assert first_difference(record, expected.lane(lane)) is None
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -238,7 +235,7 @@ def test_the_strong_form_equals_its_twin_in_fixed_point(scenario: str, native: N
     expected = StrongTwinQ31(config, lanes).run(phi, y)
     for lane, estimator in enumerate(lanes):
         record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-        assert compare_q31.first_difference(record, expected, lane) is None
+        assert first_difference(record, expected.lane(lane)) is None
 
 
 # ---- the bench itself ----

@@ -18,7 +18,7 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.board.replay_image import SAMPLE_RATE, ReplayRun, native_hashes, standard_run
+from pvid.board.replay_image import SAMPLING, ReplayRun, native_hashes, standard_run
 from pvid.board.stream_rig import StreamRig, played_samples, stream_rig
 from pvid.board.target import HOST_TARGET, Playback, Target, judge, open_target, play, verify
 from pvid.core.native import Native
@@ -62,8 +62,8 @@ def form(request: pytest.FixtureRequest) -> str:
 def rig_of(run: ReplayRun) -> StreamRig:
     """What an image is made for that plays it."""
     return StreamRig(
-        config=run.config if run.fixed is None else run.fixed,
-        sample_rate=SAMPLE_RATE[run.form],
+        config=run.config,
+        sample_rate=SAMPLING[run.form].rate,
         l1=STANDARD_PENDULUM.l1,
         phi_lsb=float(run.phi_lsb),
         y_lsb=float(run.y_lsb),
@@ -86,7 +86,7 @@ def play_standard(
     patience_s: float = 30.0,
 ) -> Playback:
     run = standard_run(form, TICKS, core)
-    phi, y = (run.phi, run.y) if core == "f32" else (run.counts[:, 0], run.counts[:, 1])
+    phi, y = run.samples
     return play(target, rig_of(run), phi, y, reopen=reopen, patience_s=patience_s, resend_s=0.5)
 
 
@@ -103,7 +103,7 @@ def test_every_target_computes_the_bits_of_the_host(name: str, form: str, core: 
 @pytest.mark.parametrize(("form", "core"), KINDS)
 def test_a_long_run_stays_equal_on_two_boards_at_once(form: str, core: str, native: Native) -> None:
     run = standard_run(form, LONG, core)
-    phi, y = (run.phi, run.y) if core == "f32" else (run.counts[:, 0], run.counts[:, 1])
+    phi, y = run.samples
     rig = rig_of(run)
     with ThreadPoolExecutor(2) as pool:
         verdicts = list(pool.map(lambda name: verify(name, rig, native, phi, y), ("mps2-an386", "virt-rv32imac")))

@@ -24,7 +24,7 @@ from pvid.board.replay_image import (
 )
 from pvid.core.native import Native
 
-LONG_TICKS = 40_000
+FORMS_AND_CORES = [(form, core) for form in ("strong", "weak") for core in ("f32", "q31")]
 LONG = ("mps2-an386", "virt-rv32imac")
 TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
 
@@ -46,14 +46,22 @@ def assert_same_hashes(report: ReplayReport, replay: ReplayRun, native: Native) 
     assert report.hash == int(expected[-1])
 
 
-@pytest.mark.parametrize("form", ["strong", "weak"])
-def test_the_host_computes_the_bits_of_the_twin(form: str, native: Native) -> None:
-    for ticks in (sizes.TICKS, LONG_TICKS):
-        replay = standard_run(form, ticks)
-        assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
+@pytest.mark.ticks(short=sizes.TICKS, long=40_000)
+@pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)
+def test_the_host_computes_the_bits_of_the_twin(form: str, core: str, native: Native, ticks: int) -> None:
+    replay = standard_run(form, ticks, core)
+    assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
 
 
-@pytest.mark.parametrize(("form", "core"), [(form, core) for form in ("strong", "weak") for core in ("f32", "q31")])
+@pytest.mark.parametrize(("name", "core"), [("mps2-an386", "f32"), ("microbit", "q31")])
+def test_one_board_of_each_core_computes_the_bits_of_the_host(name: str, core: str, native: Native) -> None:
+    replay = standard_run("weak", 1000, core)
+    image, _ = build_image(BOARDS[name], replay)
+    assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), replay, native)
+
+
+@pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)
+@pytest.mark.slow
 def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measured: Measured, native: Native) -> None:
     boards = set()
     for configuration, (_, report) in measured.items():
@@ -64,14 +72,16 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
     assert boards == {board.name for board in BOARDS.values() if board.toolchain != "avr"} | avrs
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["strong", "weak"])
 @pytest.mark.parametrize("name", LONG)
 def test_long_runs_end_with_the_bits_of_the_host(name: str, form: str, native: Native) -> None:
-    replay = standard_run(form, LONG_TICKS)
+    replay = standard_run(form, 40_000)
     image, _ = build_image(BOARDS[name], replay)
     assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), replay, native)
 
 
+@pytest.mark.slow
 def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> None:
     """A product of the port, not of the core: the figures that benchmarks/cost.md gives for the AVR are from here."""
     replay = standard_run("strong", 1000)
@@ -83,12 +93,43 @@ def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> No
         build_image(BOARDS["atmega328p"], replay)
 
 
+def mean_of(measured: Measured, board: str, form: str, core: str) -> int:
+    """Instructions a tick."""
+    return measured[sizes.Configuration(BOARDS[board], form, core)][0].mean
+
+
+@pytest.mark.parametrize("board", ["microbit", "virt-rv32imac"])
+@pytest.mark.slow
+def test_integers_cost_a_fifth_of_soft_float_at_most(board: str, measured: Measured) -> None:
+    assert 5 * mean_of(measured, board, "weak", "q31") <= mean_of(measured, board, "weak", "f32")
+
+
+@pytest.mark.slow
+def test_the_strong_form_in_integers_costs_less_than_soft_float_at_every_row(measured: Measured) -> None:
+    for board, ratio in (("microbit", 1.2), ("virt-rv32imac", 2.0)):
+        assert ratio * mean_of(measured, board, "strong", "q31") <= mean_of(measured, board, "strong", "f32"), board
+
+
+@pytest.mark.parametrize("board", ["microbit", "virt-rv32imac"])
+@pytest.mark.slow
+def test_the_strong_form_costs_half_of_soft_float_with_a_solve_at_every_fourth_row(board: str, native: Native) -> None:
+    reports = {}
+    for core in ("q31", "f32"):
+        replay = standard_run("strong", 1500, core, divider=4)  # all alike from the 500th on
+        image, _ = build_image(BOARDS[board], replay)
+        reports[core] = play(BOARDS[board], image, TIMEOUT_S)
+        assert reports[core].hash == int(native_hashes(replay, native)[-1])
+    assert 2 * reports["q31"].instructions_mean <= reports["f32"].instructions_mean
+
+
+@pytest.mark.slow
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:
     footprints = {configuration: footprint for configuration, (footprint, _) in measured.items()}
     over = sizes.over_budget(ROOT / "tests" / "budget.toml", footprints)
     assert not over, "accept: ./tools/pvid sizes --budget tests/budget.toml --update host/docs/benchmarks/cost.md"
 
 
+@pytest.mark.slow
 def test_the_readme_shows_what_is_measured(measured: Measured) -> None:
     page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8").splitlines()
     rows = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in page if line.startswith("| ")}
@@ -98,6 +139,7 @@ def test_the_readme_shows_what_is_measured(measured: Measured) -> None:
         assert figures == pytest.approx([int(cell) for cell in row[2:]], rel=0.02), row
 
 
+@pytest.mark.slow
 def test_the_stack_that_is_seen_lies_within_the_bound(measured: Measured) -> None:
     for configuration, (footprint, report) in measured.items():
         assert 0 < footprint.stack_seen <= footprint.stack_bound < report.stack_size, configuration.name
@@ -117,6 +159,7 @@ def test_a_figure_over_its_budget_is_named(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_an_image_for_an_fpu_reports_the_fault_on_a_core_without_one() -> None:
     board = BOARDS["mps2-an386"]
     image, _ = build_image(board, standard_run("weak", sizes.TICKS))

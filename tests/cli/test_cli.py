@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from pvid.cli.demo import stage
+from pvid.cli.demo import target
 from pvid.rig.file import RigFile
 from pvid.rig.run import write_run
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
@@ -136,10 +136,10 @@ def test_demo_prints_its_table_and_draws_its_figure(tmp_path: Path) -> None:
 
 
 def test_without_an_emulator_the_demo_says_where_it_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert stage().where == "mps2-an386, Cortex-M4F in QEMU"
+    assert target().where == "mps2-an386, Cortex-M4F in QEMU"
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert stage().where == "this machine, over a pseudo-terminal"
-    assert stage().lacking == "mps2-an386 needs arm-none-eabi-gcc and qemu-system-arm"
+    assert target().where == "this machine, over a pseudo-terminal"
+    assert target().lacking == "mps2-an386 needs arm-none-eabi-gcc and qemu-system-arm"
 
 
 def test_a_run_without_motion_is_not_identified(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def printing(*arguments: str, to: IO[Any] | int, **options: Any) -> subprocess.C
     return subprocess.run([*PVID, *arguments], stdout=to, stderr=subprocess.PIPE, text=True, check=False, **options)
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("link-schema",), ("fir-table", "--points", "21")])
+@pytest.mark.parametrize("arguments", [("--help",), ("schema",), ("tables", "--form", "fir", "--points", "21")])
 def test_a_full_disk_is_one_sentence_and_exit_code_2(arguments: tuple[str, ...]) -> None:
     with open("/dev/full", "wb") as full:
         done = printing(*arguments, to=full)
@@ -38,7 +38,7 @@ def test_a_full_disk_is_one_sentence_and_exit_code_2(arguments: tuple[str, ...])
 
 
 def test_a_closed_output_is_one_sentence_and_exit_code_2() -> None:
-    command = f"{' '.join(PVID)} link-schema >&-"
+    command = f"{' '.join(PVID)} schema >&-"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "pvid: the output cannot be written: standard output is closed\n"
@@ -48,7 +48,7 @@ def test_closed_pipe_ends_the_command_silently() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     try:
-        done = printing("link-schema", to=writing)
+        done = printing("schema", to=writing)
     finally:
         os.close(writing)
     assert (done.returncode, done.stderr) == (READER_GONE, "")
@@ -67,7 +67,7 @@ def test_a_table_that_does_not_fit_leaves_an_empty_file(tmp_path: Path) -> None:
 
     table = tmp_path / "table.h"
     with table.open("wb") as file:
-        done = printing("fir-table", to=file, preexec_fn=bounded)
+        done = printing("tables", "--form", "fir", to=file, preexec_fn=bounded)
     assert done.returncode == 2
     assert done.stderr == "pvid: the output cannot be written: File too large\n"
     assert table.read_bytes() == b""

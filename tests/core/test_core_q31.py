@@ -164,7 +164,7 @@ int main(void)
 def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: Path, native: Native) -> None:
     """A program made from the generated header and the sources alone computes the bits of the shared library."""
     _, rig_path = recorded
-    command = ["weak-table", "--core", "q31", "--rig", str(rig_path), "--name", "standard"]
+    command = ["tables", "--core", "q31", "--rig", str(rig_path), "--name", "standard"]
     header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
     (tmp_path / "table.h").write_text(header)
     (tmp_path / "main.c").write_text(PROGRAM)

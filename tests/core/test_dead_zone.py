@@ -10,12 +10,11 @@ import pytest
 from linear_rig import LINEAR_RIG
 
 from pvid.base.errors import PvidError
+from pvid.cases import case_of
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run import compare_q31
 from pvid.run.compare import first_difference
-from pvid.run.compare_q31 import twin_q31
 from pvid.settings.enums import Status
 from pvid.setup.f32 import config_of
 from pvid.setup.q31 import config_of_q31, counts_of, p_of, se_of
@@ -56,8 +55,7 @@ def test_float32_equals_its_twin(form: str, law: str, native: Native, run: Run) 
     expected = twin.run(phi, y)
     core = native_of(native, form, config)
     record = core.run(phi, y, hashes=False)
-    theirs = [expected.p[:, :, 0], expected.sums[:, :, 0], expected.reason[:, 0]]
-    assert first_difference(record, *theirs, *([expected.published[:, :, 0]] if form == "weak" else [])) is None
+    assert first_difference(record, expected.lane()) is None
     assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
     assert core.counters["at_rest"] > 0 or law == "paper"  # whose F does not decay
 
@@ -68,10 +66,10 @@ def test_fixed_point_equals_its_twin(form: str, law: str, native: Native, run: R
     config = config_of_q31(rig_with(form=form, dead_zone=1.5, forgetting_s=4.0, **LAWS[law]), 1000.0)
     ticks = 20_000 if form == "weak" else 2_000
     phi, y = (c[:ticks] for c in counts_of(RIG, run))
-    twin = twin_q31(config)
+    twin = case_of(config).twin(config)
     expected = twin.run(phi, y)
     core = native.identifier(config)
-    assert compare_q31.first_difference(core.run(phi, y, hashes=False), expected) is None
+    assert first_difference(core.run(phi, y, hashes=False), expected.lane()) is None
     assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
     assert core.counters["at_rest"] > 0 or law == "paper"
 

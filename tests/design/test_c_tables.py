@@ -19,7 +19,7 @@ from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, source
 from pvid.design.c_tables import bank_header, float_array, float_literal
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import design, to_c_header
-from pvid.oracle.strong import linear
+from pvid.models.kapitza.physical import linear
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import write_run
 from pvid.run.survey import fitted
@@ -72,7 +72,8 @@ def test_five_points_of_the_core_are_what_is_generated(tmp_path: Path) -> None:
 
 
 def test_the_command_prints_and_checks(tmp_path: Path) -> None:
-    command = [sys.executable, "-P", "-m", "pvid", "fir-table", "--points", "21", "--degree", "6", "--name", "sg21"]
+    command = [sys.executable, "-P", "-m", "pvid", "tables", "--form", "fir", "--points", "21"]
+    command += ["--degree", "6", "--name", "sg21"]
     header = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert ".half = 10, .stride = 1, .weights = sg21" in header
     path = tmp_path / "sg21.h"
@@ -94,9 +95,9 @@ def test_weak_tables_follow_a_run(tmp_path: Path) -> None:
     poor = replace(RigFile.standard(), nominal=Nominal(l2=0.25, rho2=0.05), sample_rate=2000.0)
     poor.write(tmp_path / "poor.toml")
     known = replace(fitted(poor, run), sample_rate=2000.0)
-    runner, table = CliRunner(), ["weak-table", "--rig", str(tmp_path / "poor.toml")]
+    runner, table = CliRunner(), ["tables", "--rig", str(tmp_path / "poor.toml")]
     shown = runner.invoke(commands, [*table, "--run", str(tmp_path / "run.csv")], catch_exceptions=False)
-    banner = "pvid weak-table --rig poor.toml --run run.csv --name weak_tables"
+    banner = "pvid tables --form weak --core f32 --rig poor.toml --run run.csv --name weak_tables"
     expected = to_c_header(weak_design_of(known, 2000.0), "weak_tables", banner)
     assert shown.stdout == expected
     assert "build the core with -DPVID_MAX_TAPS=" in " ".join(shown.stderr.split())

@@ -177,7 +177,7 @@ def test_the_schema_describes_itself() -> None:
 
 def test_c_header_equals_the_python_definition() -> None:
     written = (ROOT / "firmware" / "link" / "schema.h").read_text(encoding="utf-8")
-    assert written == link.c_header(), "./tools/pvid link-schema > firmware/link/schema.h"
+    assert written == link.c_header(), "./tools/pvid schema > firmware/link/schema.h"
 
 
 def test_loss_report_names_the_lost_samples() -> None:

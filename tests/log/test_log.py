@@ -322,7 +322,7 @@ def test_log_records_all_and_ends_with_a_summary(tmp_path: Path, boards: Boards,
     listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     listener.bind(("127.0.0.1", 0))
     boards(ticks=TICKS)
-    process = pvid("--tee", f"udp://127.0.0.1:{listener.getsockname()[1]}")
+    process = pvid("--live", f"udp://127.0.0.1:{listener.getsockname()[1]}")
     wait_for(tmp_path / "out.pvlog", lambda account: account.samples == TICKS)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=20)

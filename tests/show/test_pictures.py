@@ -1,6 +1,6 @@
 """What a person sees of a recording fits the screen: an 80 x 24 terminal, a window of 1280 x 800, a page of paper.
 
-PVID_PICTURES=folder ./tools/test tests/show/test_pictures.py      leaves the pictures there, to be looked at
+PVID_PICTURES=folder ./tools/pvid bench long --only show      leaves the pictures there, to be looked at
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
+from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
 from pvid.show.page import page
 from pvid.show.report import recording_of, write_report
@@ -61,7 +62,7 @@ def photograph(browser: webdriver.Chrome, path: Path) -> None:
 
 
 def test_terminal_view_always_fits_80_by_24(
-    sent: list[tuple[int, link.Message]], pictures: Path, tmp_path: Path
+    sent: list[tuple[int, link.Message]], pictures: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     def told(message: link.Message) -> link.Message:
         if isinstance(message, link.Estimate) and worst:
@@ -71,7 +72,8 @@ def test_terminal_view_always_fits_80_by_24(
     for worst in (False, True):
         frames = [link.encode(told(message), i & 0xFFFF, tick) for i, (tick, message) in enumerate(sent)]
         console = Console(width=80, height=24, force_terminal=True, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-        view, stream = LiveView(console, "/dev/ttyACM0 -> run.pvlog", 0.3, "http://127.0.0.1:8765/"), LogStream()
+        mechanism, stream = RigFile.standard().mechanism, LogStream()
+        view = LiveView(console, "/dev/ttyACM0 -> run.pvlog", mechanism, "http://127.0.0.1:8765/")
         writer = LogWriter(tmp_path / f"{worst}.pvlog")
         writer.begin("/dev/ttyACM0", None)
         writer.take(b"".join(frames[:300] + frames[305 if worst else 300 :]))
@@ -85,6 +87,8 @@ def test_terminal_view_always_fits_80_by_24(
         assert len(lines) <= 24 and max(map(len, lines)) <= 80
         assert not worst or "friction, large angles" in " ".join(lines)
         assert "parameters identifiable" in "".join(lines) or worst
+        if not request.config.getoption("--long"):
+            continue
         (tmp_path / "terminal.svg").write_text(console.export_svg(title="pvid log"))
         with chromium(tmp_path / f"chromium{worst}", 1000, 620) as browser:
             browser.get((tmp_path / "terminal.svg").as_uri())
@@ -99,6 +103,7 @@ _TEXTS = """
 """
 
 
+@pytest.mark.long
 def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Path, tmp_path: Path) -> None:
     with (
         page("127.0.0.1:0", log, "/dev/ttyACM0 -> run.pvlog") as address,
@@ -108,7 +113,7 @@ def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Pat
         while not browser.title.startswith("pvid log /dev") and time.monotonic() < limit:
             browser.get(address)
             time.sleep(1)
-        while not browser.execute_script("return !!document.querySelector('#yPlot .scatterlayer .js-line')"):
+        while not browser.execute_script("return !!document.querySelector('#signal1 .scatterlayer .js-line')"):
             assert time.monotonic() < limit, "the plots were never drawn"
             time.sleep(0.2)
         size = browser.execute_script("return [document.body.scrollWidth, document.documentElement.scrollHeight]")

@@ -20,7 +20,9 @@ MEMBERS = {("Form", "WEAK"), ("Form", "STRONG"), ("Core", "F32"), ("Core", "Q31"
 # Types of which there is one for each form or core.
 OWN = re.compile(r"(?:Weak|Strong|Fixed|Float)(?:Config|Twin|Identifier)(?:Q31)?|ConfigQ31|EstimatorQ31")
 PAIRS = (("Configure", "ConfigureQ31"), ("Estimate", "EstimateQ31"), ("Sample", "Count"), ("Raw", "RawCount"))
-MACROS = re.compile(r"^\s*#\s*(?:el)?if.*\b(?:STREAM|REPLAY)_(?:FORM|CORE|Q31|WEAK)\b|\bif\(.*PVID_STREAM_CORE")
+MACROS = re.compile(
+    r"^\s*#\s*(?:el)?if.*\b(?:STREAM|REPLAY)_(?:FORM|CORE|Q31|WEAK|IS_FLOAT)\b|\bif\(.*PVID_STREAM_CORE"
+)
 
 
 def _is_name(node: ast.AST) -> bool:

@@ -6,9 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.long
 def test_the_quick_tests_take_95_per_cent_of_the_branches() -> None:
     command = [sys.executable, "-P", str(ROOT / "tools" / "coverage.py")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=1500)

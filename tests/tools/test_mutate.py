@@ -79,6 +79,7 @@ def test_reasons_speak_of_lines_that_stand_there(mutate: ModuleType) -> None:
         assert any(reason.is_of(mutant) for mutant in known), f"{reason.file}: {reason.line}"
 
 
+@pytest.mark.long
 def test_of_ten_mutants_the_quick_tests_kill_eight(
     mutate: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -42,6 +44,7 @@ def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
     assert "link.c" in done.stdout and "out of bounds index" in done.stdout
 
 
+@pytest.mark.long
 def test_room_that_is_a_byte_short_is_not_proved(tmp_path: Path) -> None:
     copy(tmp_path, "firmware/link", "firmware/src/keep/crc32.c")
     room = "(PVID_LINK_RAW_BYTES(n) / 254u) + "

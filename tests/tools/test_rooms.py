@@ -1,91 +1,125 @@
-"""The core's files depend on one another one way only: no circles, and no room uses one above it."""
+"""The packages of host/src/pvid stand in one order and import leftwards only; no circle of files."""
 
 from __future__ import annotations
 
-import re
-import subprocess
-from concurrent.futures import ThreadPoolExecutor
+import ast
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
-from pvid.core.sources import INCLUDES, MODEL, SRC, core_sources
+SOURCE = ROOT / "host" / "src"
 
-# Each room may use itself and those before it; the two forms do not use each other.
-ROOMS = ("number", "solve", MODEL.name, "judge", "strong", "weak", "keep")
-STRANGERS = {("weak", "strong"), ("strong", "weak")}
+# Each imports from itself and from those before it.
+ORDER = "base settings core models rig sim design oracle setup twin link cases run board log show cli".split()
 
-Graph = dict[str, set[str]]
+# Names of the pendulum's parameters stand in its own rooms only: what shows, stores or sends them asks the model.
+PENDULUMS = ("models/kapitza", "twin/kapitza", "oracle", "sim")
+# The rough guess of a rig file; the command that simulates the pendulum.
+MAY_NAME = ("rig/file.py", "cli/main.py", "cli/simulate.py")
+NAMES = {"d1", "d2", "c1", "c2", "l2", "rho2"}
+
+Graph = Mapping[str, set[str]]
 
 
-def node(path: Path) -> str:
-    """Room and stem: a source and its header are one."""
-    return f"{path.parent.name}/{path.stem}"
+def module_of(path: Path, source: Path) -> str:
+    """pvid.log.reader of .../pvid/log/reader.py; a package is its __init__.py."""
+    name = ".".join(path.relative_to(source).with_suffix("").parts)
+    return name.removesuffix(".__init__")
 
 
-def room(name: str) -> str:
-    return name.partition("/")[0]
+def imported(path: Path, modules: set[str]) -> Iterator[str]:
+    """The modules among `modules` that a file imports anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            assert node.level == 0, f"{path}: imports are absolute"
+            for name in node.names:
+                inner = f"{node.module}.{name.name}"
+                yield from {inner if inner in modules else node.module} & modules
+        elif isinstance(node, ast.Import):
+            yield from {name.name for name in node.names} & modules
+
+
+def graph_of(source: Path) -> dict[str, set[str]]:
+    """What each module imports."""
+    files = {module_of(path, source): path for path in source.rglob("*.py")}
+    return {module: set(imported(path, set(files))) - {module} for module, path in files.items()}
+
+
+def room_of(module: str) -> str:
+    """log of pvid.log.reader; "" of pvid itself."""
+    return "".join(module.split(".")[1:2])
+
+
+def upward(graph: Graph, order: list[str]) -> list[str]:
+    """Imports from a package on the right."""
+    return [
+        f"{module} imports {other}"
+        for module, others in graph.items()
+        for other in others
+        if room_of(module) in order and room_of(other) and order.index(room_of(other)) > order.index(room_of(module))
+    ]
+
+
+def circle(graph: Graph) -> set[str]:
+    """Modules that import one another in a circle; none: there is no circle."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return set(error.args[1])
+    return set()
 
 
 @pytest.fixture(scope="module")
-def uses(tmp_path_factory: pytest.TempPathFactory) -> Graph:
-    """Which files each file uses: by the symbols of its object, and by its includes."""
-    folder = tmp_path_factory.mktemp("objects")
-    sources = core_sources()
-
-    def compiled(source: Path) -> str:
-        target = folder / f"{source.stem}.o"
-        command = ["gcc", "-std=c99", "-O0", "-DPVID_PLAIN_NAMES", *INCLUDES, "-c", str(source), "-o", str(target)]
-        subprocess.run(command, check=True)
-        return subprocess.run(["nm", str(target)], capture_output=True, text=True, check=True).stdout
-
-    with ThreadPoolExecutor(2) as pool:
-        listings = list(pool.map(compiled, sources))
-    defined: dict[str, str] = {}
-    for source, listing in zip(sources, listings, strict=True):
-        defined |= dict.fromkeys(re.findall(r" [TDRB] (\w+)$", listing, re.MULTILINE), node(source))
-    graph: Graph = {node(path): set() for path in [*SRC.glob("*/*.[ch]"), *MODEL.glob("*.[ch]")]}
-    for source, listing in zip(sources, listings, strict=True):
-        wanted = re.findall(r" U (\w+)$", listing, re.MULTILINE)
-        graph[node(source)] |= {defined[name] for name in wanted if name in defined}
-    for path in [*SRC.glob("*/*.[ch]"), *MODEL.glob("*.[ch]")]:
-        for name in re.findall(r'^#include "(?!pvid/)(.*)\.h"$', path.read_text(encoding="utf-8"), re.MULTILINE):
-            graph[node(path)].add(name if "/" in name else f"{MODEL.name}/{name}")
-    return {name: used - {name} for name, used in graph.items()}
+def graph() -> dict[str, set[str]]:
+    return graph_of(SOURCE)
 
 
-def circles(graph: Graph) -> list[list[str]]:
-    """Files that use themselves by way of others, each with those on the way."""
-    reached: Graph = {}
-    for start in graph:
-        ahead, seen = list(graph[start]), set()
-        while ahead:
-            if (one := ahead.pop()) not in seen:
-                seen.add(one)
-                ahead += graph[one]
-        reached[start] = seen
-    return [sorted(one for one in reached[name] if name in reached[one]) for name in graph if name in reached[name]]
+def test_every_package_has_a_place_in_the_order(graph: Graph) -> None:
+    rooms = {room_of(module) for module in graph} - {"", "__main__"}
+    assert rooms == set(ORDER)
 
 
-def test_files_form_no_circle(uses: Graph) -> None:
-    assert len(uses) > 50 and "solve/staged_f32" in uses["weak/finish_f32"]
-    assert circles(uses) == []
+def test_imports_go_left_only(graph: Graph) -> None:
+    assert upward(graph, ORDER) == []
 
 
-def test_rooms_depend_one_way(uses: Graph) -> None:
-    against = {
-        (name, one)
-        for name, used in uses.items()
-        for one in used
-        if ROOMS.index(room(one)) > ROOMS.index(room(name)) or (room(name), room(one)) in STRANGERS
-    }
-    assert against == set()
+def test_no_circle_of_files(graph: Graph) -> None:
+    assert circle(graph) == set()
 
 
-def test_estimator_contains_nothing_of_the_mechanism() -> None:
-    for path in SRC.glob("solve/*.[ch]"):
-        assert "kapitza" not in path.read_text(encoding="utf-8").lower(), path.name
+def test_names_of_the_pendulums_parameters_stand_in_its_own_rooms() -> None:
+    """Fails where a quoted name is written a second time, beside the model."""
+    package = SOURCE / "pvid"
+    for path in sorted(package.rglob("*.py")):
+        place = path.relative_to(package).as_posix()
+        if place.startswith(PENDULUMS) or place in MAY_NAME:
+            continue
+        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        quoted = {str(node.value) for node in nodes if isinstance(node, ast.Constant) and node.value in NAMES}
+        assert not quoted, f"{place} names {sorted(quoted)}: pvid.models contains them"
 
 
-def test_a_circle_is_found() -> None:
-    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [["b", "c"], ["b", "c"]]
+@pytest.fixture
+def planted(tmp_path: Path) -> Path:
+    """A package of two rooms, of which the left one imports from the right one, and two files each other."""
+    for name, text in {
+        "base/one.py": "def late() -> None:\n    from pvid.log import two\n",
+        "base/__init__.py": "",
+        "log/__init__.py": "",
+        "log/two.py": "import pvid.log.three\n",
+        "log/three.py": "from pvid.log.two import x\n",
+        "__init__.py": "",
+    }.items():
+        path = tmp_path / "pvid" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_planted_import_to_the_right_and_a_circle_are_found(planted: Path) -> None:
+    graph = graph_of(planted)
+    assert upward(graph, ["base", "log"]) == ["pvid.base.one imports pvid.log.two"]
+    assert circle(graph) == {"pvid.log.two", "pvid.log.three"}

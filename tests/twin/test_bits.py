@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from pvid.core.native import Native
 from pvid.rig.file import Differentiator, RigFile
@@ -13,12 +14,15 @@ from pvid.rig.run import Run
 from pvid.run.compare import compare_run, first_difference
 from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import EstimatorConfig, StrongConfig
+from pvid.settings.record import Record
 from pvid.setup.f32 import strong_config
 from pvid.sim.pendulum import STANDARD_DRIVE, Drive, Simulation, simulate, standard_sensors, standard_start
 from pvid.twin import fnv
 from pvid.twin.f32.gate import Gate
 from pvid.twin.kapitza import strong as model
-from pvid.twin.strong import StrongTwin, TwinRecord, lanes_of, run_rows
+from pvid.twin.record import TwinRecord
+from pvid.twin.rows import run_rows
+from pvid.twin.strong import StrongTwin, lanes_of
 
 RATE = 1000.0
 STARTS = 20
@@ -72,7 +76,7 @@ class Group:
     of one twin.
     """
 
-    def __init__(self, config: StrongConfig, natives: list[Native], run: Run, first_row: int) -> None:
+    def __init__(self, config: StrongConfig, natives: list[Native], run: Run, first_row: int, rows: int) -> None:
         self.natives = natives
         starts = [standard_start(seed) for seed in range(STARTS)]
         whole = variants(config.estimator)
@@ -84,7 +88,7 @@ class Group:
             [native.identifier(replace(config, estimator=lane)) for native in natives] for lane in whole
         ]
         warming_up = window(config)
-        phi, y = (x[first_row - warming_up :] for x in (run.phi, run.y))
+        phi, y = (x[first_row - warming_up : first_row + rows] for x in (run.phi, run.y))
         n, row_y, row_reason = StrongTwin(config).rows(phi, y)
         assert (row_reason[:warming_up] == Reason.WARMING_UP).all()
         assert (row_reason[warming_up:] == Reason.ACCUMULATED).all()
@@ -95,63 +99,52 @@ class Group:
     def _warm_up(self, k: int, phi: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> int:
         """Feeds identifier k until its next sample makes a row; returns its hash."""
         start = np.asarray(self.lanes[len(self.estimators) + k].start, np.float32)
-        p = np.tile(start, (len(phi), 1))
+        p, sums = np.tile(start, (len(phi), 1)), np.zeros((len(phi), model.SUMS), np.float32)
         reported = np.full(len(phi), Reason.WARMING_UP, np.uint8)
-        return self._compare_identifiers(
-            k, phi, y, p, np.zeros((len(phi), model.SUMS), np.float32), reported, fnv.START
-        )
+        return self._compare_identifiers(k, phi, y, Record(p, sums, reported), fnv.START)
 
     def _compare_identifiers(
-        self,
-        k: int,
-        phi: npt.NDArray[np.float64],
-        y: npt.NDArray[np.float64],
-        p: npt.NDArray[np.float32],
-        sums: npt.NDArray[np.float32],
-        reason: npt.NDArray[np.uint8],
-        hashed: int,
+        self, k: int, phi: npt.NDArray[np.float64], y: npt.NDArray[np.float64], own: Record, hashed: int
     ) -> int:
-        hashes = fnv.running_hashes(p, sums, reason, hashed)
+        hashes = fnv.running_hashes(own, hashed)
         for native, identifier in zip(self.natives, self.identifiers[k], strict=True):
             record = identifier.run(phi, y)
-            assert first_difference(record, p, sums, reason) is None, native.build
+            assert first_difference(record, own) is None, native.build
             assert np.array_equal(record.hash, hashes), native.build
         return int(hashes[-1])
 
     def compare(self, part: slice, twin: TwinRecord, first_lane: int) -> None:
         """Asserts that every build has the bits of its lane of the twin after every row of a part."""
         for lane in range(len(self.lanes)):
-            own = first_lane + lane
-            p, sums = (np.ascontiguousarray(x[:, :, own]) for x in (twin.p, twin.sums))
-            reason = np.ascontiguousarray(twin.reason[:, own])
+            own = twin.lane(first_lane + lane)
             if self.is_whole[lane]:
                 k = lane - len(self.estimators)
-                samples = self.phi[part], self.y[part]
-                self.hashes[k] = self._compare_identifiers(k, *samples, p, sums, reason, self.hashes[k])
+                self.hashes[k] = self._compare_identifiers(k, self.phi[part], self.y[part], own, self.hashes[k])
                 continue
-            reason[reason == Reason.MISFIT] = Reason.UPDATED  # the verdict is the identifier's
+            own.reason[own.reason == Reason.MISFIT] = Reason.UPDATED  # the verdict is the identifier's
             for native, estimator in zip(self.natives, self.estimators[lane], strict=True):
                 record = estimator.run(self.n[part], self.row_y[part], hashes=False)
-                assert first_difference(record, p, sums, reason) is None, native.build
+                assert first_difference(record, own) is None, native.build
 
 
+@pytest.mark.ticks(short=3000, long=40_000)
 def test_twenty_starts_and_whole_identifiers_equal_the_twin_in_every_build(
-    matrix: dict[str, Native], standard_20_bits: Simulation
+    matrix: dict[str, Native], standard_20_bits: Simulation, ticks: int
 ) -> None:
     """Both differentiators, both laws, with and without forgetting: 168 lanes of one twin, compared at every row."""
     configs = [configuration(of) for of in DIFFERENTIATORS]
     natives = [matrix[name] for name in BUILDS]
     first_row = max(window(config) for config in configs)
-    groups = [Group(config, natives, standard_20_bits.run, first_row) for config in configs]
+    groups = [Group(config, natives, standard_20_bits.run, first_row, ticks) for config in configs]
     rows, lanes = len(groups[0].row_y), len(groups[0].lanes)
-    assert rows >= 40_000
+    assert rows == ticks
     twin = StrongTwin(configs[0], [lane for group in groups for lane in group.lanes])
     gate = GateOfSome(twin, np.array([whole for group in groups for whole in group.is_whole]))
     for first in range(0, rows, PIECE):
         part = slice(first, first + PIECE)
         n = np.repeat(np.stack([group.n[part] for group in groups], axis=2), lanes, axis=2)
         y = np.repeat(np.stack([group.row_y[part] for group in groups], axis=1), lanes, axis=1)
-        expected = run_rows(twin.estimator, n, y, gate=gate, misfit=twin.misfit)
+        expected = run_rows(twin.estimator, lambda n, y: twin.estimator.step(n, y, gate, twin.misfit), n, y)
         for place, group in enumerate(groups):
             group.compare(part, expected, place * lanes)
 
@@ -163,7 +156,7 @@ def test_a_changed_bit_is_found_and_named(native: Native, standard_20_bits: Simu
     twin = StrongTwin(config).run(phi, run.y[:500])
     phi[300] = np.nextafter(np.float32(phi[300]), np.float32(1))
     record = native.identifier(config).run(phi, run.y[:500])
-    difference = first_difference(record, twin.p[:, :, 0], twin.sums[:, :, 0], twin.reason[:, 0])
+    difference = first_difference(record, twin.lane())
     assert difference is not None
     assert difference.tick == 300  # five points: the newest sample enters at once
     assert difference.core_word != difference.twin_word

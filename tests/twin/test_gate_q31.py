@@ -16,7 +16,7 @@ from pvid.base.errors import PvidError
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare_q31 import first_difference
+from pvid.run.compare import first_difference
 from pvid.settings.enums import Reason, Status
 from pvid.settings.f32 import GateConfig
 from pvid.settings.q31 import GateConfigQ31, StrongConfigQ31, WeakConfigQ31
@@ -106,7 +106,7 @@ def gated_like(
     cores = [native.identifier(config) for native in matrix.values()]
     for core in cores:
         record = core.run(phi, y, hashes=False)
-        assert first_difference(record, expected) is None, core.native.build
+        assert first_difference(record, expected.lane()) is None, core.native.build
         assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
         assert (record.reason == OUTLIER).sum() == core.counters["rejected_outlier"] > 0
     return cores
@@ -160,7 +160,7 @@ def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
     twin = StrongTwinQ31(replace(config, drive_min=0))
     expected = twin.run(phi, y)
     core = native.identifier(replace(config, drive_min=0))
-    assert first_difference(core.run(phi, y, hashes=False), expected) is None
+    assert first_difference(core.run(phi, y, hashes=False), expected.lane()) is None
     assert core.counters["rejected_saturated"] > 0
 
 

@@ -15,7 +15,7 @@ from linear_rig import LINEAR_RIG
 from bench.hard import CASES, Case
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
-from pvid.run.compare_q31 import compare_run_q31
+from pvid.run.compare import compare_run
 from pvid.settings.enums import Reason
 from pvid.settings.record import Record
 from pvid.setup.f32 import weak_config
@@ -132,7 +132,7 @@ def test_the_twin_has_the_same_integers_where_it_is_hard(native: Native, label: 
     one = case(label)
     run = one.run(3, duration=8.0)
     config = weak_config_q31(one.rig, run.sample_rate, standard_start(3))
-    result = compare_run_q31(native, config, *counts_of(one.rig, run))
+    result = compare_run(native, config, *counts_of(one.rig, run))
     assert result.equal, str(result.difference)
 
 

@@ -13,12 +13,14 @@ import pytest
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
-from pvid.run.compare_q31 import first_difference, twin_hashes
+from pvid.run.compare import first_difference
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
+from pvid.settings.record import Record
 from pvid.setup.q31 import counts_of, p_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
-from pvid.twin.weak_q31 import TwinRecordQ31, WeakTwinQ31
+from pvid.twin import fnv
+from pvid.twin.weak_q31 import WeakTwinQ31
 
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
 RIG = RigFile.standard()
@@ -41,9 +43,9 @@ def configuration(seed: int = 0, zero_unknown: bool = True, **identifier: Any) -
     return weak_config_q31(rig, 1000.0, standard_start(seed))
 
 
-def first_ticks(record: TwinRecordQ31, ticks: int) -> TwinRecordQ31:
+def first_ticks(record: Record, ticks: int) -> Record:
     """The beginning of a run."""
-    return TwinRecordQ31(record.p[:ticks], record.sums[:ticks], record.exponent[:ticks], record.reason[:ticks])
+    return Record(record.p[:ticks], record.sums[:ticks], record.reason[:ticks], record.exponent[:ticks])
 
 
 def assert_lanes_equal(
@@ -62,7 +64,7 @@ def assert_lanes_equal(
     assessed = twin.estimator.assess()
     for lane, one in enumerate(lanes):
         own = expected.lane(lane)
-        hashes = twin_hashes(first_ticks(own, hashed_ticks))
+        hashes = fnv.running_hashes(first_ticks(own, hashed_ticks))
         for native in natives:
             core = native.identifier(replace(config, estimator=one))
             record = core.run(phi, y)

@@ -236,9 +236,9 @@ def _rigs(draw: random.Random, run: Run) -> _Mutants:
     rig = Path("rig.toml")
     commands = (
         ["design", "--rig", "rig.toml", "--duration", "4"],
-        ["weak-table", "--rig", "rig.toml"],
-        ["weak-table", "--core", "q31", "--rig", "rig.toml"],
-        ["strong-table", "--rig", "rig.toml"],
+        ["tables", "--rig", "rig.toml"],
+        ["tables", "--core", "q31", "--rig", "rig.toml"],
+        ["tables", "--form", "strong", "--rig", "rig.toml"],
         ["identify", "run.csv", "--rig", "rig.toml"],
         ["identify", "run.csv", "--rig", "rig.toml", "--json"],
         ["identify", "run.csv", "--rig", "rig.toml", "--core", "q31"],

@@ -62,26 +62,26 @@ _COMMANDS: dict[str, tuple[int, tuple[str, ...], dict[str, tuple[str, ...]]]] = 
         (),
         {**_READ, "--run": _NAME, "--tone": _TONES, "--duration": _NUMBER, "--json": _FLAG},
     ),
-    "weak-table": (0, (), {"--rig": _NAME, "--name": _NAME, "--check": _NAME, "--core": _CHOICES, "--run": _NAME}),
-    "strong-table": (0, (), {"--rig": _NAME, "--name": _NAME, "--check": _NAME}),
-    "fir-table": (
+    "tables": (
         0,
         (),
         {
             **dict.fromkeys(("--points", "--degree", "--stride"), _NUMBER),
+            **{"--form": ("weak", "strong", "fir", "x"), "--core": _CHOICES, "--rig": _NAME, "--run": _NAME},
             **{"--name": _NAME, "--difference": _FLAG, "--check": _NAME},
         },
     ),
+    "models": (0, (), {"--x": _NUMBER}),
     "log": (
         2,
         _PORTS,
-        {"--rig": _NAME, "--web": _HOSTS, "--tee": _HOSTS, "--samples": _NUMBER, "--allow-loss": _NUMBER, "-q": _FLAG},
+        {"--rig": _NAME, "--web": _HOSTS, "--live": _HOSTS, "--samples": _NUMBER, "--allow-loss": _NUMBER, "-q": _FLAG},
     ),
     "verify": (1, _NAME, {"--rig": _NAME}),
     "export": (1, _NAME, {"--rig": _NAME, "--to": ("csv", "mcap", "npz", "parquet", "xml"), "--out": _NAME}),
     "plot": (1, _NAME, {**_READ, "--out": _NAME}),
     "campaign": (1, _NAME, {"--by": _NAME, "-o": ("",), "--scheduler": _HOSTS, "--rigs": ("0", "-1", "abc")}),
-    "link-schema": (0, (), {"--x": _NUMBER}),
+    "schema": (0, (), {"--x": _NUMBER}),
     "nope": (1, _NAME, {}),
     "": (0, (), {}),
 }
@@ -105,7 +105,7 @@ def command_line(draw: random.Random) -> list[str]:
         line.append(option)
         if options[option]:
             line.append(_GOOD[option] if option in _GOOD and draw.random() < 0.4 else draw.choice(options[option]))
-    if name in ("weak-table", "strong-table", "design") and "--rig" not in line:
+    if name in ("tables", "design") and "--rig" not in line:
         line += ["--rig", "run.toml"]
     if draw.random() < 0.03:
         line.append(draw.choice((*_NUMBERS, *_NAMES, "--nope", "-h", "--version")))

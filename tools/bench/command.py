@@ -178,18 +178,6 @@ def bench_longevity(
     return DONE
 
 
-@bench.command(name="noise")
-@UPDATE
-def bench_noise(update: Path | None) -> int:
-    """Bias by the noise inside the weak form's rows, as it is and with that noise taken off, in float64."""
-    from bench import noise
-
-    with progress_bar("noise in the rows", len(noise.CASES)) as advance:
-        rows = list(noise.noise_table(Native(), progress=advance))
-    put_table(update, "noise", markdown(noise.HEADER, rows))
-    return DONE
-
-
 @bench.command(name="reading")
 @UPDATE
 def bench_reading(update: Path | None) -> int:
@@ -372,3 +360,15 @@ def bench_side_by_side(update: Path | None) -> int:
         rows = list(side_by_side.side_by_side(Native(), instructions=counted, progress=advance))
     put_table(update, "side-by-side", markdown(side_by_side.HEADER, rows))
     return DONE
+
+
+@bench.command(name="long")
+@UPDATE
+@click.option("--only", metavar="ROOM", multiple=True, help="A folder of tests/; repeatable.")
+def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
+    """The long forms of the tests: 40 000 ticks, every build and board, mutants, a browser (an hour)."""
+    from bench import long
+
+    rows = long.long_table(only)
+    put_table(update, "long", markdown(long.HEADER, rows))
+    return DONE if all(row[-1] == "passed" for row in rows) else DIFFERENT

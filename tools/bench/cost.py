@@ -15,7 +15,7 @@ from pathlib import Path
 
 from bench.spread import PERIOD
 from pvid.base.errors import PvidError
-from pvid.core.sources import INCLUDES, ROOT, without
+from pvid.core.sources import INCLUDES, ROOT, sources_of
 
 STAGES = {
     "differentiator": "two channels, five points, orders 0 to 4",
@@ -49,7 +49,7 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: 
     PvidError
         When the compiler is missing or refuses.
     """
-    sources = sorted([*without("q31"), *(ROOT / "tests" / "cost").glob("*.c")])
+    sources = sorted([*sources_of("f32"), *(ROOT / "tests" / "cost").glob("*.c")])
     binary = folder / "tick_cost"
     command = [compiler, "-std=c99", level, "-ffp-contract=off", *INCLUDES]
     command += [f"-D{definition}" for definition in ("PVID_PLAIN_NAMES", *definitions)]  # callgrind is given names

@@ -255,7 +255,7 @@ def field_log(
         out=log,
         rig=rig.text(),
         begin=lambda: board.configure(settings, every, every, Source.SENSOR_PACED),
-        anew=True,
+        restart=True,
     )
     logger.observers = [_Accidents(logger, [source.kill, source.close_line, source.kill], samples // 4)]
     try:

@@ -17,7 +17,7 @@ from pvid.core.native import Native
 from pvid.oracle.weak import sample_sd
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.identify import LINEAR, Identification, identify
+from pvid.run.identify import Identification, identify
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
     STANDARD_PENDULUM,
@@ -136,7 +136,7 @@ def _cases() -> Iterator[Case]:
         yield Case(f"encoder of {bits} bits", bits=bits)
     for noise in (1, 2, 4, 8, 16, 32, 64, 128, 256, 512):
         yield Case(f"14 bits, noise of {noise} LSB", noise_lsb=noise)
-    yield Case("14 bits, noise of 64 LSB, phi_lsb says 0.58", noise_lsb=64, told=False)
+    yield Case("14 bits, noise of 64 LSB, phi_lsb set for 0.58", noise_lsb=64, told=False)
     for bits, factors in ((14, (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)), (12, (0.2, 0.1, 0.05))):
         for factor in factors:
             largest = LARGEST * factor / standard_sensors(bits).phi_lsb
@@ -204,8 +204,8 @@ def run_case(
     for seed in range(seeds):
         progress(seed)
         results.append(identify(case.run(seed), case.rig, native, start=standard_start(seed)))
-    values = np.array([[result.value[name] for name in LINEAR] for result in results])
-    standard_errors = np.array([[result.se[name] for name in LINEAR] for result in results])
+    values = np.array([[result.value[name] for name in result.model.mapped_names] for result in results])
+    standard_errors = np.array([[result.se[name] for name in result.model.mapped_names] for result in results])
     return Outcome(
         published=np.array([result.identified for result in results]),
         alarmed=np.array([result.alarm for result in results]),

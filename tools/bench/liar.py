@@ -32,7 +32,7 @@ from bench.lies import BEHAVIOURS, Behaviour
 from pvid.base.errors import PvidError
 from pvid.board.target import Target
 from pvid.link.frames import Raw
-from pvid.log.live_stream import Tee
+from pvid.log.live_stream import LiveStream
 from pvid.log.reader import LogReader, Observer
 from pvid.log.recorder import Logger
 from pvid.log.status import StatusLine
@@ -107,10 +107,10 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
     source = RehearsedSource(behaviour)
     console = Console(file=screen, force_terminal=True, width=100)
     views: list[Observer] = [
-        LiveView(console, "title", rig().l1),
+        LiveView(console, "title", rig().mechanism),
         StatusLine(line),
-        Tee("udp://127.0.0.1:9"),
-        Tee("teleplot://[::1]:9"),
+        LiveStream("udp://127.0.0.1:9"),
+        LiveStream("teleplot://[::1]:9"),
     ]
     source.logger = Logger(source=source, out=log, observers=views, rig=rig().text())
     faults: list[str] = []

@@ -18,7 +18,7 @@ from bench.liar_board import LyingBoard, rig
 from pvid.link import frames as link
 from pvid.link.frames import LAYOUTS, MAX_PAYLOAD, Frame
 from pvid.log.file import LOG_SCHEMA, LogWriter
-from pvid.log.live_stream import Tee
+from pvid.log.live_stream import LiveStream
 from pvid.log.reader import LogReader, Observer
 from pvid.log.status import StatusLine
 from pvid.log.values import Values
@@ -124,11 +124,11 @@ def _read(log: Path) -> Iterator[str]:
     """What goes wrong."""
     screen = io.StringIO()
     views: list[Observer] = [
-        LiveView(Console(file=screen, force_terminal=True, width=100), "title", rig().l1),
+        LiveView(Console(file=screen, force_terminal=True, width=100), "title", rig().mechanism),
         StatusLine(io.StringIO()),
-        Tee("udp://127.0.0.1:9", rig().l1),
+        LiveStream("udp://127.0.0.1:9", rig().mechanism),
     ]
-    values, reader = Values(rig().l1), LogReader(log)
+    values, reader = Values(rig().mechanism), LogReader(log)
     try:
         for record in reader:
             for view in views:

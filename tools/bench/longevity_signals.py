@@ -81,7 +81,7 @@ SCENARIOS = _named(
     Disturbance("stuck sensor", "the encoder keeps its last reading"),
     Disturbance("saturated sensor", "the encoder ends at 0.05 rad"),
     Disturbance("outliers", "1 % of the angles off by 100 sigma"),
-    Disturbance("dropped samples", "up to 20 samples missing every 5 s, told as no number"),
+    Disturbance("dropped samples", "up to 20 samples missing every 5 s, sent as NaN"),
     Disturbance("slipping clock", "a sample twice, or left out, every second"),
     Disturbance("sensor wrap", "the encoder's turn ends 0.05 rad from rest"),
     Disturbance("step", "w larger by 20 % from then on"),

@@ -20,11 +20,9 @@ from bench.longevity_tables import keep, load, measured_with
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.replay_image import MISSING, REPORT_EVERY, ReplayRun, build_image, play
-from pvid.core.native import Identifier, Native
+from pvid.cases import CASES
+from pvid.core.native import Native
 from pvid.rig.file import RigFile
-from pvid.settings.f32 import WeakConfig
-from pvid.setup.f32 import config_of
-from pvid.setup.q31 import config_of_q31
 
 BITS = {"weak": 14, "strong": 19}
 PAIRS = [(form, core) for form in ("weak", "strong") for core in ("f32", "q31")]
@@ -65,26 +63,17 @@ def run_of(library: ctypes.CDLL, scenario: str, form: str, core: str, ticks: int
         settings = replace(settings, form="strong", stride=STRIDE)
     rig = replace(rig, identifier=settings, sensor=replace(rig.sensor, phi_lsb=lsb))
     return ReplayRun(
-        form=form,
-        config=config_of(rig, RATE_HZ),
+        config=CASES[form, core].settings(rig, RATE_HZ),
         counts=counts,
         phi_lsb=np.float32(lsb),
         y_lsb=np.float32(sensing.y_lsb),
         measure_from=min(SETTLED, ticks // 2),
-        fixed=config_of_q31(rig, RATE_HZ) if core == "q31" else None,
     )
 
 
 def host_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash on this machine after every REPORT_EVERY ticks; memory does not grow with the run."""
-    identifier: Identifier
-    samples: tuple[npt.NDArray[np.generic], npt.NDArray[np.generic]]
-    if run.fixed is not None:
-        identifier, samples = native.identifier(run.fixed), (run.counts[:, 0], run.counts[:, 1])
-    elif isinstance(run.config, WeakConfig):
-        identifier, samples = native.identifier(run.config), (run.phi, run.y)
-    else:
-        identifier, samples = native.identifier(run.config), (run.phi, run.y)
+    identifier, samples = native.identifier(run.config), run.samples
     parts = []
     for at in range(0, run.ticks, CHUNK):
         phi, y = (x[at : at + CHUNK] for x in samples)

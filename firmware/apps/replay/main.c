@@ -10,32 +10,6 @@
 #include "replay_run.h"
 #include "report.h"
 
-#if REPLAY_Q31 && !REPLAY_WEAK
-typedef pvid_strong_q31 identifier_type;
-typedef int32_t sample_type;
-#define INIT pvid_strong_init_q31
-#define STEP pvid_strong_step_q31
-#define HASH pvid_fnv_estimator_q31
-#elif REPLAY_Q31
-typedef pvid_weak_q31 identifier_type;
-typedef int32_t sample_type;
-#define INIT pvid_weak_init_q31
-#define STEP pvid_weak_step_q31
-#define HASH pvid_fnv_estimator_q31
-#elif REPLAY_WEAK
-typedef pvid_weak_f32 identifier_type;
-typedef float sample_type;
-#define INIT pvid_weak_init_f32
-#define STEP pvid_weak_step_f32
-#define HASH pvid_fnv_estimator_f32
-#else
-typedef pvid_strong_f32 identifier_type;
-typedef float sample_type;
-#define INIT pvid_strong_init_f32
-#define STEP pvid_strong_step_f32
-#define HASH pvid_fnv_estimator_f32
-#endif
-
 #define EXIT_REFUSED 2
 #define EXIT_ARITHMETIC 3
 
@@ -46,18 +20,18 @@ typedef float sample_type;
 #define SAMPLE(tick, channel) (replay_samples[tick][channel])
 #endif
 
-static identifier_type identifier;
+static REPLAY_TYPE identifier;
 
 /* What a count is to the identifier: itself times what a step is worth; no number where there was no sample. */
-static sample_type sample_of(int16_t count, sample_type lsb)
+static REPLAY_SAMPLE sample_of(int16_t count, REPLAY_SAMPLE lsb)
 {
-#if !REPLAY_Q31
+#if REPLAY_IS_FLOAT
     if (count == REPLAY_MISSING) {
         static const uint8_t no_number[4] = {0x00u, 0x00u, 0xC0u, 0x7Fu};
         return pvid_get_f32(no_number);
     }
 #endif
-    return (sample_type)count * lsb; /* fixed point: lsb 1 */
+    return (REPLAY_SAMPLE)count * lsb; /* fixed point: lsb 1 */
 }
 
 typedef struct {
@@ -85,15 +59,15 @@ static uint32_t play(cost *whole)
     uint32_t hash = PVID_FNV_START;
     const uint32_t reading = overhead();
     for (uint32_t tick = 0; tick < REPLAY_TICKS; tick++) {
-        const sample_type phi = sample_of(SAMPLE(tick, 0), replay_phi_lsb);
-        const sample_type y = sample_of(SAMPLE(tick, 1), replay_y_lsb);
+        const REPLAY_SAMPLE phi = sample_of(SAMPLE(tick, 0), replay_phi_lsb);
+        const REPLAY_SAMPLE y = sample_of(SAMPLE(tick, 1), replay_y_lsb);
         const uint32_t before = pvid_port_instructions();
-        const pvid_reason reason = STEP(&identifier, phi, y);
+        const pvid_reason reason = REPLAY_STEP(&identifier, phi, y);
         const uint32_t counts = pvid_port_instructions() - before - reading;
         if (tick >= REPLAY_MEASURE_FROM) {
             add(whole, counts);
         }
-        hash = HASH(hash, &identifier.estimator, reason);
+        hash = REPLAY_HASH(hash, &identifier.estimator, reason);
         if (((tick + 1u) % REPLAY_REPORT_EVERY) == 0u) {
             report_hash_at(tick + 1u, hash);
         }
@@ -105,16 +79,12 @@ int main(void)
 {
     pvid_port_init();
     report_text("pvid replay on " PVID_BOARD_NAME ", " REPLAY_FORM " form\n");
-#if REPLAY_Q31
-    const uint32_t faults = 0; /* asked of floats, which there are none of */
-#else
-    const uint32_t faults = pvid_arithmetic_faults_f32();
-#endif
+    const uint32_t faults = REPLAY_FAULTS;
     report_number("arithmetic_faults", faults);
     if (faults != 0u) {
         return EXIT_ARITHMETIC;
     }
-    const pvid_status status = INIT(&identifier, &replay_config);
+    const pvid_status status = REPLAY_INIT(&identifier, &replay_config);
     report_number("status", (uint32_t)status);
     if (status != PVID_OK) {
         return EXIT_REFUSED;

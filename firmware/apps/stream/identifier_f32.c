@@ -5,19 +5,7 @@
 #include "pvid/pvid.h"
 #include "stream_tables.h"
 
-#if STREAM_FORM == 1 /* PVID_FORM_WEAK */
-typedef pvid_weak_f32 identifier_type;
-typedef pvid_weak_config_f32 config_type;
-#define INIT pvid_weak_init_f32
-#define STEP pvid_weak_step_f32
-#else
-typedef pvid_strong_f32 identifier_type;
-typedef pvid_strong_config_f32 config_type;
-#define INIT pvid_strong_init_f32
-#define STEP pvid_strong_step_f32
-#endif
-
-static identifier_type identifier;
+static STREAM_TYPE identifier;
 
 static void get_floats(float to[], const uint8_t from[])
 {
@@ -33,7 +21,7 @@ uint32_t identifier_arithmetic_faults(void)
 
 pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
 {
-    config_type config = stream_config;
+    STREAM_CONFIG config = stream_config;
     pvid_estimator_config_f32 *estimator = &config.estimator;
     get_floats(estimator->start, &payload[PVID_CONFIGURE_START]);
     get_floats(estimator->start_sd, &payload[PVID_CONFIGURE_START_SD]);
@@ -44,7 +32,7 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
     estimator->feedback_hz = pvid_get_f32(&payload[PVID_CONFIGURE_FEEDBACK_HZ]);
     estimator->law = (pvid_law)payload[PVID_CONFIGURE_LAW]; /* whatever it is: init knows the two */
     estimator->divider = pvid_get_u16(&payload[PVID_CONFIGURE_DIVIDER]);
-    return INIT(&identifier, &config);
+    return STREAM_INIT(&identifier, &config);
 }
 
 void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES])
@@ -55,7 +43,7 @@ void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES])
 
 pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
 {
-    return STEP(&identifier, pvid_get_f32(sample), pvid_get_f32(&sample[4]));
+    return STREAM_STEP(&identifier, pvid_get_f32(sample), pvid_get_f32(&sample[4]));
 }
 
 uint32_t identifier_hash(uint32_t hash, pvid_reason reason)

@@ -5,19 +5,7 @@
 #include "pvid/pvid_q31.h"
 #include "stream_tables.h"
 
-#if STREAM_FORM == 1 /* PVID_FORM_WEAK */
-typedef pvid_weak_q31 identifier_type;
-typedef pvid_weak_config_q31 config_type;
-#define INIT pvid_weak_init_q31
-#define STEP pvid_weak_step_q31
-#else
-typedef pvid_strong_q31 identifier_type;
-typedef pvid_strong_config_q31 config_type;
-#define INIT pvid_strong_init_q31
-#define STEP pvid_strong_step_q31
-#endif
-
-static identifier_type identifier;
+static STREAM_TYPE identifier;
 
 static void get_integers(int32_t to[], const uint8_t from[])
 {
@@ -34,7 +22,7 @@ uint32_t identifier_arithmetic_faults(void)
 
 pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_Q31_BYTES])
 {
-    config_type config = stream_config;
+    STREAM_CONFIG config = stream_config;
     pvid_estimator_config_q31 *estimator = &config.estimator;
     get_integers(estimator->start, &payload[PVID_CONFIGURE_Q31_START]);
     get_integers(estimator->start_sd, &payload[PVID_CONFIGURE_Q31_START_SD]);
@@ -46,7 +34,7 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_Q31_BYTES])
     estimator->divider = pvid_get_u16(&payload[PVID_CONFIGURE_Q31_DIVIDER]);
     config.phi_offset = pvid_get_i32(&payload[PVID_CONFIGURE_Q31_PHI_OFFSET]);
     config.y_offset = pvid_get_i32(&payload[PVID_CONFIGURE_Q31_Y_OFFSET]);
-    return INIT(&identifier, &config);
+    return STREAM_INIT(&identifier, &config);
 }
 
 void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES])
@@ -57,7 +45,7 @@ void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES])
 
 pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
 {
-    return STEP(&identifier, pvid_get_i32(sample), pvid_get_i32(&sample[4]));
+    return STREAM_STEP(&identifier, pvid_get_i32(sample), pvid_get_i32(&sample[4]));
 }
 
 uint32_t identifier_hash(uint32_t hash, pvid_reason reason)

@@ -10,7 +10,7 @@
  *   float d[PVID_ORDERS];
  *   if (pvid_differentiator_step_f32(&phi, sample, d)) use d[0] .. d[4];
  *
- * Not thread-safe; one object per channel. Tables come from `pvid fir-table`.
+ * Not thread-safe; one object per channel. Tables come from `pvid tables --form fir`.
  */
 #ifndef PVID_DIFFERENTIATOR_H
 #define PVID_DIFFERENTIATOR_H

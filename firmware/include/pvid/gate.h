@@ -1,15 +1,16 @@
-/* pvid/gate.h - keeps what does not fit out of the sums: a jolt, a sensor that sticks or jumps, a wrong sample.
+/* pvid/gate.h - rejects outliers: jolts, stuck or jumping sensors, wrong samples.
  *
- * Looks at residuals, squared (a row's innovation in the strong form; the mean over a window's rows, relative to what
- * the sensors' noise explains, in the weak form), before they are taken in. One that is larger than so many times
- * the usual size is an outlier: its row or window is left out, p and the sums stay, and the tick says so.
+ * A residual is compared with the usual size before its row or window is added. In the strong form it is a row's
+ * squared innovation; in the weak form the mean over a window's rows, relative to the sensors' noise. Beyond
+ * `sigmas` times the usual size the row or window is dropped: p and the sums are unchanged, and the tick returns
+ * PVID_REJECTED_OUTLIER.
  *
- * The usual size is robust: the mean square of what passes, which follows downwards and upwards alike; outliers
- * do not count in it. But each of them widens it a little, so that a mechanism that has changed is let in again after
- * `patience_s`, or never, as you say. (In that time the scale of squares grows by 10^4.)
+ * The usual size is the running mean square of accepted residuals; outliers do not contribute. Each outlier widens
+ * it slightly (squares: by 10^4 within patience_s), so that a changed mechanism is accepted after `patience_s`, or
+ * never.
  *
- * A rig file has it on where it does not say, but in equation (5) (pvid_law), which is to stay as the paper has it; a
- * configuration of zeros has none. Total; one comparison, one division a residual.
+ * Enabled by default in rig files, except for the paper's law (5); a zeroed configuration disables it. Every input
+ * is allowed. Cost: one comparison and one division per residual.
  */
 #ifndef PVID_GATE_H
 #define PVID_GATE_H
@@ -25,21 +26,22 @@ extern "C" {
 #endif
 
 typedef struct {
-    float sigmas;     /* largest residual [times the usual size], 2..1e3; 0: no gate */
-    float patience_s; /* until a changed mechanism is believed [s], 0..1e12; 0: never */
+    float sigmas;     /* largest residual [multiples of the usual size], 2..1e3; 0: no gate */
+    float patience_s; /* time after which a changed mechanism is accepted [s], 0..1e12; 0: never */
 } pvid_gate_config_f32;
 
-/* State: detail/gate_state.h. Only the functions below write to it. */
+/* State: detail/gate_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_gate_f32 pvid_gate_f32;
 
-/* Prepares `self` for residuals that come at rate_hz, of which the scale remembers `memory` (at least 1) and whose mean
- * square is never taken to be below `floor` (> 0). Fails iff a field of config is not as described there; the status
- * names it. */
+/* Initialises `self` for residuals at rate_hz [Hz]; the scale averages over `memory` (>= 1) of them and is never
+ * below `floor` (> 0). Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER), or
+ *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *config, float rate_hz, float memory,
                                float floor);
 
-/* Whether a residual may be taken in, by its square. The first `memory` ones may; so may what is no number or
- * infinite, which others refuse for what it is. */
+/* Returns whether a residual is accepted, given its square. The first `memory` residuals are accepted. NaN and
+ * infinity pass: the estimator rejects them with their own reason. */
 bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square);
 
 #ifdef __cplusplus

@@ -1,31 +1,32 @@
-/* pvid/misfit.h - tells when the strong form leaves more unexplained than it should: its verdict on itself.
+/* pvid/misfit.h - alarm of the strong form: the residuals of the rows are larger than they were.
  *
- * Sums that took a jolt or a stuck sensor in, and a mechanism that has changed under sums that never forget, leave an
- * estimate that is wrong and looks sure. What gives it away is the rows that follow: their residuals
- * e = Y - N^T theta. They are judged in blocks of rows by their energy, and by the part q that it is of what the rows
- * say of p[0],
+ * Sums that contain a jolt, or a mechanism that changed under sums without forgetting, give a wrong estimate with
+ * small standard errors. The residuals e = Y - N^T theta of later rows show it. They are judged in blocks by their
+ * energy and by
  *
  *   q = sum e^2 / sum (p[0] dY/dp[0])^2
  *
- * of which noise in the regressors takes about q away from p[0] (more where the other parameters can imitate it). A
- * block is a misfit where q is beyond PVID_MISFIT_MOST, or where both the energy and q are more than PVID_MISFIT_TIMES
- * what they were in the quietest block. (Another drive moves one of the two, not both.) Below PVID_MISFIT_LEAST nothing
- * is a misfit: the filters' own bias is of that size. The first block only teaches: p is still on its way. Of rows
- * without motion nothing is said; residuals that are no numbers are a misfit.
+ * Noise in the regressors biases p[0] by about -q (more if other parameters can compensate). A block is a misfit
+ * iff
+ *   - q > PVID_MISFIT_MOST, or
+ *   - both energy and q exceed PVID_MISFIT_TIMES their values in the quietest block (a different drive changes
+ *     only one of them) and q > PVID_MISFIT_LEAST, the size of the filters' bias, or
+ *   - a residual is not finite.
+ * The first block only sets the reference; blocks without motion are not judged.
  *
- * Total; some ten instructions a row, two divisions a block.
+ * Cost: ten instructions per row, two divisions per block.
  */
 #ifndef PVID_MISFIT_H
 #define PVID_MISFIT_H
 
 #include <stdint.h>
 
-#define PVID_MISFIT_MOST 4.0e-3f  /* of q: takes some 0.5 % away from w */
-#define PVID_MISFIT_LEAST 2.0e-5f /* of q: w is off by some 0.5 % */
+#define PVID_MISFIT_MOST 4.0e-3f  /* of q: biases w by about 0.5 % */
+#define PVID_MISFIT_LEAST 2.0e-5f /* of q: w is off by about 0.5 % */
 #define PVID_MISFIT_TIMES 3.0f    /* blocks of white noise differ by a quarter */
-#define PVID_MISFIT_BLOCK_S 4.0f  /* three swings of the slow mode */
+#define PVID_MISFIT_BLOCK_S 4.0f  /* length of a block [s]: three swings of the slow mode */
 
-/* State: detail/misfit_state.h. Only the strong form writes to it. */
+/* State: detail/misfit_state.h, not API. Only the strong form writes to it. */
 typedef struct pvid_misfit_f32 pvid_misfit_f32;
 
 #include "pvid/detail/misfit_state.h"

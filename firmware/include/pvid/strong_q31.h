@@ -3,7 +3,7 @@
  * The same identifier as strong.h for cores without a floating-point unit:
  *
  *   static pvid_strong_q31 identifier;
- *   (config from the header that `pvid strong-table` writes)
+ *   (config from the header that `pvid tables --form strong` writes)
  *   if (pvid_strong_init_q31(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_strong_step_q31(&identifier, phi_counts, y_counts);
  *

@@ -1,24 +1,24 @@
-/* pvid/trust.h - which estimates are published.
+/* pvid/trust.h - decides which estimates are published.
  *
  * The estimator always has a p; this module decides whether it is accurate enough. After every group of rows it
  * checks the present estimate, publishes it or not, and returns the reason:
  *
- *   PVID_UPDATED            it is published
- *   PVID_MISFIT             it is published, but the residuals are larger than the sensors' noise explains
- *   PVID_HELD_NOT_EXCITED   the data contain too little information on p[0], or no more than noise would
- *   PVID_HELD_PIVOT         the system could not be solved
- *   PVID_HELD_UNCERTAIN     the standard errors are too large, or p has not converged yet
+ *   PVID_UPDATED            published
+ *   PVID_MISFIT             published, but the residuals exceed the sensors' noise: the model does not fit
+ *   PVID_HELD_NOT_EXCITED   held: too little information on p[0], or no more than noise gives
+ *   PVID_HELD_PIVOT         held: the system could not be solved
+ *   PVID_HELD_UNCERTAIN     held: standard errors too large, or p not converged
  *
- * Until the first estimate is trusted, the published one is the start with the start's standard deviations.
- * A trusted estimate is held until a later one is trusted.
+ * The published estimate is the start with start_sd until the first one is trusted; then it is held until the next
+ * one.
  *
- * The alarm compares residuals with what the sensors' noise explains, from the first judgement on: the variance of all
- * rows in the sums at the present p, and the windows lately, at the p that they met.
+ * Misfit alarm. Residual variances are compared with their expectation from the sensors' noise: that of all rows
+ * in the sums at the present p, and those of the latest windows at the p before each window.
  *
- * Rows that came in at a poor start may weigh far too much, and float32 sums with which p has come a long way have lost
- * digits. Once p has settled, such a past is renewed: it fades before each of the next groups.
+ * Renewal. Rows added far from the solution may have too much weight, and float32 sums lose digits when p moves
+ * far. When p has converged far from them, the old sums are faded over the next groups.
  *
- * Defined for every input; O(n_p^2).
+ * Every input is allowed. Cost: O(n_p^2).
  */
 #ifndef PVID_TRUST_H
 #define PVID_TRUST_H
@@ -34,52 +34,54 @@ extern "C" {
 #endif
 
 typedef struct {
-    float kappa_min;     /* least kappa and least pivot, 0 <= . < 1: what one mode of motion alone says of d1 and d2
-                            is rounding, and stays below 2e-5 */
-    float se_max;        /* largest standard error of the positive parameters, relative to them, > 0 */
-    float misfit_max;    /* alarm when the residuals' variance exceeds what is expected of it so many times: that of all
-                            rows remembered, 1 + 3 sqrt(2 / degrees of freedom) times as much; on the mean over
-                            PVID_TRUST_LONG groups and more; half as much again on the mean over the last
-                            PVID_TRUST_SHORT ones. At least 1; 0: no alarm */
+    float kappa_min;  /* least kappa and least pivot of a published estimate, 0 <= . < 1. A single mode of motion gives
+                         below 2e-5, by rounding */
+    float se_max;     /* largest relative standard error of the positive parameters, > 0 */
+    float misfit_max; /* alarm when the residual variance exceeds its expectation by this factor, >= 1; 0: no alarm. Of
+                         all rows in the sums: times 1 + 3 sqrt(2 / degrees of freedom); of the mean of PVID_TRUST_LONG
+                         groups and more: times 1; of the last PVID_TRUST_SHORT groups: times 1.5 */
     uint16_t groups_min; /* groups before the first publication */
-    uint16_t revert_after; /* consecutive groups with too little information for a step, after which p is reset to the
-                          published one, so that it does not stay where noise moved it; 0: never */
-    float renewal;         /* the past is renewed once p has settled so far from where its rows came in, in one of its
-                              positive parameters and relative to it, while the residuals of all rows are beyond the
-                              alarm's limit; 0.01..1e3; 0: never */
+    uint16_t
+        revert_after; /* consecutive uninformative groups after which p reverts to the published estimate; 0: never */
+    float renewal; /* the old sums are renewed when a positive parameter has converged this far from its value at their
+                      rows, relative, and the residual variance of all rows is beyond the alarm's limit; 0.01..1e3; 0:
+                      never */
 } pvid_trust_config_f32;
 
-/* kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %. */
+/* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %. */
 extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 
-/* State: detail/trust_state.h. Only the functions below write to it. */
+/* State: detail/trust_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_trust_f32 pvid_trust_f32;
 
-/* Prepares `self`; the published estimate is the estimator's start. Fails iff a field of config is not as
- * described there; the status names it. */
+/* Initialises `self`; the published estimate is the estimator's start. Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER), or
+ *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
                                 const pvid_estimator_f32 *estimator);
 
-/* Publishes the start again, where p was placed elsewhere before the first row. */
+/* Publishes the start again after pvid_estimator_place_f32. */
 void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
-/* Renews the past, and the alarm with it: the rows are made in another way from now on. */
+/* Renews the sums and restarts the alarm; call it when the rows change their meaning. */
 void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
-/* Factor on the sums of the past before the coming group's rows are added; 1 where nothing is renewed, or too little
- * would be left. Call it once a group. */
+/* Factor on the sums before the rows of the next group are added; 1: no renewal, or too little would remain. Call
+ * it once per group. */
 float pvid_trust_fade_factor_f32(pvid_trust_f32 *self);
 
-/* Largest standard error of the positive parameters, relative to them. */
+/* Largest relative standard error of the positive parameters. */
 float pvid_trust_largest_error_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate);
 
-/* Where p is to go if the coming group does not let it step; NULL: nowhere. */
+/* p to revert to if the next group allows no step; NULL: none. */
 const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self);
 
-/* Judges a group whose last solve and whose assessment of `candidate` are complete.
- *   reason, size: of that solve;  informed: of the assessment;
- *   variance_ratio: variance of the group's residuals over what was expected.
- * Returns what is to be told; counts it. */
+/* Judges a group after its last solve and its assessment.
+ *   reason, size:    of that solve
+ *   above_noise:     of the assessment
+ *   variance_ratio:  residual variance of the group over its expectation
+ *   candidate:       the assessed estimate
+ * Returns and counts the reason of the table above. */
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
                                  bool above_noise, float variance_ratio, const pvid_estimate_f32 *candidate);
 

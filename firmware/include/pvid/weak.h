@@ -1,9 +1,9 @@
-/* pvid/weak.h - the weak form of the identifier: samples of a real encoder in, parameters out.
+/* pvid/weak.h - identifies a pendulum from an encoder and the pivot's height: the weak form in float32.
  *
- * The strong form differentiates the angle four times, which amplifies an encoder's noise too much. The weak form
- * multiplies the equation of motion by K test functions over a window of about a second and
- * integrates by parts (MATH.md 5): no derivative of the angle is left, only y_A'' of the pivot, and
- * each window gives K rows (Y, N) to the same estimator.
+ * Multiplies the equation of motion by K test functions (modulating functions) over a window of about a second and
+ * integrates by parts (host/docs/theory.md 5). No derivative of the angle remains, only y_A'' of the pivot, so
+ * that a 14-bit encoder suffices. Each window gives K rows (Y, N) for the estimator. The strong form
+ * differentiates the angle four times and needs 20 bits.
  *
  *   static pvid_weak_f32 identifier;
  *   pvid_weak_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .design = &table,
@@ -11,26 +11,24 @@
  *                                   .estimator = pvid_estimator_defaults_f32,
  *                                   .trust = pvid_trust_defaults_f32 };
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
- *   each tick: reason = pvid_weak_step_f32(&identifier, phi, y);
- *   there:     estimate = pvid_weak_estimate_f32(&identifier);
- *   elsewhere: if (pvid_weak_read_f32(&identifier, &copy, &number) && (number > 0)) ...
+ *   each tick:     reason = pvid_weak_step_f32(&identifier, phi, y);
+ *   same context:  estimate = pvid_weak_estimate_f32(&identifier);
+ *   other context: if (pvid_weak_read_f32(&identifier, &copy, &number) && (number > 0)) ...
  *
- * Schedule. Samples are smoothed over `taps` and decimated by D; two windows of W decimated
- * samples, half a window apart, add sums; every H = (W - 1) / 2 decimated samples one of them is
- * complete. Of D ticks the first half smooths, a slice of the taps in each; the second half adds the result
- * to the windows, a slice of the functions in each. The first half also turns a complete window
- * into rows and Gauss-Newton steps, one small stage in each tick, while the other window fills; then the estimate is
- * checked, and published or not. The longest tick costs about three times the mean tick up to K = 12, four
- * times at K = 16, if a hop (H decimated samples) has a free tick for every stage. (If it has fewer, a tick runs
- * `together` stages of the state, and the longest tick is longer by about this factor.) The work of a tick depends on
- * its place in this schedule, not on the data; only a window dropped for too little drive or for its angle skips it.
+ * Never allocates. Every input is allowed: a sample that is not finite is rejected and restarts the windows; the
+ * sums are kept. Call all functions of an object from one context, except pvid_weak_read_f32 (publication.h). RAM:
+ * sizeof(pvid_weak_f32); the tables stay in flash.
  *
- * The first window that is used sets c to the mean of phi over it: an encoder's offset may be far from 0.
+ * Schedule. Samples are smoothed over `taps` and decimated by D. Two windows of W decimated samples overlap by
+ * half; every H = (W - 1) / 2 decimated samples one of them is complete. In a block of D ticks the first half
+ * smooths, a part of the taps per tick; the second half adds the result to the windows, a part of the functions
+ * per tick. In the first half the last complete window is also processed, one stage per tick: rows, Gauss-Newton
+ * steps, assessment, publication. The longest tick costs about 3 times the mean tick for K <= 12, 4 times for K =
+ * 16. If H has fewer free ticks than stages, a tick runs `stages_per_tick` stages and is longer by this factor.
+ * The work of a tick depends on its place in the schedule, not on the data, except that a dropped window is not
+ * processed.
  *
- * Never allocates. Defined for every input: a sample that is not finite is rejected and restarts the windows (its
- * neighbours are no longer equidistant); the sums are kept. Call all functions of an object from one context; only
- * pvid_weak_read_f32 may be called from other contexts at the same time (publication.h).
- * RAM: sizeof(pvid_weak_f32); the tables are read where they are.
+ * The first window in use sets c to its mean phi: the encoder's offset may be large.
  */
 #ifndef PVID_WEAK_H
 #define PVID_WEAK_H
@@ -48,89 +46,94 @@
 extern "C" {
 #endif
 
-/* The tables of a design: constant data, made on a PC, kept by reference.
+/* The tables of a design: constant data from `pvid tables`, kept by reference.
  *
- * The test functions chi_k and their first three derivatives vanish at both ends of the window, so
- * the first and the last sample of a window have no weight: their rows of chi are not read. The
- * functions are combined such that their residual filters chi'''' + d1 w chi'' + d2 w^2 chi are
- * orthonormal at a nominal p; the Gram tables are what restores this at the p of the moment. */
+ * The test functions chi_k and their first three derivatives vanish at both ends of the window; therefore the
+ * first and the last row of chi are not read. The functions are combined such that their residual filters chi''''
+ * + d1 w chi'' + d2 w^2 chi are orthonormal at a nominal p; the Gram tables make them orthonormal at the present
+ * p. */
 typedef struct {
-    uint16_t taps;       /* smoothing window [samples], odd, 5..PVID_MAX_TAPS */
+    uint16_t taps;       /* smoothing filter [samples], odd, 5..PVID_MAX_TAPS */
     uint16_t decimation; /* D, 1..PVID_MAX_DECIMATION */
     uint16_t window;     /* W [decimated samples], odd, 9..PVID_MAX_WEAK_WINDOW */
     uint8_t functions;   /* K, 4..PVID_MAX_FUNCTIONS */
-    const float *smooth; /* [(taps - 1) / 2] value, folded as in differentiator.h: x0 + sum w q_i */
-    const float *second; /* [(taps - 1) / 2] second derivative per sample^2, folded: sum w q_i */
+    const float *smooth; /* [(taps - 1) / 2] weights of the value, folded as in differentiator.h: x0 + sum w q_i */
+    const float *second; /* [(taps - 1) / 2] weights of the second derivative per sample^2, folded: sum w q_i */
     const float *chi;    /* [W][3][K] chi, chi'' [1/s^2], chi'''' [1/s^4] at the window's samples */
     const float *gram;   /* [6][K (K + 1) / 2] lower triangles by rows: G44, G42 + G24, G40 + G04, G22,
                             G20 + G02, G00 with G_ij = sum over samples of chi^(i) chi^(j)^T */
-    float overlap;       /* variance inflation because half-overlapping windows share noise, >= 1 */
-    uint8_t lag;         /* decimated samples between the three that phi'' is taken from for the alarm, 1..255:
-                            a sixth of the fast mode's period */
+    float overlap;       /* variance inflation by the noise that overlapping windows share, >= 1 */
+    uint8_t lag; /* decimated samples between the three samples of the curvature for the misfit alarm, 1..255: a sixth
+                    of the fast mode's period */
 } pvid_weak_design_f32;
 
 typedef struct pvid_weak_angle_f32 pvid_weak_angle_f32;
 
 typedef struct {
-    float sample_rate_hz; /* 1e-3..1e6 */
+    float sample_rate_hz; /* sample rate [Hz], 1e-3..1e6 */
     float l1;             /* length of rod 1 [m], > 0 */
-    float drive_min;      /* rms of u = y_A''/l1 about its mean [1/s^2] over a window, below which the pivot
-                             counts as still and the window is dropped; some ten times the noise of u.
-                             0: every window is taken in */
-    float pivot_noise;    /* variance that the pivot sensor's noise gives a row, for each (rad/s^2)^2 of mean square
-                             phi'' [s^4]; 0: an exact pivot. For the alarm only */
-    float angle_limit;    /* largest |phi - c| [rad] that a window may hold; 0: no limit */
-    const pvid_weak_design_f32 *design; /* must outlive the identifier, as must its tables */
-    pvid_weak_angle_f32 *angle;         /* memory for full_angle and friction; must outlive the identifier. NULL if both
-                                     are false */
-    bool full_angle;    /* correct the rows for sines and cosines once the estimate has settled; set angle_limit
-                           to 0.2 rad: the correction is not accurate beyond that */
-    bool friction;      /* p = (w, d1, d2, c, c1, c2): two viscous frictions absorb what damps the motion. Needs
+    float drive_min; /* least rms of u = y_A''/l1 about its mean in a window [1/s^2], >= 0: a window with less drive is
+                        dropped. Choose ten times the noise of u. 0: every window is used */
+    float pivot_noise; /* variance of a row by the pivot sensor's noise per (rad/s^2)^2 of mean square phi'' [s^4], >=
+                          0; used by the misfit alarm. 0: exact pivot */
+    float angle_limit; /* largest |phi - c| in a window [rad], >= 0: a window beyond it is dropped. 0: no limit */
+    const pvid_weak_design_f32 *design; /* must outlive the identifier, with its tables */
+    pvid_weak_angle_f32
+        *angle;         /* memory for full_angle and friction, must outlive the identifier; NULL if both are false */
+    bool full_angle;    /* correct the rows for sin and cos once the estimate has converged; set angle_limit to 0.2 rad,
+                           the limit of its accuracy */
+    bool friction;      /* p = (w, d1, d2, c, c1, c2): two viscous friction coefficients, nuisance parameters. Needs
                            zero_unknown, PVID_MAX_P 6 and PVID_MAX_MOMENTS 55 */
-    uint8_t passes;     /* of the correction, 1..PVID_MAX_PASSES; 3 is good */
+    uint8_t passes;     /* iterations of the correction per window, 1..PVID_MAX_PASSES; recommended: 3 */
     bool zero_unknown;  /* true: p = (w, d1, d2, c), c [rad] the encoder's reading at rest; false: c = 0 */
-    uint8_t iterations; /* Gauss-Newton steps a window, 1..PVID_MAX_ITERATIONS; 3 is good. One where
-                           the estimator's law is a rate (g < 1) */
-    pvid_estimator_config_f32 estimator; /* model, update_rate_hz, row_weight and correlation are filled
-                                            in by init. A group of rows is a window; row_sd [rad] is
-                                            the noise of a decimated sample */
-    pvid_trust_config_f32 trust;         /* which estimates are published */
-    pvid_gate_config_f32 gate;           /* on the residuals of a window */
+    uint8_t iterations; /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3. Always 1 if g < 1 */
+    pvid_estimator_config_f32 estimator; /* one group of rows per window; row_sd [rad] is the noise of a decimated
+                                            sample. init sets model, update_rate_hz, row_weight and correlation */
+    pvid_trust_config_f32 trust;         /* conditions of publication */
+    pvid_gate_config_f32 gate;           /* outlier gate on the residuals of a window */
 } pvid_weak_config_f32;
 
-/* State: detail/weak_state.h. Only the functions below write to it. */
+/* State: detail/weak_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_weak_f32 pvid_weak_f32;
 
-/* Prepares `self`. Fails iff a field of config or of its design is out of its range (the status names it), a table is
- * missing or holds a number that is not finite (PVID_BAD_DESIGN), or a window cannot be worked off before the next one
- * is complete (PVID_BAD_ITERATIONS): H D / 2 ticks, one at least a sample, for less than
- * 10 K + 35 stages, 19 a Gauss-Newton step and K / 6 + W / 4 + 3 a pass of the correction. A tick takes as many stages
- * as that needs: one where the hop is long enough, 32 at most. */
+/* Initialises `self`. Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - a field of config or design is out of its range (the status names it),
+ *   - a table is NULL or contains a number that is not finite (PVID_BAD_DESIGN), or
+ *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS).
+ * A window has H D / 2 free ticks, at least one per sample, and needs at most 10 K + 35 stages, 19 per
+ * Gauss-Newton step and K / 6 + W / 4 + 3 per pass of the correction. A tick runs 1..32 stages. */
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
 
-/* One tick: phi [rad] and y_A [m] sampled together. Returns PVID_WARMING_UP until the first window is
- * complete; at the tick that ends the work on a window what trust.h says of it; PVID_HELD_NOT_EXCITED or
- * PVID_HELD_OUT_OF_RANGE at once where a window was dropped for want of drive or for its angle, and
- * PVID_REJECTED_OUTLIER where the gate kept it out;
- * PVID_REJECTED_.. when the sample or a window's row was not usable; else PVID_ACCUMULATED. */
+/* One tick: phi [rad] and y_A [m], sampled at the same time. Returns
+ *   - PVID_WARMING_UP until the first window is complete,
+ *   - PVID_REJECTED_NOT_FINITE if a sample is not finite, PVID_REJECTED_SATURATED if a row of the window exceeds
+ *     its limit,
+ *   - PVID_HELD_NOT_EXCITED or PVID_HELD_OUT_OF_RANGE when a window is dropped for too little drive or too large
+ *     an angle, PVID_REJECTED_OUTLIER when the gate rejects it, PVID_HELD_FROZEN while frozen,
+ *   - the reason of trust.h at the tick that completes a window's processing,
+ *   - PVID_ACCUMULATED at all other ticks. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y);
 
-/* The published estimate, for the context that calls step: the last trusted estimate, or the start as long as there is
- * none (then self->trust.published is false). Its age: time since step last returned PVID_UPDATED or PVID_MISFIT. */
+/* The published estimate, for the context that calls step: the last trusted estimate, or the start before the
+ * first one (then self->trust.published is false). Count the ticks since PVID_UPDATED or PVID_MISFIT to know its
+ * age. */
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 
-/* Copies the published estimate consistently, from any context, while another context calls step (publication.h).
- * *number: estimates published so far; 0: none, and *estimate is the start; the pointer may be NULL. Returns false,
- * with *estimate undefined, iff an estimate was published during each of PVID_READ_ATTEMPTS tries, or before init. */
+/* Copies the published estimate from any context, also while another one calls step (publication.h). *number:
+ * estimates published so far, 0: *estimate is the start; may be NULL. Fails iff
+ *   - an estimate was published during each of PVID_READ_ATTEMPTS attempts, or
+ *   - `self` is not initialised.
+ * On failure *estimate is undefined. */
 bool pvid_weak_read_f32(const pvid_weak_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number);
 
-/* Call this if samples are missing: the windows start again, all other state is kept. */
+/* Call this when samples are missing: the windows restart, all other state is kept. */
 void pvid_weak_gap_f32(pvid_weak_f32 *self);
 
-/* Freezes the identifier (true) or resumes it (false). While it is frozen every complete window is dropped with
- * PVID_HELD_FROZEN: p and the sums are kept, without forgetting. A window that is being processed is finished, in less
- * than half a window. Samples are still added to windows, so that it resumes bumplessly: the next window is complete
- * after at most half a window, and may have begun before the resumption. */
+/* Freezes the identifier (true) or resumes it (false). While frozen, complete windows are dropped with
+ * PVID_HELD_FROZEN; p and the sums are kept without forgetting. The window in processing is finished within half a
+ * window. Windows continue to fill, so that resuming is bumpless: the next window is complete after at most half a
+ * window, and may contain samples from before the resumption. */
 void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen);
 
 #ifdef __cplusplus

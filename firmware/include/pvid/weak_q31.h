@@ -3,7 +3,7 @@
  * The same identifier as weak.h, in the same stages and the same schedule, for cores without a floating-point unit:
  *
  *   static pvid_weak_q31 identifier;
- *   (config from the header that `pvid weak-table --core q31` writes)
+ *   (config from the header that `pvid tables --core q31` writes)
  *   if (pvid_weak_init_q31(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_weak_step_q31(&identifier, phi_counts, y_counts);
  *
@@ -43,7 +43,7 @@ extern "C" {
 /* State: detail/weak_state_q31.h. Only the functions below write to it. */
 typedef struct pvid_weak_q31 pvid_weak_q31;
 
-/* Tables and formats of a design: constant data, made by `pvid weak-table --core q31`, kept by reference. See weak.h
+/* Tables and formats of a design: constant data, made by `pvid tables --core q31`, kept by reference. See weak.h
  * for what the tables are. */
 typedef struct {
     uint16_t taps;       /* smoothing window [samples], odd, 5..PVID_MAX_TAPS */

@@ -10,10 +10,7 @@ from pvid.board.target import verify
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare import compare_run
-from pvid.run.compare_q31 import compare_run_q31
-from pvid.setup.f32 import config_of
-from pvid.setup.q31 import config_for_run
+from pvid.run.compare import compare_rig
 
 Progress = Callable[[int], None]
 
@@ -40,11 +37,7 @@ class Outcome:
 
 def compare_here(rig: RigFile, run: Run, native: Native, progress: Progress | None = None) -> Outcome:
     """The rig file's core, form and law on this machine against the twin, in every bit."""
-    samples = played_samples(rig, run)
-    if rig.identifier.core == "q31":
-        found = compare_run_q31(native, config_for_run(rig, run), *samples, progress=progress)
-    else:
-        found = compare_run(native, config_of(rig, run.sample_rate), *samples, progress=progress)
+    found = compare_rig(native, rig, run, progress=progress)
     return Outcome(
         target="host",
         core=rig.identifier.core,

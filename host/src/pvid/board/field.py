@@ -18,8 +18,9 @@ import serial
 
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import Samples, StreamRig
+from pvid.board.stream_rig import StreamRig
 from pvid.board.target import Target, refusal
+from pvid.cases import Samples
 from pvid.link.frames import (
     Code,
     Configuration,

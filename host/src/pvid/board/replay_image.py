@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,23 +16,14 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.boards import run as run_image
-from pvid.core.headers import Headers, Tables, default_library
+from pvid.cases import Samples, case_of
 from pvid.core.native import Native
-from pvid.design.c_tables import float_array, float_literal, struct_initializer
-from pvid.design.weak_sizing import raised_bounds
+from pvid.design.c_tables import float_literal
 from pvid.rig.file import RigFile
-from pvid.run.compare_q31 import twin_hashes as twin_hashes_q31
-from pvid.run.compare_q31 import twin_q31
-from pvid.settings.f32 import StrongConfig, WeakConfig
-from pvid.settings.q31 import StrongConfigQ31
-from pvid.setup.f32 import config_of
-from pvid.setup.q31 import ConfigQ31, config_of_q31
-from pvid.setup.strong_header_q31 import strong_header_q31
-from pvid.setup.weak_header_q31 import to_c_header_q31
+from pvid.settings.enums import Core, Form
+from pvid.settings.kinds import Settings
 from pvid.sim.pendulum import simulate, standard_sensors, standard_start
 from pvid.twin import fnv
-from pvid.twin.strong import StrongTwin
-from pvid.twin.weak import WeakTwin
 
 REPORT_EVERY = 500  # ticks from one line with the running hash to the next
 
@@ -40,35 +32,42 @@ MISSING = int(np.iinfo(np.int16).min)  # a count that stands for no sample; not 
 # From so many ticks on the samples are a file that the assembler takes in: a compiler is slow with so many numbers.
 MANY_TICKS = 100_000
 
-# Both fit 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20.
-ENCODER_BITS = {"strong": 20, "weak": 14}
 
-# The strong form's five points need 20 ms between samples (benchmarks/accuracy.md); its window is five samples long.
-SAMPLE_RATE = {"strong": 50.0, "weak": 1000.0}
+class Sampling(NamedTuple):
+    """How the standard run of a form is sampled: ticks a second, bits of the encoder."""
 
-STRONG_SETTLED = 500  # ticks by which windows are full and the drive is noticed: from there all ticks are alike
+    rate: float
+    bits: int
+
+
+# Both fit 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20. The strong form's five points need 20 ms between samples
+# (benchmarks/accuracy.md); its window is five samples long.
+SAMPLING: dict[Form, Sampling] = {"strong": Sampling(50.0, 20), "weak": Sampling(1000.0, 14)}
 
 
 @dataclass(frozen=True)
 class ReplayRun:
     """A run in counts of the sensors, and the settings to identify it with.
 
-    counts int16 [ticks, 2]: phi and y; a sample is float32(count) * lsb, rounded once, on the board and here, and no
-    number where it is MISSING.
+    counts int16 [ticks, 2]: phi and y; to the float core a sample is float32(count) * lsb, rounded once, on the board
+    and here, and no number where it is MISSING.
     """
 
-    form: str
-    config: StrongConfig | WeakConfig
+    config: Settings
     counts: npt.NDArray[np.int16]
     phi_lsb: np.float32
     y_lsb: np.float32
     measure_from: int
-    fixed: ConfigQ31 | None = None  # in place of config, where the fixed-point core plays the counts
 
     @property
-    def core(self) -> str:
+    def form(self) -> Form:
+        """Which form of the model."""
+        return self.config.form
+
+    @property
+    def core(self) -> Core:
         """Which arithmetic."""
-        return "f32" if self.fixed is None else "q31"
+        return self.config.core
 
     @property
     def ticks(self) -> int:
@@ -76,32 +75,37 @@ class ReplayRun:
         return len(self.counts)
 
     @property
-    def phi(self) -> npt.NDArray[np.float32]:
-        """[rad], [ticks]"""
-        return self._samples(0, self.phi_lsb)
+    def phi(self) -> Samples:
+        """[rad], or counts, [ticks]"""
+        return self.samples[0]
 
     @property
-    def y(self) -> npt.NDArray[np.float32]:
-        """[m], [ticks]"""
-        return self._samples(1, self.y_lsb)
+    def y(self) -> Samples:
+        """[m], or counts, [ticks]"""
+        return self.samples[1]
 
-    def _samples(self, channel: int, lsb: np.float32) -> npt.NDArray[np.float32]:
-        counts = self.counts[:, channel]
-        values = counts.astype(np.float32) * lsb
-        return np.where(counts == MISSING, np.float32(np.nan), values)
+    @property
+    def samples(self) -> tuple[Samples, Samples]:
+        """phi and y [ticks] as the core takes them."""
+        values = case_of(self.config).from_counts(self.counts, (float(self.phi_lsb), float(self.y_lsb)))
+        if not _is_float(self):
+            return values
+        phi, y = (np.where(self.counts[:, i] == MISSING, np.float32(np.nan), x) for i, x in enumerate(values))
+        return phi, y
 
 
 @cache
-def standard_run(form: str, ticks: int, core: str = "f32", divider: int = 1) -> ReplayRun:
+def standard_run(form: Form, ticks: int, core: Core = "f32", divider: int = 1) -> ReplayRun:
     """The standard rig (linear truth) for `ticks`: weak form at 1 kHz and 14 bits, strong form (five points) at 50 Hz
     and 20 bits, with a solve every `divider` groups of rows."""
-    sensors = replace(standard_sensors(ENCODER_BITS[form]), random_offset=False)
-    rate = SAMPLE_RATE[form]
+    sensors = replace(standard_sensors(SAMPLING[form].bits), random_offset=False)
+    rate = SAMPLING[form].rate
     run = simulate(sensors=sensors, truth="linear", sample_rate=rate, duration=ticks / rate, seed=1).run
     standard = RigFile.standard()
     identifier = replace(
         standard.identifier,
-        form=form,  # type: ignore[arg-type]
+        form=form,
+        core=core,
         differentiator="finite-difference",
         stride=1,
         full_angle=False,  # the run's equations are linear
@@ -109,51 +113,23 @@ def standard_run(form: str, ticks: int, core: str = "f32", divider: int = 1) -> 
     )
     rig = replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb))
     start = standard_start(1)
-    config = config_of(rig, run.sample_rate, start)
+    config = case_of(identifier).settings(rig, run.sample_rate, start)
     counts = np.rint(np.stack([run.phi / sensors.phi_lsb, run.y / sensors.y_lsb], axis=1))[:ticks]
     if len(counts) != ticks or np.abs(counts).max() > np.iinfo(np.int16).max:
         raise PvidError("the standard run does not fit 16-bit counts")
     return ReplayRun(
-        form=form,
         config=config,
         counts=counts.astype(np.int16),
         phi_lsb=np.float32(sensors.phi_lsb),
         y_lsb=np.float32(sensors.y_lsb),
-        measure_from=_measure_from(config, ticks),
-        fixed=config_of_q31(rig, run.sample_rate, start) if core == "q31" else None,
+        measure_from=case_of(identifier).alike_from(config, ticks),
     )
-
-
-def _measure_from(config: StrongConfig | WeakConfig, ticks: int) -> int:
-    """First tick of the mean: whole periods of the weak form's windows, all of them with a solve in work."""
-    if isinstance(config, StrongConfig):
-        return min(STRONG_SETTLED, ticks // 2)
-    period = config.hop * config.design.decimation
-    settled = 3 * period + config.design.taps
-    return ticks - max((ticks - settled) // period, 1) * period
 
 
 def header(run: ReplayRun, samples: Path | None = None) -> str:
     """replay_run.h of a run; its counts stand in it, or little-endian in the file `samples`."""
-    tables: Tables = {}
-    if run.fixed is not None:
-        settings = [_header_q31(run.fixed)]
-    else:
-        headers = Headers.of(default_library())
-        filled = headers.filled(f"pvid_{run.form}_config_f32", run.config)
-        tables = filled.tables
-        pointers = {name: f"replay_{name}" for name in tables}
-        settings = []
-        if isinstance(run.config, WeakConfig):
-            design = struct_initializer(headers, filled.struct.design[0], pointers)
-            settings = [f"static const pvid_weak_design_f32 replay_design = {design};"]
-            pointers |= {"design": "&replay_design"}
-        initializer = struct_initializer(headers, filled.struct, pointers)
-        settings.append(f"static const pvid_{run.form}_config_f32 replay_config = {initializer};")
-    arrays = [
-        float_array(f"replay_{name}", np.asarray(table, np.float32).reshape(table.shape[0], -1), "see the settings")
-        for name, table in tables.items()
-    ]
+    case = case_of(run.config)
+    settings = case.header(run.config, RigFile.standard().l1, "replay_config", "pvid.board.replay_image")
     return "\n".join(
         [
             "/* Generated by pvid.board.replay_image: do not edit. */",
@@ -162,7 +138,7 @@ def header(run: ReplayRun, samples: Path | None = None) -> str:
             "",
             "#include <stddef.h>",
             "",
-            f'#include "pvid/pvid{"_q31" if run.core == "q31" else ""}.h"',
+            f'#include "{case.umbrella}"',
             "",
             "#if defined(__AVR__)",
             "#include <avr/pgmspace.h>",
@@ -171,16 +147,20 @@ def header(run: ReplayRun, samples: Path | None = None) -> str:
             "#define REPLAY_IN_FLASH",
             "#endif",
             "",
-            f"#define REPLAY_Q31 {int(run.core == 'q31')}",
-            f"#define REPLAY_WEAK {int(run.form == 'weak')}",
+            f"#define REPLAY_TYPE pvid_{run.form}_{run.core}",
+            f"#define REPLAY_INIT pvid_{run.form}_init_{run.core}",
+            f"#define REPLAY_STEP pvid_{run.form}_step_{run.core}",
+            f"#define REPLAY_HASH pvid_fnv_estimator_{run.core}",
+            f"#define REPLAY_SAMPLE {'float' if _is_float(run) else 'int32_t'}",
+            f"#define REPLAY_FAULTS {'pvid_arithmetic_faults_f32()' if _is_float(run) else '0u'}",
+            f"#define REPLAY_IS_FLOAT {int(_is_float(run))}",
             f'#define REPLAY_FORM "{run.form}"',
             f"#define REPLAY_TICKS {run.ticks}u",
             f"#define REPLAY_MEASURE_FROM {run.measure_from}u",
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
             f"#define REPLAY_MISSING ({MISSING + 1} - 1)",
             "",
-            *arrays,
-            *settings,
+            settings,
             *_resolutions(run),
             "/* [tick][phi, y] in steps of these */",
             *_counts_text(run, samples),
@@ -209,21 +189,18 @@ def _packed(run: ReplayRun) -> bytes:
     return run.counts.astype("<i2").tobytes()
 
 
-def _header_q31(config: ConfigQ31) -> str:
-    names = RigFile.standard().l1, "replay_config", "pvid.board.replay_image"
-    if isinstance(config, StrongConfigQ31):
-        return strong_header_q31(config, *names)
-    return to_c_header_q31(config, *names)
-
-
 def _resolutions(run: ReplayRun) -> list[str]:
     """What a count is worth to the core: itself in fixed point."""
-    if run.core == "q31":
+    if not _is_float(run):
         return ["#define replay_phi_lsb 1", "#define replay_y_lsb 1"]
     return [
-        f"static const float replay_phi_lsb = {float_literal(run.phi_lsb)};",
-        f"static const float replay_y_lsb = {float_literal(run.y_lsb)};",
+        f"#define replay_phi_lsb {float_literal(run.phi_lsb)}",
+        f"#define replay_y_lsb {float_literal(run.y_lsb)}",
     ]
+
+
+def _is_float(run: ReplayRun) -> bool:
+    return np.issubdtype(case_of(run.config).sample_type, np.floating)
 
 
 # ---- what the host computes
@@ -231,23 +208,12 @@ def _resolutions(run: ReplayRun) -> list[str]:
 
 def native_hashes(run: ReplayRun, native: Native) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
-    if run.fixed is not None:
-        return native.identifier(run.fixed).run(run.counts[:, 0], run.counts[:, 1]).hash
-    if isinstance(run.config, WeakConfig):
-        return native.identifier(run.config).run(run.phi, run.y).hash
-    return native.identifier(run.config).run(run.phi, run.y).hash
+    return native.identifier(run.config).run(*run.samples).hash
 
 
 def twin_hashes(run: ReplayRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]. Cost: 0.5 ms a tick in the strong form."""
-    if run.fixed is not None:
-        phi, y = run.counts.astype(np.int64).T
-        return twin_hashes_q31(twin_q31(run.fixed).run(phi, y))
-    if isinstance(run.config, WeakConfig):
-        states = WeakTwin(run.config).run(run.phi, run.y)
-    else:
-        states = StrongTwin(run.config).run(run.phi, run.y)
-    return fnv.running_hashes(states.p[:, :, 0], states.sums[:, :, 0], states.reason[:, 0])
+    return fnv.running_hashes(case_of(run.config).twin(run.config).run(*run.samples).lane())
 
 
 # ---- what the image says
@@ -323,16 +289,7 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
     folder = BUILD / "runs" / name
     keep_header(folder, "replay_run.h", text)
     options = {"PVID_REPLAY_RUN": str(folder)}
-    if isinstance(run.config, StrongConfig):
-        options["PVID_MAX_WINDOW"] = str(run.config.window)
-    elif target.toolchain == "avr":
-        design = run.config.design
-        options |= {"PVID_MAX_TAPS": str(design.taps), "PVID_MAX_DECIMATION": str(design.decimation)}
-        options |= {"PVID_MAX_FUNCTIONS": str(design.functions)}
-        if run.fixed is not None:
-            options |= {"PVID_MAX_THETA_Q31": str(len(run.fixed.estimator.n_bits))}
-    else:
-        options |= {macro: str(value) for macro, value in raised_bounds(run.config.design).items()}
+    options |= case_of(run.config).sizes(run.config, exact=target.toolchain == "avr")
     options |= macros or {}
     suffix = "".join(f"-{macro}-{value}" for macro, value in (macros or {}).items())
     tree = build(target, BUILD / f"{target.name}-{name}{suffix}", options)

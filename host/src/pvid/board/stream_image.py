@@ -4,97 +4,38 @@ from __future__ import annotations
 
 import subprocess
 import zlib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
-from pvid.board.stream_rig import FixedConfig, FloatConfig, StreamRig
-from pvid.core.headers import Headers, default_library
-from pvid.core.sources import FIRMWARE, FOLDERS, without
-from pvid.design.c_tables import float_array, float_literal, struct_initializer
-from pvid.design.weak_sizing import raised_bounds
-from pvid.link.frames import MAX_P, Core
-from pvid.settings.bounds import MAX_MOMENTS
-from pvid.settings.enums import Law
-from pvid.settings.f32 import StrongConfig, WeakConfig
-from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
-from pvid.setup.strong_header_q31 import strong_header_q31
-from pvid.setup.weak_header_q31 import to_c_header_q31
+from pvid.board.stream_rig import StreamRig
+from pvid.core.sources import FIRMWARE, FOLDERS, sources_of
+from pvid.design.c_tables import float_literal
+from pvid.settings.enums import Core
 from pvid.twin.sensor import SensorConstants
 
 HOST = "host"
 
 
-def _shared(config: FloatConfig | FixedConfig) -> FloatConfig | FixedConfig:
-    """`config` without what Configure brings."""
-    if isinstance(config, FixedConfig):
-        integers = (1,) * len(config.estimator.start)
-        fixed = replace(
-            config.estimator,
-            start=integers,
-            start_sd=integers,
-            lower=integers,
-            upper=integers,
-            row_sd=1,
-            forgetting_groups=0,
-            gain=2**30,
-            divider=1,
-        )
-        return replace(config, estimator=fixed, phi_offset=0, y_offset=0)
-    ones = np.ones(len(config.estimator.start), np.float32)
-    estimator = replace(
-        config.estimator,
-        start=ones,
-        start_sd=ones,
-        lower=ones,
-        upper=ones,
-        row_sd=1.0,
-        forgetting_s=0.0,
-        feedback_hz=0.0,
-        law=Law.STATIONARY,
-        divider=1,
-    )
-    return replace(config, estimator=estimator)
-
-
-def _tables(config: FloatConfig | FixedConfig, l1: float) -> str:
-    """stream_tables.h: `stream_config` and what it points to."""
-    shared = _shared(config)
-    if isinstance(shared, FixedConfig):
-        banner = ("stream_config", "pvid.board.stream_image")
-        if isinstance(shared, WeakConfigQ31):
-            return to_c_header_q31(shared, l1, *banner)
-        return strong_header_q31(shared, l1, *banner)
-    headers = Headers.of(default_library())
-    filled = headers.filled(f"pvid_{shared.form}_config_f32", shared)
-    pointers = {name: f"stream_{name}" for name in filled.tables}
-    settings = []
-    if isinstance(shared, WeakConfig):
-        design = struct_initializer(headers, filled.struct.design[0], pointers)
-        settings = [f"static const pvid_weak_design_f32 stream_design = {design};"]
-        pointers |= {"design": "&stream_design"}
-        if shared.full_angle or shared.friction:
-            settings.insert(0, "static pvid_weak_angle_f32 stream_angle;")
-            pointers["angle"] = "&stream_angle"
-    initializer = struct_initializer(headers, filled.struct, pointers)
-    settings.append(f"static const pvid_{shared.form}_config_f32 stream_config = {initializer};")
-    arrays = [
-        float_array(f"stream_{name}", np.asarray(table, np.float32).reshape(table.shape[0], -1), "see the settings")
-        for name, table in filled.tables.items()
-    ]
-    return _guarded("STREAM_TABLES_H", ['#include "pvid/pvid.h"', "", *arrays, *settings])
+def _tables(rig: StreamRig) -> str:
+    """stream_tables.h: `stream_config`, without what Configure brings, and what it points to."""
+    return rig.case.header(rig.case.shared(rig.config), rig.l1, "stream_config", "pvid.board.stream_image")
 
 
 def _macros(rig: StreamRig) -> list[str]:
     """stream_rig.h but for the number of it all."""
     units = ", ".join(float_literal(np.float32(unit)) for unit in rig.p_unit)
+    form, core = rig.case.form, rig.case.core
     sensor = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
     return [
         f"#define STREAM_CORE {int(rig.core)}",
         f"#define STREAM_FORM {int(rig.form)}",
+        f"#define STREAM_TYPE pvid_{form}_{core}",
+        f"#define STREAM_CONFIG pvid_{form}_config_{core}",
+        f"#define STREAM_INIT pvid_{form}_init_{core}",
+        f"#define STREAM_STEP pvid_{form}_step_{core}",
         f"#define STREAM_N_P {rig.n_p}u",
         f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(rig.sample_rate))}",
         f"#define STREAM_PHI_LSB {float_literal(np.float32(rig.phi_lsb))}",
@@ -106,7 +47,7 @@ def _macros(rig: StreamRig) -> list[str]:
 
 def settings_number(rig: StreamRig) -> int:
     """CRC-32 of the settings and tables an image must hold to be configured for `rig`."""
-    return zlib.crc32("\n".join([*_macros(rig), _tables(rig.config, rig.l1)]).encode())
+    return zlib.crc32("\n".join([*_macros(rig), _tables(rig)]).encode())
 
 
 def _guarded(guard: str, lines: list[str]) -> str:
@@ -119,22 +60,8 @@ def headers(rig: StreamRig) -> dict[str, str]:
     number = f"#define STREAM_SETTINGS 0x{settings_number(rig):08X}u /* CRC-32 of what follows and of the tables */"
     return {
         "stream_rig.h": _guarded("STREAM_RIG_H", [number, *_macros(rig)]),
-        "stream_tables.h": _tables(rig.config, rig.l1),
+        "stream_tables.h": _tables(rig),
     }
-
-
-def _sizes(config: FloatConfig | FixedConfig) -> dict[str, str]:
-    """Macros of pvid/config.h without which the settings would not fit, or take more room than they need."""
-    match config:
-        case StrongConfig():
-            return {"PVID_MAX_WINDOW": str(max(config.window, 5))}
-        case StrongConfigQ31():
-            return {"PVID_MAX_WINDOW": str(config.design.bank.window)}
-        case WeakConfig() | WeakConfigQ31():
-            bounds = raised_bounds(config.design)
-            if isinstance(config, WeakConfig) and config.friction:
-                bounds |= {"PVID_MAX_P": MAX_P, "PVID_MAX_MOMENTS": MAX_MOMENTS}
-            return {macro: str(value) for macro, value in bounds.items()}
 
 
 def build_image(rig: StreamRig, board: Board | None) -> Path:
@@ -149,12 +76,12 @@ def build_image(rig: StreamRig, board: Board | None) -> Path:
     folder = BUILD / "runs" / name
     for file, text in headers(rig).items():
         keep_header(folder, file, text)
-    sizes = _sizes(rig.config)
+    sizes = rig.case.sizes(rig.config)
     if board is None:
         tree = BUILD / f"{HOST}-{name}"
         with one_at_a_time(tree):
-            return _build_for_host(folder, tree, rig.core, sizes)
-    options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": rig.core.name.lower(), **sizes}
+            return _build_for_host(folder, tree, rig.case.core, sizes)
+    options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": rig.case.core, **sizes}
     tree = build(board, BUILD / f"{board.name}-{name}", options)
     return tree / "apps" / "stream" / "stream.elf"
 
@@ -163,11 +90,11 @@ def _build_for_host(folder: Path, tree: Path, core: Core, sizes: dict[str, str])
     """With the options of the core (firmware/cmake/PvidCompile.cmake); what the other core alone needs is left out."""
     application = FIRMWARE / "apps" / "stream"
     sources = [
-        *without({Core.F32: "q31", Core.Q31: "f32"}[core]),
+        *sources_of(core),
         FIRMWARE / "link" / "link.c",
         FIRMWARE / "ports" / "host" / "port.c",
         FIRMWARE / "ports" / "host" / "receiver.c",
-        *(application / file for file in ("main.c", "answers.c", "sensor.c", f"identifier_{core.name.lower()}.c")),
+        *(application / file for file in ("main.c", "answers.c", "sensor.c", f"identifier_{core}.c")),
     ]
     image = tree / "stream"
     inputs = [*sources, *folder.glob("*.h"), *FIRMWARE.glob("**/*.h")]

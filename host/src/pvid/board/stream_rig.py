@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.cases import Case, Samples, case_of
 from pvid.core.native import Native
-from pvid.link.frames import MAX_P, Configure, ConfigureQ31, Core, Count, Form, Sample, Source
+from pvid.link.frames import MAX_P, Configuration, Core, Form, Message, Source
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.settings.f32 import StrongConfig, WeakConfig
-from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
-from pvid.setup.f32 import config_of
-from pvid.setup.q31 import config_for_run, config_of_q31, counts_of, units_of
+from pvid.settings.kinds import Settings
 from pvid.sim.pendulum import standard_sensors
-
-FloatConfig = StrongConfig | WeakConfig
-FixedConfig = StrongConfigQ31 | WeakConfigQ31
-Samples = npt.NDArray[Any]  # float32 [rad], [m], or int32 counts
 
 _SLOWEST = 1.0  # ticks a second: the image counts the time between two samples in 32 bits of nanoseconds
 
@@ -43,7 +36,7 @@ class StreamRig:
         What a count of the board's own sensors is worth [rad], [m]; rounded to float32, as the image holds it.
     """
 
-    config: FloatConfig | FixedConfig
+    config: Settings
     sample_rate: float
     l1: float
     phi_lsb: float
@@ -54,14 +47,19 @@ class StreamRig:
             raise PvidError(f"sample_rate is {self.sample_rate:g} Hz, and a board streams at 1 Hz and more")
 
     @property
+    def case(self) -> Case:
+        """What belongs to the settings' form and core."""
+        return case_of(self.config)
+
+    @property
     def core(self) -> Core:
-        """Which arithmetic."""
-        return Core.Q31 if isinstance(self.config, FixedConfig) else Core.F32
+        """Which arithmetic, as a frame numbers it."""
+        return self.case.numbers[1]
 
     @property
     def form(self) -> Form:
-        """Which form of the model."""
-        return Form.STRONG if isinstance(self.config, StrongConfig | StrongConfigQ31) else Form.WEAK
+        """Which form of the model, likewise."""
+        return self.case.numbers[0]
 
     @property
     def n_p(self) -> int:
@@ -71,32 +69,25 @@ class StreamRig:
     @property
     def p_unit(self) -> tuple[float, ...]:
         """One unit of each p in SI, filled up to the places of a frame."""
-        units = [1.0] * self.n_p if not isinstance(self.config, FixedConfig) else units_of(self.config).tolist()
+        units = self.case.units(self.config).tolist()
         return tuple([*units, *[0.0] * (MAX_P - len(units))])
 
     def from_counts(self, counts: npt.NDArray[np.int32]) -> tuple[Samples, Samples]:
         """phi and y [n] as the identifier gets them, from what the board's own sensors count [n, 2]."""
-        if self.core is Core.Q31:
-            return counts[:, 0].astype(np.int32), counts[:, 1].astype(np.int32)
-        values = counts.astype(np.float32) * np.array([self.phi_lsb, self.y_lsb], np.float32)
-        return values[:, 0], values[:, 1]
+        return self.case.from_counts(counts, (self.phi_lsb, self.y_lsb))
 
     def samples(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Samples, Samples]:
         """phi [n] and y [n] as the identifier takes them: float32 in rad and m, or counts."""
-        kind = np.int32 if self.core is Core.Q31 else np.float32
-        return np.asarray(phi, kind), np.asarray(y, kind)
+        return np.asarray(phi, self.case.sample_type), np.asarray(y, self.case.sample_type)
 
-    def sample(self, phi: Samples, y: Samples) -> Sample | Count:
+    def sample(self, phi: Samples, y: Samples) -> Message:
         """The frame of consecutive samples."""
-        return Count.of_values(phi, y) if self.core is Core.Q31 else Sample.of_values(phi, y)
+        made: Message = self.case.frame.of_values(phi, y)
+        return made
 
     def hashes(self, native: Native, phi: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the core on this machine, uint32 [n]."""
-        config = self.config
-        if isinstance(config, FixedConfig):
-            return native.identifier(config).run(phi, y, sums=False).hash
-        identifier = native.identifier(config)
-        return identifier.run(phi, y, sums=False).hash
+        return native.identifier(self.config).run(phi, y, sums=False).hash
 
     def configure(
         self,
@@ -105,44 +96,18 @@ class StreamRig:
         estimate_every: int,
         source: Source = Source.PC,
         first_tick: int = 0,
-    ) -> Configure | ConfigureQ31:
+    ) -> Configuration:
         """The frame that configures a board whose image has these `settings`, with a new session number."""
-        config, estimator = self.config, self.config.estimator
-        common: dict[str, Any] = {
-            "session": secrets.randbelow(2**32 - 1) + 1,
-            "settings": settings,
-            "form": int(self.form),
-            "source": int(source),
-            "hash_every": hash_every,
-            "estimate_every": estimate_every,
-            "divider": estimator.divider,
-            "first_tick": first_tick,
-            **{name: _places(getattr(estimator, name)) for name in ("start", "start_sd", "lower", "upper")},
-        }
-        if isinstance(config, FixedConfig):
-            fixed = config.estimator
-            return ConfigureQ31(
-                **common,
-                row_sd=fixed.row_sd,
-                forgetting_groups=fixed.forgetting_groups,
-                gain=fixed.gain,
-                phi_offset=config.phi_offset,
-                y_offset=config.y_offset,
-            )
-        floats = config.estimator
-        return Configure(
-            **common,
-            law=int(floats.law),
-            row_sd=floats.row_sd,
-            forgetting_s=floats.forgetting_s,
-            feedback_hz=floats.feedback_hz,
+        return self.case.configure(
+            self.config,
+            session=secrets.randbelow(2**32 - 1) + 1,
+            settings=settings,
+            form=int(self.form),
+            source=int(source),
+            hash_every=hash_every,
+            estimate_every=estimate_every,
+            first_tick=first_tick,
         )
-
-
-def _places(values: npt.ArrayLike) -> tuple[Any, ...]:
-    """Filled up with zeros to the places of a frame."""
-    given = np.asarray(values).tolist()
-    return tuple([*given, *[type(given[0])(0)] * (MAX_P - len(given))])
 
 
 def stream_rig(
@@ -162,18 +127,10 @@ def stream_rig(
     PvidError
         When the settings do not fit the core.
     """
-    if rig.identifier.core == "f64":
-        raise PvidError("targets hold the cores f32 and q31, and core f64 was asked for")
-    config: FloatConfig | FixedConfig
-    if rig.identifier.core == "f32":
-        config = config_of(rig, sample_rate, start)
-    elif run is not None:
-        config = config_for_run(rig, run, start)
-    else:
-        config = config_of_q31(rig, sample_rate, start)
+    case = case_of(rig.identifier)
     standard = standard_sensors()  # a simulated sensor counts in something where the rig file does not say
     return StreamRig(
-        config=config,
+        config=case.settings(rig, sample_rate, start) if run is None else case.settings_for_run(rig, run, start),
         sample_rate=sample_rate,
         l1=rig.l1,
         phi_lsb=rig.sensor.phi_lsb or standard.phi_lsb,
@@ -181,6 +138,6 @@ def stream_rig(
     )
 
 
-def played_samples(rig: RigFile, run: Run) -> tuple[npt.NDArray[np.generic], npt.NDArray[np.generic]]:
+def played_samples(rig: RigFile, run: Run) -> tuple[Samples, Samples]:
     """phi and y [n] of a run for the rig file's core: counts of its sensors in fixed point."""
-    return counts_of(rig, run) if rig.identifier.core == "q31" else (run.phi, run.y)
+    return case_of(rig.identifier).samples(rig, run)

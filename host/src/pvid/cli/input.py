@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,26 @@ def columns_option(command: Command) -> Command:
         "is the position of the column, from 1; units are s ms us ns min, rad mrad deg rev turn, m cm mm um in, a "
         "number of SI units, or one of these divided (rev/4096) or with opposite sign (-mm).",
     )(command)
+
+
+def form_options(function: Command) -> Command:
+    for option in (
+        click.option("--form", type=click.Choice(["weak", "strong"]), help="Form; overrides the rig file."),
+        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Law; overrides the rig file."),
+        columns_option,
+        rig_options,
+    ):
+        function = option(function)
+    return function
+
+
+def with_overrides(rig: RigFile, **overrides: str | None) -> RigFile:
+    given = {name: value for name, value in overrides.items() if value is not None}
+    return replace(rig, identifier=replace(rig.identifier, **given)) if given else rig  # type: ignore[arg-type]
+
+
+log_argument = click.argument("log", type=click.Path(path_type=Path))
+log_rig = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
 
 
 class ColumnsType(click.ParamType[Columns]):

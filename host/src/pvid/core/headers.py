@@ -40,6 +40,7 @@ class Filled:
 
     struct: Any  # a reference to it
     tables: Tables
+    designs: dict[str, Any]  # structs that it points to, by field
     owners: list[Any]
 
 
@@ -80,7 +81,7 @@ class Headers:
 
     def __init__(self, text: str) -> None:
         self.ffi = FFI()
-        self.ffi.cdef(text)
+        self.ffi.cdef(text.replace("extern const ", "extern "))  # a constant that is no number has no address in cffi
 
     @staticmethod
     def of(library: Path) -> Headers:
@@ -136,7 +137,7 @@ class Headers:
     def filled(self, kind: str, settings: Any) -> Filled:
         """A struct of C with the settings' attributes of its fields' names."""
         owner = self.ffi.new(f"{kind} *")
-        filled = Filled(owner[0], {}, [owner])
+        filled = Filled(owner[0], {}, {}, [owner])
         self._fill(filled, owner[0], settings)
         return filled
 
@@ -151,6 +152,7 @@ class Headers:
             elif kind == "pointer":
                 owner = self.ffi.new(field.type)
                 whole.owners.append(owner)
+                whole.designs[name] = owner[0]
                 setattr(struct, name, owner)
                 self._fill(whole, owner[0], value)
             elif kind == "struct" and not isinstance(value, tuple):

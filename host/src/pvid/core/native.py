@@ -13,14 +13,15 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.core.headers import Headers, Tables, default_library
 from pvid.settings.enums import Core, Status
-from pvid.settings.f32 import EstimatorConfig, StrongConfig, WeakConfig
-from pvid.settings.q31 import EstimatorConfigQ31, ScaleQ31, StrongConfigQ31, WeakConfigQ31
+from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.forms import FORMS
+from pvid.settings.kinds import Settings
+from pvid.settings.q31 import EstimatorConfigQ31, ScaleQ31
 from pvid.settings.record import Record
 from pvid.settings.tables import FirBankQ31, RowShiftsQ31
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
-Settings = WeakConfig | StrongConfig | WeakConfigQ31 | StrongConfigQ31
 
 
 class _Arithmetic(NamedTuple):
@@ -300,7 +301,8 @@ class Identifier(Stepper):
     def __init__(self, native: Native, config: Settings) -> None:
         self.form = config.form
         given = {}
-        if isinstance(config, WeakConfig):
+        kind = f"pvid_{config.form}_config_{config.core}"
+        if "angle" in dict(native.headers.ffi.typeof(kind).fields):  # storage of the correction for large angles
             self._angle = given["angle"] = native.headers.ffi.new("pvid_weak_angle_f32 *")
         super().__init__(native, config.form, config.core, config, replay=config.form, **given)
 
@@ -312,7 +314,7 @@ class Identifier(Stepper):
     @property
     def publishes(self) -> bool:
         """Whether it publishes estimates that it trusts."""
-        return self.form == "weak"
+        return FORMS[self.form].publishes
 
     @property
     def is_published(self) -> bool:

@@ -12,6 +12,7 @@ PUBLIC_FOLDERS = (FIRMWARE / "include", MODEL / "include")
 FOLDERS = (*PUBLIC_FOLDERS, SRC, MODEL)
 PUBLIC_INCLUDES = [f"-I{folder}" for folder in PUBLIC_FOLDERS]
 INCLUDES = [f"-I{folder}" for folder in FOLDERS]
+_CORES = ("_f32", "_q31")
 
 
 def core_sources(pattern: str = "*.c") -> list[Path]:
@@ -19,9 +20,9 @@ def core_sources(pattern: str = "*.c") -> list[Path]:
     return sorted([*SRC.glob(f"*/{pattern}"), *MODEL.glob(pattern)], key=lambda path: path.name)
 
 
-def without(core: str) -> list[Path]:
-    """All sources but those that only the core `core` (f32 or q31) needs."""
-    return [path for path in core_sources() if not path.stem.endswith(f"_{core}")]
+def sources_of(core: str) -> list[Path]:
+    """The sources of one core, f32 or q31, and those that both need."""
+    return [path for path in core_sources() if not path.stem.endswith(_CORES) or path.stem.endswith(f"_{core}")]
 
 
 def source(name: str) -> Path:

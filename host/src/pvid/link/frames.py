@@ -8,7 +8,7 @@ last 8900 years at 1 kHz. `Frame.tick` and `encode` combine them. The ticks of a
 session number in the same frames distinguishes a restart from a wrapped counter.
 
 The classes below with a `TYPE` are the only definition of the payloads: the schema text that a board sends, its hash in
-every header and firmware/link/schema.h are generated from them (`pvid link-schema`).
+every header and firmware/link/schema.h are generated from them (`pvid schema`).
 
     decoder = Decoder()
     for item in decoder.feed(port.read(...)):
@@ -26,7 +26,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from enum import IntEnum
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +37,8 @@ from pvid.base.wording import shown
 
 VERSION = 1
 MAX_PAYLOAD = 2048
+Float = npt.NDArray[np.float64]
+
 MAX_P = 6  # places for parameters; those that a model lacks are 0
 MAX_FIELDS = 64  # of a payload that a schema text describes
 MAX_LEARNT = 16  # schemas that a decoder keeps of those that a line brought
@@ -231,6 +233,11 @@ class Hello(Message):
     board: str = wire("char", 16)
     tick_high: int = wire("u16", absent=0)
 
+    @property
+    def form_name(self) -> Literal["weak", "strong"]:
+        """The form in words; "strong" for a number that none has."""
+        return "weak" if self.form == Form.WEAK else "strong"
+
 
 @dataclass(frozen=True)
 class Schema(Message):
@@ -308,6 +315,10 @@ class Samples(Message):
         """float32 [n, 2]: phi, y."""
         return np.frombuffer(self.phi_y[: 8 * self.count], "<f4").astype(np.float32).reshape(self.count, 2)
 
+    def in_si(self, lsb: Float) -> Float:
+        """[n, 2]: phi [rad], y [m], whatever a count of the board's sensors is worth."""
+        return self.values.astype(np.float64)
+
     @classmethod
     def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:
         """From phi [n] and y [n], rounded to float32 as a board would read them."""
@@ -347,6 +358,10 @@ class Counts(Message):
         """int32 [n, 2]: phi, y."""
         return np.frombuffer(self.phi_y[: 8 * self.count], "<i4").astype(np.int32).reshape(self.count, 2)
 
+    def in_si(self, lsb: Float) -> Float:
+        """[n, 2]: phi [rad], y [m], a count being worth `lsb` [2]."""
+        return self.values.astype(np.float64) * lsb
+
     @classmethod
     def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:
         """From counts phi [n] and y [n]."""
@@ -369,6 +384,13 @@ class RawCount(Counts):
     tick_high: int = wire("u16", absent=0)
 
 
+def _symmetric(upper: tuple[float, ...]) -> Float:
+    """The matrix [MAX_P, MAX_P] of its upper triangle by rows."""
+    matrix = np.zeros((MAX_P, MAX_P))
+    matrix[np.triu_indices(MAX_P)] = upper
+    return matrix + np.triu(matrix, 1).T
+
+
 @dataclass(frozen=True)
 class Estimate(Message):
     """Board to PC: the estimate after the header's tick (pvid_estimate_f32).
@@ -387,6 +409,12 @@ class Estimate(Message):
     reason: int = wire("u8")
     tick_high: int = wire("u16", absent=0)
 
+    FULL_KAPPA: ClassVar[float] = 1.0
+
+    def in_si(self, units: Float, zero: float) -> tuple[Float, Float]:
+        """p [MAX_P] and its covariance [MAX_P, MAX_P], whatever the board says of its units."""
+        return np.array(self.p), _symmetric(self.covariance)
+
 
 @dataclass(frozen=True)
 class EstimateQ31(Message):
@@ -403,6 +431,15 @@ class EstimateQ31(Message):
     weight: int = wire("u32")
     reason: int = wire("u8")
     tick_high: int = wire("u16", absent=0)
+
+    FULL_KAPPA: ClassVar[float] = 2.0**30
+
+    def in_si(self, units: Float, zero: float) -> tuple[Float, Float]:
+        """p [MAX_P] and its covariance [MAX_P, MAX_P] of a board with these units of p [MAX_P]; `zero` [rad] is added
+        to c."""
+        se, p = np.array(self.se) * units, np.array(self.p) * units
+        p[3] += zero
+        return p, _symmetric(self.correlation) / 2**30 * np.outer(se, se)
 
 
 @dataclass(frozen=True)
@@ -739,7 +776,7 @@ def c_header() -> str:
     """firmware/link/schema.h."""
     text = SCHEMA_TEXT.split("\n")
     lines = [
-        "/* Made by `pvid link-schema`: do not edit. The fields are explained in host/src/pvid/link/frames.py. */",
+        "/* Made by `pvid schema`: do not edit. The fields are explained in host/src/pvid/link/frames.py. */",
         "#ifndef PVID_SCHEMA_H",
         "#define PVID_SCHEMA_H",
         "",

@@ -241,14 +241,14 @@ class Starter:
         To the board.
     begin
         Makes a configuration, with a new session.
-    anew
+    restart
         Also a board that is configured already, whenever the link has come up.
     """
 
-    def __init__(self, send: Callable[[Message], None], begin: Callable[[], Configuration], anew: bool) -> None:
+    def __init__(self, send: Callable[[Message], None], begin: Callable[[], Configuration], restart: bool) -> None:
         self._send = send
         self._begin = begin
-        self._anew = anew
+        self._restart = restart
         self._fresh = False  # the link has just come up
         self._wanted: Configuration | None = None
         self._has_run = False
@@ -266,7 +266,7 @@ class Starter:
             case Segment():
                 self._wanted, self._fresh = None, True
             case Hello() as hello if self._wanted is None:
-                if hello.session == 0 or (self._anew and self._fresh):
+                if hello.session == 0 or (self._restart and self._fresh):
                     self._wanted, self._sent = self._begin(), float("-inf")
                 self._fresh = False
             case Status() as status if self._wanted is not None and status.session == self._wanted.session:
@@ -321,7 +321,7 @@ class Logger:
         Ends by itself so long after the link first came up; None: when it is asked to.
     samples
         Ends by itself when so many have come; None: likewise.
-    begin, anew
+    begin, restart
         See Starter; without `begin` nothing is configured.
     failures
         Of observers, and of the stream that reads the log for them, in a sentence each.
@@ -335,7 +335,7 @@ class Logger:
     duration_s: float | None = None
     samples: int | None = None
     begin: Callable[[], Configuration] | None = None
-    anew: bool = False
+    restart: bool = False
     stream: LogStream = field(default_factory=LogStream)
     failures: list[str] = field(default_factory=list)
     _observers: list[Observer] = field(default_factory=list)
@@ -351,7 +351,7 @@ class Logger:
         """
         writer = LogWriter(self.out, rig=self.rig, append=self.append)
         recorder = Recorder(self.source, writer)
-        starter = None if self.begin is None else Starter(recorder.send, self.begin, self.anew)
+        starter = None if self.begin is None else Starter(recorder.send, self.begin, self.restart)
         self._observers = [*self.observers, *([] if starter is None else [starter])]
         with _asked_to_end(recorder), self.out.open("rb") as file:
             file.seek(writer.start)

@@ -15,7 +15,7 @@ the log counts as verified.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import FixedConfig, FloatConfig, stream_rig
+from pvid.board.stream_rig import stream_rig
+from pvid.cases import case_of
 from pvid.link.frames import (
     MAX_P,
     Configuration,
@@ -41,18 +42,12 @@ from pvid.link.frames import (
 from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
 from pvid.run.compare import P_NAMES, Difference
-from pvid.settings.enums import Law, Reason
-from pvid.settings.f32 import StrongConfig, WeakConfig
-from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.settings.enums import Reason
+from pvid.settings.kinds import Settings
 from pvid.twin import fnv
-from pvid.twin.q31.estimator import EstimatorQ31
-from pvid.twin.strong import StrongTwin
-from pvid.twin.strong_q31 import StrongTwinQ31
-from pvid.twin.weak import WeakTwin
-from pvid.twin.weak_q31 import WeakTwinQ31
+from pvid.twin.record import Recorder
 
 Check = Estimate | EstimateQ31 | Hash | Credit
-Twin = WeakTwin | StrongTwin | WeakTwinQ31 | StrongTwinQ31
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
 _UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
@@ -203,7 +198,7 @@ class Verifier:
         self._configurations: dict[int, Configure | ConfigureQ31] = {}
         self._open: _Open | None = None
         self._before: tuple[int, int] | None = None  # segment and tick where the last samples ended
-        self._settings: dict[float, tuple[FloatConfig | FixedConfig, int]] = {}
+        self._settings: dict[float, tuple[Settings, int]] = {}
 
     def stretches(self, records: Iterable[Record]) -> Iterator[Stretch]:
         """The stretches of all records, in order."""
@@ -311,7 +306,7 @@ class Verifier:
         if self._progress is not None and self._done % 512 == 0:
             self._progress(self._done)
 
-    def _config(self, configuration: Configuration) -> FloatConfig | FixedConfig:
+    def _config(self, configuration: Configuration) -> Settings:
         """The identifier's settings: those of the rig file, with the values of the configuration."""
         if self.rig is None:
             raise PvidError("the log holds no rig file: name it with --rig")
@@ -324,68 +319,12 @@ class Verifier:
         config, number = self._settings[rate]
         if configuration.settings != number:
             raise PvidError("the board's image was made for other settings than the rig file's")
-        n_p = len(config.estimator.start)
-        names = ("start", "start_sd", "lower", "upper")
-        match config, configuration:
-            case WeakConfigQ31() | StrongConfigQ31(), ConfigureQ31() as given:
-                integers: dict[str, Any] = {name: tuple(getattr(given, name)[:n_p]) for name in names}
-                estimator = replace(
-                    config.estimator,
-                    **integers,
-                    row_sd=given.row_sd,
-                    forgetting_groups=given.forgetting_groups,
-                    gain=given.gain,
-                    divider=given.divider,
-                )
-                return replace(config, estimator=estimator, phi_offset=given.phi_offset, y_offset=given.y_offset)
-            case WeakConfig() | StrongConfig(), Configure() as given:
-                floats: dict[str, Any] = {name: np.array(getattr(given, name)[:n_p], np.float32) for name in names}
-                settings = replace(
-                    config.estimator,
-                    **floats,
-                    row_sd=given.row_sd,
-                    forgetting_s=given.forgetting_s,
-                    feedback_hz=given.feedback_hz,
-                    law=_law(given.law),
-                    divider=given.divider,
-                )
-                return replace(config, estimator=settings)
-            case _:
-                raise PvidError("the board's image holds another core than the rig file asks for")
-
-
-def _law(number: int) -> Law:
-    if number not in list(Law):
-        raise PvidError(f"the board was configured with law {number}, which does not exist")
-    return Law(number)
+        return case_of(config).configured(config, configuration)
 
 
 def _pace(configuration: Configuration) -> int:
     """Ticks from an estimate or a hash to the next."""
     return min((every for every in (configuration.hash_every, configuration.estimate_every) if every), default=0)
-
-
-def _reach(twin: Twin) -> int:
-    """Ticks from a sample until the identifier has processed it completely."""
-    match twin:
-        case WeakTwin() | WeakTwinQ31():
-            return twin.schedule.reach
-        case StrongTwin():
-            return twin.config.window
-        case StrongTwinQ31():
-            return twin.config.design.bank.window
-
-
-def _twin_of(config: FloatConfig | FixedConfig) -> Twin:
-    match config:
-        case WeakConfig():
-            return WeakTwin(config)
-        case StrongConfig():
-            return StrongTwin(config)
-        case WeakConfigQ31():
-            return WeakTwinQ31(config)
-        case StrongConfigQ31():
-            return StrongTwinQ31(config)
 
 
 class _DifferentError(Exception):
@@ -398,16 +337,16 @@ class _Recomputation:
 
     def __init__(
         self,
-        config: FloatConfig | FixedConfig,
+        config: Settings,
         checks: dict[int, list[Check]],
         stretch: Stretch,
         count: Callable[[], None],
     ) -> None:
-        self.twin = _twin_of(config)
-        self.reach = _reach(self.twin)
+        self._case = case_of(config)
+        self.twin = self._case.twin(config)
+        self.reach = self.twin.reach
         self.covered = 0
         self.hashed = False
-        self._fixed = isinstance(config, FixedConfig)
         self._checks = checks
         self._stretch = stretch
         self._count = count
@@ -419,8 +358,7 @@ class _Recomputation:
         """Runs over samples [ticks, 2] from the session's first tick; writes the result into the stretch."""
         self._sample_hashes = fnv.sample_hashes(samples)
         try:
-            wide = samples.astype(np.int64) if self._fixed else samples
-            self.twin.follow(wide[:, 0], wide[:, 1], self._after)
+            self.twin.follow(samples[:, 0], samples[:, 1], self._after)
         except _DifferentError:
             pass
 
@@ -443,13 +381,9 @@ class _Recomputation:
 
     def _state(self, reason: int) -> bytes:
         """The bytes that the hash covers, as in fnv.h."""
-        estimator = self.twin.estimator
-        word = reason.to_bytes(4, "little")
-        if isinstance(estimator, EstimatorQ31):
-            exponent = int(estimator.exponent[0]).to_bytes(4, "little")
-            p, sums = estimator.p[:, 0].astype("<i4"), estimator.sums[:, 0].astype("<i8")
-            return p.tobytes() + sums.tobytes() + exponent + word
-        return estimator.p[:, 0].astype("<f4").tobytes() + estimator.sums[:, 0].astype("<f4").tobytes() + word
+        recorder = Recorder(self.twin.estimator, 1)
+        recorder(0, np.empty(0, np.uint8))
+        return recorder.finished(np.array([[reason]], np.uint8)).lane().hashed().tobytes()
 
     def _compared(self, check: Check, tick: int, reason: int) -> Iterator[tuple[str, int, int]]:
         """Yields variable, word of the log and word of the twin."""
@@ -465,18 +399,17 @@ class _Recomputation:
                 yield from self._compared_estimate(check)
 
     def _compared_estimate(self, check: Estimate | EstimateQ31) -> Iterator[tuple[str, int, int]]:
-        if isinstance(check, EstimateQ31) != self._fixed:
+        matrix = self._case.matrix
+        if not hasattr(check, matrix):
             raise PvidError("the estimates are of another core than the rig file asks for")
         own = self.twin.estimator.assess()[0]
         n_p = len(self.twin.estimator.p)
         upper = tuple((a, b) for a, b in _UPPER if b < n_p)
         for i in range(n_p):
             yield P_NAMES[i], _word(check.p[i]), _word(own["p"][i])
-        matrix = "correlation" if isinstance(check, EstimateQ31) else "covariance"
         logged = dict(zip(_UPPER, getattr(check, matrix), strict=True))
-        if isinstance(check, EstimateQ31):
-            for i in range(n_p):
-                yield f"standard error of {P_NAMES[i]}", _word(check.se[i]), _word(own["se"][i])
+        for i, se in enumerate(getattr(check, "se", ())[:n_p]):  # where the matrix does not hold them
+            yield f"standard error of {P_NAMES[i]}", _word(se), _word(own["se"][i])
         for a, b in upper:
             yield f"{matrix} of {P_NAMES[a]} and {P_NAMES[b]}", _word(logged[a, b]), _word(own[matrix][a, b])
         for name in ("kappa", "residual_sd", "weight"):

@@ -16,7 +16,6 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.models.kapitza.modes import modes_hz
 from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile, Unset
 from pvid.rig.run import Run
@@ -161,7 +160,7 @@ def _trial(case: Case, native: Native) -> Identification | None:
     """The case in the weak form and float32, its residuals held against the sensors' noise alone; None where the
     settings are refused."""
     identifier = case.rig.identifier
-    float32 = replace(identifier, core="f32", form="weak", law="stationary", window_s=_weak_window(case.rig))
+    float32 = identifier.in_weak_form(core="f32", law="stationary")
     try:
         return identify(case.run, _settled(Case(case.run, replace(case.rig, identifier=float32))), native, points=1)
     except PvidError:
@@ -174,10 +173,6 @@ def _settled(case: Case) -> RigFile:
     return replace(rig, identifier=replace(rig.identifier, disturbance=case.rig.identifier.disturbance))
 
 
-def _weak_window(rig: RigFile) -> float:
-    return rig.identifier.window_s if rig.identifier.form == "weak" else 0.0
-
-
 def _is_good(result: Identification | None) -> bool:
     return result is not None and result.identified and result.warning is None
 
@@ -187,8 +182,8 @@ def _is_explained(result: Identification | None) -> bool:
 
 
 def _answers(trial: Identification | None) -> bool:
-    """With parameters that some pendulum has."""
-    return trial is not None and trial.identified and "g" in trial.value
+    """With parameters that some mechanism has."""
+    return trial is not None and trial.identified and all(name in trial.value for name in trial.model.physical_names)
 
 
 def _is_better(trial: Identification | None, now: Identification | None) -> bool:
@@ -417,14 +412,15 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
             "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
             Case(replace(run, y=-run.y), rig),
         )
+    in_float = "" if rig.identifier.core_traits.corrects_angles else " with --core f32"
     largest = now.largest_angle if now is not None else _swing(run)[1]
     if not rig.identifier.full_angle:
         yield Cure(
             f"angles go to {largest:.2g} rad, and sin phi is not phi there: use --set identifier.full_angle=true"
-            + (" with --core f32" if rig.identifier.core == "q31" else ""),
+            + in_float,
             with_identifier(full_angle=True),
         )
-    elif rig.identifier.form == "weak" and rig.identifier.core != "q31":
+    elif rig.identifier.corrects_angles:
         yield Cure(
             "the run follows the equations of small angles, as a simulation of them does: use "
             "--set identifier.full_angle=false",
@@ -432,8 +428,7 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
         )
     if not rig.identifier.damping and rig.identifier.zero:
         yield Cure(
-            "there is friction in the joints: use --set identifier.damping=true"
-            + (" with --core f32" if rig.identifier.core == "q31" else ""),
+            "there is friction in the joints: use --set identifier.damping=true" + in_float,
             with_identifier(damping=True),
         )
 
@@ -451,7 +446,8 @@ def _at_rate(case: Case, factor: float) -> Case:
 def _clock(case: Case, native: Native) -> Cure | None:
     """A clock that runs too slow or too fast. Any explains a run, with another gravity: one is tried that brings what
     phi does most to the nominal slow mode, and gravity tells which is right."""
-    slow = (modes_hz(nominal_start(case.rig)) or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
+    modes = case.rig.mechanism.model.modes_hz(nominal_start(case.rig))
+    slow = (modes or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
     tried = slow / _dominant_hz(case.run)
     if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
         return None

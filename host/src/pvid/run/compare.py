@@ -8,44 +8,49 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Identifier, Native
-from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.cases import case_of
+from pvid.core.native import Native
+from pvid.models.registry import DEFAULT, MODELS
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.settings.kinds import Settings
 from pvid.settings.record import Record
 from pvid.twin import fnv
-from pvid.twin.strong import StrongTwin
-from pvid.twin.weak import WeakTwin
 
-P_NAMES = ("w", "d1", "d2", "c", "c1", "c2")
+P_NAMES = MODELS[DEFAULT].p_names  # the library holds one mechanism
 
-# Moments and entries of B by the number of sums: strong form, weak form with and without the encoder's zero, and with
-# friction.
-_LAYOUTS = {
-    n_sums: (moments, n_theta) for n_sums, moments, n_theta in ((58, 45, 11), (46, 36, 8), (22, 15, 5), (67, 55, 10))
-}
+# The float strong form stores equal moments once: number of its sums, moments and entries of B.
+_SHARED_MOMENTS = {58: (45, 11)}
+
+
+def _layout(n_sums: int) -> tuple[int, int]:
+    """Number of moments and of entries of B, or b, among the sums."""
+    own = ((n * (n + 1) // 2, n) for n in range(1, 13) if n * (n + 1) // 2 + n + 2 == n_sums)
+    return _SHARED_MOMENTS.get(n_sums) or next(own)
 
 
 def sum_name(index: int, n_sums: int) -> str:
     """Name of a sum by its place among `n_sums`: M[i], B[i], yy or weight."""
-    moments, n_theta = _LAYOUTS[n_sums]
+    moments, n_theta = _layout(n_sums)
     if index < moments:
         return f"M[{index}]"
-    if index < moments + n_theta:
-        return f"B[{index - moments}]"
-    return ("yy", "weight")[index - moments - n_theta]
+    return f"B[{index - moments}]" if index < moments + n_theta else ("yy", "weight")[index - moments - n_theta]
 
 
 @dataclass(frozen=True)
 class Difference:
-    """The first bit that differs: tick, variable and both 32-bit words."""
+    """The first bit that differs: tick, variable and both words, of floats 32 bits."""
 
     tick: int
     variable: str
     core_word: int
     twin_word: int
     core: str = "core"  # what is compared with the twin
+    written: str = "08x"
 
     def __str__(self) -> str:
-        return f"tick {self.tick}, {self.variable}: {self.core} {self.core_word:08x}, twin {self.twin_word:08x}"
+        words = f"{self.core} {self.core_word:{self.written}}, twin {self.twin_word:{self.written}}"
+        return f"tick {self.tick}, {self.variable}: {words}"
 
 
 @dataclass(frozen=True)
@@ -59,69 +64,63 @@ class Comparison:
 
     @property
     def equal(self) -> bool:
-        """Every p, M, B, yy, weight and status equal in bits, and the running hashes with them."""
+        """Every p, sum, status and published p equal in bits, and the running hashes with them."""
         return self.difference is None and self.core_hash == self.twin_hash
 
 
-def _words(values: npt.NDArray[np.float32]) -> npt.NDArray[np.uint32]:
-    return np.ascontiguousarray(values).view(np.uint32)
-
-
-def first_difference(
-    record: Record,
-    p: npt.NDArray[np.float32],
-    sums: npt.NDArray[np.float32],
-    reason: npt.NDArray[np.uint8],
-    published: npt.NDArray[np.float32] | None = None,
-) -> Difference | None:
-    """The first difference between a replay of the core and one lane of the twin: p, sums, status, then what is
+def first_difference(core: Record, twin: Record) -> Difference | None:
+    """The first difference between a replay of the core and a lane of its twin: p, sums, status, then what is
     published."""
-    n_sums = sums.shape[1]
-    names: list[Callable[[int], str]] = [P_NAMES.__getitem__, lambda i: sum_name(i, n_sums), lambda _: "status"]
-    cores = [_words(record.p), _words(record.sums), record.reason[:, None].astype(np.uint32)]
-    twins = [_words(p), _words(sums), reason[:, None].astype(np.uint32)]
-    if published is not None:
-        names.append(lambda i: f"published {P_NAMES[i]}")
-        cores.append(_words(record.published))
-        twins.append(_words(published))
-    found: list[tuple[int, int, str, int, int]] = []
-    for order, (core, twin, name) in enumerate(zip(cores, twins, names, strict=True)):
-        ticks, places = np.nonzero(core != twin)
+    names: dict[str, Callable[[int], str]] = {
+        "p": P_NAMES.__getitem__,
+        "sums": lambda place: sum_name(place, core.sums.shape[1]),
+        "exponent": lambda _: "exponent of the sums",
+        "status": lambda _: "status",
+        "published": lambda place: f"published {P_NAMES[place]}",
+    }
+    found, twins = [], twin.words()
+    for order, (part, own) in enumerate(core.words().items()):
+        other = twins.get(part, own)
+        ticks, places = np.nonzero(own != other)
         if len(ticks):
-            tick, place = int(ticks[0]), int(places[0])
-            found.append((tick, order, name(place), int(core[tick, place]), int(twin[tick, place])))
+            at = int(ticks[0]), int(places[0])
+            found.append((at[0], order, names[part](at[1]), int(own[at]), int(other[at])))
     if not found:
         return None
     tick, _, variable, core_word, twin_word = min(found)
-    return Difference(tick, variable, core_word, twin_word)
+    return Difference(tick, variable, core_word, twin_word, written="d" if core.is_fixed else "08x")
 
 
 def compare_run(
     native: Native,
-    config: StrongConfig | WeakConfig,
+    config: Settings,
     phi: npt.ArrayLike,
     y: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,
 ) -> Comparison:
-    """Runs phi [rad], y [m] through the core and the twin and compares every tick.
+    """Runs phi [rad], y [m], or counts, through the core and the twin of a configuration and compares every tick.
 
     Cost: about 0.5 ms a tick in the strong form, which solves at every tick, 0.01 ms in the weak form.
     """
-    identifier: Identifier
-    if isinstance(config, WeakConfig):
-        identifier = native.identifier(config)
-        twin = WeakTwin(config).run(phi, y, progress=progress)
-    else:
-        identifier = native.identifier(config)
-        twin = StrongTwin(config).run(phi, y, progress=progress)
+    identifier = native.identifier(config)
+    twin = case_of(config).twin(config).run(phi, y, progress=progress).lane()
     record = identifier.run(phi, y)
-    p, sums, reason = twin.p[:, :, 0], twin.sums[:, :, 0], twin.reason[:, 0]
-    hashes = fnv.running_hashes(p, sums, reason)
+    hashes = fnv.running_hashes(twin)
     return Comparison(
         ticks=len(record.reason),
         core_hash=identifier.running_hash,
         twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
-        difference=first_difference(
-            record, p, sums, reason, twin.published[:, :, 0] if isinstance(config, WeakConfig) else None
-        ),
+        difference=first_difference(record, twin),
     )
+
+
+def compare_rig(
+    native: Native,
+    rig: RigFile,
+    run: Run,
+    start: npt.ArrayLike | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Comparison:
+    """The same with the form, core and settings that a rig file asks for on a run."""
+    case = case_of(rig.identifier)
+    return compare_run(native, case.settings_for_run(rig, run, start), *case.samples(rig, run), progress=progress)

@@ -60,6 +60,12 @@ class StrongConfig(Folded):
 
     form: ClassVar[Form] = "strong"
     core: ClassVar[Core] = "f32"
+    corrects_angles: ClassVar[bool] = False
+
+    @property
+    def ticks_needed(self) -> int:
+        """Samples up to the first estimate."""
+        return 2 * self.delay + 1
 
     @property
     def bank(self) -> StrongConfig:
@@ -136,6 +142,11 @@ class WeakConfig:
     core: ClassVar[Core] = "f32"
 
     @property
+    def corrects_angles(self) -> bool:
+        """Whether it corrects its rows for large angles or friction."""
+        return self.full_angle or self.friction
+
+    @property
     def hop(self) -> int:
         """Decimated samples from the start of a window to the start of the next."""
         return (self.design.window - 1) // 2
@@ -144,3 +155,8 @@ class WeakConfig:
     def delay(self) -> int:
         """Ticks between a sample and the smoothed value that refers to its instant."""
         return (self.design.taps - 1) // 2
+
+    @property
+    def ticks_needed(self) -> int:
+        """Samples up to the first estimate: one window, and as many again as its rows and steps may take."""
+        return self.design.taps + self.design.decimation * (self.design.window + self.hop)

@@ -74,6 +74,13 @@ class WeakConfigQ31:
 
     form: ClassVar[Form] = "weak"
     core: ClassVar[Core] = "q31"
+    counts_about_rest: ClassVar[bool] = True  # phi_offset is where the encoder rests
+    limits_acceleration: ClassVar[bool] = True  # samples are rejected for the pivot's acceleration, too
+
+    @property
+    def full_scale(self) -> tuple[int, int]:
+        """Of phi and y [counts]."""
+        return self.design.phi_max, self.design.y_max
 
     @property
     def hop(self) -> int:
@@ -95,6 +102,13 @@ class StrongConfigQ31:
 
     form: ClassVar[Form] = "strong"
     core: ClassVar[Core] = "q31"
+    counts_about_rest: ClassVar[bool] = False  # the encoder's zero is taken for the equilibrium
+    limits_acceleration: ClassVar[bool] = False
+
+    @property
+    def full_scale(self) -> tuple[int, int]:
+        """Of phi and y [counts]."""
+        return self.bank.phi_max, self.bank.y_max
 
     @property
     def bank(self) -> FirBankQ31:

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[Any]
+Bytes = npt.NDArray[np.uint8]
+
+
+def _none(dtype: npt.DTypeLike) -> Any:
+    return field(default_factory=lambda: np.empty(0, dtype))
+
+
+def _integers(values: Array) -> Array:
+    """Floats as their 32 bits, integers as they are."""
+    return np.ascontiguousarray(values).view(np.uint32) if values.dtype.kind == "f" else values
 
 
 @dataclass
@@ -19,23 +29,44 @@ class Record:
         The estimator's parameters [ticks, n_p].
     sums
         M, B, yy and weight [ticks, n] (fixed point: int64, M, b, rr times 4^-exponent, and weight).
-    exponent
-        Of the sums [ticks] in fixed point; else empty.
     reason
         Outcome of each tick, uint8 [ticks].
-    hash
-        Running hash after each tick, uint32 [ticks].
+    exponent
+        Of the sums [ticks] in fixed point; else empty.
     published, published_se
         What the weak form publishes and its standard errors [ticks, n_p]; else empty.
+    hash
+        Running hash after each tick, uint32 [ticks]; empty where it was not asked for.
     estimate
         Every so many ticks an estimate, structured. In fixed point it is the published one in the weak form.
     """
 
     p: Array
     sums: Array
-    exponent: npt.NDArray[np.uint8]
     reason: npt.NDArray[np.uint8]
-    hash: npt.NDArray[np.uint32]
-    published: Array
-    published_se: Array
-    estimate: npt.NDArray[np.void]
+    exponent: npt.NDArray[np.uint8] = _none(np.uint8)
+    published: Array = _none(np.float32)
+    published_se: Array = _none(np.float32)
+    hash: npt.NDArray[np.uint32] = _none(np.uint32)
+    estimate: npt.NDArray[np.void] = _none(np.void)
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the numbers are integers."""
+        return self.p.dtype.kind != "f"
+
+    def words(self) -> dict[str, Array]:
+        """What is compared, as integers [ticks, n]: floats as their 32 bits. In the order in which it is compared."""
+        parts = {"p": self.p, "sums": self.sums, "exponent": self.exponent[:, None], "status": self.reason[:, None]}
+        if len(self.published):
+            parts["published"] = self.published
+        return {name: _integers(values) for name, values in parts.items()}
+
+    def hashed(self) -> Bytes:
+        """The bytes of every tick that the running hash covers, uint8 [ticks, n]: p, the sums and the reason as a
+        32-bit word, in fixed point the exponent before it; all little-endian."""
+        narrow, wide = ("<i4", "<i8") if self.is_fixed else ("<f4", "<f4")
+        pieces = [self.p.astype(narrow), self.sums.astype(wide), self.reason.astype("<u4")[:, None]]
+        if self.is_fixed:
+            pieces.insert(2, self.exponent.astype("<u4")[:, None])
+        return np.concatenate([np.ascontiguousarray(piece).view(np.uint8) for piece in pieces], axis=1)

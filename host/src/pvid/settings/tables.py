@@ -105,6 +105,11 @@ class StrongDesignQ31:
     dt: float
 
     @property
+    def p_units(self) -> Float:
+        """What w, d1, d2 are counted in, in SI."""
+        return np.array([1 / self.dt**2, 1.0, 1.0])
+
+    @property
     def margins(self) -> dict[str, float]:
         """For each derivative the bits that its largest value leaves free."""
         return self.bank.margins
@@ -171,3 +176,13 @@ class WeakTablesQ31:
     dt: float
     overlap: float
     margins: dict[str, float]
+
+    @property
+    def p_units(self) -> Float:
+        """What w, d1, d2 and c are counted in, in SI."""
+        return np.array([1 / self.dt**2, 1.0, 1.0, self.f_unit])
+
+    @property
+    def encoder_count(self) -> float:
+        """One count of the encoder [rad]."""
+        return float(self.f_unit * 2.0 ** (self.smooth_bits - self.phi_shift))

@@ -15,6 +15,7 @@ from pvid.rig.file import RigFile, Sensor
 from pvid.rig.run import Run
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig
+from pvid.settings.kinds import FixedSettings
 from pvid.settings.q31 import (
     EstimatorConfigQ31,
     GateConfigQ31,
@@ -29,7 +30,7 @@ from pvid.setup.ranges_q31 import Beyond, beyond_ranges, middle_of_travel, reach
 
 Float = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
-ConfigQ31 = WeakConfigQ31 | StrongConfigQ31
+ConfigQ31 = FixedSettings
 
 PATIENCE_MAX = 2**30  # groups of rows, of gate_q31.h
 FORGETTING_MIN, FORGETTING_MAX = 4, 2**24  # likewise, of estimator_q31.h
@@ -101,17 +102,14 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
     A run that does not fit about 0 is counted about the middle of its travel; the strong form takes the encoder's zero
     for the equilibrium, and of the pivot only what changes counts.
     """
-    if rig.identifier.form == "weak" and rig.identifier.damping:
+    if rig.identifier.form_traits.estimates_zero and rig.identifier.damping:
         raise PvidError("core q31 has no damping: use --core f32")
     rig = with_ranges_of(rig, run)
     config = config_of_q31(rig, run.sample_rate, start)
     phi, y = counts_of(rig, run)
-    if isinstance(config, StrongConfigQ31):
-        return replace(config, y_offset=_offset(y, config.design.bank.y_max))
-    design = config.design
-    return replace(
-        config, phi_offset=_offset(phi, design.phi_max, config.phi_offset), y_offset=_offset(y, design.y_max)
-    )
+    phi_max, y_max = config.full_scale
+    phi_offset = _offset(phi, phi_max, config.phi_offset) if config.counts_about_rest else config.phi_offset
+    return replace(config, phi_offset=phi_offset, y_offset=_offset(y, y_max))
 
 
 def _offset(counts: Int64, limit: int, given: int = 0) -> int:
@@ -126,11 +124,8 @@ def _offset(counts: Int64, limit: int, given: int = 0) -> int:
 
 def beyond_range(config: ConfigQ31, phi: Int64, y: Int64, rejected: int) -> Beyond:
     """Which of the counts phi, y [n] a core of this configuration could not take in; `rejected` of them in all."""
-    if isinstance(config, StrongConfigQ31):
-        bank = config.design.bank
-        return beyond_ranges(phi, y - config.y_offset, bank.phi_max, bank.y_max, 0)
-    design = config.design
-    return beyond_ranges(phi - config.phi_offset, y - config.y_offset, design.phi_max, design.y_max, rejected)
+    limited = rejected if config.limits_acceleration else 0
+    return beyond_ranges(phi - config.phi_offset, y - config.y_offset, *config.full_scale, limited)
 
 
 def _estimator_q31(
@@ -225,7 +220,7 @@ def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | Non
     estimator = _estimator_q31(
         e,
         weak_config(rig, sample_rate).estimator,
-        _p_units(tables)[:n_p],
+        tables.p_units[:n_p],
         tables.column_bits[: 8 if n_p == 4 else 5],
         tables.column_bits[8],
         tables.f_unit,
@@ -271,7 +266,7 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
     estimator = _estimator_q31(
         e,
         strong_config(rig, sample_rate).estimator,
-        _p_units(design),
+        design.p_units,
         design.n_bits,
         design.y_bits,
         design.angle_unit / design.dt**8,
@@ -294,24 +289,17 @@ def config_of_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
     return make(rig, sample_rate, start)
 
 
-def _p_units(design: WeakTablesQ31 | StrongDesignQ31) -> Float:
-    """What w, d1, d2 and, in the weak form, c are counted in, in SI."""
-    zero = [design.f_unit] if isinstance(design, WeakTablesQ31) else []
-    return np.array([1 / design.dt**2, 1.0, 1.0, *zero])
-
-
 def units_of(config: ConfigQ31) -> Float:
     """One unit of each of the core's integers p in SI [n_p]."""
     bits = np.array(config.estimator.p_bits, np.float64)
-    return np.asarray(_p_units(config.design)[: len(bits)] * 2.0**-bits)
+    return np.asarray(config.design.p_units[: len(bits)] * 2.0**-bits)
 
 
 def p_of(config: ConfigQ31, p: npt.ArrayLike) -> Float:
     """p = (w, d1, d2, c) in SI from the core's integers [..., n_p]; c is the encoder's reading at rest."""
     values = np.asarray(p, np.float64) * units_of(config)
-    if values.shape[-1] > 3 and isinstance(config, WeakConfigQ31):
-        lsb = config.design.f_unit * 2.0 ** (config.design.smooth_bits - config.design.phi_shift)
-        values[..., 3] += config.phi_offset * lsb
+    if values.shape[-1] > 3 and isinstance(config.design, WeakTablesQ31):
+        values[..., 3] += config.phi_offset * config.design.encoder_count
     return np.asarray(values)
 
 

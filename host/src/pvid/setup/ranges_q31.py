@@ -47,7 +47,7 @@ def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
     the default."""
     default = with_default_ranges(rig)
     given = rig.sensor
-    rest = 0.0 if rig.identifier.form == "strong" else None  # the strong form measures angles from 0
+    rest = None if rig.identifier.form_traits.estimates_zero else 0.0
     ranges = {
         "phi_range": given.phi_range or max(default.phi_range, _MARGIN * reach(run.phi, rest)),
         "y_range": given.y_range or max(default.y_range, _MARGIN * reach(run.y)),
@@ -59,7 +59,7 @@ def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
 def _acceleration_range(rig: RigFile, run: Run, default: float) -> float:
     """The range that the run needs [m/s^2]. If it is above the default, faults of the sensor are excluded. In the
     strong form, whose products do not lose bits, it is at least the default."""
-    if rig.identifier.form == "weak":
+    if rig.identifier.form_traits.uses_windows:
         largest = _ACCELERATION_MARGIN * _largest_acceleration(rig, run)
         if 0 < largest <= default:
             return largest

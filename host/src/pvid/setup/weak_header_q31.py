@@ -8,10 +8,10 @@ from dataclasses import fields
 import numpy as np
 import numpy.typing as npt
 
+from pvid.models.kapitza import MODEL
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
 from pvid.setup.q31 import ConfigQ31, scale_of, units_of
 
-_P_UNITS = ("1/s^2", "", "", "rad")
 _TABLES = ("smooth", "second", "chi", "multiplier", "gram")
 
 
@@ -62,8 +62,8 @@ def gate_line(gate: GateConfigQ31) -> str:
 def unit_lines(config: ConfigQ31) -> list[str]:
     """What one unit of each parameter is, as lines of a comment."""
     return [
-        f" *   p[{i}] = {label}: one unit is {unit:.17g} {text}".rstrip()
-        for i, (label, unit, text) in enumerate(zip(("w", "d1", "d2", "c"), units_of(config), _P_UNITS, strict=False))
+        f" *   p[{i}] = {one.name}: one unit is {unit:.17g} {one.unit}".rstrip()
+        for i, (one, unit) in enumerate(zip(MODEL.parameters, units_of(config), strict=False))
     ]
 
 

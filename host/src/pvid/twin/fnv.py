@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from pvid.settings.record import Record
+
 START = 0x811C9DC5
 _PRIME = 0x01000193
 _PIECE = 256  # ticks at a time, so that what is held stays in the processor's cache
@@ -72,36 +74,6 @@ def sample_hashes(samples: npt.NDArray[np.float32] | npt.NDArray[np.int32]) -> n
     return _running(np.ascontiguousarray(samples, samples.dtype.newbyteorder("<")).view(np.uint8), START)
 
 
-def running_hashes(
-    p: npt.NDArray[np.float32],
-    sums: npt.NDArray[np.float32],
-    reason: npt.NDArray[np.uint8],
-    start: int = START,
-) -> npt.NDArray[np.uint32]:
-    """Hash after every tick of one lane, over p [ticks, n_p], sums [ticks, n] and reason [ticks].
-
-    The bytes of a tick are p, the sums and the reason as a 32-bit word, all little-endian.
-    """
-    words = [
-        np.ascontiguousarray(p).view(np.uint32),
-        np.ascontiguousarray(sums).view(np.uint32),
-        reason.astype(np.uint32)[:, None],
-    ]
-    return _running(np.concatenate(words, axis=1).astype("<u4").view(np.uint8), start)
-
-
-def running_hashes_q31(
-    p: npt.NDArray[np.int32],
-    sums: npt.NDArray[np.int64],
-    exponent: npt.NDArray[np.uint8],
-    reason: npt.NDArray[np.uint8],
-    start: int = START,
-) -> npt.NDArray[np.uint32]:
-    """Hash after every tick of one lane of the fixed-point core (pvid/fnv_q31.h); shapes as in `running_hashes`."""
-    pieces = [
-        np.ascontiguousarray(p, "<i4").view(np.uint8),
-        np.ascontiguousarray(sums, "<i8").view(np.uint8),
-        exponent.astype("<u4")[:, None].view(np.uint8),
-        reason.astype("<u4")[:, None].view(np.uint8),
-    ]
-    return _running(np.concatenate(pieces, axis=1), start)
+def running_hashes(record: Record, start: int = START) -> npt.NDArray[np.uint32]:
+    """Hash after every tick of a record (pvid/fnv.h, pvid/fnv_q31.h)."""
+    return _running(record.hashed(), start)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -17,20 +17,17 @@ from pvid.twin.q31.gate import GateQ31
 from pvid.twin.q31.integer import Int, clamp, integers, times_q31
 from pvid.twin.q31.misfit import MisfitQ31
 from pvid.twin.q31.scaled import scaled
-from pvid.twin.weak_q31 import TwinRecordQ31
-
-Mask = npt.NDArray[np.bool_]
-Reasons = npt.NDArray[np.uint8]
+from pvid.twin.record import After, Mask, Reasons, Twin
+from pvid.twin.rows import follow_rows
 
 DERIVATIVE_LIMIT = 2**30
 
 
-class StrongTwinQ31:
+class StrongTwinQ31(Twin):
     """The strong-form identifier in several lanes that share samples and design."""
 
     def __init__(self, config: StrongConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
         self.config = config
-        self.frozen: Mask | None = None  # [ticks], to be set before a run
         self.estimator = EstimatorQ31(estimators or [config.estimator], model.STRONG)
         floor = self.estimator.expected_variance.shifted(-20).plus(scaled(1, 0))
         self.gate = GateQ31(config.gate, config.drive_ticks // 4, floor)
@@ -70,85 +67,23 @@ class StrongTwinQ31:
             driven[tick] = mean_square >= threshold
         return driven
 
-    def follow(self, phi: Int, y: Int, after: Callable[[int, Reasons], None]) -> Reasons:
-        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+    @property
+    def reach(self) -> int:
+        """Ticks from a sample until the identifier has processed it completely."""
+        return self.config.design.bank.window
 
-        Returns what every tick told, [ticks, lanes].
-        """
-        return follow_rows(self.estimator, *self.rows(phi, y), after, self.gate, self.misfit)
+    def step(self, n: Int, y: Int) -> Reasons:
+        """A row of all lanes."""
+        return step(self.estimator, n, y, self.gate, self.misfit)
 
-    def run(
-        self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
-    ) -> TwinRecordQ31:
-        """Steps all lanes through a run from its first sample: counts phi, y, both int64 [ticks]."""
-        return run_rows(
-            self.estimator, *self.rows(phi, y), sums=sums, progress=progress, gate=self.gate, misfit=self.misfit
-        )
+    def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
+        """See Twin."""
+        return follow_rows(self.estimator, self.step, *self.rows(integers(phi), integers(y)), after)
 
 
-def run_rows(
-    estimator: EstimatorQ31,
-    n: Int,
-    y: Int,
-    row_reason: Reasons,
-    *,
-    sums: bool = True,
-    progress: Callable[[int], None] | None = None,
-    gate: GateQ31 | None = None,
-    misfit: MisfitQ31 | None = None,
-) -> TwinRecordQ31:
-    """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share, each a group of its own.
-
-    `fate` [ticks] tells what became of a tick before it reached the estimator: ACCUMULATED where it has a row.
-    """
-    ticks = len(y)
-    n_p, lanes = estimator.p.shape
-    p = np.empty((ticks, n_p, lanes), np.int32)
-    state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64)
-    exponent = np.empty((ticks, lanes), np.uint8)
-
-    def record(tick: int, _: Reasons) -> None:
-        p[tick] = estimator.p
-        exponent[tick] = estimator.exponent
-        if sums:
-            state[tick] = estimator.sums
-        if progress is not None and tick % 512 == 0:
-            progress(tick)
-
-    reason = follow_rows(estimator, n, y, row_reason, record, gate, misfit)
-    return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason)
-
-
-def follow_rows(
-    estimator: EstimatorQ31,
-    n: Int,
-    y: Int,
-    row_reason: Reasons,
-    after: Callable[[int, Reasons], None],
-    gate: GateQ31 | None = None,
-    misfit: MisfitQ31 | None = None,
+def step(
+    estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None = None, misfit: MisfitQ31 | None = None
 ) -> Reasons:
-    """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
-
-    Returns what every tick told, [ticks, lanes].
-    """
-    ticks = len(y)
-    lanes = estimator.p.shape[1]
-    reason = np.empty((ticks, lanes), np.uint8)
-    wide_n = np.broadcast_to(n[:, :, None], (ticks, n.shape[1], lanes))
-    wide_y = np.broadcast_to(y[:, None], (ticks, lanes))
-    for tick in range(ticks):
-        if row_reason[tick] == Reason.ACCUMULATED:
-            reason[tick] = _step(estimator, wide_n[tick], wide_y[tick], gate, misfit)
-        else:
-            reason[tick] = row_reason[tick]
-            if row_reason[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
-                estimator.counters[Reason(row_reason[tick]).name.lower()] += 1
-        after(tick, reason[tick])
-    return reason
-
-
-def _step(estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None, misfit: MisfitQ31 | None) -> Reasons:
     """A row and the solve it may lead to; all lanes must let the same rows in."""
     terms, e, fits = estimator.terms(n, y)
     held = np.where(fits, e, 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,13 +19,13 @@ from pvid.twin.f32.trust import Trust
 from pvid.twin.f32.weak_window import Window
 from pvid.twin.kapitza import weak as kapitza_weak
 from pvid.twin.kapitza.full_angle import Angle
-from pvid.twin.strong import TwinRecord
-from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
+from pvid.twin.record import After, Mask, Reasons, Twin
+from pvid.twin.weak_schedule import Schedule, Work, play
 
 Float32 = npt.NDArray[np.float32]
 
 
-class WeakTwin:
+class WeakTwin(Twin):
     """The weak-form identifier in several lanes that share samples, design and rate.
 
     Parameters
@@ -47,7 +47,6 @@ class WeakTwin:
         ]
         pattern = kapitza_weak.WEAK if config.zero_unknown else kapitza_weak.ZEROED
         pattern = kapitza_weak.FRICTION if config.friction else pattern
-        self.frozen: Mask | None = None  # [ticks], to be set before a run
         self.estimator = RelativeEstimator(lanes, float(rate), pattern)
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.angle = Angle(config, len(lanes)) if config.full_angle or config.friction else None
@@ -138,40 +137,15 @@ class WeakTwin:
         self.estimator.counters["rejected_not_finite"] += 1
         return Reason.REJECTED_NOT_FINITE
 
-    def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: Callable[[int, Reasons], None]) -> Reasons:
-        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+    @property
+    def reach(self) -> int:
+        """Ticks from a sample until the identifier has processed it completely."""
+        return self.schedule.reach
 
-        Returns what every tick told, [ticks, lanes].
-        """
-        complete, finite, free = self.windows(phi, y)
+    def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
+        """See Twin."""
+        complete, usable, free = self.windows(phi, y)
         lanes = self.estimator.p.shape[1]
         return play(
-            finite, free, complete, self.stages_per_tick, lanes, reject=self._reject, take=self._take, record=after
+            usable, free, complete, self.stages_per_tick, lanes, reject=self._reject, take=self._take, record=after
         )
-
-    def run(
-        self,
-        phi: npt.ArrayLike,
-        y: npt.ArrayLike,
-        *,
-        sums: bool = True,
-        progress: Callable[[int], None] | None = None,
-    ) -> TwinRecord:
-        """Steps all lanes through a run from its first sample: phi [rad], y [m], both [ticks]."""
-        estimator = self.estimator
-        ticks = np.size(phi)
-        n_p, lanes = estimator.p.shape
-        p = np.empty((ticks, n_p, lanes), np.float32)
-        state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.float32)
-        published = np.empty((ticks, n_p, lanes), np.float32)
-
-        def record(tick: int, _: Reasons) -> None:
-            p[tick] = estimator.p
-            published[tick] = self.trust.estimate["p"][:, :n_p].T
-            if sums:
-                state[tick] = estimator.sums
-            if progress is not None and tick % 512 == 0:
-                progress(tick)
-
-        reason = self.follow(phi, y, record)
-        return TwinRecord(p=p, sums=state, reason=reason, published=published)

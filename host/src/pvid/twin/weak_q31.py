@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -21,40 +20,15 @@ from pvid.twin.q31.integer import Int, integers, scale
 from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.trust import TrustQ31
 from pvid.twin.q31.weak_window import Window
-from pvid.twin.weak_schedule import Mask, Reasons, Schedule, Work, play
+from pvid.twin.record import After, Mask, Reasons, Twin
+from pvid.twin.weak_schedule import Schedule, Work, play
 
 
-@dataclass
-class TwinRecordQ31:
-    """State after every tick: p [ticks, n_p, lanes], sums [ticks, n, lanes], exponent and reason [ticks, lanes].
-
-    published: p as published, like p, of the weak form.
-    """
-
-    p: npt.NDArray[np.int32]
-    sums: Int
-    exponent: npt.NDArray[np.uint8]
-    reason: npt.NDArray[np.uint8]
-    published: npt.NDArray[np.int32] | None = None
-
-    def lane(self, lane: int) -> TwinRecordQ31:
-        """A copy of one lane, for whoever looks at it more than once: its ticks lie side by side."""
-        own = slice(lane, lane + 1)
-        return TwinRecordQ31(
-            p=self.p[:, :, own].copy(),
-            sums=self.sums[:, :, own].copy(),
-            exponent=self.exponent[:, own].copy(),
-            reason=self.reason[:, own].copy(),
-            published=None if self.published is None else self.published[:, :, own].copy(),
-        )
-
-
-class WeakTwinQ31:
+class WeakTwinQ31(Twin):
     """The weak-form identifier in several lanes that share samples and design."""
 
     def __init__(self, config: WeakConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
         self.config = config
-        self.frozen: Mask | None = None  # [ticks], to be set before a run
         model = kapitza_weak_q31.WEAK if config.zero_unknown else kapitza_weak_q31.ZEROED
         self.estimator = EstimatorQ31(estimators or [config.estimator], model)
         self.trust = TrustQ31(config.trust, self.estimator)
@@ -140,37 +114,15 @@ class WeakTwinQ31:
         self.estimator.counters["rejected_saturated"] += 1
         return Reason.REJECTED_SATURATED
 
-    def follow(self, phi: Int, y: Int, after: Callable[[int, Reasons], None]) -> Reasons:
-        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+    @property
+    def reach(self) -> int:
+        """Ticks from a sample until the identifier has processed it completely."""
+        return self.schedule.reach
 
-        Returns what every tick told, [ticks, lanes].
-        """
-        complete, within, free = self.window_sums(phi, y)
+    def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
+        """See Twin."""
+        complete, usable, free = self.window_sums(integers(phi), integers(y))
         lanes = self.estimator.lanes
         return play(
-            within, free, complete, self.stages_per_tick, lanes, reject=self._reject, take=self._take, record=after
+            usable, free, complete, self.stages_per_tick, lanes, reject=self._reject, take=self._take, record=after
         )
-
-    def run(
-        self, phi: Int, y: Int, *, sums: bool = True, progress: Callable[[int], None] | None = None
-    ) -> TwinRecordQ31:
-        """Steps all lanes through a run from its first sample: counts phi, y, both int64 [ticks]."""
-        estimator = self.estimator
-        ticks = len(phi)
-        n_p, lanes = estimator.p.shape
-        p = np.empty((ticks, n_p, lanes), np.int32)
-        state = np.empty((ticks if sums else 0, estimator.model.n_sums, lanes), np.int64)
-        exponent = np.empty((ticks, lanes), np.uint8)
-        published = np.empty((ticks, n_p, lanes), np.int32)
-
-        def record(tick: int, _: Reasons) -> None:
-            p[tick] = estimator.p
-            exponent[tick] = estimator.exponent
-            published[tick] = self.trust.estimate["p"][:, :n_p].T
-            if sums:
-                state[tick] = estimator.sums
-            if progress is not None and tick % 512 == 0:
-                progress(tick)
-
-        reason = self.follow(phi, y, record)
-        return TwinRecordQ31(p=p, sums=state, exponent=exponent, reason=reason, published=published)

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.enums import Reason
+from pvid.twin.record import Mask, Reasons
 
-Mask = npt.NDArray[np.bool_]
-Reasons = npt.NDArray[np.uint8]
 Work = Iterator[Reasons | None]
 WindowT = TypeVar("WindowT")
 

@@ -18,7 +18,7 @@ extern "C" {
 
 #define PVID_KAPITZA_BITS_Q31 24
 
-/* What turns p into metres; `pvid weak-table --core q31` writes it. */
+/* What turns p into metres; `pvid tables --core q31` writes it. */
 typedef struct {
     int32_t l1;           /* [2^-24 m], > 0 */
     int32_t g_multiplier; /* g [2^-24 m/s^2] = w g_multiplier 2^-g_shift for the integer w of an estimate, > 0 */

@@ -26,7 +26,8 @@ from pvid.twin.q31.integer import (
 from pvid.twin.q31.scaled import Scaled, pick, scaled
 from pvid.twin.q31.trust import VARIANCE_RATIO_BITS, TrustQ31
 from pvid.twin.q31.weak_window import Window
-from pvid.twin.weak_schedule import Mask, Work
+from pvid.twin.record import Mask
+from pvid.twin.weak_schedule import Work
 
 COLUMNS = 12
 COLUMN_LIMIT = 2**28

@@ -1,0 +1,363 @@
+"""The four identifiers behind one face: CASES[form, core] knows what belongs to a form and a core.
+
+From a rig to the settings, from a run to the samples, from the core's numbers to SI, and to the frames of the link, the
+twin and the C headers of the same settings. The rest of the package asks the case, which everything that has a form and
+a core leads to (`case_of`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.design.weak_sizing import raised_bounds
+from pvid.link import frames
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.settings.bounds import MAX_MOMENTS
+from pvid.settings.enums import Core, Form, Law
+from pvid.settings.forms import FORMS
+from pvid.settings.kinds import Settings
+from pvid.setup import q31 as fixed
+from pvid.setup.f32 import config_of
+from pvid.setup.header_f32 import header_f32
+from pvid.setup.ranges_q31 import Beyond, with_ranges_of
+from pvid.setup.strong_header_q31 import strong_header_q31
+from pvid.setup.weak_header_q31 import to_c_header_q31
+from pvid.twin.record import Twin
+from pvid.twin.strong import StrongTwin
+from pvid.twin.strong_q31 import StrongTwinQ31
+from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
+
+Float = npt.NDArray[np.float64]
+Samples = npt.NDArray[Any]  # float32 [rad], [m], or int32 counts
+
+# Fields of the settings that a Configure frame has for every parameter.
+_PER_PARAMETER = ("start", "start_sd", "lower", "upper")
+
+
+class HasCase(Protocol):
+    """Settings of an identifier, or what a rig file says of it."""
+
+    @property
+    def form(self) -> Form: ...
+    @property
+    def core(self) -> str: ...
+
+
+class Case(ABC):
+    """What depends on the core: methods of the two subclasses; on the form: what they are made with.
+
+    Parameters
+    ----------
+    form
+        Which form of the model.
+    twin
+        The twin's class.
+    """
+
+    core: ClassVar[Core]
+    sample_type: ClassVar[type[np.generic]]  # of the samples that the core takes
+    frame: ClassVar[Any]  # of samples to the board
+    configure_frame: ClassVar[Any]
+    umbrella: ClassVar[str]  # the header of the whole core
+    matrix: ClassVar[str]  # in an estimate: covariance, or correlation beside standard errors
+    linear_rows_only: ClassVar[bool]  # whether its weak form has no correction for large angles
+    _single: ClassVar[tuple[str, ...]]  # fields of the estimator's settings in a Configure frame, besides
+
+    def __init__(self, form: Form, twin: type[Any]) -> None:
+        self.form = form
+        self._twin = twin
+
+    @property
+    def publishes(self) -> bool:
+        """Whether it publishes the estimates that it trusts, and no others."""
+        return FORMS[self.form].publishes
+
+    @property
+    def numbers(self) -> tuple[frames.Form, frames.Core]:
+        """Form and core as a frame numbers them."""
+        return frames.Form[self.form.upper()], frames.Core[self.core.upper()]
+
+    # ---- settings
+
+    @abstractmethod
+    def settings(self, rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> Settings:
+        """For samples at `sample_rate` [Hz]; `start` overrides the rig's nominal p = (w, d1, d2)."""
+
+    @abstractmethod
+    def settings_for_run(self, rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> Settings:
+        """For a run, whose samples they take in."""
+
+    def twin(self, config: Settings, estimators: Sequence[Any] | None = None) -> Twin:
+        """The numpy twin; one lane for each of `estimators`, by default the settings' own."""
+        made: Twin = self._twin(config, estimators)
+        return made
+
+    @abstractmethod
+    def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
+        """A C header that defines the settings as `name`, with their tables, for a rod of l1 [m]."""
+
+    def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
+        """Macros of pvid/config.h without which the settings would not fit, or take more room than they need.
+
+        exact: no more room than they need in the weak form either, for a board of little memory.
+        """
+        if self.form == "strong":
+            return {"PVID_MAX_WINDOW": str(max(config.bank.window, 5))}
+        design = config.design
+        bounds = raised_bounds(design)
+        if exact:
+            bounds |= {"PVID_MAX_TAPS": design.taps, "PVID_MAX_DECIMATION": design.decimation}
+            bounds |= {"PVID_MAX_FUNCTIONS": design.functions}
+        return {macro: str(value) for macro, value in bounds.items()}
+
+    def alike_from(self, config: Any, ticks: int) -> int:
+        """First of `ticks` from which on the mean cost of a tick is taken: whole periods of the weak form's windows,
+        all of them with a solve in work; in the strong form what follows the first 500."""
+        if self.form == "strong":  # windows are full and the drive is noticed
+            return min(500, ticks // 2)
+        period = config.hop * config.design.decimation
+        settled = 3 * period + config.design.taps
+        return int(ticks - max((ticks - settled) // period, 1) * period)
+
+    # ---- samples
+
+    @abstractmethod
+    def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:
+        """phi and y [ticks] of a run as the core takes them."""
+
+    @abstractmethod
+    def from_counts(self, counts: npt.NDArray[np.integer], lsb: tuple[float, float]) -> tuple[Samples, Samples]:
+        """The same from what a board's sensors count [n, 2], a count being worth `lsb` [rad], [m]."""
+
+    def with_ranges(self, rig: RigFile, run: Run) -> RigFile:
+        """The rig file with the ranges that the core needs for a run, where it needs any."""
+        return rig
+
+    # ---- estimates
+
+    @abstractmethod
+    def units(self, config: Any) -> Float:
+        """One unit of each p in SI [n_p]."""
+
+    @abstractmethod
+    def p_of(self, config: Any, p: npt.ArrayLike) -> Float:
+        """p in SI from the core's numbers [..., n_p]."""
+
+    @abstractmethod
+    def se_of(self, config: Any, se: npt.ArrayLike) -> Float:
+        """Standard errors in SI likewise."""
+
+    @abstractmethod
+    def covariance_of(self, config: Any, estimate: npt.NDArray[np.void]) -> Float:
+        """Covariance of p in SI [..., n_p, n_p] from estimates of the core."""
+
+    @abstractmethod
+    def kappa_of(self, estimate: npt.NDArray[np.void]) -> Float:
+        """kappa of estimates."""
+
+    def beyond(self, config: Any, phi: Samples, y: Samples, rejected: int) -> Beyond | None:
+        """Which samples lay beyond the core's ranges; None in a core without ranges. `rejected` of them in all."""
+        return None
+
+    def zero_shift(self, rig: RigFile, run: Run, phi: Samples) -> float:
+        """What the run's angles lie above the samples that the core took, on average [rad]."""
+        return 0.0
+
+    # ---- frames
+
+    def configure(self, config: Any, **common: Any) -> frames.Configuration:
+        """The Configure frame of the settings, with the fields `common` to both cores."""
+        estimator = config.estimator
+        given = {name: getattr(estimator, name) for name in ("divider", *self._single)}
+        places = {name: _places(getattr(estimator, name)) for name in _PER_PARAMETER}
+        made: frames.Configuration = self.configure_frame(**common, **given, **places, **self._offsets(config))
+        return made
+
+    def configured(self, config: Any, frame: frames.Configuration) -> Settings:
+        """The settings with what a Configure frame says."""
+        if not isinstance(frame, self.configure_frame):
+            raise PvidError("the board's image holds another core than the rig file asks for")
+        n_p = len(config.estimator.start)
+        given = {name: getattr(frame, name) for name in ("divider", *self._single)}
+        places = {name: self._array(getattr(frame, name)[:n_p]) for name in _PER_PARAMETER}
+        return self._with(config, {**given, **places}, {name: getattr(frame, name) for name in self._offsets(config)})
+
+    def shared(self, config: Any) -> Settings:
+        """The settings without what a Configure frame brings: those of an image."""
+        ones = self._array((1,) * len(config.estimator.start))
+        neutral = {"divider": 1, "row_sd": 1, **dict.fromkeys(_PER_PARAMETER, ones), **self._neutral}
+        return self._with(config, neutral, dict.fromkeys(self._offsets(config), 0))
+
+    _neutral: ClassVar[Mapping[str, Any]]
+
+    @staticmethod
+    @abstractmethod
+    def _array(values: tuple[Any, ...]) -> Any: ...
+
+    def _offsets(self, config: Any) -> dict[str, int]:
+        return {}
+
+    def _with(self, config: Any, estimator: Mapping[str, Any], own: Mapping[str, Any]) -> Settings:
+        made: Settings = replace(config, estimator=replace(config.estimator, **estimator), **own)
+        return made
+
+
+class _Float(Case):
+    core = "f32"
+    sample_type = np.float32
+    frame = frames.Sample
+    configure_frame = frames.Configure
+    umbrella = "pvid/pvid.h"
+    matrix = "covariance"
+    linear_rows_only = False
+    _single = ("row_sd", "forgetting_s", "feedback_hz", "law")
+    _neutral: ClassVar[Mapping[str, Any]] = {"forgetting_s": 0.0, "feedback_hz": 0.0, "law": Law.STATIONARY}
+
+    def settings(self, rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> Settings:
+        return config_of(rig, sample_rate, start)
+
+    def settings_for_run(self, rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> Settings:
+        return config_of(rig, run.sample_rate, start)
+
+    def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
+        return header_f32(config, name, made_by)
+
+    def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
+        more = {"PVID_MAX_P": str(frames.MAX_P), "PVID_MAX_MOMENTS": str(MAX_MOMENTS)}
+        return super().sizes(config, exact) | (more if len(config.estimator.start) > 4 else {})
+
+    def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:
+        return run.phi, run.y
+
+    def from_counts(self, counts: npt.NDArray[np.integer], lsb: tuple[float, float]) -> tuple[Samples, Samples]:
+        values = counts.astype(np.float32) * np.array(lsb, np.float32)
+        return values[:, 0], values[:, 1]
+
+    def units(self, config: Any) -> Float:
+        return np.ones(len(config.estimator.start))
+
+    def p_of(self, config: Any, p: npt.ArrayLike) -> Float:
+        return np.asarray(p, np.float64)
+
+    def se_of(self, config: Any, se: npt.ArrayLike) -> Float:
+        return np.asarray(se, np.float64)
+
+    def covariance_of(self, config: Any, estimate: npt.NDArray[np.void]) -> Float:
+        n_p = len(config.estimator.start)
+        return estimate["covariance"][..., :n_p, :n_p].astype(np.float64)
+
+    def kappa_of(self, estimate: npt.NDArray[np.void]) -> Float:
+        return estimate["kappa"].astype(np.float64)
+
+    @staticmethod
+    def _array(values: tuple[Any, ...]) -> Any:
+        return np.array(values, np.float32)
+
+    def _with(self, config: Any, estimator: Mapping[str, Any], own: Mapping[str, Any]) -> Settings:
+        law = estimator["law"]
+        if law not in list(Law):
+            raise PvidError(f"the board was configured with law {law}, which does not exist")
+        return super()._with(config, {**estimator, "law": Law(law), "row_sd": float(estimator["row_sd"])}, own)
+
+
+class _Fixed(Case):
+    core = "q31"
+    sample_type = np.int32
+    frame = frames.Count
+    configure_frame = frames.ConfigureQ31
+    umbrella = "pvid/pvid_q31.h"
+    matrix = "correlation"
+    linear_rows_only = True
+    _single = ("row_sd", "forgetting_groups", "gain")
+    _neutral: ClassVar[Mapping[str, Any]] = {"forgetting_groups": 0, "gain": 2**30}
+
+    def settings(self, rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> Settings:
+        return fixed.config_of_q31(rig, sample_rate, start)
+
+    def settings_for_run(self, rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> Settings:
+        return fixed.config_for_run(with_ranges_of(rig, run), run, start)
+
+    def with_ranges(self, rig: RigFile, run: Run) -> RigFile:
+        return with_ranges_of(rig, run)
+
+    def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
+        return (to_c_header_q31 if self.form == "weak" else strong_header_q31)(config, l1, name, made_by)
+
+    def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
+        more = {"PVID_MAX_THETA_Q31": str(len(config.estimator.n_bits))}
+        return super().sizes(config, exact) | (more if exact else {})
+
+    def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:
+        return fixed.counts_of(rig, run)
+
+    def from_counts(self, counts: npt.NDArray[np.integer], lsb: tuple[float, float]) -> tuple[Samples, Samples]:
+        return counts[:, 0].astype(np.int32), counts[:, 1].astype(np.int32)
+
+    def units(self, config: Any) -> Float:
+        return fixed.units_of(config)
+
+    def p_of(self, config: Any, p: npt.ArrayLike) -> Float:
+        return fixed.p_of(config, p)
+
+    def se_of(self, config: Any, se: npt.ArrayLike) -> Float:
+        return fixed.se_of(config, se)
+
+    def covariance_of(self, config: Any, estimate: npt.NDArray[np.void]) -> Float:
+        return fixed.covariance_of(config, estimate)
+
+    def kappa_of(self, estimate: npt.NDArray[np.void]) -> Float:
+        return np.asarray(estimate["kappa"] / 2**30)
+
+    def beyond(self, config: Any, phi: Samples, y: Samples, rejected: int) -> Beyond | None:
+        return fixed.beyond_range(config, phi, y, rejected)
+
+    def zero_shift(self, rig: RigFile, run: Run, phi: Samples) -> float:
+        """0 when the run was recorded as counts."""
+        return float(np.nanmean(run.phi - phi * rig.sensor.phi_lsb))
+
+    @staticmethod
+    def _array(values: tuple[Any, ...]) -> Any:
+        return tuple(values)
+
+    def _offsets(self, config: Any) -> dict[str, int]:
+        return {"phi_offset": config.phi_offset, "y_offset": config.y_offset}
+
+
+def _places(values: npt.ArrayLike) -> tuple[Any, ...]:
+    """Filled up with zeros to the places of a frame."""
+    given = np.asarray(values).tolist()
+    return tuple([*given, *[type(given[0])(0)] * (frames.MAX_P - len(given))])
+
+
+CASES: dict[tuple[str, str], Case] = {
+    (case.form, case.core): case
+    for case in (
+        _Float("weak", WeakTwin),
+        _Float("strong", StrongTwin),
+        _Fixed("weak", WeakTwinQ31),
+        _Fixed("strong", StrongTwinQ31),
+    )
+}
+
+
+def case_of(what: HasCase) -> Case:
+    """The case of an identifier's settings, or of those that a rig file asks for.
+
+    Raises
+    ------
+    PvidError
+        For core f64, which is no case: only this machine has it.
+    """
+    case = CASES.get((what.form, what.core))
+    if case is None:
+        raise PvidError(f"targets hold the cores f32 and q31, and core {what.core} was asked for")
+    return case

@@ -1,0 +1,61 @@
+"""`pvid compare`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from pvid.base.console import DIFFERENT, DONE, progress_bar
+from pvid.cli.input import form_options, read_input, with_overrides
+from pvid.core.native import Native
+from pvid.log.rig_settings import rig_for
+from pvid.rig.columns import Columns
+from pvid.run.survey import fitted
+
+
+@click.command(name="compare")
+@click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@form_options
+@click.option("--core", type=click.Choice(["f32", "q31", "all"]), help="Which arithmetic.  [default: the rig file's]")
+@click.option("--on", "targets", metavar="TARGET", multiple=True, help="Also there: emulator, serial port, all.")
+def command(
+    run_path: Path,
+    rig_path: Path | None,
+    settings: tuple[str, ...],
+    columns: Columns | None,
+    law: str | None,
+    form: str | None,
+    core: str | None,
+    targets: tuple[str, ...],
+) -> int:
+    """Compares the C core with its numpy twin on RUN, after every tick, in every bit: start and tables are those of
+    identify.
+
+    With --on the run is streamed to targets, too, and their running hashes are held against the host's.
+    """
+    from pvid.board.compare_on import Outcome, compare_here, compare_there
+    from pvid.board.target import targets_of
+
+    rig = with_overrides(rig_for(run_path, rig_path, settings), form=form)
+    run = read_input(run_path, rig, columns)
+    rig = fitted(rig, run)
+    native = Native()
+    outcomes: list[Outcome] = []
+    for arithmetic in ["f32", "q31"] if core == "all" else [core or rig.identifier.core_traits.in_c]:
+        for one in [law] if law else ["stationary", "pseudovelocity"]:
+            chosen = replace(rig, identifier=replace(rig.identifier, law=one, core=arithmetic))  # type: ignore[arg-type]
+            with progress_bar(f"{one} law, {arithmetic}", len(run.t)) as advance:
+                outcomes.append(compare_here(chosen, run, native, advance))
+            for target in targets_of(targets):
+                with progress_bar(f"{one} law, {arithmetic} on {target}", len(run.t)) as advance:
+                    outcomes.append(compare_there(target, chosen, run, native, advance))
+    table = Table("target", "core", "form", "law", "ticks", "hash", "verdict")
+    for outcome in outcomes:
+        table.add_row(*outcome.cells)
+    Console(width=None if sys.stdout.isatty() else 140).print(table)
+    return DONE if all(outcome.equal for outcome in outcomes) else DIFFERENT

@@ -1,0 +1,79 @@
+"""`pvid design`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from pvid.base.console import DONE
+from pvid.base.errors import PvidError
+from pvid.base.rounding import with_error
+from pvid.cli.input import columns_option, read_input, rig_options
+from pvid.cli.simulate import tone
+from pvid.log.rig_settings import rig_for
+from pvid.rig.columns import Columns
+from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_RELEASE
+
+
+@click.command(name="design")
+@rig_options
+@click.option("--run", "run_path", type=click.Path(path_type=Path), help="Predict for the drive of this recorded run.")
+@columns_option
+@click.option(
+    "--tone",
+    "tones",
+    multiple=True,
+    metavar="A,F,PHASE",
+    help="Predict for this drive [m,Hz,rad]; repeatable.  [default: the standard rig's]",
+)
+@click.option("--release", nargs=2, type=float, help="phi1, phi1+phi [rad] that a predicted run starts from, at rest.")
+@click.option("--duration", type=float, help="Length to predict for [s].  [default: the run's, else 40]")
+@click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
+def command(
+    rig_path: Path | None,
+    settings: tuple[str, ...],
+    run_path: Path | None,
+    columns: Columns | None,
+    tones: tuple[str, ...],
+    release: tuple[float, float] | None,
+    duration: float | None,
+    as_json: bool,
+) -> int:
+    """Predicts what the weak form's tables for a rig will give: standard errors, kappa, delay, memory, instructions.
+
+    The drive comes from a recorded run or from tones, not from the rig file. The tables themselves are printed by
+    tables.
+    """
+    from pvid.run.design_report import report_for_run, report_for_tones
+
+    rig = rig_for(run_path, rig_path, settings)
+    if duration is not None and not 0 < duration < float("inf"):
+        raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
+    if run_path is None:
+        if columns is not None:
+            raise PvidError("--columns is for the run: name it with --run")
+        drive = tuple(tone(text) for text in tones) or STANDARD_DRIVE
+        report = report_for_tones(rig, drive, release or STANDARD_RELEASE, duration or 40.0)
+    elif tones or release:
+        raise PvidError("--run says how the rig was driven: leave --tone and --release out")
+    else:
+        report = report_for_run(rig, read_input(run_path, rig, columns, whole=True), duration)
+    if as_json:
+        click.echo(json.dumps(report.as_json()))
+        return DONE
+    table = Table("parameter", "predicted at", "standard error", "%", title=f"a run of {report.duration:g} s")
+    model = rig.mechanism.model
+    for name, value in report.value.items():
+        share = f"{100 * report.se[name] / abs(value):.2g}" if name != model.offset_name else ""
+        label = escape(model.answer(name).name_and_unit)
+        table.add_row(label, *with_error(value, report.se[name]), share)
+    Console().print(table)
+    click.echo(f"kappa {report.kappa:.2g}; noise of a row {report.row_sd:.2g} rad")
+    for name, text in report.cost_rows():
+        click.echo(f"{name}: {text}")
+    return DONE

@@ -1,0 +1,79 @@
+"""`pvid identify`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.cli.input import FigurePath, form_options, print_notes, read_input, with_overrides
+from pvid.cli.result import identified, print_result, print_warning, write_figure
+from pvid.core.native import Native
+from pvid.log.rig_settings import rig_for
+from pvid.rig.columns import Columns
+from pvid.rig.sensor_steps import resolution_note, resolved
+from pvid.run import answer
+from pvid.run.survey import fitted
+
+
+@click.command(name="identify")
+@click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@form_options
+@click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
+@click.option("--on", "target", metavar="TARGET", help="Also compute on an emulator, stream-host or a serial port.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
+def command(
+    run_path: Path,
+    rig_path: Path | None,
+    settings: tuple[str, ...],
+    columns: Columns | None,
+    law: str | None,
+    form: str | None,
+    core: str | None,
+    target: str | None,
+    as_json: bool,
+    figure: Path | None,
+) -> int:
+    """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m], or what --columns names.
+
+    A rig file is not needed: --set l1=0.25, the length of rod 1 [m], is enough. Short gaps are interpolated, long ones
+    stay empty, a clock that is not uniform is corrected; all of these are reported.
+
+    With --on the run is also streamed to a target, and the result is printed only if the target computed the same
+    bits at every tick that it reported and at the end.
+    """
+    rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
+    run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)
+    given, rig = rig, resolved(rig, run)
+    notes = resolution_note(given, rig)
+    print_notes(notes)
+    native = Native()
+    result = identified(replace(run, notes=(*run.notes, *notes)), rig, native)
+    if target is not None:
+        from pvid.board.stream_rig import played_samples, stream_rig
+        from pvid.board.target import verify
+
+        image = stream_rig(fitted(rig, run), run.sample_rate, run)
+        with progress_bar(f"streaming to {target}", len(run.t)) as advance:
+            verdict = verify(target, image, native, *played_samples(rig, run), progress=advance)
+        write_stderr(f"{target}: {verdict.playback.account}")
+        if not verdict.equal:
+            write_stderr(f"pvid: {target}: {verdict.text}")
+            return DIFFERENT
+        result = replace(result, on=target)
+    if as_json:
+        click.echo(json.dumps(answer.as_json(result)))
+    else:
+        print_result(result, rig)
+    if figure is not None:
+        write_figure(result, figure, None)
+    print_warning(result)
+    if not result.identified:
+        write_stderr(f"pvid: nothing identified: {result.verdict}")
+    for sentence in result.advice:
+        write_stderr(f"pvid: advice: {sentence}")
+    return DONE if result.identified else NOTHING_IDENTIFIED

@@ -1,0 +1,49 @@
+"""What the commands that identify print: the table, the warning, the figure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from pvid.base.console import write_stderr
+from pvid.base.errors import PvidError
+from pvid.core.native import Native
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.run import answer
+from pvid.run.identify import Identification, identify
+
+
+def identified(run: Run, rig: RigFile, native: Native) -> Identification:
+    """The answer with advice; a refusal has the advice in front of its sentence."""
+    from pvid.run.advice import advice, advice_on_refusal, behind
+
+    try:
+        result = identify(run, rig, native)
+    except PvidError as error:
+        raise behind(advice_on_refusal(run, rig, native), error) from error
+    return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
+
+
+def write_figure(result: Identification, path: Path, truths: dict[str, float] | None) -> None:
+    from pvid.show.figures import convergence  # loads matplotlib, half a second
+
+    convergence(result, path, truth=truths)
+    click.echo(f"figure: {path}")
+
+
+def print_result(result: Identification, rig: RigFile, truths: dict[str, float] | None = None) -> None:
+    table = answer.table(result, truths)
+    if table is not None:
+        Console().print(table)
+    for line in (answer.error_line(result, rig), answer.status_line(result)):
+        if line is not None:
+            click.echo(line)
+
+
+def print_warning(result: Identification) -> None:
+    if result.warning is not None:
+        write_stderr(f"pvid: warning: {result.warning}")

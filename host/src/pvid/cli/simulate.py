@@ -1,0 +1,107 @@
+"""`pvid simulate`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from pvid.base.console import DONE, write_stderr
+from pvid.log.rig_settings import rig_path_of
+from pvid.rig.file import RigFile
+from pvid.rig.run import write_run
+from pvid.sim.pendulum import (
+    STANDARD_DRIVE,
+    STANDARD_PENDULUM,
+    STANDARD_RELEASE,
+    Pendulum,
+    Sensors,
+    Tone,
+    simulate,
+    standard_sensors,
+)
+
+
+def tone(text: str) -> Tone:
+    try:
+        amplitude, frequency, phase = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} is not AMPLITUDE_M,FREQUENCY_HZ,PHASE_RAD") from error
+    return Tone(amplitude, frequency, phase)
+
+
+@click.command(name="simulate")
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--duration", default=40.0, show_default=True, help="Length [s].")
+@click.option("--rate", default=1000.0, show_default=True, help="Sample rate [Hz].")
+@click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
+@click.option("--bits", default=14, show_default=True, type=click.IntRange(4, 32), help="Encoder resolution.")
+@click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no offset.")
+@click.option("--noise", type=float, help="White noise of the encoder [LSB].  [default: 0.5]")
+@click.option("--zero", default=0.0, show_default=True, help="Offset of the encoder [rad].")
+@click.option("--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s].")
+@click.option("--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable.")
+@click.option(
+    "--release",
+    nargs=2,
+    type=float,
+    default=STANDARD_RELEASE,
+    show_default=True,
+    help="phi1, phi1+phi [rad].",
+)
+@click.option("--l1", default=STANDARD_PENDULUM.l1, show_default=True, help="[m]")
+@click.option("--l2", default=STANDARD_PENDULUM.l2, show_default=True, help="[m]")
+@click.option("--rho2", default=STANDARD_PENDULUM.rho2, show_default=True, help="[m]")
+@click.option("--gravity", default=STANDARD_PENDULUM.g, show_default=True, help="Gravity [m/s^2].")
+@click.option("--tilt", default=0.0, show_default=True, help="Tilt of the plane of motion [rad].")
+@click.option(
+    "--damping", default=0.0, show_default=True, help="Viscous friction of both joints per unit mass [m^2/s]."
+)
+@click.option("--seed", default=0, show_default=True)
+@click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
+def command(**options: Any) -> int:
+    """Simulates a rig into OUT (.csv, .csv.gz, .npz, .parquet) and writes the rig file that goes with it."""
+    pendulum = Pendulum(
+        l1=options["l1"],
+        l2=options["l2"],
+        rho2=options["rho2"],
+        g=options["gravity"],
+        damping1=options["damping"],
+        damping2=options["damping"],
+    ).tilted(options["tilt"])
+    sensors = standard_sensors(options["bits"])
+    if options["exact"]:
+        sensors = Sensors()
+    if options["noise"] is not None:
+        sensors = replace(sensors, phi_noise_lsb=options["noise"])
+    sensors = replace(sensors, phi_zero=options["zero"], skew_s=options["skew"])
+    drive = tuple(tone(text) for text in options["tones"]) or STANDARD_DRIVE
+    simulation = simulate(
+        pendulum=pendulum,
+        drive=drive,
+        sensors=sensors,
+        sample_rate=options["rate"],
+        duration=options["duration"],
+        release=tuple(options["release"]),
+        truth=options["truth"],
+        seed=options["seed"],
+    )
+    out: Path = options["out"]
+    write_run(out, simulation.run)
+    rig_path: Path = options["rig_out"] or rig_path_of(out)
+    standard = RigFile.standard()
+    rig = replace(
+        standard,
+        l1=pendulum.l1,
+        sample_rate=options["rate"],
+        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+        # linear equations have no sines to correct
+        identifier=replace(standard.identifier, full_angle=options["truth"] == "full"),
+    )
+    rig.write(rig_path)
+    largest = float(np.abs(simulation.run.phi).max())
+    write_stderr(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
+    return DONE

@@ -1,0 +1,42 @@
+"""`pvid sizes`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
+from pvid.base.errors import PvidError
+from pvid.cli.page_table import UPDATE, markdown, put_table
+
+
+@click.command(name="sizes")
+@UPDATE
+@click.option("--budget", type=click.Path(path_type=Path, exists=True), help="Write the figures as this file's budget.")
+@click.option("--check", type=click.Path(path_type=Path, exists=True), help="Hold the figures against this budget.")
+@click.option("--profile", "profiled", metavar="BOARD", help="Where a tick's instructions go on a board, by function.")
+def command(update: Path | None, budget: Path | None, check: Path | None, profiled: str | None) -> int:
+    """Flash, RAM, stack and instructions a tick on every board, built and run in its emulator."""
+    from pvid.board import sizes
+
+    if profiled is not None:
+        if budget is not None or check is not None:
+            raise PvidError("--profile has no budget: leave --budget and --check out")
+        from pvid.board import boards, profile
+
+        profiles = {form: profile.profile(boards.board(profiled), form) for form in ("strong", "weak")}
+        put_table(update, "profile", markdown(profile.HEADER, profile.table_rows(profiles)))
+        return DONE
+    footprints = {}
+    with progress_bar("boards", len(sizes.CONFIGURATIONS)) as advance:
+        for done, configuration in enumerate(sizes.CONFIGURATIONS):
+            footprints[configuration] = sizes.measure(configuration)[0]
+            advance(done + 1)
+    put_table(update, "sizes", markdown(sizes.HEADER, sizes.table_rows(footprints)))
+    if budget is not None:
+        sizes.write_budget(budget, footprints)
+    excess = sizes.over_budget(check, footprints) if check is not None else []
+    for sentence in excess:
+        write_stderr(f"pvid: over budget: {sentence}")
+    return DIFFERENT if excess else DONE

@@ -1,0 +1,62 @@
+"""`pvid tune`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from pvid.base.console import DONE, progress_bar
+from pvid.base.errors import PvidError
+from pvid.cli.input import columns_option, read_input, rig_options
+from pvid.cli.result import identified, print_warning
+from pvid.core.native import Native
+from pvid.log.rig_settings import rig_for, rig_path_of
+from pvid.rig.columns import Columns
+from pvid.rig.sensor_steps import resolved
+from pvid.run import answer
+
+
+@click.command(name="tune")
+@click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@rig_options
+@columns_option
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Rig file to write.  [default: RUN-tuned.toml]")
+def command(
+    run_path: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
+) -> int:
+    """Picks the weak form's settings for a recorded RUN: equations (full angles, friction), window, test functions,
+    pass band, decimation, forgetting.
+
+    The rig file's own settings are kept unless others predict blocks of the run that are held back better, by more than
+    chance explains, or as well and with clearly smaller standard errors. An answer that `identify` gives is never lost.
+    Writes a rig file with all settings explicit, with which `identify` gives the answer that is printed.
+    """
+    from pvid.run.tune import STEPS, tune
+    from pvid.run.tune_table import candidates_table
+
+    rig = rig_for(run_path, rig_path, settings)
+    run = read_input(run_path, rig, columns)
+    native = Native()
+    try:
+        with progress_bar("tuning", STEPS) as advance:
+            tuned = tune(run, rig, native, advance)
+    except PvidError as error:
+        from pvid.run.advice import behind
+
+        raise behind(identified(run, resolved(rig, run), native).advice, error) from error
+    out = out or run_path.with_name(rig_path_of(run_path).stem + "-tuned.toml")
+    tuned.rig.write(out)
+    Console(width=None if sys.stdout.isatty() else 160).print(candidates_table(tuned))
+    for note in tuned.notes:
+        click.echo(note)
+    drift = ", ".join(f"{one.forgetting_s:g} s {one.energy:.4g}" for one in tuned.forgetting if one.forgetting_s > 0)
+    if drift:
+        click.echo(f"residual of the next window with forgetting, over that without: {drift}")
+    click.echo(f"chosen: {tuned.reason}")
+    click.echo(f"with it the C core identifies {answer.one_line(tuned.answer)}")
+    print_warning(tuned.answer)
+    click.echo(f"rig file: {out}")
+    return DONE

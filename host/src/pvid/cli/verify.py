@@ -1,0 +1,49 @@
+"""`pvid verify`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar
+from pvid.cli.input import log_argument, log_rig
+from pvid.log.reader import LogReader
+from pvid.log.rig import rig_of_log
+from pvid.rig.file import load
+
+_MOST_STRETCHES = 100  # that are printed
+
+
+@click.command(name="verify")
+@log_argument
+@log_rig
+@click.option("--partial", is_flag=True, help="Exit code 0 also if only a part is verified.")
+def command(log: Path, rig_path: Path | None, partial: bool) -> int:
+    """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
+
+    Prints the first difference. A sample is verified if an equal hash covers it. Samples after a lost sample cannot
+    be verified until the board begins another session; they are listed, and counted in the summary.
+
+    Exit code 0: every sample is verified; those after the last hash may be unverified if no further hash was due.
+    1: there is a difference, or, without --partial, other samples are not verified. 3: no sample is verified.
+    """
+    from pvid.log.verify import Verdict, Verifier  # the twins, which other commands do not need
+
+    rig = load(rig_path) if rig_path is not None else rig_of_log(log)
+    reader = LogReader(log)
+    verdict = Verdict()
+    with progress_bar("verifying", None) as advance:
+        for stretch in Verifier(rig, advance).stretches(reader):
+            if verdict.stretches < _MOST_STRETCHES or stretch.difference is not None:
+                click.echo(stretch.text)
+            verdict.add(stretch)
+    if (more := verdict.stretches - _MOST_STRETCHES) > 0:
+        click.echo(f"{more} stretches more, named here where they are DIFFERENT")
+    click.echo(verdict.text)
+    click.echo(reader.account.text)
+    if verdict.different:
+        return DIFFERENT
+    if not verdict.verified:
+        return NOTHING_IDENTIFIED
+    return DONE if partial or not verdict.left else DIFFERENT
