@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "solve/assess_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "pvid/pvid.h"
 
 #define INFINITE (3.4e38f * 10.0f)
