@@ -1,4 +1,4 @@
-/* The strong form in float32 against MATH.md's formulas written out in double. */
+/* The strong form in float32 against theory.md's formulas written out in double. */
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -42,7 +42,7 @@ static int make_rows(void **state)
 
 static const float p[3] = {31.7f, 8.9f, 5.6f};
 
-/* N of MATH.md 2, its theta, and C by columns. */
+/* N of theory.md 2, its theta, and C by columns. */
 static void paper_row(int i, double n[N], double *y)
 {
     const double z0 = (double)phi[i][0], z2 = (double)phi[i][2], z3 = (double)phi[i][3], z4 = (double)phi[i][4];
@@ -232,7 +232,7 @@ static void physical_parameters_come_back(void **state)
     pvid_estimate_f32 estimate;
     memset(&estimate, 0, sizeof estimate);
     pvid_kapitza_linear_f32(&truth, 0.3f, estimate.p);
-    assert_float_equal(estimate.p[0], 31.666667f, 1.0e-5f); /* MATH.md 6; a few ulp */
+    assert_float_equal(estimate.p[0], 31.666667f, 1.0e-5f); /* theory.md 6; a few ulp */
     assert_float_equal(estimate.p[1], 8.875f, 5.0e-6f);
     assert_float_equal(estimate.p[2], 5.625f, 5.0e-6f);
     estimate.covariance[0][0] = 1.0e-4f;

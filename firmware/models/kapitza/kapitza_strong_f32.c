@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-/* The strong form of Kapitza's pendulum (MATH.md 2) as a model: row, theta, C. */
+/* The strong form of Kapitza's pendulum (theory.md 2) as a model: row, theta, C. */
 #include "kapitza_strong_f32.h"
 
 #include <stddef.h>

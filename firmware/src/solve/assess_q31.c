@@ -57,7 +57,7 @@ void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 v
     self->expected.e = mean.e;
 }
 
-/* Residual variance over what the sensors explain of it, Q16; 0 where that is not known. */
+/* Residual variance over its expectation, Q16; 0: unknown. */
 static int32_t misfit_of(const pvid_estimator_q31 *self)
 {
     const int64_t freedom = freedom_of(self);

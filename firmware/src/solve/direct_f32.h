@@ -1,5 +1,4 @@
-/* The engine of models that project their sums by themselves, and what their own `take_row` shares with it. Private to
- * the core. */
+/* The engine of models with their own `project`, and the parts shared with their `take_row`. Private to the core. */
 #ifndef PVID_DIRECT_F32_H
 #define PVID_DIRECT_F32_H
 
@@ -22,7 +21,7 @@ pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, const flo
 
 /* ---- inlined ---- */
 
-/* Counts why p stays where it is. */
+/* Counts and returns why p is held. */
 static inline pvid_reason pvid_direct_hold_f32(uint32_t *counter, pvid_reason reason)
 {
     pvid_count_up(counter);

@@ -1,4 +1,4 @@
-/* What every part of the estimator reads of its state. Private to the core. */
+/* Shared by all parts of the estimator. Private to the core. */
 #ifndef PVID_SOLVE_STATE_F32_H
 #define PVID_SOLVE_STATE_F32_H
 

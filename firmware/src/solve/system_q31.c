@@ -72,7 +72,7 @@ void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[],
     }
 }
 
-/* t += m e_j a for the symmetric m whose upper triangle is packed by rows. */
+/* t += m e_j a for the symmetric m, packed upper triangle by rows. */
 static void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int64_t t[])
 {
     size_t at = j;

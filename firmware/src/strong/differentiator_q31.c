@@ -146,7 +146,7 @@ bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, in
             return false;
         }
     }
-    /* head is now the oldest sample; the centre stands half * stride after it */
+    /* head is now the oldest sample; the centre is half * stride after it */
     const size_t after_oldest = self->head + (half * stride);
     size_t newer = (after_oldest >= length) ? (after_oldest - length) : after_oldest;
     size_t older = newer;

@@ -113,7 +113,7 @@ static inline bool differentiate(pvid_strong_f32 *self, float phi, float y, floa
     return true;
 }
 
-/* A row: judged, let in or not, and solved with. */
+/* Judges a row, adds it if the gate accepts it, and solves. */
 static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAPITZA_STRONG_THETA], float y)
 {
     pvid_estimator_f32 *estimator = &self->estimator;

@@ -21,7 +21,7 @@
 #define GATE_MEMORY_PARTS 4u
 #define GATE_FLOOR_BITS 20 /* 1e-6 of its square */
 
-/* The gate's least scale: a part of row_sd^2, and no less than what rounding leaves of a row's dozen terms. */
+/* The gate's least scale: a part of row_sd^2, at least the rounding of a row's dozen terms. */
 static pvid_scaled_q31 gate_floor(const pvid_estimator_q31 *estimator)
 {
     const pvid_scaled_q31 rounding = pvid_scaled_of_q31(1, 0);
@@ -144,7 +144,7 @@ static bool passes(pvid_strong_q31 *self, int64_t square)
     return (self->gate.limit.m == 0) || pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(square, 0));
 }
 
-/* A row: judged, let in or not, and solved with. */
+/* Judges a row, adds it if the gate accepts it, and solves. */
 static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
 {
     pvid_estimator_q31 *estimator = &self->estimator;
