@@ -19,7 +19,7 @@
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
-/* Places among the moments; a sequence stands by descending powers of u, as in N. */
+/* Indices of the moments; sequences are in descending powers of u, as in N. */
 enum {
     AA = 0,
     AE = 1,
@@ -36,7 +36,7 @@ enum {
     WEIGHT = 57
 };
 
-/* Adds a product to a sum and returns what it comes to. */
+/* Adds a product to a sum and returns the new sum. */
 static inline float plus(const float *restrict high, float *restrict low, float product)
 {
     const float sum = *low + product;
