@@ -5,7 +5,7 @@
 #include "pvid/crc32.h"
 #include "pvid/little_endian.h"
 
-#define GROUP 0xFFu /* code of a COBS group of 254 bytes, after which no 0 stands */
+#define GROUP 0xFFu /* code of a COBS group of 254 bytes without a 0 at its end */
 
 typedef struct {
     uint8_t *out;
@@ -30,7 +30,7 @@ static void stuff(stuffer *self, const uint8_t bytes[], size_t n) /*@ ghost (siz
         loop assigns i, self->at, self->code_at, self->code, self->out[0 .. room - 1];
         loop variant n - i; */
     for (size_t i = 0; i < n; i++) {
-        if (self->code == GROUP) { /* full: opened only now, for nothing may follow */
+        if (self->code == GROUP) { /* full: opened only now, because nothing may follow */
             self->code_at = self->at++;
             self->code = 1u;
         }
@@ -104,7 +104,7 @@ static void follow_sequence(pvid_link_decoder *self, uint16_t sequence)
     self->sequence = (uint16_t)(sequence + 1u);
 }
 
-/* What stands in raw, now that the 0 has come. */
+/* Checks the bytes in raw after the final 0. */
 static bool accept(pvid_link_decoder *self, pvid_link_frame *frame)
 {
     if (self->bad || (self->left != 0u) || (self->filled < PVID_LINK_RAW_BYTES(0u))) {

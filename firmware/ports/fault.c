@@ -23,7 +23,7 @@ static void write_text(const char *text)
 
 void pvid_fault_begin(const char *what)
 {
-    pvid_port_init(); /* the fault may have come before the program's own */
+    pvid_port_init(); /* the fault may have occurred before the program's own call */
     write_text("\npvid fault: ");
     write_text(what);
 }

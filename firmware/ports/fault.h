@@ -1,4 +1,4 @@
-/* How a board's fault handler speaks: over the UART, and by the code the emulator exits with. */
+/* Output of a board's fault handler: over the UART, and the exit code of the emulator. */
 #ifndef PVID_FAULT_H
 #define PVID_FAULT_H
 
@@ -7,7 +7,7 @@
 /* Exit code of a program that ended in a fault. */
 #define PVID_EXIT_FAULT 112
 
-/* Starts the report: a new line, "pvid fault: " and what happened. */
+/* Starts the report: a new line, "pvid fault: " and the event. */
 void pvid_fault_begin(const char *what);
 
 /* Adds " name 0x........" to it. */

@@ -1,10 +1,10 @@
-/* ports/interrupts.h - what the receiver needs of a core's interrupts: the UART's, and to sleep until it comes. */
+/* ports/interrupts.h - interrupts of a core for the receiver: the UART's, and sleeping until it occurs. */
 #ifndef PVID_INTERRUPTS_H
 #define PVID_INTERRUPTS_H
 
 #include <stdbool.h>
 
-/* Prepares the UART's interrupt and lets it through. */
+/* Initialises and enables the UART's interrupt. */
 void pvid_interrupts_init(void);
 
 /* Lets it through, or not. */

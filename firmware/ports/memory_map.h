@@ -4,10 +4,10 @@
 
 #include <stdint.h>
 
-extern uint32_t pvid_stack_guard[];  /* below the stack: what must not be written */
+extern uint32_t pvid_stack_guard[];  /* below the stack: write-protected */
 extern uint32_t pvid_stack_bottom[]; /* the lowest word */
 extern uint32_t pvid_stack_top[];
-extern const uint32_t pvid_data_load[]; /* where .data stands in the image */
+extern const uint32_t pvid_data_load[]; /* the initial values of .data in the image */
 extern uint32_t pvid_data_start[];
 extern uint32_t pvid_data_end[];
 extern uint32_t pvid_bss_start[];

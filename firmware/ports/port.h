@@ -1,7 +1,7 @@
-/* ports/port.h - what an application needs of a board: bytes in and out, a counter, an exit, the stack.
+/* ports/port.h - services of a board for an application: bytes in and out, a counter, an exit, the stack.
  *
- * One implementation a board, in C99 without vendor code; the core knows none of them. The applications of
- * firmware/apps use these functions and nothing else of the board.
+ * One implementation per board, in C99 without vendor code; the core is independent of it. The applications of
+ * firmware/apps use only these functions.
  *
  *   pvid_port_init();
  *   for (;;) {
@@ -26,12 +26,12 @@ void pvid_port_init(void);
 /* Takes the bytes that have arrived, at most `room`; returns how many: 0 when none has. */
 size_t pvid_port_receive(uint8_t bytes[], size_t room);
 
-/* Hands bytes to the serial port, at most `n`; returns how many it took: 0 while it is busy. They leave in
+/* Passes at most `n` bytes to the serial port; returns how many it accepted, 0 while it is busy. They are sent in
  * order; nothing is overwritten. */
 size_t pvid_port_send(const uint8_t bytes[], size_t n);
 
-/* A free-running count for measuring. The difference of two calls, modulo 2^32, divided by
- * pvid_port_counts_per_1024() / 1024 is what was executed between them:
+/* A free-running count for measurements. The difference of two calls, modulo 2^32, divided by
+ * pvid_port_counts_per_1024() / 1024 is the number of executed instructions or cycles between them:
  *
  *   board                 counts                                       wraps after
  *   Cortex-M in QEMU      SysTick under -icount shift=8: instructions  2.6 million (netduinoplus2: 390 000,
@@ -39,8 +39,8 @@ size_t pvid_port_send(const uint8_t bytes[], size_t n);
  *   RISC-V virt           minstret under -icount shift=0: instructions 4 thousand million
  *   AVR in simavr         timer 1: clock cycles                        4 thousand million
  *
- * The call itself costs some 10 instructions, of which the difference contains those between the two
- * readings: measure two calls in a row and subtract. */
+ * The call itself costs about 10 instructions, some of which are in the difference: measure two calls in a row and
+ * subtract. */
 uint32_t pvid_port_instructions(void);
 
 /* Counts for 1024 instructions (AVR: cycles). */
@@ -57,8 +57,8 @@ __attribute__((noreturn))
 #endif
 void pvid_port_exit(int code);
 
-/* Bytes of the stack that have ever been in use since the start, judged by the paint that is gone; 0 where
- * the board has no painted stack (the host). Cost: one pass over the unused part. */
+/* Largest number of stack bytes in use since the start, by the paint that is overwritten; 0 if the board has no
+ * painted stack (the host). Cost: one pass over the unused part. */
 size_t pvid_port_stack_used(void);
 
 /* Bytes of stack there are. */

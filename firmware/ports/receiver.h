@@ -1,8 +1,8 @@
-/* ports/receiver.h - what arrives at the serial port, kept by an interrupt until the program has time for it.
+/* ports/receiver.h - buffers received bytes in an interrupt until the program reads them.
  *
- * A UART holds one byte to sixteen; a tick in soft float takes as long as dozens arrive. With the receiver none is lost
- * as long as no more than PVID_RECEIVER_BYTES - 1 arrive between two calls of take; where the other end waits (an
- * emulator's does), none is lost at all. An image that uses it links pvid_receiver (firmware/cmake/PvidBoard.cmake).
+ * A UART buffers 1 to 16 bytes; dozens arrive during a tick in soft float. With the receiver none is lost if at
+ * most PVID_RECEIVER_BYTES - 1 arrive between two calls of take; with flow control (emulators) none is ever lost.
+ * An image that uses it links pvid_receiver (firmware/cmake/PvidBoard.cmake).
  */
 #ifndef PVID_RECEIVER_H
 #define PVID_RECEIVER_H

@@ -5,7 +5,7 @@
 
 int main(void);
 
-/* Volatile: no call of memset or memcpy, whose frames would lie in what is being painted. */
+/* Volatile: no call of memset or memcpy, whose frames would be in the painted area. */
 static void fill(volatile uint32_t *from, const volatile uint32_t *end, uint32_t word)
 {
     const size_t words = ((uintptr_t)end - (uintptr_t)from) / sizeof word;

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* Paints the stack up to `top_of_rest`, fills .data, clears .bss, runs main and exits with what it returned. */
+/* Paints the stack up to `top_of_rest`, fills .data, clears .bss, runs main and exits with its result. */
 #if defined(__GNUC__)
 __attribute__((noreturn))
 #endif

@@ -142,7 +142,7 @@ def test_losses_of_the_line_are_named(native: Native) -> None:
 
 def test_an_unknown_source_is_refused(host_target: Target) -> None:
     rig = standard_rig("weak")
-    with pytest.raises(PvidError, match="no such source of samples"):
+    with pytest.raises(PvidError, match="the source of samples is unknown to it"):
         collect(host_target, 100, begin=rig, source=7)  # type: ignore[arg-type]
 
 

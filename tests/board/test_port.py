@@ -106,7 +106,7 @@ def test_non_port_is_refused_by_name(tmp_path: Path) -> None:
     nowhere.write_text("a file")
     with pytest.raises(PvidError, match=f"^{nowhere} is no serial port$"):
         open_port(str(nowhere))
-    with pytest.raises(PvidError, match="^nobody listens at socket://127.0.0.1:1$"):
+    with pytest.raises(PvidError, match="^no connection to socket://127.0.0.1:1: nothing listens there$"):
         open_port("socket://127.0.0.1:1")
     with pytest.raises(PvidError, match="^cannot open the port nothing://x: invalid URL"):
         open_port("nothing://x")

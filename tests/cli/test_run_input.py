@@ -161,7 +161,7 @@ def test_clock_error_of_a_thousandth_is_reported(run: Run, tmp_path: Path) -> No
     path = write(tmp_path / "run.csv", run, t=run.t * 1.001)
     RigFile.standard().write(tmp_path / "run.toml")
     done = pvid("identify", path, "--json")
-    assert done.stderr.startswith("pvid: input: t runs at 999 Hz, -0.1 % off the rig's sample rate: t is believed")
+    assert done.stderr.startswith("pvid: input: t runs at 999 Hz, -0.1 % off the rig's sample rate: t is used")
     assert json.loads(done.stdout)["input"] == [done.stderr.splitlines()[0].removeprefix("pvid: input: ")]
 
 

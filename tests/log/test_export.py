@@ -214,7 +214,7 @@ def test_a_log_is_a_run(tmp_path: Path, log: Path) -> None:
     writer.begin("a port", None)
     writer.end("the end")
     writer.close()
-    with pytest.raises(PvidError, match="never said who it is"):
+    with pytest.raises(PvidError, match="contains no description of the board"):
         run_of_log(tmp_path / "empty.pvlog")
 
 

@@ -397,7 +397,7 @@ def test_too_much_loss_is_exit_code_1(tmp_path: Path, pvid: Loggers) -> None:
     line.write(b"".join(frames[:9] + frames[10:]))
     out, err = process.communicate(timeout=30)
     assert process.returncode == 1
-    assert "5 % lost, 0.1 % are allowed" in err
+    assert "5 % lost, allowed are 0.1 %" in err
     (tmp_path / "out.pvlog").unlink()
     lenient = pvid("--duration", "1", "--allow-loss", "0.05")
     line.await_word()
@@ -598,7 +598,7 @@ def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -
     with pytest.raises(PvidError, match="a.pvlog was recorded with another rig file: a log has one"):
         refuse_to_append(tmp_path / "a.pvlog", replace(rig, l1=0.31))
     (tmp_path / "run.csv").write_text("t,phi,y\n" + 100 * "0,0,0\n")
-    with pytest.raises(PvidError, match="run.csv is no log of pvid, and nothing is added to it"):
+    with pytest.raises(PvidError, match="run.csv is not a log of pvid: nothing is appended"):
         refuse_to_append(tmp_path / "run.csv", rig)
     arguments = ["log", "nowhere", str(tmp_path / "run.csv"), "--append"]
     with pytest.raises(PvidError, match="is no log of pvid"):
@@ -687,7 +687,7 @@ def test_unwritable_folder_is_reported(tmp_path: Path, boards: Boards) -> None:
     ("error", "told"),
     [
         (serial.SerialException("device reports readiness to read but returned no data (...)"), "nothing is at its"),
-        (serial.SerialException("socket disconnected"), "nothing is at its other end any more"),
+        (serial.SerialException("socket disconnected"), "its other end was closed"),
         (OSError(5, "Input/output error"), "Input/output error"),
         (serial.SerialException("something else"), "something else"),
     ],

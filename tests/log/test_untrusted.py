@@ -349,7 +349,7 @@ def test_line_with_garbage_alone_is_reported(
     garbage: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert print_account(account_of(log_of(tmp_path / "a.pvlog", garbage)), 1.0) == 1
-    told = "what came from the board holds not one frame: is it the right port, and is the board's baud rate 115200?"
+    told = "the received data contain not one frame: is it the right port, and is the board's baud rate 115200?"
     assert told in capsys.readouterr().err
     nothing = account_of(log_of(tmp_path / "b.pvlog", b""))
     assert print_account(nothing, 1.0) == 0

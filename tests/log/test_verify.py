@@ -277,8 +277,8 @@ def test_unverifiable_segment_has_its_reason(tmp_path: Path, sent: Sent) -> None
 
     without = [one for one in sent if not isinstance(one[1], link.Configuration)]
     silent = [one for one in sent if not isinstance(one[1], link.Estimate | link.Hash)]
-    assert reason("a", without) == "the board's configuration did not come with them"
-    assert reason("b", silent) == "no estimate and no hash came with them"
+    assert reason("a", without) == "the board's configuration is missing"
+    assert reason("b", silent) == "the log contains no estimate and no hash for them"
     assert reason("c", [one for one in sent if one[0] >= 160]) == (
         "its session began before this segment did, and the samples before tick 160 are not in it"
     )
@@ -320,12 +320,12 @@ def test_losses_within_a_segment_are_named(tmp_path: Path, sent: Sent) -> None:
 
 def test_empty_log_is_reported(tmp_path: Path) -> None:
     writer = LogWriter(tmp_path / "a.pvlog")
-    with pytest.raises(PvidError, match=r"a.pvlog is empty: the recording ended before the link had come up"):
+    with pytest.raises(PvidError, match=r"a.pvlog is empty: the recording ended before the link was up"):
         list(LogReader(tmp_path / "a.pvlog"))
     writer.begin("a port", None)
     writer.close()
     nothing = pvid(tmp_path, "verify", "a.pvlog")
-    assert nothing.returncode == 3 and nothing.stdout.startswith("nothing to verify: the log holds no samples\n")
+    assert nothing.returncode == 3 and nothing.stdout.startswith("nothing to verify: the log contains no samples\n")
 
 
 # ---- the program

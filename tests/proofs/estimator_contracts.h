@@ -2,7 +2,9 @@
 #ifndef ESTIMATOR_CONTRACTS_H
 #define ESTIMATOR_CONTRACTS_H
 
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
 
@@ -42,15 +44,15 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
 bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve);
 
 /*@ requires \valid_read(self) && \valid(solve) && \valid(estimate);
-    assigns solve->informed \from \nothing;
-    ensures solve->informed == 0 || solve->informed == 1; */
+    assigns solve->above_noise \from \nothing;
+    ensures solve->above_noise == 0 || solve->above_noise == 1; */
 void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
                                          pvid_estimate_q31 *estimate);
 
 /*@ requires \valid_read(self) && \valid(solve) && \valid(estimate);
-    assigns \result, solve->informed \from \nothing;
+    assigns \result, solve->above_noise \from \nothing;
     ensures \result == 0 || \result == 1;
-    ensures solve->informed == 0 || solve->informed == 1; */
+    ensures solve->above_noise == 0 || solve->above_noise == 1; */
 bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
                                        pvid_estimate_q31 *estimate);
 

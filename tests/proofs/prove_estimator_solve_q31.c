@@ -18,7 +18,7 @@ static void any_solve(const pvid_model_q31 *model, bool ends_group, bool has_fal
     }
     while (!pvid_estimator_advance_q31(&estimator, &solve)) {
     }
-    /*@ assert \initialized(&solve.reason) && \initialized(&solve.size) && \initialized(&solve.informed); */
+    /*@ assert \initialized(&solve.reason) && \initialized(&solve.size) && \initialized(&solve.above_noise); */
     for (size_t a = 0; a < model->n_p; a++) {
         /*@ assert -0x7FFFFFFF <= estimator.p[a] <= 0x7FFFFFFF; */
         if (((model->positive >> a) & 1u) != 0u) {

@@ -2,7 +2,8 @@
 #ifndef STRONG_CONTRACTS_H
 #define STRONG_CONTRACTS_H
 
-#include "solve/estimator_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
 #include "judge/misfit_q31.h"
 #include "pvid/differentiator_q31.h"
 #include "pvid/gate_q31.h"
@@ -50,7 +51,7 @@ void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int
 void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups);
 
 /*@ requires 0 <= square <= 0x100000000000000;
-    assigns \result, *self \from *self, square, told;
+    assigns \result, *self \from *self, square, sensitivity;
     ensures \result == 0 || \result == 1; */
 bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity);
 

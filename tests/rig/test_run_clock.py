@@ -256,7 +256,7 @@ def test_stamps_in_bursts_are_those_of_the_serial_port(tmp_path: Path) -> None:
     run = read(tmp_path, stamps, phi, y)
     assert run.phi.tobytes() == phi.tobytes()
     assert run.sample_rate == pytest.approx(1000.0, rel=1e-5)  # 16 ms over 10 s, averaged over 625 bursts
-    assert "t comes in bursts" in run.notes[0] and "a missing one would not be seen" in run.notes[0]
+    assert "t arrives in bursts" in run.notes[0] and "a missing one would not be seen" in run.notes[0]
     apart = stamps + 1e-5 * (np.arange(t.size) % 16)  # read one after the other
     again = read(tmp_path, apart, phi, y)
     assert again.phi.tobytes() == phi.tobytes() and "smoother without that" in again.notes[0]
@@ -279,7 +279,7 @@ def test_clock_of_the_run_overrides_the_rig_file_with_a_note(tmp_path: Path) -> 
     run = read(tmp_path, t, phi, y, 1000.0)
     assert run.sample_rate == pytest.approx(1001.0, rel=1e-6)
     assert run.phi.tobytes() == phi.tobytes()
-    assert run.notes == ("t runs at 1001 Hz, +0.1 % off the rig's sample rate: t is believed",)
+    assert run.notes == ("t runs at 1001 Hz, +0.1 % off the rig's sample rate: t is used",)
     assert read(tmp_path, uniform(10.0, 1000.05), phi[:10000], y[:10000], 1000.0).notes == ()
 
 

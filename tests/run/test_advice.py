@@ -175,7 +175,7 @@ MISTAKES = {
     ),
     "large angles": Mistake(
         lambda: (run_of(), with_identifier(full_angle=False)),
-        "angles go to 0.096 rad, and sin phi is not phi there",
+        "angles reach 0.096 rad, where sin phi differs from phi",
         "--set identifier.full_angle=true",
         lambda run, rig: (run, RIG),
     ),
@@ -218,8 +218,8 @@ def test_a_mistake_gets_its_sentence_without_a_rig_file_too(native: Native, name
     [
         (lambda: run_of(), ()),
         (lambda: replace(run_of(), y=0 * run_of().y), ("the pivot does not move",)),
-        (lambda: run_of(release=3.0), ("angles go to 0.25 rad",)),
-        (lambda: run_of(friction=2e-3), ("the swing dies away",)),
+        (lambda: run_of(release=3.0), ("angles reach 0.25 rad",)),
+        (lambda: run_of(friction=2e-3), ("the swing decays",)),
     ],
 )
 def test_advice_without_a_rig_file_is_on_the_cause(
@@ -233,7 +233,7 @@ def test_advice_without_a_rig_file_is_on_the_cause(
 def test_a_wrong_resolution_does_not_hide_the_cause(native: Native) -> None:
     rig = replace(RIG, sensor=replace(RIG.sensor, phi_lsb=LSB / 4))
     _, said = advised(run_of(release=3.0), rig, native)
-    assert [one[:14] for one in said] == ["phi moves in s", "angles go to 0"]
+    assert [one[:14] for one in said] == ["phi moves in s", "angles reach 0"]
 
 
 def test_swapped_columns_are_reported(native: Native) -> None:
@@ -265,7 +265,7 @@ def test_fixed_point_is_advised_to_be_float32_where_angles_are_large(native: Nat
     result, said = advised(run_of(release=1.8), with_identifier(core="q31"), native)
     assert result is not None and result.linear_error > 0.01
     assert said == (
-        "angles go to 0.2 rad, and fixed point does not correct sines and cosines: use --core f32, or smaller angles; "
+        "angles reach 0.2 rad, and fixed point does not correct sines and cosines: use --core f32, or smaller angles; "
         "its standard errors contain 3.8 % for that",
     )
 
@@ -287,8 +287,8 @@ def test_fixed_point_is_advised_to_let_the_run_set_its_ranges(native: Native) ->
     assert result is not None and not result.identified
     assert result.status == "saturated"
     assert said == (
-        "22 % of the samples are beyond y_range = 0.008 m: raise y_range in the rig file, or leave out the key, and "
-        "the run sets it",
+        "22 % of the samples are beyond y_range = 0.008 m: raise y_range in the rig file, or omit the key to derive it "
+        "from the run",
     )
     assert "saturated: 22 % of the samples are beyond y_range = 0.008 m" in result.verdict
 
@@ -300,7 +300,7 @@ def test_fixed_point_is_advised_to_let_the_run_set_its_ranges(native: Native) ->
     ("drive", "said"),
     [
         (0.1, "the drive is weak: the pivot's acceleration (rms) is 2.1 % of gravity"),
-        (0.001, "the pivot's acceleration hardly stands out of its sensor's noise"),
+        (0.001, "the pivot's acceleration is barely above its sensor's noise"),
         (0.0, "the pivot does not move"),
     ],
 )
@@ -331,12 +331,12 @@ def test_constant_angle_is_reported(native: Native, size: float, said: str) -> N
 def test_swing_beyond_the_valid_range_is_reported(native: Native) -> None:
     _, said = advised(run_of(release=3.0), RIG, native)
     assert len(said) == 1
-    assert said[0].startswith("angles go to 0.25 rad, and the equations are corrected up to 0.2 rad")
+    assert said[0].startswith("angles reach 0.25 rad, and the equations are corrected up to 0.2 rad")
 
 
 def test_decaying_swing_is_reported(native: Native) -> None:
     _, said = advised(run_of(friction=2e-3), RIG, native)
-    assert len(said) == 1 and said[0].startswith("the swing dies away")
+    assert len(said) == 1 and said[0].startswith("the swing decays")
 
 
 def test_the_strong_form_is_advised_to_be_the_weak_one(native: Native) -> None:

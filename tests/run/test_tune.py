@@ -238,7 +238,7 @@ def refused(native: Native, run: Run) -> str:
 def test_untunable_run_is_reported(native: Native) -> None:
     still = simulate(drive=(), sensors=standard_sensors(14), duration=15.0).run
     said = refused(native, still)
-    assert "nothing is identified" in said and "stands still" in said
+    assert "nothing is identified" in said and "rests" in said
     run = short_run()
     assert "nothing" in refused(native, replace(run, phi=run.y / 0.3))  # driven, but the angle is the pivot's
     assert "nothing" in refused(native, simulate(duration=0.05).run)

@@ -78,7 +78,7 @@ def test_terminal_view_always_fits_80_by_24(
         writer.begin("/dev/ttyACM0", None)
         writer.take(b"".join(frames[:300] + frames[305 if worst else 300 :]))
         if worst:
-            writer.end("the port is gone: nothing is at its other end any more")
+            writer.end("the port is gone: its other end was closed")
         writer.close()
         for record in stream.feed((tmp_path / f"{worst}.pvlog").read_bytes()):
             view.take(record, stream.account)

@@ -105,7 +105,7 @@ def test_residuals_of_the_strong_form() -> None:
     residuals = residuals_of(run, rig, P)
     assert float(residuals.e.std()) == pytest.approx(1) and not residuals.expected
     still = Run(t=run.t, phi=run.phi, y=0 * run.y, sample_rate=run.sample_rate)
-    with pytest.raises(PvidError, match="the pivot stands still"):
+    with pytest.raises(PvidError, match="the pivot rests"):
         residuals_of(still, rig, P)
 
 
@@ -213,7 +213,7 @@ def test_report_of_a_held_run_states_the_reason(tmp_path: Path) -> None:
     text = shown(tmp_path / "held.svg")
     assert "nothing identified: held not explained" in text
     assert "advice: y is counted downwards" in text and "columns y=y:" in text  # XML comments hold no two dashes
-    assert "Measured angle (nothing is identified to simulate with)" in text
+    assert "Measured angle (no estimate to simulate with)" in text
     for false in ("outside the physical region", "too little", "R²", "simulated with", "last estimate"):
         assert false not in text, false
 

@@ -73,7 +73,7 @@ def test_view_shows_every_item(sent: list[bytes]) -> None:
     assert "field: weak form, core f32, 1000 samples per second" in seen
     assert f"{TICKS} samples" in seen and "lost       nothing" in seen
     assert f"{newest['kappa']:.2g}  good" in seen and "times the encoder's noise" in seen
-    assert "updated" in seen and "the estimate took a step" in seen
+    assert "updated" in seen and "the estimate was updated" in seen
     assert "a port -> a [bold]log" in seen
     assert "rad, pivot" in seen
 
@@ -85,7 +85,7 @@ def test_losses_and_a_broken_link_are_reported(sent: list[bytes]) -> None:
 
 
 def test_view_before_the_first_frame_is_labelled(sent: list[bytes]) -> None:
-    assert "has not said yet who it is" in view_of([])
+    assert "has not described itself yet" in view_of([])
     beginning = view_of(sent[:5])
     assert "none yet" in beginning and "no estimate yet" in beginning
 
@@ -307,7 +307,7 @@ def test_log_draws_on_a_terminal_and_leaves_the_last_picture(tmp_path: Path, boa
     terminal = Terminal(tmp_path, "--duration", "4")
     seen = terminal.read_to_end()
     assert terminal.process.returncode == 0, seen
-    assert "has not said yet who it is" in seen or "weak form" in seen
+    assert "has not described itself yet" in seen or "weak form" in seen
     last = seen[seen.rindex("╭") :]
     assert "L1 L2" in last and f"{samples_in(tmp_path / 'out.pvlog')} samples in 1 segment" in last
     assert last.count("ended") >= 1 and "Ctrl-C ends" not in last

@@ -72,7 +72,7 @@ static const pvid_strong_config_q31 strong_unit = {
     },
 };
 
-/* for pvid_kapitza_physical_q31; a macro, so that who does not ask for it is not told it is unused */
+/* for pvid_kapitza_physical_q31; a macro, to avoid unused-variable warnings */
 #define STRONG_UNIT_SCALE {5033165, 1572864000, 29, 24, 25}
 
 #endif

@@ -268,7 +268,7 @@ static const pvid_weak_config_q31 weak_unit = {
     .gate = {262144u, 0u},
 };
 
-/* for pvid_kapitza_physical_q31; a macro, so that who does not ask for it is not told it is unused */
+/* for pvid_kapitza_physical_q31; a macro, to avoid unused-variable warnings */
 #define WEAK_UNIT_SCALE {5033165, 1092266667, 29, 24, 25}
 
 #endif

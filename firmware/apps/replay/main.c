@@ -1,9 +1,9 @@
-/* Plays a run that stands in the image through the identifier and reports, as lines of text: the running hash
- * (fnv.h) on the way and at the end, what a tick costs, how much stack and state it took. No link is needed, so
- * it is the first thing to run on a new board. `pvid sizes` and the tests make replay_run.h: settings, tables
- * and samples in counts of the sensors.
+/* Runs the identifier on the samples in the image and reports as lines of text: the running hash (fnv.h) during
+ * the run and at the end, the cost of a tick, and the size of stack and state. It needs no link: run it first on a
+ * new board. `pvid sizes` and the tests generate replay_run.h: settings, tables and samples in counts of the
+ * sensors.
  *
- * Exit codes: 0 played, 2 the core refused the settings, 3 float arithmetic is not what was promised.
+ * Exit codes: 0 done, 2 the core refused the settings, 3 float arithmetic differs from the promised one.
  */
 #include "port.h"
 #include "pvid/little_endian.h"
@@ -22,7 +22,7 @@
 
 static REPLAY_TYPE identifier;
 
-/* What a count is to the identifier: itself times what a step is worth; no number where there was no sample. */
+/* A count in the identifier's unit: count times step; NaN for a missing sample. */
 static REPLAY_SAMPLE sample_of(int16_t count, REPLAY_SAMPLE lsb)
 {
 #if REPLAY_IS_FLOAT

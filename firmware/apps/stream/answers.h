@@ -15,7 +15,7 @@ typedef struct {
     uint8_t bytes[ANSWERS_BYTES];
 } answers;
 
-/* Hands the port what it takes. */
+/* Passes bytes to the port as it accepts them. */
 void answers_pump(answers *self);
 
 /* Whether n bytes fit. */

@@ -1,6 +1,7 @@
-/* The identifier behind the link: the core and the form of stream_rig.h, one source a core.
+/* The identifier behind the link: the core and form of stream_rig.h, one source file per core.
  *
- * Settings, samples and estimates go in and out as they stand in the frames of that core (link/schema.h). */
+ * Settings, samples and estimates have the layout of that core's frames (link/schema.h).
+ */
 #ifndef IDENTIFIER_H
 #define IDENTIFIER_H
 

@@ -30,7 +30,7 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
     estimator->row_sd = pvid_get_f32(&payload[PVID_CONFIGURE_ROW_SD]);
     estimator->forgetting_s = pvid_get_f32(&payload[PVID_CONFIGURE_FORGETTING_S]);
     estimator->feedback_hz = pvid_get_f32(&payload[PVID_CONFIGURE_FEEDBACK_HZ]);
-    estimator->law = (pvid_law)payload[PVID_CONFIGURE_LAW]; /* whatever it is: init knows the two */
+    estimator->law = (pvid_law)payload[PVID_CONFIGURE_LAW]; /* any value: init checks it */
     estimator->divider = pvid_get_u16(&payload[PVID_CONFIGURE_DIVIDER]);
     return STREAM_INIT(&identifier, &config);
 }

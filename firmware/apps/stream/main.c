@@ -79,7 +79,7 @@ static struct {
 
 static struct {
     uint32_t clock_us; /* when the clock was last read */
-    uint32_t due_ns;   /* elapsed time whose samples are still to be taken */
+    uint32_t due_ns;   /* elapsed time whose samples are still due */
     uint32_t count;    /* samples in `frame`: the last ones before stream.ticks */
     uint8_t frame[IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * RAW_SAMPLES)]; /* payload of a frame of samples */
 } field;
@@ -208,7 +208,7 @@ static void announce(void)
     } else if (sampling()) {
         answer(IDENTIFIER_CONFIGURE, stream.configuration, sizeof stream.configuration);
     } else {
-        /* the PC knows what it configured */
+        /* the PC has sent this configuration */
     }
 }
 
@@ -284,7 +284,7 @@ static bool sample_due(bool room)
     return true;
 }
 
-/* ---- what comes from the PC */
+/* ---- requests from the PC */
 
 static void start_over(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES])
 {

@@ -1,4 +1,4 @@
-/* A simulated rig; host/src/pvid/twin/sensor.py says which and does the same, operation by operation. */
+/* A simulated rig; host/src/pvid/twin/sensor.py documents it and computes the same operations. */
 #include "sensor.h"
 
 #include "stream_rig.h"

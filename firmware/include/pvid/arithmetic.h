@@ -1,6 +1,6 @@
-/* pvid/arithmetic.h - does this build compute the bits that were promised?
+/* pvid/arithmetic.h - tests whether this build computes the promised bits.
  *
- * Bit-exactness needs IEEE-754 binary32, round to nearest even, no fused multiply-add, no reordered sums, no flushing
+ * Equal bits need IEEE-754 binary32, round to nearest even, no fused multiply-add, no reordered sums, no flushing
  * of subnormals. Compiler flags can silently break each of these; a board can test them at start-up. The sources
  * themselves disable fusing, which is gcc's default without -std=c99.
  */

@@ -1,9 +1,9 @@
 /* pvid/config.h - compile-time bounds of the core.
  *
- * Every array of the library is sized by one of these macros: no heap, no VLA. Override with -D
- * or put the definitions into a header of your own and name it with -DPVID_CONFIG_HEADER="my.h".
- * A size is a plain decimal number. Sizes change the layout of the state structs: an application that was compiled
- * with other sizes than the library does not link (sized.h). The CMake target passes its sizes on to its users.
+ * Every array of the library has a size from one of these macros: no heap, no VLA. Override them with -D, or in
+ * your own header named by -DPVID_CONFIG_HEADER="my.h". A size is a plain decimal number. Sizes determine the
+ * layout of the state structs: an application compiled with other sizes than the library does not link (sized.h).
+ * The CMake target passes its sizes on to its users.
  */
 #ifndef PVID_CONFIG_H
 #define PVID_CONFIG_H
@@ -28,8 +28,8 @@
 #error "PVID_MAX_THETA must lie in 11..32"
 #endif
 
-/* Largest number of free parameters p: 3 in the strong form, 4 in the weak, 6 in the weak with
- * friction (which PVID_MAX_MOMENTS 55 goes with). */
+/* Largest number of free parameters p: 3 in the strong form, 4 in the weak, 6 in the weak with friction (with
+ * PVID_MAX_MOMENTS 55). */
 #ifndef PVID_MAX_P
 #define PVID_MAX_P 4
 #endif
@@ -37,8 +37,8 @@
 #error "PVID_MAX_P must lie in 3..8"
 #endif
 
-/* Largest number of distinct entries of M that a model keeps: 45 for Kapitza's strong form, 36 for the weak,
- * 55 for that with friction. RAM: 12 bytes each. A model without repeated entries needs n_theta (n_theta + 1) / 2. */
+/* Largest number of distinct entries of M: 45 for Kapitza's strong form, 36 for the weak, 55 with friction. RAM:
+ * 12 bytes each. A model without repeated entries needs n_theta (n_theta + 1) / 2. */
 #ifndef PVID_MAX_MOMENTS
 #define PVID_MAX_MOMENTS 45
 #endif
@@ -70,7 +70,7 @@
 #error "PVID_MAX_WEAK_WINDOW must lie in 9..4095"
 #endif
 
-/* Largest number of test functions. RAM: 160 bytes each and 4 for each pair. */
+/* Largest number of test functions. RAM: 160 bytes each and 4 per pair. */
 #ifndef PVID_MAX_FUNCTIONS
 #define PVID_MAX_FUNCTIONS 16
 #endif
@@ -78,7 +78,7 @@
 #error "PVID_MAX_FUNCTIONS must lie in 4..64"
 #endif
 
-/* Most Gauss-Newton steps a window of the weak form may ask for. */
+/* Largest number of Gauss-Newton steps per window of the weak form. */
 #ifndef PVID_MAX_ITERATIONS
 #define PVID_MAX_ITERATIONS 10
 #endif
@@ -86,7 +86,7 @@
 #error "PVID_MAX_ITERATIONS must lie in 1..255"
 #endif
 
-/* Most passes of the full-angle correction. */
+/* Largest number of passes of the full-angle correction. */
 #ifndef PVID_MAX_PASSES
 #define PVID_MAX_PASSES 8
 #endif
@@ -102,14 +102,14 @@
 #error "PVID_MAX_THETA_Q31 must lie in 5..12"
 #endif
 
-/* Qualifier of the fixed-point tables: empty where constants are read from where they stand. On an AVR, whose constants
- * are copied into RAM, __flash (and -std=gnu99) leaves them in the first 64 kB of the flash. */
+/* Qualifier of the fixed-point tables; empty where flash is addressed like RAM. On an AVR __flash (with
+ * -std=gnu99) keeps the tables in the first 64 kB of the flash instead of copying them to RAM. */
 #ifndef PVID_TABLE
 #define PVID_TABLE
 #endif
 
-/* 0 leaves the weak form's correction for large angles and friction out of the image, 3 kB on a Cortex-M4F, and
- * init refuses full_angle and friction. By itself the linker cannot: a setting that init reads asks for them. */
+/* 0 removes the correction for large angles and friction (3 kB on a Cortex-M4F) from the image; init then refuses
+ * full_angle and friction. The linker alone cannot remove it, because init refers to it. */
 #ifndef PVID_FULL_ANGLE
 #define PVID_FULL_ANGLE 1
 #endif
@@ -117,25 +117,26 @@
 #error "PVID_FULL_ANGLE must be 0 or 1"
 #endif
 
-/* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your own
- * trap or reset here; without one the misused function does nothing and returns PVID_NOT_READY or PVID_BAD_POINTER. */
+/* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your
+ * own trap or reset here; by default the misused function does nothing and returns PVID_NOT_READY or
+ * PVID_BAD_POINTER. */
 #ifndef PVID_ASSERT
 #define PVID_ASSERT(condition) ((void)(condition))
 #endif
 
-/* ---- sizes that are no settings ---- */
+/* ---- fixed sizes ---- */
 
-#define PVID_ORDERS 5        /* derivatives of a channel, orders 0 to 4 */
-#define PVID_NOISE_TRACES 3  /* numbers that describe the noise inside the rows; see model.h */
+#define PVID_ORDERS 5        /* derivatives of a channel: orders 0 to 4 */
+#define PVID_NOISE_TRACES 3  /* numbers that describe the noise of a row; see model.h */
 #define PVID_TRUST_SHORT 8   /* groups in the alarm's short mean; see trust.h */
-#define PVID_TRUST_LONG 16   /* and, at least, in its long mean */
-#define PVID_READ_ATTEMPTS 8 /* of a read before it returns false: one fails only if a put happens meanwhile */
+#define PVID_TRUST_LONG 16   /* least number of groups in its long mean */
+#define PVID_READ_ATTEMPTS 8 /* attempts of a read; one fails only during a put */
 
 #if !defined(PVID_PLAIN_NAMES)
 #include "pvid/sized.h"
 #endif
 
-/* The bits promised need IEEE-754 binary32 evaluated as such: no excess precision, no fast-math. */
+/* The promised bits need IEEE-754 binary32: no excess precision, no fast-math. */
 #if defined(__FAST_MATH__)
 #error "pvid must be compiled without -ffast-math: its results would not be reproducible"
 #endif

@@ -1,4 +1,4 @@
-/* pvid/crc32.h - the checksum of frames and of saved states: CRC-32 as zlib's (polynomial 0xEDB88320). */
+/* pvid/crc32.h - CRC-32 of zlib (polynomial 0xEDB88320), for frames and snapshots. */
 #ifndef PVID_CRC32_H
 #define PVID_CRC32_H
 
@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-/* crc continued over n bytes; the first call continues 0. A table of 64 bytes, two look-ups a byte. */
+/* Continues crc over n bytes; start with 0. Table: 64 bytes; cost: two look-ups per byte. */
 uint32_t pvid_crc32(uint32_t crc, const uint8_t bytes[], size_t n);
 
 #ifdef __cplusplus

@@ -1,16 +1,15 @@
 /* pvid/differentiator.h - derivatives of order 0 to 4 of one sampled channel.
  *
- * One window of the last 2 * half * stride + 1 samples and a bank of five symmetric FIR filters
- * over it: central finite differences with a stride, Savitzky-Golay of any degree, or any table
- * of yours. All orders refer to the same instant, the window's centre: half * stride samples ago.
- * Never allocates, never reads a sample twice, time independent of the data.
+ * A window of the last 2 * half * stride + 1 samples and a bank of five symmetric FIR filters: central finite
+ * differences with a stride, Savitzky-Golay of any degree, or your own table. All orders refer to the centre of
+ * the window, half * stride samples ago. Never allocates; the time of a step does not depend on the data.
  *
  *   pvid_differentiator_f32 phi;                              (static)
  *   if (pvid_differentiator_init_f32(&phi, &bank, 1000.0f) != PVID_OK) ...
  *   float d[PVID_ORDERS];
  *   if (pvid_differentiator_step_f32(&phi, sample, d)) use d[0] .. d[4];
  *
- * Not thread-safe; one object per channel. Tables come from `pvid tables --form fir`.
+ * Not thread-safe; one object per channel. `pvid tables --form fir` prints tables.
  */
 #ifndef PVID_DIFFERENTIATOR_H
 #define PVID_DIFFERENTIATOR_H
@@ -30,30 +29,34 @@ extern "C" {
  *   order 0:      x[0] + sum w[0][i-1] q_i
  *   orders 2, 4:  rate^k sum w[k][i-1] q_i        rate = sample rate / stride
  *   orders 1, 3:  rate^k sum w[k][i-1] d_i
- * so a constant is reproduced exactly whatever the rounding of the weights, and the large common
- * part of a sensor's reading never enters a product. */
+ *
+ * A constant is reproduced exactly for any rounding of the weights, and the large common part of the readings
+ * enters no product. */
 typedef struct {
-    uint16_t half;        /* points on each side, 2..; 2 half stride + 1 <= PVID_MAX_WINDOW */
-    uint16_t stride;      /* samples between points, 1.. */
+    uint16_t half;        /* points on each side, >= 2; 2 half stride + 1 <= PVID_MAX_WINDOW */
+    uint16_t stride;      /* samples between points, >= 1 */
     const float *weights; /* [PVID_ORDERS][half], order k in units of 1/point^k; kept by reference */
 } pvid_fir_bank_f32;
 
 /* Central differences on five points: errors of order h^4 (orders 0, 1, 2) and h^2 (3, 4). */
 extern const float pvid_five_points_f32[PVID_ORDERS * 2];
 
-/* State: detail/differentiator_state.h. Only the functions below write to it. */
+/* State: detail/differentiator_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_differentiator_f32 pvid_differentiator_f32;
 
-/* Prepares `self` for samples taken at sample_rate_hz. Fails iff the bank is not as described above (PVID_BAD_HALF,
- * PVID_BAD_STRIDE, PVID_BAD_BANK for the weights) or the rate is not in 1e-3..1e6 Hz (PVID_BAD_SAMPLE_RATE). */
+/* Initialises `self` for samples at sample_rate_hz [Hz]. Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - half or stride is out of its range (PVID_BAD_HALF, PVID_BAD_STRIDE),
+ *   - a weight is not finite (PVID_BAD_BANK), or
+ *   - the rate is not in 1e-3..1e6 Hz (PVID_BAD_SAMPLE_RATE). */
 pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
                                          float sample_rate_hz);
 
-/* Empties the window: after a gap the samples no longer stand at equal distances. */
+/* Empties the window; call it after a gap, when samples are no longer equidistant. */
 void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self);
 
-/* Takes one finite sample in and, once the window is full, writes the five derivatives
- * out[k] [unit/s^k]. Returns whether it did. Cost: 5 half multiplications. */
+/* Adds a finite sample. When the window is full, writes the derivatives out[k] [unit/s^k] and returns true. Cost:
+ * 5 half multiplications. */
 bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, float out[PVID_ORDERS]);
 
 #ifdef __cplusplus

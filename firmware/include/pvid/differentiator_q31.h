@@ -1,15 +1,16 @@
-/* pvid/differentiator_q31.h - derivatives of two sensors' counts in integers alone.
+/* pvid/differentiator_q31.h - derivatives of two sensors' counts with integers only.
  *
- * The bank of differentiator.h with integer weights, over two channels that are sampled together: orders 0 to 4 of phi,
- * 2 to 4 of y, all for the instant of the window's centre. The sums are exact; each is shifted right once, half up.
+ * The bank of differentiator.h with integer weights, over two channels sampled at the same time: orders 0 to 4 of
+ * phi, 2 to 4 of y, all at the centre of the window. The sums are exact; each is shifted right once, rounding half
+ * up.
  *
  *   pvid_differentiator_q31 differentiator;                              (static)
  *   if (pvid_differentiator_init_q31(&differentiator, &bank) != PVID_OK) ...
  *   if (pvid_differentiator_step_q31(&differentiator, phi, y, d_phi, d_y)) use them
  *
- * Never wraps: init does the sum over the weights' magnitudes and refuses a bank in which any counts within full scale
- * could leave a product 32 bits or a derivative its limit. A weight times a difference of counts is one 32-bit
- * multiplication on any core. Not thread-safe.
+ * Never wraps: init sums the weights' magnitudes and refuses a bank in which counts within full scale could
+ * overflow a 32-bit product or a derivative. A weight times a difference of counts is one 32-bit multiplication.
+ * Not thread-safe.
  */
 #ifndef PVID_DIFFERENTIATOR_Q31_H
 #define PVID_DIFFERENTIATOR_Q31_H
@@ -34,10 +35,11 @@ extern "C" {
 #define PVID_Y_ORDERS_Q31 3
 #define PVID_Y_LOWEST_Q31 2
 
-/* A folded bank as in differentiator.h, with integers w for weights and the centre sample itself weighted in order 0:
+/* A folded bank as in differentiator.h, with integer weights w and a weighted centre sample in order 0:
  *   order 0:  centre x[0] + sum w[0][i-1] q_i,   2, 4:  sum w[k][i-1] q_i,   1, 3:  sum w[k][i-1] d_i
- * times 2^-shift. A format is the design tool's affair: an order k whose weights are 2^b times those of a derivative
- * per time unit^k comes out in 2^(shift - b) counts per time unit^k. */
+ *
+ * times 2^-shift. An order k whose weights are 2^b times those of a derivative per time unit^k has 2^(shift - b)
+ * counts per time unit^k. */
 typedef struct {
     uint16_t half;   /* points on each side, 2..; 2 half stride + 1 <= PVID_MAX_WINDOW */
     uint16_t stride; /* samples between points, 1.. */
@@ -53,18 +55,20 @@ typedef struct {
 extern const PVID_TABLE int32_t pvid_five_points_q31[PVID_ORDERS * 2];
 #define PVID_FIVE_POINTS_CENTRE_Q31 12
 
-/* State: detail/differentiator_state_q31.h. Only the functions below write to it. */
+/* State: detail/differentiator_state_q31.h, not API. Only the functions below write to it. */
 typedef struct pvid_differentiator_q31 pvid_differentiator_q31;
 
-/* Prepares `self`. Fails iff the bank is not as described above; the status names the field. Where counts within full
- * scale could overflow it that is PVID_BAD_FULL_SCALE for a product with a weight, PVID_BAD_SHIFT for their sum. */
+/* Initialises `self`. Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - a field of the bank is out of its range (the status names it), or
+ *   - counts within full scale could overflow a product (PVID_BAD_FULL_SCALE) or a sum (PVID_BAD_SHIFT). */
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
 
-/* Empties the window: after a gap the samples no longer stand at equal distances. */
+/* Empties the window; call it after a gap, when samples are no longer equidistant. */
 void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self);
 
-/* Takes one sample of each channel in, within full scale, and, once the window is full, writes the derivatives of phi
- * and y. Returns whether it did. Cost: 8 half multiplications. */
+/* Adds one sample of each channel, within full scale. When the window is full, writes the derivatives of phi and y
+ * and returns true. Cost: 8 half multiplications. */
 bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, int32_t y, int32_t d_phi[PVID_ORDERS],
                                   int32_t d_y[PVID_Y_ORDERS_Q31]);
 

@@ -9,8 +9,8 @@
 extern "C" {
 #endif
 
-/* hash continued over p (int32), every sum (int64, low word first), the sums' exponent and the reason code (a word
- * each) after a tick that ended with `reason`. */
+/* Continues hash over p (int32), every sum (int64, low word first), the sums' exponent and the reason code (one
+ * word each) after a tick with this reason. */
 uint32_t pvid_fnv_estimator_q31(uint32_t hash, const pvid_estimator_q31 *estimator, pvid_reason reason);
 
 #ifdef __cplusplus

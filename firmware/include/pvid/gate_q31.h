@@ -1,8 +1,7 @@
-/* pvid/gate_q31.h - keeps what does not fit out of the sums: gate.h in integers alone.
+/* pvid/gate_q31.h - rejects outliers: gate.h with integers only.
  *
- * The same rule, the same robust scale, the same patience: see there. Squares of residuals span more
- * than any fixed point holds, so they are weighed as numbers of 30 digits with an exponent; the scale is one, too.
- * Total and bounded: some ten shifts and products a residual.
+ * The same rule and scale. Squares of residuals exceed any fixed-point range; therefore squares and scale are
+ * numbers of 30 bits with an exponent. Every input is allowed. Cost: about ten shifts and products per residual.
  */
 #ifndef PVID_GATE_Q31_H
 #define PVID_GATE_Q31_H
@@ -18,21 +17,23 @@ extern "C" {
 #endif
 
 typedef struct {
-    uint32_t sigmas;          /* largest residual [times the usual size], Q16: 2..1000; 0: no gate */
-    uint32_t patience_groups; /* rows (strong form) or windows (weak form) until a changed mechanism is believed,
-                                 1..2^30; 0: never */
+    uint32_t sigmas;          /* largest residual [multiples of the usual size], Q16: 2..1000; 0: no gate */
+    uint32_t patience_groups; /* rows (strong form) or windows (weak form) after which a changed mechanism is
+                                 accepted, 1..2^30; 0: never */
 } pvid_gate_config_q31;
 
-/* State: detail/gate_state_q31.h. Only the functions below write to it. */
+/* State: detail/gate_state_q31.h, not API. Only the functions below write to it. */
 typedef struct pvid_gate_q31 pvid_gate_q31;
 
-/* Prepares `self` for residuals of which the scale remembers `memory` (0 counts as 1) and whose mean square is never
- * taken to be below `floor` (> 0, at most 2^100). Fails iff a field of config is not as described there; the status
- * names it. */
+/* Initialises `self`; the scale averages over `memory` residuals (0 counts as 1) and is never below `floor` (> 0,
+ * at most 2^100). Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER), or
+ *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *config, uint32_t memory,
                                pvid_scaled_q31 floor);
 
-/* Whether a residual may be taken in, by its square: m >= 0, below 2^200. The first `memory` ones may. */
+/* Returns whether a residual is accepted, given its square, m >= 0, below 2^200. The first `memory` residuals are
+ * accepted. */
 bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
 
 #ifdef __cplusplus

@@ -1,11 +1,10 @@
-/* pvid/information.h - the sums M, B, yy of least squares, kept so that they neither stall nor drift.
+/* pvid/information.h - the sums M, B, yy of least squares, exact enough for any length of a run.
  *
- *   M = sum N N^T (distinct entries only),  B = sum N Y,  yy = sum Y^2,  weight = sum 1     (MATH.md 4)
+ *   M = sum N N^T (distinct entries only),  B = sum N Y,  yy = sum Y^2,  weight = sum 1     (theory.md 4)
  *
- * A plain float32 sum stops growing after 2^24 equal terms. Here each sum has two levels: terms go
- * into `low`, and after `block` groups of rows `low` is folded into `high`; what the fold cannot
- * represent stays in `low` (an exact two-sum), so nothing is lost. Forgetting multiplies both levels
- * once a block. The value of a sum is high + low.
+ * A plain float32 sum stops growing after 2^24 equal terms. Here each sum has two levels: terms are added to
+ * `low`, and every `block` groups `low` is folded into `high`; the part that `high` cannot represent remains in
+ * `low` (exact two-sum). Forgetting multiplies both levels once per block. The value of a sum is high + low.
  */
 #ifndef PVID_INFORMATION_H
 #define PVID_INFORMATION_H
@@ -22,33 +21,32 @@ extern "C" {
 /* Layout of the sums: n_moments of M, n_theta of B, yy, weight. */
 #define PVID_MAX_SUMS (PVID_MAX_MOMENTS + PVID_MAX_THETA + 2)
 
-/* The root of a row's sum of squares may not exceed this: 2^32 such rows still fit into float32. */
+/* Limit of the root of a row's sum of squares: 2^32 such rows fit into float32. */
 #define PVID_ROW_LIMIT 1.0e14f
 
-/* State: detail/information_state.h. Only the functions below write to it. */
+/* State: detail/information_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_information_f32 pvid_information_f32;
 
-/* Empty sums for `model`; forgetting_groups is the time constant of forgetting in groups of rows,
- * 0 for none (else at least 4). */
+/* Zeroes the sums for `model`. forgetting_groups: time constant of forgetting [groups of rows], >= 4; 0: no
+ * forgetting. */
 void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model, float forgetting_groups);
 
-/* Adds one row and writes the values of the sums with it, as pvid_information_read_f32 would: the
- * row must be within PVID_ROW_LIMIT. sums may be NULL where the model does not accumulate by itself.
- * Cost: a product and two additions a sum. */
+/* Adds a row within PVID_ROW_LIMIT and writes the new values of the sums, as pvid_information_read_f32 does. sums
+ * may be NULL for a model without its own accumulate. Cost: one product and two additions per sum. */
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS]);
 
-/* Ends a group of rows (one tick of the strong form, one window of the weak form): folds and
- * forgets when a block is complete. */
+/* Ends a group of rows (one tick of the strong form, one window of the weak form); folds and forgets at the end of
+ * a block. */
 void pvid_information_end_group_f32(pvid_information_f32 *self);
 
-/* Multiplies all that was gathered by factor, 0..1. */
+/* Multiplies all sums by factor, 0..1. */
 void pvid_information_fade_f32(pvid_information_f32 *self, float factor);
 
-/* sums[0 .. n_moments + n_theta + 1] = the current values, in the layout above. */
+/* Writes the values sums[0 .. n_moments + n_theta + 1] in the layout above. */
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS]);
 
-/* tail[0] = yy, tail[1] = weight. */
+/* Writes tail[0] = yy, tail[1] = weight. */
 void pvid_information_tail_f32(const pvid_information_f32 *self, float tail[2]);
 
 #ifdef __cplusplus

@@ -1,8 +1,8 @@
-/* pvid/model_q31.h - what the fixed-point estimator knows of a mechanism.
+/* pvid/model_q31.h - a mechanism's model for the fixed-point estimator.
  *
- * The same as model.h tells the float core: theta = f(p) and the non-zeros of its Jacobian C. Numbers are integers
- * with a format: a value is its integer times 2^-bits. The formats of p come from the configuration; the model says
- * which formats theta and C have then. theta and C are int64 within +-2^60, so that no digit of p is lost.
+ * As model.h: theta = f(p) and the non-zeros of its Jacobian C. Numbers are integers with a format: a value is its
+ * integer times 2^-bits. The configuration defines the formats of p; `formats` returns those of theta and C. theta
+ * and C are int64 within +-2^60, so that no bit of p is lost.
  */
 #ifndef PVID_MODEL_Q31_H
 #define PVID_MODEL_Q31_H
@@ -16,12 +16,12 @@
 
 typedef struct {
     uint8_t n_theta;   /* entries of theta and N, 1..PVID_MAX_THETA_Q31 */
-    uint8_t n_p;       /* free parameters, 1..PVID_MAX_P; p[0] is the one kappa speaks of */
+    uint8_t n_p;       /* free parameters, 1..PVID_MAX_P; kappa refers to p[0] */
     uint8_t n_c;       /* structural non-zeros of C, 1..PVID_MAX_C_Q31 */
-    uint32_t positive; /* bit i set: p[i] > 0 always, steps are taken relative to it */
+    uint32_t positive; /* bit i set: p[i] > 0; steps are relative to p[i] */
 
-    /* The entries of N that hold the sensor's noise times chi'' and chi, both 0 where the model does not know: noise of
-     * unit variance in Y puts noise[0], noise[1], noise[2] into their products 00, 01, 11 (see estimator_q31.h). */
+    /* Entries of N that contain the sensor's noise times chi'' and chi; both 0: unknown. Noise of unit variance in
+     * Y adds noise[0], noise[1], noise[2] to their products 00, 01, 11 (see estimator_q31.h). */
     uint8_t noisy[2];
 
     const uint8_t *c_row;    /* [n_c] row in theta of each non-zero of C, ascending in a column */

@@ -1,16 +1,19 @@
-/* pvid/publication.h - other contexts read an estimate while a tick runs: consistently, and without a lock.
+/* pvid/publication.h - passes estimates from the context of step to other contexts, consistently and without a
+ * lock.
  *
- * One context writes (the one that calls step). Any number of contexts read: interrupts, main loop, threads, cores.
- * There are two copies and a version number. A put writes `copy`, makes the version odd, writes `estimate` and makes
- * the version even again. A read copies `copy` while the version is odd and `estimate` while it is even. It starts
- * again if the version has changed meanwhile. So one of the two copies is consistent at every instant:
+ * One context writes (the one that calls step). Any number of contexts read: interrupts, main loop, threads,
+ * cores. There are two copies and a version number. A put writes `copy`, makes the version odd, writes `estimate`
+ * and makes the version even again. A read copies `copy` while the version is odd and `estimate` while it is even,
+ * and repeats if the version has changed meanwhile. One of the two copies is consistent at every instant:
  *
- *   - step in an interrupt, read in the main loop: the read starts again if an estimate was published meanwhile;
- *   - step in the main loop, read in an interrupt: the read succeeds at the first attempt, even in the middle of a put;
- *   - threads, several cores: neither waits for the other. With gcc and clang every access to a word is atomic, with
- *     the memory fences that other cores need; there is no data race in the sense of C11.
+ *   - step in an interrupt, read in the main loop: the read repeats if an estimate was published meanwhile;
+ *   - step in the main loop, read in an interrupt: the read succeeds at the first attempt, even in the middle of a
+ *     put;
+ *   - threads, several cores: neither blocks the other. With gcc and clang every access to a word is atomic, with
+ *     the
+ *     memory fences for other cores; there is no data race in the sense of C11.
  *
- * The weak form has this built in (pvid_weak_read_f32). The strong form computes an estimate only on request:
+ * The weak form contains a publication (pvid_weak_read_f32). The strong form computes an estimate only on request:
  *
  *   static pvid_publication_f32 shared;                     (all zeros: nothing has been published)
  *   in the context that calls step, every N ticks:
@@ -19,9 +22,8 @@
  *   in any context:
  *       if (pvid_publication_read_f32(&shared, &estimate, &number) && (number > 0)) ...
  *
- * Other compilers than gcc and clang use volatile accesses, which are enough on one core: an interrupt sees them in
- * the order of the source. Cores without atomic instructions (Cortex-M0, AVR) use them, too: these are single cores.
- * RAM: two estimates and 12 bytes.
+ * Other compilers use volatile accesses, which suffice on one core: an interrupt sees them in source order. Cores
+ * without atomic instructions (Cortex-M0, AVR) use them too. RAM: two estimates and 12 bytes.
  */
 #ifndef PVID_PUBLICATION_H
 #define PVID_PUBLICATION_H
@@ -46,9 +48,12 @@ typedef struct {
 /* Publishes an estimate. Call it from one context only. Cost: two copies of the estimate. */
 void pvid_publication_put_f32(pvid_publication_f32 *self, const pvid_estimate_f32 *estimate);
 
-/* Copies the published estimate consistently. *number: how many have been published; 0: none, and *estimate is all
- * zeros; the pointer may be NULL. Returns false, with *estimate undefined, iff an estimate was published during each of
- * PVID_READ_ATTEMPTS attempts (call it again later), or `self` or `estimate` is NULL. */
+/* Copies the published estimate consistently. *number: estimates published so far, 0: none, *estimate is zero; may
+ * be NULL. Fails iff
+ *   - an estimate was published during each of PVID_READ_ATTEMPTS attempts (call it again later), or
+ *   - `self` or `estimate` is NULL.
+ *
+ * On failure *estimate is undefined. */
 bool pvid_publication_read_f32(const pvid_publication_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* pvid/publication_q31.h - publication.h for estimates of the fixed-point core. */
+/* pvid/publication_q31.h - publication.h for fixed-point estimates. */
 #ifndef PVID_PUBLICATION_Q31_H
 #define PVID_PUBLICATION_Q31_H
 

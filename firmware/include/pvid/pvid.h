@@ -1,7 +1,8 @@
 /* pvid.h - identifies the parameters of a mechanism on the microcontroller that drives it.
  *
- * C99, float32, static memory, no library but sqrtf. Start at weak.h or strong.h (samples in,
- * parameters out) or at estimator.h and model.h (rows of a model of yours in). The same in integers: pvid_q31.h. */
+ * C99, float32, static memory, no library function but sqrtf. Start with weak.h or strong.h (samples in,
+ * parameters out), or with estimator.h and model.h for rows of your own model. Integers only: pvid_q31.h.
+ */
 #ifndef PVID_PVID_H
 #define PVID_PVID_H
 
@@ -12,9 +13,8 @@
 #include "pvid/fnv.h"
 #include "pvid/gate.h"
 #include "pvid/information.h"
-#include "pvid/kapitza.h"
-#include "pvid/kapitza_weak.h"
 #include "pvid/little_endian.h"
+#include "pvid/mechanism.h"
 #include "pvid/misfit.h"
 #include "pvid/model.h"
 #include "pvid/publication.h"

@@ -1,7 +1,9 @@
-/* pvid_q31.h - identifies the parameters of a mechanism in integers alone, for cores without a floating-point unit.
+/* pvid_q31.h - identifies the parameters of a mechanism with integers only, for cores without a floating-point
+ * unit.
  *
- * Nothing of it holds or includes a floating-point type. Start at weak_q31.h or strong_q31.h (counts of the sensors in,
- * parameters out) or at estimator_q31.h and model_q31.h (rows of a model of yours in). In float32: pvid.h. */
+ * Includes no floating-point type. Start with weak_q31.h or strong_q31.h (sensor counts in, parameters out), or
+ * with estimator_q31.h and model_q31.h for rows of your own model. In float32: pvid.h.
+ */
 #ifndef PVID_PVID_Q31_H
 #define PVID_PVID_Q31_H
 
@@ -10,9 +12,7 @@
 #include "pvid/estimator_q31.h"
 #include "pvid/fnv_q31.h"
 #include "pvid/gate_q31.h"
-#include "pvid/kapitza_q31.h"
-#include "pvid/kapitza_strong_q31.h"
-#include "pvid/kapitza_weak_q31.h"
+#include "pvid/mechanism_q31.h"
 #include "pvid/misfit_q31.h"
 #include "pvid/model_q31.h"
 #include "pvid/publication_q31.h"

@@ -1,8 +1,7 @@
-/* pvid/snapshot.h - saves an identifier's state and restores it, so that a run goes on after the power was off.
+/* pvid/snapshot.h - saves an identifier's state and restores it after a power cut, bit for bit.
  *
- * A snapshot is the identifier as it stands in memory, sealed: with what made it, a generation and a checksum. A
- * restored identifier continues bit for bit, whatever it was in the middle of. A snapshot that is damaged, cut short
- * or not of this identifier is refused, and nothing is changed.
+ * A snapshot is the identifier's memory with a header, a generation and a checksum. restore refuses a snapshot
+ * that is damaged, truncated or from another identifier, and then changes nothing.
  *
  *   static uint8_t image[PVID_SNAPSHOT_WEAK_F32];
  *   (at the start, after init:)
@@ -14,13 +13,12 @@
  *   n = pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, image, sizeof image);
  *   write n bytes to the slot choice.next, then choose again
  *
- * Two slots: the one written to is never that of the newest valid snapshot, so power that fails at any byte of a
- * write leaves that one to be found. How bytes get into flash is the caller's business; they may be written in any
- * order.
+ * Two slots. The slot to write is never that of the newest valid snapshot; a power cut at any byte of a write
+ * leaves that one valid. The caller writes the bytes to flash, in any order.
  *
- * What a snapshot is good for: the same build (release, sizes, byte order, width of pointers: all in `layout`), the
- * same form and core, the same configuration with the same tables. Pointers are not saved: they stay what init made of
- * them. The checksum guards against accident, not against malice. Not thread-safe: no tick while one of these works.
+ * A snapshot is valid for the same build (release, sizes, byte order, width of pointers: all in `layout`), the
+ * same form and core, the same configuration and tables. Pointers are not saved: they keep the values of init. The
+ * checksum detects accidents, not attacks. Not thread-safe: no tick during these functions.
  *
  * Layout of a snapshot, all numbers little-endian:
  *    0 magic "PVSS"   4 bytes in all   8 version, that of the library   12 kind   16 layout   20 configuration
@@ -40,22 +38,25 @@
 extern "C" {
 #endif
 
-/* Room for a snapshot of an identifier [bytes]. */
+/* Size of a snapshot of an identifier [bytes]. */
 #define PVID_SNAPSHOT_STRONG_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_f32))
 #define PVID_SNAPSHOT_WEAK_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32))
 #define PVID_SNAPSHOT_WEAK_ANGLE_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32) + sizeof(pvid_weak_angle_f32))
 
-/* Writes a snapshot of `self` to image[] and returns its length [bytes], or 0 with nothing written iff it does not fit
- * into `room` [bytes] or `self` is not initialised. config: the configuration that `self` was initialised with. Cost: a
- * copy and a checksum of the object and a hash of the tables, as long as some ticks: call it where a tick can wait. */
+/* Writes a snapshot of `self` to image[]; config is the configuration of its init. Returns its length [bytes].
+ * Fails (returns 0, writes nothing) iff
+ *   - it does not fit into `room` [bytes], or
+ *   - `self` is not initialised.
+ *
+ * Cost: a copy and a checksum of the object and a hash of the tables, some ticks long. */
 size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                      uint32_t generation, uint8_t image[], size_t room);
-/* PVID_SNAPSHOT_WEAK_ANGLE_F32 where the angle's storage is in use, else PVID_SNAPSHOT_WEAK_F32. */
+/* PVID_SNAPSHOT_WEAK_ANGLE_F32 if config.angle is in use, else PVID_SNAPSHOT_WEAK_F32. */
 size_t pvid_snapshot_save_weak_f32(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t generation,
                                    uint8_t image[], size_t room);
 
-/* Restores `self`, which has been initialised with config, from the snapshot at image[0 .. length - 1] (it may be
- * followed by anything). Whatever the answer but PVID_SNAPSHOT_RESTORED, `self` is left as it was. */
+/* Restores `self`, initialised with config, from the snapshot at image[0 .. length - 1]; bytes after the snapshot
+ * are ignored. Any answer but PVID_SNAPSHOT_RESTORED leaves `self` unchanged. */
 pvid_snapshot_status pvid_snapshot_restore_strong_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                                       const uint8_t image[], size_t length);
 pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,

@@ -1,4 +1,4 @@
-/* pvid/snapshot_q31.h - snapshot.h for the identifiers in fixed point. */
+/* pvid/snapshot_q31.h - snapshot.h for the fixed-point identifiers. */
 #ifndef PVID_SNAPSHOT_Q31_H
 #define PVID_SNAPSHOT_Q31_H
 
@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-/* Room for a snapshot of an identifier [bytes]. */
+/* Size of a snapshot of an identifier [bytes]. */
 #define PVID_SNAPSHOT_STRONG_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_q31))
 #define PVID_SNAPSHOT_WEAK_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_q31))
 

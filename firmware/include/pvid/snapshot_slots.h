@@ -1,6 +1,4 @@
-/* pvid/snapshot_slots.h - what snapshots of every identifier share: their answers, their size, the choice of a slot.
- *
- * snapshot.h explains their use. */
+/* pvid/snapshot_slots.h - results, size and slots of snapshots, for every identifier. Usage: snapshot.h. */
 #ifndef PVID_SNAPSHOT_SLOTS_H
 #define PVID_SNAPSHOT_SLOTS_H
 
@@ -11,7 +9,7 @@
 extern "C" {
 #endif
 
-/* Whether a snapshot could be restored, and why not. */
+/* Result of a restore. */
 typedef enum {
     PVID_SNAPSHOT_RESTORED = 0,
     PVID_SNAPSHOT_NONE,          /* no snapshot begins here */
@@ -26,7 +24,7 @@ typedef enum {
 
 #define PVID_SNAPSHOT_HEADER 28u
 
-/* Bytes of a snapshot: room that is always enough for one of that kind. */
+/* Size of a snapshot [bytes]: the upper limit of its kind. */
 #define PVID_SNAPSHOT_BYTES(object) (PVID_SNAPSHOT_HEADER + (object) + 4u)
 
 /* Which of two slots to read and which to write. */
@@ -36,8 +34,8 @@ typedef struct {
     uint32_t generation; /* for the next snapshot */
 } pvid_snapshot_choice;
 
-/* Looks at two slots of `size` bytes each. Valid: whole and undamaged; of whose identifier, restore asks. Generations
- * are compared modulo 2^32. Costs the checksums of both. */
+/* Compares two slots of `size` bytes each. A slot is valid if it is complete and undamaged; restore checks whose
+ * it is. Generations are compared modulo 2^32. Cost: the checksums of both. */
 pvid_snapshot_choice pvid_snapshot_choose(const uint8_t slot_0[], const uint8_t slot_1[], size_t size);
 
 #ifdef __cplusplus

@@ -1,21 +1,21 @@
-/* pvid/status.h - the status of an init, the reason code of a tick, counters and laws, in either arithmetic. */
+/* pvid/status.h - statuses of init, reason codes of a tick, counters and laws, for both cores. */
 #ifndef PVID_STATUS_H
 #define PVID_STATUS_H
 
 #include <stdint.h>
 
-/* Return value of every init. Each code names the refused field of the configuration. After a refused init the object
- * is all zeros, like a static object before its init: step returns PVID_NOT_READY, all other functions do nothing. (An
- * automatic variable before its init is not all zeros, and this misuse is not detected.) */
+/* Result of every init: the refused field of the configuration. After a refused init the object is all zeros, like
+ * a static object before its init: step returns PVID_NOT_READY and all other functions do nothing. (An automatic
+ * variable before its init is not zero; this misuse is not detected.) */
 typedef enum {
     PVID_OK = 0,
     PVID_BAD_MODEL,         /* NULL, or larger than the PVID_MAX_ bounds */
     PVID_BAD_SAMPLE_RATE,   /* not finite or outside 1e-3..1e6 Hz */
     PVID_BAD_BANK,          /* weights of a bank: NULL, or one that is not finite */
     PVID_BAD_LENGTH,        /* l1 not finite or not positive */
-    PVID_BAD_START,         /* start not finite, not positive where the model asks, or out of bounds */
+    PVID_BAD_START,         /* start not finite, not positive for a positive parameter, or out of bounds */
     PVID_BAD_START_SD,      /* not finite or not positive */
-    PVID_BAD_BOUNDS,        /* not finite, lower >= upper, or lower <= 0 where p must be positive */
+    PVID_BAD_BOUNDS,        /* not finite, lower >= upper, or lower <= 0 for a positive parameter */
     PVID_BAD_ROW_SD,        /* not finite or not positive */
     PVID_BAD_UPDATE_RATE,   /* not finite or outside 1e-6..1e6 Hz */
     PVID_BAD_FORGETTING,    /* not finite, negative, or shorter than 4 updates */
@@ -26,8 +26,8 @@ typedef enum {
     PVID_BAD_KAPPA_MIN,     /* not finite or outside [0, 1) */
     PVID_BAD_CORRELATION,   /* not finite or below 1 */
     PVID_BAD_DRIVE_MIN,     /* not finite or negative; q31: or too large */
-    PVID_BAD_ROW_WEIGHT,    /* not finite or outside (0, 1], or not 1 for a model that accumulates by itself */
-    PVID_BAD_DESIGN,        /* NULL, or one of a design's tables is, or holds what is not finite or would overflow */
+    PVID_BAD_ROW_WEIGHT,    /* not finite or outside (0, 1], or not 1 for a model with its own accumulate */
+    PVID_BAD_DESIGN,        /* the design or a table is NULL, or a table is not finite or could overflow */
     PVID_BAD_ITERATIONS,    /* outside 1..PVID_MAX_ITERATIONS, or too many for the window's hop */
     PVID_BAD_NOISE_MARGIN,  /* not finite or outside 0..1e6 */
     PVID_BAD_PUBLISH_KAPPA, /* kappa_min of trust.h not finite or outside [0, 1) */
@@ -35,13 +35,13 @@ typedef enum {
     PVID_BAD_MISFIT_MAX,    /* not finite, or neither 0 nor at least 1 */
     PVID_BAD_PIVOT_NOISE,   /* not finite or negative */
     PVID_BAD_ANGLE_LIMIT,   /* not finite or negative */
-    PVID_BAD_ANGLE,         /* full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or
-                               friction with a known zero or with bounds too small for it */
-    PVID_BAD_GATE_SIGMAS,   /* not finite, or neither 0 nor 2..1e3 */
+    PVID_BAD_ANGLE,       /* full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or friction
+                             without zero_unknown or with too small bounds */
+    PVID_BAD_GATE_SIGMAS, /* not finite, or neither 0 nor 2..1e3 */
     PVID_BAD_GATE_PATIENCE, /* not finite or outside 0..1e12 s */
     PVID_BAD_DEAD_ZONE,     /* not finite or outside 0..100 */
-    PVID_BAD_HALF,          /* of a bank: below 2, or a window over PVID_MAX_WINDOW with any stride */
-    PVID_BAD_STRIDE,        /* of a bank: 0, or with this half a window over PVID_MAX_WINDOW */
+    PVID_BAD_HALF,          /* of a bank: below 2, or a window over PVID_MAX_WINDOW for every stride */
+    PVID_BAD_STRIDE,        /* of a bank: 0, or a window over PVID_MAX_WINDOW */
     PVID_BAD_CENTRE,        /* of a q31 bank: outside 1..2^30 */
     PVID_BAD_TAPS,          /* of a design: even, or outside 5..PVID_MAX_TAPS */
     PVID_BAD_DECIMATION,    /* of a design: outside 1..PVID_MAX_DECIMATION */
@@ -49,34 +49,32 @@ typedef enum {
     PVID_BAD_FUNCTIONS,     /* of a design: outside 4..PVID_MAX_FUNCTIONS */
     PVID_BAD_LAG,           /* of a design: 0 */
     PVID_BAD_OVERLAP,       /* of a design: not finite or below 1 */
-    PVID_BAD_FULL_SCALE,    /* phi_max, y_max or u_max of a q31 bank or design: not positive, or too large, by itself
-                               or for the bank's weights */
-    PVID_BAD_SHIFT,         /* a shift of a q31 bank, row or design: more than a 64-bit number has, or leaves too many
-                               bits for what full scale can make */
-    PVID_BAD_U_MULTIPLIER,  /* of the q31 strong form: not positive */
-    PVID_BAD_DRIVE_TICKS,   /* of the q31 strong form: outside 1..2^30 */
-    PVID_BAD_FORMAT,        /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
-    PVID_BAD_RENEWAL,       /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
-    PVID_BAD_POINTER        /* the object, the configuration or the bank is NULL */
+    PVID_BAD_FULL_SCALE,   /* phi_max, y_max or u_max of a q31 bank or design: not positive, too large, or too large for
+                              the weights */
+    PVID_BAD_SHIFT,        /* a shift of a q31 bank, row or design: beyond 64 bits, or too small for full scale */
+    PVID_BAD_U_MULTIPLIER, /* of the q31 strong form: not positive */
+    PVID_BAD_DRIVE_TICKS,  /* of the q31 strong form: outside 1..2^30 */
+    PVID_BAD_FORMAT,       /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
+    PVID_BAD_RENEWAL,      /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
+    PVID_BAD_POINTER       /* the object, the configuration or the bank is NULL */
 } pvid_status;
 
 /* Result of a tick. Every estimate is reported together with one of these. */
 typedef enum {
-    PVID_UPDATED = 0,         /* the parameters were updated, or are within the dead zone and need no step */
+    PVID_UPDATED = 0,         /* p was updated, or is within the dead zone */
     PVID_WARMING_UP,          /* the window of samples is not full yet */
-    PVID_ACCUMULATED,         /* data taken in, no solve due at this tick (divider) */
-    PVID_HELD_NOT_EXCITED,    /* w is not identifiable: no drive, kappa below its threshold, or no more
-                                 information than noise makes */
+    PVID_ACCUMULATED,         /* data added, no solve due at this tick (divider) */
+    PVID_HELD_NOT_EXCITED,    /* insufficient excitation for p[0]: no drive, kappa below its threshold, or no more
+                                 information than noise gives */
     PVID_HELD_PIVOT,          /* the system could not be solved, or its solution was not finite */
     PVID_REJECTED_NOT_FINITE, /* NaN or infinity in the sample or in its row */
-    PVID_REJECTED_OUTLIER,    /* a residual far beyond the usual: see gate.h */
+    PVID_REJECTED_OUTLIER,    /* a residual far beyond the usual size: gate.h */
     PVID_REJECTED_SATURATED,  /* a row beyond PVID_ROW_LIMIT */
-    PVID_HELD_UNCERTAIN,      /* not published: standard errors too large, or p not converged yet */
+    PVID_HELD_UNCERTAIN,      /* not published: standard errors too large, or p not converged */
     PVID_HELD_OUT_OF_RANGE,   /* window dropped: the angle exceeded the range of the equations */
-    PVID_MISFIT,              /* the parameters were updated, but the residuals are larger than the sensors'
-                                 noise explains: the model does not fit the mechanism */
-    PVID_HELD_FROZEN,         /* window not used, because the identifier is frozen */
-    PVID_NOT_READY            /* nothing was done: no init yet, a refused init, or NULL instead of an object */
+    PVID_MISFIT, /* p was updated, but the residuals exceed the sensors' noise: the model does not fit the mechanism */
+    PVID_HELD_FROZEN, /* row or window not used: the identifier is frozen */
+    PVID_NOT_READY    /* not initialised, init refused, or NULL instead of an object: nothing was done */
 } pvid_reason;
 
 /* The law by which an estimator moves p; see estimator.h. */
@@ -85,9 +83,9 @@ typedef enum {
     PVID_LAW_PSEUDOVELOCITY  /* equation (5) alone */
 } pvid_law;
 
-/* How often something has happened since init. */
+/* Event counts since init. */
 typedef struct {
-    uint32_t rows;    /* rows taken in */
+    uint32_t rows;    /* rows added */
     uint32_t updates; /* steps of p */
     uint32_t limited; /* of those, shortened to step_limit */
     uint32_t bounded; /* of those, stopped at a bound */
@@ -95,11 +93,11 @@ typedef struct {
     uint32_t held_pivot;
     uint32_t rejected_not_finite;
     uint32_t rejected_saturated;
-    uint32_t held_uncertain;    /* groups after which nothing was published: see trust.h */
-    uint32_t held_out_of_range; /* windows dropped because the angle was too large */
-    uint32_t misfits;           /* groups published, or updates told, under the alarm */
-    uint32_t rejected_outlier;  /* rows or windows that the gate kept out: see gate.h */
-    uint32_t at_rest;           /* solves within the dead zone: p stayed */
+    uint32_t held_uncertain;    /* groups without publication, see trust.h */
+    uint32_t held_out_of_range; /* windows dropped for their angle */
+    uint32_t misfits;           /* groups published, or updates reported, during the misfit alarm */
+    uint32_t rejected_outlier;  /* rows or windows rejected by the gate */
+    uint32_t at_rest;           /* solves within the dead zone: p unchanged */
 } pvid_counters;                /* each stops at 2^32 - 1 */
 
 #endif

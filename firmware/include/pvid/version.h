@@ -1,4 +1,4 @@
-/* pvid/version.h - the version's one home. Before 1.0 a minor version may change a struct. */
+/* pvid/version.h - the version, defined here only. Before 1.0 a minor version may change a struct. */
 #ifndef PVID_VERSION_H
 #define PVID_VERSION_H
 

@@ -13,7 +13,7 @@ enum { REMAINDER_Y = 0, REMAINDER_C1 = 1, REMAINDER_C2 = 2 };
 #define FUNCTIONS_PER_STAGE 6u
 #define SAMPLES_PER_STAGE 4u
 
-/* Below this L2 = (l2 / rho2)^2 is hardly a pendulum's, and 1 / L1 too large to be trusted. */
+/* Below this L2 = (l2 / rho2)^2 is implausible, and 1 / L1 too large. */
 #define L2_MIN 0.05f
 
 /* The correction waits for these many windows, steps and errors smaller than these; it ends beyond the last. */
@@ -101,7 +101,7 @@ static void solve(pvid_weak_angle_f32 *self)
 
 /* ---- the motion, sample by sample ---- */
 
-/* x - sin x and 1 - cos x for |x| < 1: what is left out is below 3e-6 of them. */
+/* x - sin x and 1 - cos x for |x| < 1, relative error below 3e-6. */
 static float sine_remainder(float x)
 {
     const float x2 = x * x;
@@ -157,7 +157,8 @@ static moment moment_of(pvid_weak_angle_f32 *self)
     const float force = g * angle;
     const float t = self->dt * ((float)self->index - (0.5f * (float)(self->window - 1u)));
     const float i2 = integrate(&self->motion, self->dt, first, force);
-    const float q = ((self->a + (self->b * t)) - (d1 * phi)) - (d2 * i2); /* phi: a has taken in what c does here */
+    const float q =
+        ((self->a + (self->b * t)) - (d1 * phi)) - (d2 * i2); /* phi: a already contains the effect of c here */
     const float q_rate = (self->b - (d1 * rate)) - (d2 * self->motion.once);
     const float k = d1 - 1.0f; /* L2 (1 + L1) */
     const float a1 = q + (k * angle);

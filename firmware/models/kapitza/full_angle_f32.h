@@ -18,7 +18,7 @@
 
 #include "pvid/weak.h"
 
-/* Whether there is a correction: never where it is left out, and then nothing refers to the functions below. */
+/* True if the correction is compiled in and configured. */
 static inline bool pvid_angle_correction_enabled_f32(const pvid_weak_angle_f32 *self)
 {
     return (PVID_FULL_ANGLE == 1) && (self != NULL);
@@ -42,9 +42,10 @@ bool pvid_weak_angle_step_f32(pvid_weak_angle_f32 *self, const pvid_weak_design_
 /* Number of stages. */
 uint32_t pvid_weak_angle_stages_f32(const pvid_weak_angle_f32 *self, const pvid_weak_design_f32 *design);
 
-/* Switches the correction on once the estimate has settled, off when it is lost: p after the window's steps,
- * `worst` the largest relative standard error, `groups` windows taken in: from the first window on it would
- * diverge. Returns whether it was switched on: what was gathered without it is to be aged then. */
+/* Enables the correction once the estimate has converged, disables it when the estimate is lost. p: after the
+ * window's steps; `worst`: largest relative standard error; `groups`: windows used (from the first window on the
+ * correction would diverge). Returns true if this call enabled it; the sums without correction must be renewed
+ * then. */
 bool pvid_weak_angle_switch_f32(pvid_weak_angle_f32 *self, const float p[], float worst, uint16_t groups);
 
 #endif

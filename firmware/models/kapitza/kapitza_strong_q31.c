@@ -12,7 +12,7 @@ enum { N_A = 0, N_E = 1, N_PHI2 = 2, N_PHI0 = 6 };
 
 /* ---- the row ---- */
 
-/* *out = x 2^-shift; false where it is beyond the limit of a row. */
+/* *out = x 2^-shift; false if it exceeds the limit of a row. */
 static bool round_entry(int64_t x, uint8_t shift, int32_t *out)
 {
     const int64_t rounded = pvid_round_shift_q31(x, shift);
@@ -72,8 +72,8 @@ int64_t pvid_kapitza_strong_sensitivity_q31(const int64_t term[PVID_KAPITZA_STRO
 
 /* ---- theta and C ---- */
 
-/* p has 31 bits: a single one is moved up to 58, a product of two down to 58; a product with a third comes back by 31.
- * Factors 2 and 4 are a matter of format, 3 stands in the integer. */
+/* p has 31 bits: a single factor is shifted up to 58 bits, a product of two down to 58; a third factor shifts by
+ * 31. Factors 2 and 4 are in the format, 3 is in the integer. */
 #define UP 27
 #define DOWN 4
 #define ONE_BITS (30 + UP)

@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-/* The sums of the strong form (MATH.md 2) and C^T M C from them, with its two economies.
+/* The sums of the strong form (theory.md 2) and C^T M C from them, with its two economies.
  *
  * Products repeat. With A = N_1, E = N_2, the entries 3..6 are -u^k phi'' and 7..11 are -u^k phi,
  * so M holds only the sums of A^2, AE, E^2, of A and E times each of those nine, and of
@@ -19,7 +19,7 @@
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
-/* Places among the moments; a sequence stands by descending powers of u, as in N. */
+/* Indices of the moments; sequences are in descending powers of u, as in N. */
 enum {
     AA = 0,
     AE = 1,
@@ -36,7 +36,7 @@ enum {
     WEIGHT = 57
 };
 
-/* Adds a product to a sum and returns what it comes to. */
+/* Adds a product to a sum and returns the new sum. */
 static inline float plus(const float *restrict high, float *restrict low, float product)
 {
     const float sum = *low + product;

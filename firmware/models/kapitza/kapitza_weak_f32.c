@@ -63,8 +63,8 @@ static void zeroed_jacobian_of(const float p[], float c[])
     c[7] = w * w;
 }
 
-/* Noise of phi alone stands in N2 = -int chi'' phi and N5 = -int chi phi as if it were motion; c_2 and c_5, what
- * they carry into C^T N, do not contain the zero. The double integrals of the noise are small beside it. */
+/* Noise of phi is in N2 = -int chi'' phi and N5 = -int chi phi; their factors c_2 and c_5 in C^T N do not depend
+ * on the offset. The double integrals of the noise are small in comparison. */
 static void noise_of(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P])
 {
     const float w = p[W];

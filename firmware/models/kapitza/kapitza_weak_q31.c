@@ -4,7 +4,7 @@
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2, C = PVID_KAPITZA_C };
 
-/* p has 31 bits: a single one is moved up to 46, a product of two down to 46; a product with a third comes back by
+/* p has 31 bits: a single factor is shifted up to 46 bits, a product of two down to 46; a third factor shifts by
  * 31. */
 #define UP 15
 #define DOWN 16

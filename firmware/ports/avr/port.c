@@ -1,7 +1,7 @@
 /* An ATmega with USART0 and timer 1 (328P, 2560, ...), started by avr-libc.
  *
- * Counts are clock cycles. The stack grows down from the end of the RAM towards .bss: what lies between is
- * painted, and nothing stops an overflow.
+ * Counts are clock cycles. The stack grows down from the end of the RAM towards .bss; the space between is
+ * painted. There is no protection against overflow.
  */
 #include "../port.h"
 

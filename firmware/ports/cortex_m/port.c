@@ -21,8 +21,8 @@ void pvid_port_init(void)
     CONTROL = CONTROL_ENABLE_FROM_CORE_CLOCK;
 }
 
-/* The 24 bits of SysTick, counted upwards, stand in the upper bits, so that a difference modulo 2^32 is
- * one modulo 2^24 of its own. */
+/* The 24 bits of SysTick, counted upwards, are the upper bits, so that differences modulo 2^32 are differences
+ * modulo 2^24 of SysTick. */
 uint32_t pvid_port_instructions(void)
 {
     return (LARGEST - VALUE) << 8;

@@ -1,9 +1,9 @@
-/* Start of a Cortex-M (v6-M to v8.1-M): vector table, FPU, then main; every exception is a fault here,
- * reported over the UART with its cause.
+/* Start of a Cortex-M (v6-M to v8.1-M): vector table, FPU, then main; every exception is a fault, reported over
+ * the UART with its cause.
  *
- * A stack that overflows faults instead of writing over variables: it lies at the lowest address of the RAM,
- * above a guard that no one may write (v7-M: MPU) or a limit of the stack pointer (v8-M). On a v6-M core there
- * is only the end of the memory. The report has a stack of its own.
+ * A stack overflow faults instead of overwriting variables: the stack is at the lowest address of the RAM, above a
+ * guard without write access (v7-M: MPU) or a limit of the stack pointer (v8-M). A v6-M core has only the end of
+ * the memory. The report has its own stack.
  */
 #include <stdbool.h>
 
@@ -19,8 +19,9 @@ static uint64_t report_stack[64];
 
 typedef void (*vector)(void);
 
-/* Entry 0 is the initial stack pointer, 1 the reset, 2 to 15 the core's own exceptions, from 16 on the board's
- * interrupts up to the UART's. In an image without a receiver that one has no handler, and is never let through. */
+/* Entry 0 is the initial stack pointer, 1 the reset, 2 to 15 the core's exceptions, from 16 on the board's
+ * interrupts up to the UART's. In an image without a receiver the UART's interrupt has no handler and is never
+ * enabled. */
 void pvid_uart_interrupt(void) __attribute__((weak));
 void pvid_systick_interrupt(void) __attribute__((weak, alias("pvid_exception"))); /* an image may have its own */
 __attribute__((section(".vectors"), used)) static const struct {
@@ -95,7 +96,7 @@ void pvid_reset(void)
     pvid_start(stack);
 }
 
-/* The report runs on its own stack: the interrupted one may be what failed. */
+/* The report runs on its own stack: the interrupted one may have caused the fault. */
 __attribute__((naked)) void pvid_exception(void)
 {
     __asm__ volatile("mrs r0, msp\n\t"

@@ -34,7 +34,7 @@ float sqrtf(float x)
     }
     int32_t exponent = (int32_t)(bits >> FRACTION_BITS);
     uint32_t fraction = bits & FRACTION_MASK;
-    if (exponent == 0) { /* subnormal: bring the leading bit to its place */
+    if (exponent == 0) { /* subnormal: shift the leading bit up */
         exponent = 1;
         for (int32_t shift = 0; (shift < FRACTION_BITS) && ((fraction & HIDDEN_BIT) == 0u); shift++) {
             fraction <<= 1;

@@ -1,5 +1,5 @@
-/* The host as a board: its UART is a pseudo-terminal whose name goes to standard output. It ends with the
- * program that started it. */
+/* The host as a board: its UART is a pseudo-terminal whose name is printed on standard output. It ends with its
+ * parent process. */
 #define _XOPEN_SOURCE 600
 
 #include <fcntl.h>
@@ -13,7 +13,7 @@
 
 #include "../port.h"
 
-#define IDLE_MS 1       /* what receive may rest while nothing comes, so that an idle board costs no processor */
+#define IDLE_MS 1       /* longest wait of receive [ms]: an idle board needs no processor time */
 #define IDLE_CALLS 256u /* without a byte either way, after which it does */
 #define EXIT_NO_TERMINAL 2
 
@@ -31,7 +31,7 @@ void pvid_port_init(void)
         exit(EXIT_NO_TERMINAL);
     }
     const char *name = ptsname(line);
-    /* Held open, so that the line does not hang up while nobody is connected. */
+    /* Kept open, so that the line does not hang up without a client. */
     const int other_end = open(name, O_RDWR | O_NOCTTY);
     if ((other_end < 0) || (tcgetattr(other_end, &raw) != 0)) {
         perror("no pseudo-terminal");

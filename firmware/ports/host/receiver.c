@@ -1,4 +1,4 @@
-/* The system keeps what arrives at a terminal, and pvid_port_receive rests while nothing does. */
+/* The system buffers received bytes, and pvid_port_receive sleeps when there are none. */
 #include "../receiver.h"
 
 #include "../port.h"

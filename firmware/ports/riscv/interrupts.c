@@ -1,5 +1,5 @@
-/* The UART's interrupt comes through the platform's controller (PLIC) of QEMU's `virt`, as its source PVID_UART_IRQ.
- * It is held back at the core (mie), for the controller ignores a completion of what it no longer lets through. */
+/* The UART's interrupt is source PVID_UART_IRQ of the platform's controller (PLIC) of QEMU's `virt`. It is masked
+ * at the core (mie), because the controller ignores the completion of a masked source. */
 #include "../interrupts.h"
 
 #include <stdint.h>

@@ -8,7 +8,7 @@ void pvid_reset(void);
 void pvid_trap(void);
 void pvid_trap_report(void);
 
-/* The report's own stack: the interrupted one may be what failed. */
+/* The report runs on its own stack: the interrupted one may have caused the fault. */
 #define REPORT_STACK_BYTES 512
 __attribute__((aligned(16), used)) uint8_t pvid_report_stack[REPORT_STACK_BYTES];
 
@@ -29,7 +29,7 @@ __attribute__((naked, section(".reset"))) void pvid_reset(void)
                      "csrs mstatus, t0\n\t"
                      "csrw fcsr, zero\n\t" /* to nearest even */
 #endif
-                     /* The page below the stack is nobody's: protected (PMP, NAPOT of 4 kB), locked. */
+                     /* The page below the stack is inaccessible (PMP, NAPOT of 4 kB) and locked. */
                      "la t0, pvid_stack_guard + 0x7FF\n\t"
                      "srli t0, t0, 2\n\t"
                      "csrw pmpaddr0, t0\n\t"

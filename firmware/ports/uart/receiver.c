@@ -8,7 +8,7 @@
 #define MASK (PVID_RECEIVER_BYTES - 1u)
 
 static volatile uint8_t ring[PVID_RECEIVER_BYTES];
-static volatile uint32_t put;   /* bytes that have come; the interrupt alone writes it */
+static volatile uint32_t put;   /* bytes received; only the interrupt writes it */
 static volatile uint32_t taken; /* of them; the program alone writes it */
 
 void pvid_uart_interrupt(void)
@@ -29,7 +29,7 @@ void pvid_receiver_init(void)
 {
     pvid_uart_enable_receive();
     pvid_interrupts_init();
-    /* A byte that came before that holds up all that follow, where the UART calls for a byte only as it arrives. */
+    /* An earlier byte would block all later ones if the UART interrupts only when a byte arrives. */
     pvid_interrupts_mask();
     pvid_uart_interrupt();
     pvid_interrupts_unmask();

@@ -26,7 +26,7 @@ void pvid_uart_acknowledge(void);
 /* ports/uart/receiver.c; weak in the start-up, which calls it. */
 void pvid_uart_interrupt(void);
 
-/* Waits until what was put has left. */
+/* Waits until all bytes are sent. */
 void pvid_uart_drain(void);
 
 #endif

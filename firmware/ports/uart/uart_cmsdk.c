@@ -18,7 +18,7 @@ void pvid_uart_init(void)
 {
     BAUDDIV = PVID_CLOCK_HZ / 115200u;
     CTRL = CTRL_TX_ENABLE | CTRL_RX_ENABLE;
-    (void)DATA; /* what came before; an emulator that holds bytes back since then goes on */
+    (void)DATA; /* discards earlier bytes; an emulator that waits for this continues */
 }
 
 bool pvid_uart_get(uint8_t *byte)

@@ -17,7 +17,7 @@
 #define INTERRUPT_RX_READY 0x4u
 #define BAUD_115200 0x01D7E000u
 
-static bool sending; /* a byte was put whose TX_READY has not come yet */
+static bool sending; /* a byte was put, and its TX_READY has not occurred yet */
 
 void pvid_uart_init(void)
 {
@@ -60,7 +60,7 @@ void pvid_uart_enable_receive(void)
     INTERRUPT_SET = INTERRUPT_RX_READY;
 }
 
-/* Taking the event back, which comes before each byte's read, does it. */
+/* Clearing the event before each read of a byte acknowledges it. */
 void pvid_uart_acknowledge(void)
 {
 }

@@ -19,7 +19,7 @@ void pvid_uart_init(void)
 {
     LINE_CONTROL = LINE_8N1;
     FIFO_CONTROL = FIFO_ENABLE_AND_CLEAR;
-    (void)DATA; /* what came before; an emulator that holds bytes back since then goes on */
+    (void)DATA; /* discards earlier bytes; an emulator that waits for this continues */
 }
 
 bool pvid_uart_get(uint8_t *byte)

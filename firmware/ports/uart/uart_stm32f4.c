@@ -19,7 +19,7 @@ void pvid_uart_init(void)
 {
     BRR = (PVID_CLOCK_HZ / 2u) / 115200u; /* APB2 runs at half the core's clock */
     CR1 = CR1_USART_ENABLE | CR1_TX_ENABLE | CR1_RX_ENABLE;
-    (void)DR; /* what came before; an emulator that holds bytes back since then goes on */
+    (void)DR; /* discards earlier bytes; an emulator that waits for this continues */
 }
 
 bool pvid_uart_get(uint8_t *byte)

@@ -8,7 +8,7 @@
 
 #define GROWTH 9.21034f   /* ln 1e4: of the scale within the time of patience */
 #define WIDEST 1.0e3f     /* the scale grows no faster than this */
-#define SCALE_MAX 1.0e30f /* of squares: far beyond any row that is taken in */
+#define SCALE_MAX 1.0e30f /* of squares: far beyond any accepted row */
 
 pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *config, float rate_hz, float memory,
                                float floor)

@@ -11,7 +11,7 @@
 #define GROWTH 150902 /* ln 1e4 in Q14: of the scale within the time of patience */
 #define GROWTH_BITS 14
 
-/* 2^100: of squares, far beyond any row that is taken in. */
+/* 2^100: of squares, far beyond any accepted row. */
 static const pvid_scaled_q31 scale_max = {(int32_t)1 << 29, 71};
 
 pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *config, uint32_t memory,
@@ -52,8 +52,8 @@ static pvid_scaled_q31 clamped(pvid_scaled_q31 scale, pvid_scaled_q31 floor)
     return ((scale.e > (scale_max.e + 1)) || pvid_scaled_exceeds_q31(scale, scale_max)) ? scale_max : scale;
 }
 
-/* Whether a square is at most limit times scale, whose mantissas' product is 2^58 at least: the exponents decide of
- * most. */
+/* Whether a square is at most limit times scale. The mantissas' product is at least 2^58: in most cases the
+ * exponents decide. */
 static bool is_usual(const pvid_gate_q31 *self, pvid_scaled_q31 square)
 {
     return ((square.e + 30) <= ((self->limit.e + self->scale.e) + 58)) ||

@@ -28,7 +28,7 @@ void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting
     self->left = self->block;
 }
 
-/* The least so far, grown, or what it has fallen to. */
+/* The minimum so far times growth, or the new value if it is smaller. */
 static float least_of(float least, float growth, float now)
 {
     const float grown = least * growth;

@@ -6,8 +6,8 @@
 
 #include "pvid/misfit.h"
 
-/* Prepares `self` for rows that come at rate_hz (> 0) and are forgotten with a time constant of forgetting_s,
- * 0: never. Both were checked by the estimator. */
+/* Initialises `self` for rows at rate_hz (> 0) and a time constant of forgetting of forgetting_s, 0: none. The
+ * estimator has checked both. */
 void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting_s);
 
 /* Ends a block: whether it is a misfit. */

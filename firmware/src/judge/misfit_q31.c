@@ -8,7 +8,7 @@
 
 #define BLOCK_S 4u           /* PVID_MISFIT_BLOCK_S */
 #define ROWS_MAX 65535u      /* of a block */
-#define SENSITIVITY_SHIFT 3u /* so that what is told of a row, within 2^31, has a square like that of a residual */
+#define SENSITIVITY_SHIFT 3u /* a sensitivity within 2^31 then has a square like that of a residual */
 #define SENSITIVITY_LIMIT ((int32_t)1 << 28)
 
 /* Of q: PVID_MISFIT_MOST, PVID_MISFIT_LEAST; and PVID_MISFIT_TIMES. */
@@ -28,8 +28,8 @@ static void begin_block(pvid_misfit_q31 *self)
     self->left = self->block;
 }
 
-/* The quietest block is forgotten four times as slowly as the sums: a block of four seconds lets it grow by what a
- * second is of their time constant. */
+/* The quietest block is forgotten four times as slowly as the sums: in a block of four seconds it grows by one
+ * second over the time constant. */
 void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups)
 {
     PVID_ASSERT(self != NULL);
@@ -65,7 +65,7 @@ bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitiv
     return self->left == 0u;
 }
 
-/* The least so far, grown, or what it has fallen to. */
+/* The minimum so far times growth, or the new value if it is smaller. */
 static pvid_scaled_q31 least_of(pvid_scaled_q31 so_far, pvid_scaled_q31 growth, pvid_scaled_q31 now)
 {
     const pvid_scaled_q31 grown = pvid_scaled_times_q31(so_far, growth);

@@ -7,16 +7,15 @@
 
 #include "pvid/misfit_q31.h"
 
-/* Rows whose squares add up in an int64. */
+/* Rows whose squares fit into the sum of an int64. */
 #define PVID_MISFIT_FEW 64u
 
-/* Prepares `self` for rows that come drive_ticks a second (1..2^30) and are forgotten with a time constant of
- * forgetting_groups rows, 0: never. */
+/* Initialises `self` for drive_ticks rows per second (1..2^30) and a time constant of forgetting of
+ * forgetting_groups rows, 0: none. */
 void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups);
 
-/* Takes a row in: the square of its residual, at most 2^56, and p[0] times its gradient in p[0], of which what is
- * beyond
- * +-2^31 counts as that. Returns whether it was the last of a block, which is then to be judged. */
+/* Adds a row: the square of its residual, at most 2^56, and its sensitivity p[0] dY/dp[0], clamped to +-2^31.
+ * Returns true at the end of a block, which must then be judged. */
 bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity);
 
 /* Ends a block: whether it is a misfit. */

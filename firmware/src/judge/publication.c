@@ -4,9 +4,9 @@
 #include "pvid/publication.h"
 #include "pvid/publication_q31.h"
 
-/* How words are shared. Atomic where the compiler has such accesses and the processor such instructions; elsewhere
- * there is one core, whose interrupts see volatile accesses in the order of the source. An estimate's floats are copied
- * as words, which gcc and clang allow by an attribute. */
+/* Shared words are atomic if compiler and processor support it; other targets have one core, whose interrupts see
+ * volatile accesses in source order. An estimate's floats are copied as words, which gcc and clang allow by an
+ * attribute. */
 #if defined(__GNUC__) && defined(__GCC_HAVE_SYNC_COMPARE_AND_SWAP_4) && !defined(__FRAMAC__)
 
 typedef uint32_t __attribute__((may_alias)) word;

@@ -8,10 +8,10 @@
 
 #include "number/count.h"
 #include "solve/assess_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
-#include "judge/trust_tell.h"
+#include "judge/verdict.h"
 
 const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .kappa_min = 3.0e-5f,
@@ -138,7 +138,7 @@ static void restart_alarm(pvid_trust_f32 *self)
     memset(self->recent, 0, sizeof self->recent);
 }
 
-/* Whether the residuals of all rows are within what chance makes of the limit. */
+/* Whether the residual variance of all rows is within the limit and its statistical spread. */
 static bool all_rows_agree(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
                            const pvid_estimate_f32 *candidate)
 {
@@ -177,7 +177,7 @@ float pvid_trust_fade_factor_f32(pvid_trust_f32 *self)
     return FADE;
 }
 
-/* Whether p is so far from where the rows came in. */
+/* Whether p has moved by `renewal` from its value at the rows. */
 static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
     bool moved = false;
@@ -190,8 +190,8 @@ static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *esti
     return moved;
 }
 
-/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
- * come in there; and a p that noise may have moved so far has not arrived anywhere. */
+/* At a converged p: renews the sums if they are stale. Rows that agree with p are as good as rows at p; a p with
+ * large errors has not converged. */
 static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool errors_small, bool agrees)
 {
     const bool stale = errors_small && !agrees && has_moved(self, estimator);

@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/state_q31.h"
 #include "judge/publication.h"
-#include "judge/trust_tell.h"
+#include "judge/verdict.h"
 
 /* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
 #define ARRIVED 19661 /* 0.3, Q16 */
@@ -122,7 +122,7 @@ static void restart_alarm(pvid_trust_q31 *self)
     memset(self->recent, 0, sizeof self->recent);
 }
 
-/* Whether the residuals of all rows are within what chance makes of the limit. */
+/* Whether the residual variance of all rows is within the limit and its statistical spread. */
 static bool all_rows_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
                            const pvid_estimate_q31 *candidate)
 {
@@ -160,7 +160,7 @@ int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self)
     return FADE;
 }
 
-/* Whether p is so far from where the rows came in. */
+/* Whether p has moved by `renewal` from its value at the rows. */
 static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
 {
     bool moved = false;
@@ -173,8 +173,8 @@ static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *esti
     return moved;
 }
 
-/* Where p has settled: renews the past if it has to be. Where the rows agree with p they are as good as if they had
- * come in there; and a p that noise may have moved so far has not arrived anywhere. */
+/* At a converged p: renews the sums if they are stale. Rows that agree with p are as good as rows at p; a p with
+ * large errors has not converged. */
 static void renew_if_stale(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool agrees)
 {
     if (!agrees && has_moved(self, estimator)) {

@@ -31,7 +31,7 @@ static uint32_t formats(uint32_t hash, const int8_t values[], size_t n)
     return running;
 }
 
-/* Tables may stand in an address space of their own. */
+/* Tables may be in their own address space. */
 static uint32_t table(uint32_t hash, const PVID_TABLE int32_t *values, size_t n)
 {
     uint32_t running = hash;

@@ -16,7 +16,7 @@
 /* Places of the header. */
 enum { AT_MAGIC = 0, AT_LENGTH = 4, AT_VERSION = 8, AT_KIND = 12, AT_LAYOUT = 16, AT_CONFIG = 20, AT_GENERATION = 24 };
 
-/* Whole and undamaged, whatever it is of. */
+/* Complete and undamaged, of any identity. */
 static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
 {
     if ((image == NULL) || (length < PVID_SNAPSHOT_HEADER + CRC_BYTES) || (pvid_get_u32(&image[AT_MAGIC]) != MAGIC)) {
@@ -57,7 +57,7 @@ static pvid_snapshot_status inspect(const uint8_t image[], size_t length, const 
     return PVID_SNAPSHOT_RESTORED;
 }
 
-/* ---- the object, its pointers and what stands behind it ---- */
+/* ---- the object, its pointers and the memory after it ---- */
 
 /* In the place of a pointer, so that equal states have equal snapshots and no address gets into flash. */
 static void put_pointers(uint8_t copy[], const pvid_snapshot_shape *shape)
@@ -82,7 +82,7 @@ static void take_all_but_pointers(uint8_t object[], const uint8_t copy[], const 
     memcpy(&object[from], &copy[from], shape->bytes - from);
 }
 
-/* Seals what stands at PVID_SNAPSHOT_HEADER; returns the length of the whole. */
+/* Adds header and checksum to the bytes at PVID_SNAPSHOT_HEADER; returns the length of the snapshot. */
 static size_t seal(uint8_t image[], const pvid_snapshot_identity *identity, uint32_t generation)
 {
     const size_t sealed = PVID_SNAPSHOT_HEADER + identity->bytes;

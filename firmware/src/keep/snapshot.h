@@ -20,29 +20,29 @@ typedef struct {
     pvid_snapshot_kind kind;
     uint32_t layout; /* hash of sizes and places */
     uint32_t config; /* hash of the configuration */
-    size_t bytes;    /* of the object, and of what stands behind it */
+    size_t bytes;    /* of the object and of the memory saved after it */
 } pvid_snapshot_identity;
 
-/* An object's bytes, and where its pointers stand among them, in ascending order. */
+/* Size of an object, and the offsets of its pointers, ascending. */
 typedef struct {
     size_t bytes;
     const uint32_t *pointers; /* [n_pointers] */
     size_t n_pointers;
 } pvid_snapshot_shape;
 
-/* Writes a snapshot of an object and of the identity->bytes - shape->bytes bytes at `behind` (NULL where there are
- * none); returns its length, or 0 with nothing written iff it does not fit into `room`. */
+/* Writes a snapshot of an object and of the identity->bytes - shape->bytes bytes at `behind` (NULL: none); returns
+ * its length. Fails (returns 0, writes nothing) iff it does not fit into `room`. */
 size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_identity *identity, uint32_t generation,
                           const void *object, const pvid_snapshot_shape *shape, const void *behind);
 
-/* Restores both if image[] holds an undamaged snapshot of this identity; pointers stay what they are. */
+/* Restores both if image[] contains an undamaged snapshot of this identity; pointers keep their values. */
 pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity,
                                            uint8_t object[], const pvid_snapshot_shape *shape, void *behind);
 
 /* Whether the pointer at `place` of the object was one when the snapshot was taken, or NULL. */
 bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place);
 
-/* Hash of words that say how an object lies in memory, and of the machine's byte order. */
+/* Hash of words that describe the object's layout, and of the machine's byte order. */
 uint32_t pvid_snapshot_layout(const uint32_t words[], size_t n);
 
 #endif

@@ -47,7 +47,7 @@ static const uint32_t layout[] = {
     PVID_MAX_WEAK_WINDOW,
 };
 
-/* The windows of the full-angle correction stand outside the identifier, and behind it in a snapshot. */
+/* The memory of the full-angle correction is separate from the identifier; in a snapshot it follows it. */
 static bool has_angle(const pvid_weak_config_f32 *config)
 {
     return config->full_angle || config->friction;
@@ -105,7 +105,7 @@ pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const p
     pvid_weak_angle_f32 *behind = has_angle(config) ? self->angle : NULL;
     const pvid_snapshot_status status =
         pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, behind);
-    if (status == PVID_SNAPSHOT_RESTORED) { /* what pointed into the object points into it again */
+    if (status == PVID_SNAPSHOT_RESTORED) { /* pointers into the object point into it again */
         pvid_weak_finish_f32 *finish = &self->finish;
         finish->angle = pvid_snapshot_had_pointer(image, PLACE(finish.angle)) ? self->angle : NULL;
         finish->solve.fallback =

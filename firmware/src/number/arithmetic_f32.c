@@ -6,7 +6,7 @@
 
 #include "number/finite_f32.h"
 
-/* volatile: the compiler must not fold what the machine has to answer. */
+/* volatile: the compiler must not compute the result itself. */
 uint32_t pvid_arithmetic_faults_f32(void)
 {
     uint32_t faults = 0;
@@ -42,7 +42,7 @@ uint32_t pvid_arithmetic_faults_f32(void)
     if (pvid_bits_f32(third) != 0x3EAAAAABu) {
         faults |= 16u;
     }
-    /* 2^24 swallows 1, in whatever direction is rounded (0 or 2 is left), unless sums are taken in another order. */
+    /* 2^24 + 1 = 2^24 in either rounding direction (0 or 2 remains), unless the sum is reordered. */
     const volatile float two_to_24 = 16777216.0f;
     const float small = one;
     const float large = two_to_24;

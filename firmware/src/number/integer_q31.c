@@ -1,7 +1,6 @@
 #include "number/integer_q31.h"
 
-/* No sum of parts leaves its type: |high low| <= 2^31 - 2^15, and what is carried into it is below 2^16 where the
- * product is positive. */
+/* No partial sum overflows: |high low| <= 2^31 - 2^15, and the carry is below 2^16 if the product is positive. */
 int64_t pvid_product_in_halves_q31(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
@@ -14,7 +13,7 @@ int64_t pvid_product_in_halves_q31(int32_t a, int32_t b)
     const int32_t second = ((int32_t)a_low * b_high) + (int32_t)carried;
     const int32_t high = (a_high * b_high) + pvid_floor_shift_32_q31(first, 16) + pvid_floor_shift_32_q31(second, 16);
     const uint32_t bottom = (((uint32_t)second & 0xFFFFu) << 16) | (low & 0xFFFFu);
-    const uint64_t both = ((uint64_t)(uint32_t)high << 32) | bottom; /* as they stand in two registers */
+    const uint64_t both = ((uint64_t)(uint32_t)high << 32) | bottom; /* the two registers */
     return (int64_t)both;
 }
 
@@ -54,8 +53,8 @@ uint32_t pvid_bit_length_q31(uint64_t x)
     return length + length_of[rest];
 }
 
-/* Digit by digit, in base 4: `rest` is what is left of x, `root` the digits found, moved along with them. The first
- * half of the digits depends on the upper half of x alone. */
+/* Digit by digit, in base 4: `rest` is the remainder of x, `root` the digits found, shifted along. The first half
+ * of the digits depends on the upper half of x only. */
 uint32_t pvid_square_root_q31(uint64_t x)
 {
     uint32_t upper_rest = (uint32_t)(x >> 32);

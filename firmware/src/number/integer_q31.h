@@ -1,7 +1,8 @@
-/* Integer arithmetic that never wraps: shifts that round, saturation, roots, reciprocals. Private to the core.
+/* Integer arithmetic that never wraps: rounding shifts, saturation, roots, reciprocals. Private to the core.
  *
- * Fixed-point code shifts and narrows only through these functions. Unless said otherwise an int64 argument lies
- * within +-PVID_WIDE, so that the sum of two still fits. All loops have a fixed number of turns. */
+ * Fixed-point code shifts and narrows only through these functions. Unless stated otherwise an int64 argument is
+ * within +-PVID_WIDE, so that the sum of two fits. All loops have a fixed number of iterations.
+ */
 #ifndef PVID_INTEGER_Q31_H
 #define PVID_INTEGER_Q31_H
 
@@ -14,10 +15,9 @@
 /* 1 in Q30. */
 #define PVID_ONE_Q30 ((int32_t)1 << 30)
 
-/* Greatest integer not above x 2^-s, s <= 63, any x. The two functions here are the
- * only ones that shift a signed number right: C99 leaves
- * it to the compiler what that does to a negative one, and every compiler for the targets repeats the sign.
- * MISRA deviation: 10.1, the assertion below makes sure of it. */
+/* Greatest integer not above x 2^-s, s <= 63, any x. Only these two functions shift a signed number right: C99
+ * leaves the result for negative numbers to the compiler, and every compiler for the targets repeats the sign.
+ * MISRA deviation: 10.1, checked by the assertion below. */
 static inline int64_t pvid_floor_shift_q31(int64_t x, uint32_t s)
 {
     return x >> s;
@@ -31,8 +31,7 @@ static inline int32_t pvid_floor_shift_32_q31(int32_t x, uint32_t s)
     return x >> s;
 }
 
-/* a b by four multiplications of 16 by 16 bits: half of what a core without a long multiplication takes for 64 by 64.
- */
+/* a b by four multiplications of 16 by 16 bits: half the cost of 64 by 64 on a core without a long multiplication. */
 int64_t pvid_product_in_halves_q31(int32_t a, int32_t b);
 
 /* a b. */

@@ -1,5 +1,4 @@
-/* Numbers of any size with 30 digits: what the gate weighs against each other spans more than an int64. Private to the
- * core. */
+/* Numbers of any size with 30 bits: the gate compares values beyond the range of an int64. Private to the core. */
 #ifndef PVID_SCALED_Q31_H
 #define PVID_SCALED_Q31_H
 

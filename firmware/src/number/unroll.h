@@ -1,4 +1,4 @@
-/* What gcc has to be asked for at -O2, and other compilers do unasked or do without. Changes no result. */
+/* Loop unrolling, which gcc needs a request for at -O2. Changes no result. */
 #ifndef PVID_UNROLL_H
 #define PVID_UNROLL_H
 

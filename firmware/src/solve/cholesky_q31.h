@@ -24,15 +24,16 @@ bool pvid_pivot_is_significant_q31(int64_t pivot, int32_t diagonal);
 /* total 2^-30 times the reciprocal in Q30, within +-limit, limit < 2^31. */
 int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limit);
 
-/* The same in steps: begin, then eliminate index j = n - 1 .. 0; `positive` says whether it can still be done. */
+/* The same in steps: begin, then eliminate index j = n - 1 .. 0; `positive` is false after a failure. */
 void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n);
 void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j);
 
 /* The least relative pivot of the factor of s, Q30. */
 int32_t pvid_cholesky_least_pivot_q31(const pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P]);
 
-/* Factors the n x n matrix whose upper triangle is s, diagonal in [2^28, 2^30), the others within +-2^30. Returns
- * false iff a diagonal entry is below that or a relative pivot is below 2^-PVID_PIVOT_SHIFT; first_pivot is 0 then. */
+/* Factors the n x n matrix with the upper triangle s, diagonal in [2^28, 2^30), the others within +-2^30. Fails
+ * (returns false, first_pivot = 0) iff a diagonal entry is below 2^28 or a relative pivot is below
+ * 2^-PVID_PIVOT_SHIFT. */
 bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P]);
 
 /* x[n] = U^-1 rhs, |rhs| < 2^PVID_RHS_BITS. */

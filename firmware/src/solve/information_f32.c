@@ -102,7 +102,7 @@ void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *
     }
 }
 
-/* Sums worked on together: lets the compiler use registers of four floats where there are any. */
+/* Number of sums processed together, for registers of four floats. */
 #define LANES 4u
 
 /* Knuth's two-sum after forgetting: new high + new low = retention (high + low), but for the two products. */

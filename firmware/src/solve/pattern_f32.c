@@ -17,8 +17,8 @@ void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c
     }
 }
 
-/* t[n] += M e_j a. Above the diagonal the entries of column j stand n - 1, n - 2, .. apart; from it
- * on they are row j, one after the other. */
+/* t[n] += M e_j a. Above the diagonal the entries of column j are n - 1, n - 2, .. apart; from the diagonal on
+ * they are row j, consecutively. */
 static inline void add_column(size_t n, const float *restrict m, size_t j, float a, float *restrict t)
 {
     size_t at = j;

@@ -33,7 +33,7 @@ enum {
     STAGE_SCALE
 };
 
-/* What a step leaves wrong in rr, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
+/* Rounding error of rr per step, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
 #define ROUNDING 2.4e-7f
 
 #define ROWS_PER_STAGE 4u
@@ -70,7 +70,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float
         return PVID_REJECTED_SATURATED;
     }
     if (self->gain < 1.0f) {
-        pvid_row_accumulate_innovation_f32(self, gradient, e);
+        pvid_row_accumulate_innovation_f32(self, self->model->n_p, gradient, e);
     }
     self->energy += e * e;
     self->group_weight += self->information.row_weight;
@@ -122,8 +122,8 @@ static float variance_of(const pvid_estimator_f32 *self, const float sums[])
     return pvid_estimator_variance_f32(self, sums, 0.0f, self->expected * pvid_estimator_freedom_f32(self, sums));
 }
 
-/* What the noise is taken to be: what it was said to be while p may still be far off, which makes residuals of its
- * own; what it was found to be once the result is judged. */
+/* Variance of the noise: the configured one for a solve, because a distant p adds residuals of its own; the
+ * measured one for an assessment. */
 static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const float weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];

@@ -2,7 +2,9 @@
 #include <string.h>
 
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/row_q31.h"
+#include "solve/system_q31.h"
 #include "number/scaled_q31.h"
 
 enum {
@@ -11,7 +13,7 @@ enum {
     STAGE_FORCE,
     STAGE_PROJECT,     /* n_p times: a row of S */
     STAGE_ABOVE_NOISE, /* is there more in S than noise puts there? In parts: less that, then a few pivots at a time */
-    STAGE_FACTOR,      /* S + H0 and its factor, likewise */
+    STAGE_FACTOR,      /* S + H0 and its factor, in the same parts */
     STAGE_SOLVE,       /* dp */
     STAGE_STEP,        /* where p and theta go with it */
     STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
@@ -19,10 +21,10 @@ enum {
     STAGE_FOLD, /* in parts */
     STAGE_DONE,
     STAGE_RESIDUAL, /* of an assessment, before STAGE_ABOVE_NOISE */
-    STAGE_KAPPA,    /* and after it: S, its factor, and what that says */
-    STAGE_WIDEN,    /* S with what the start said, and its factor */
+    STAGE_KAPPA,    /* and after it: S, its factor, kappa and least pivot */
+    STAGE_WIDEN,    /* S with the start's information, and its factor */
     STAGE_INVERT,   /* n_p times: a column */
-    STAGE_ERRORS    /* likewise */
+    STAGE_ERRORS    /* n_p times: errors and correlations of a parameter */
 };
 
 #define ROWS_PER_STAGE 8u
@@ -126,8 +128,8 @@ static void add_prior(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *
     }
 }
 
-/* Whether the data speak of p[0]: what of its information no other parameter can imitate is a part kappa of its
- * diagonal entry, and more than the start brought along. */
+/* Sufficient excitation of p[0]: the share kappa of its diagonal entry that no other parameter can explain is
+ * large enough, and exceeds the prior information. */
 static bool is_excited(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
 {
     const int32_t kappa = solve->factor.first_pivot;
@@ -223,8 +225,7 @@ static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     }
 }
 
-/* How far dp goes, as a part of what each parameter is measured by: its own value where it is positive, else the
- * standard deviation of its start. */
+/* Relative size of the step dp: over p for positive parameters, else over start_sd. */
 static int64_t size_of(const pvid_estimator_q31 *self, const int64_t dp[])
 {
     int64_t size = 0;
@@ -441,7 +442,7 @@ static uint8_t next_stage(const pvid_estimator_solve_q31 *solve)
     }
 }
 
-/* Takes the index after a stage, and says where the stage is over; returns whether nothing is left. */
+/* Sets the index after a stage and ends the stage after its last part; returns whether all stages are done. */
 static bool finish_stage(pvid_estimator_solve_q31 *solve, size_t next, size_t all)
 {
     solve->index = (uint8_t)next;
@@ -585,7 +586,7 @@ uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_gro
     const pvid_model_q31 *model = self->model;
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
     const size_t fold = ends_group ? PVID_INFORMATION_END_PARTS : 0u;
-    /* and four that come once: force, solve, step, commit */
+    /* and four single ones: force, solve, step, commit */
     return (uint16_t)(shared_stages(model) + factor_parts(model->n_p) + follow + fold + 4u);
 }
 

@@ -6,10 +6,10 @@
 
 #include "number/count.h"
 #include "number/finite_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
-/* How far a step goes in parameter a, as a part of what it is measured by: its own value where it is positive, else the
- * standard deviation of its start. As bits: those of |x| order as |x| does, infinity and NaN last. */
+/* Relative size of a step in parameter a: over p if it is positive, else over start_sd. Returned as bits: those of
+ * |x| are ordered like |x|, infinity and NaN last. */
 static inline uint32_t pvid_estimator_relative_step_f32(const pvid_estimator_f32 *self, size_t a, float step)
 {
     const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
@@ -65,8 +65,8 @@ static inline void pvid_estimator_apply_step_f32(pvid_estimator_f32 *self, const
     }
 }
 
-/* Whether the data speak of p[0]: what of its information no other parameter can imitate is a part
- * kappa of its diagonal entry, and more than the start brought along. */
+/* Sufficient excitation of p[0]: the share kappa of its diagonal entry that no other parameter can explain is
+ * large enough, and exceeds the prior information. */
 static inline bool pvid_estimator_is_excited_f32(const pvid_estimator_f32 *self, float kappa, float diagonal)
 {
     const bool own = (kappa * diagonal) >= (2.0f * self->prior[0]);

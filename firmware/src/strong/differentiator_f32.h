@@ -1,7 +1,7 @@
-/* The walk over a differentiator's window, outwards from its centre. Private to the core.
+/* The loop over a differentiator's window, outwards from its centre. Private to the core.
  *
- * Inlined, so that two channels in step with each other share the walk and the weights' loads, and orders that nobody
- * reads cost nothing. */
+ * Inlined, so that two channels in step share the loop and the weights' loads, and unused orders cost nothing.
+ */
 #ifndef PVID_DIFFERENTIATOR_F32_H
 #define PVID_DIFFERENTIATOR_F32_H
 
@@ -30,7 +30,7 @@ typedef struct {
     size_t older;
 } pvid_fir_walk;
 
-/* Both at the centre: half * stride after head, where the oldest sample stands. */
+/* Both at the centre: half * stride after head, the oldest sample. */
 static inline pvid_fir_walk pvid_fir_centre_f32(const pvid_differentiator_f32 *self)
 {
     const size_t length = self->length;
@@ -52,7 +52,7 @@ typedef struct {
     float sum[PVID_ORDERS];
 } pvid_fir_sums_f32;
 
-/* The sums of the nearest samples on either side; weight points to the first of a bank's table, whose orders stand
+/* The sums of the nearest samples on either side; weight points to the first weight of a bank, whose orders are
  * `half` apart. */
 static inline pvid_fir_sums_f32 pvid_fir_begin_f32(const float *weight, size_t half, float middle, float after,
                                                    float before)

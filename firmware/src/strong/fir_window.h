@@ -1,4 +1,4 @@
-/* The window of a bank of derivative filters, whatever the arithmetic. Private to the core. */
+/* The window of a bank of derivative filters, for both cores. Private to the core. */
 #ifndef PVID_FIR_WINDOW_H
 #define PVID_FIR_WINDOW_H
 
@@ -7,7 +7,8 @@
 #include "pvid/config.h"
 #include "pvid/status.h"
 
-/* What a bank says of its window, 2 half stride + 1 samples: the status names what makes it too short or too long. */
+/* Checks a bank's window, 2 half stride + 1 samples: the status names the field that makes it too short or too
+ * long. */
 static inline pvid_status pvid_fir_window(uint16_t half, uint16_t stride)
 {
     if ((half < 2u) || (half > ((PVID_MAX_WINDOW - 1u) / 2u))) {

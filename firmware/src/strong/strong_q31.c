@@ -4,8 +4,11 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
 #include "number/integer_q31.h"
 #include "judge/misfit_q31.h"
 #include "number/scaled_q31.h"
@@ -18,7 +21,7 @@
 #define GATE_MEMORY_PARTS 4u
 #define GATE_FLOOR_BITS 20 /* 1e-6 of its square */
 
-/* The gate's least scale: a part of row_sd^2, and no less than what rounding leaves of a row's dozen terms. */
+/* The gate's least scale: a part of row_sd^2, at least the rounding of a row's dozen terms. */
 static pvid_scaled_q31 gate_floor(const pvid_estimator_q31 *estimator)
 {
     const pvid_scaled_q31 rounding = pvid_scaled_of_q31(1, 0);
@@ -88,13 +91,8 @@ static pvid_status prepare(pvid_strong_q31 *self, const pvid_strong_config_q31 *
 
 pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 static void restart(pvid_strong_q31 *self)
@@ -146,7 +144,7 @@ static bool passes(pvid_strong_q31 *self, int64_t square)
     return (self->gate.limit.m == 0) || pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(square, 0));
 }
 
-/* A row: judged, let in or not, and solved with. */
+/* Judges a row, adds it if the gate accepts it, and solves. */
 static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
 {
     pvid_estimator_q31 *estimator = &self->estimator;

@@ -9,7 +9,7 @@
 #include "solve/cholesky_f32.h"
 #include "number/count.h"
 #include "solve/assess_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
 #include "full_angle_f32.h"
@@ -18,17 +18,17 @@
 
 enum {
     STAGE_COMBINE,   /* K times: a row of the Gram matrix at p, the columns of a function */
-    STAGE_REMAINDER, /* what linear rows lack, where that is asked for: stages of its own */
+    STAGE_REMAINDER, /* remainder of the linear rows, if enabled: its own stages */
     STAGE_FACTOR,    /* K times: a row of its Cholesky factor */
-    STAGE_TRACE,     /* 4 K times: a row of its inverse, then what noise is in it, in three sums */
+    STAGE_TRACE,     /* 4 K times: a row of its inverse, then its noise in three sums */
     STAGE_WHITEN,    /* K times: a row of L^-1 (Y, N, a, b) */
     STAGE_DIRECTION_A,
     STAGE_ALONG_A,  /* a few functions at a time */
-    STAGE_REMOVE_A, /* likewise */
+    STAGE_REMOVE_A, /* a few functions at a time */
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
-    STAGE_FIT,    /* what the rows leave unexplained, where the gate asks: a few functions at a time */
+    STAGE_FIT,    /* residuals of the rows for the gate, a few functions at a time */
     STAGE_ADD,    /* K times: a row to the estimator */
     STAGE_SOLVE,  /* `iterations` solves of several stages each */
     STAGE_ASSESS, /* several stages; the last one publishes or not */
@@ -37,7 +37,7 @@ enum {
 
 #define TRACE_STAGES (1u + PVID_NOISE_TRACES)
 
-/* Functions whose columns one stage of the projection takes. */
+/* Functions per stage of the projection. */
 #define FUNCTIONS_PER_STAGE 6u
 
 void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self)
@@ -78,8 +78,8 @@ static inline void subtract(float a, const float *restrict y, float *restrict x)
     }
 }
 
-/* The direction of a column over the functions; none, that is zero, where its squared length is not a
- * positive normal number (no drive: then there is nothing to remove either). */
+/* The direction of a column over the functions; 0 if its squared length is not a positive normal number (no drive:
+ * nothing to remove). */
 static void find_direction(pvid_weak_finish_f32 *self, size_t functions, size_t column,
                            const float sums[][PVID_WEAK_TERMS])
 {
@@ -153,8 +153,8 @@ static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *
     }
 }
 
-/* Before the rows: what noise there is (where the window keeps the whitening of its design, the last known), and
- * the past fades while it is to be aged. */
+/* Before the rows: sets their noise (if the window keeps the whitening of its design, the last known one) and
+ * fades the sums during a renewal. */
 static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator, pvid_trust_f32 *trust)
 {
     if (self->whiten.whitened) {
@@ -163,7 +163,7 @@ static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *est
     pvid_information_fade_f32(&estimator->information, pvid_trust_fade_factor_f32(trust));
 }
 
-/* A row to the estimator; its reason is told if it was refused. */
+/* Adds a row to the estimator; *reason is set if it is refused. */
 static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
 {
     float n[PVID_MAX_THETA];
@@ -192,7 +192,7 @@ static bool advance_solve(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_e
     self->iteration++;
     self->reason = self->solve.reason;
     self->size = self->solve.size;
-    /* not due: the divider says that this window only accumulates */
+    /* not due: by the divider this window only accumulates */
     if ((self->iteration >= iterations) || (self->reason == PVID_ACCUMULATED)) {
         return true;
     }

@@ -5,7 +5,9 @@
 
 #include "solve/cholesky_q31.h"
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 #include "weak/window_q31.h"
@@ -17,18 +19,18 @@ enum {
     STAGE_COMBINE,  /* K times: a row of the Gram matrix at p */
     STAGE_ASSEMBLE, /* the columns of a few functions at a time */
     STAGE_FACTOR,   /* K times, long rows in parts: a row of its Cholesky factor */
-    STAGE_TRACE,    /* likewise: a row of its inverse, and what noise is in it */
-    STAGE_WHITEN,   /* likewise: a row of L^-1 (Y, N, a, b) */
+    STAGE_TRACE,    /* K times: a row of its inverse and its noise */
+    STAGE_WHITEN,   /* K times: a row of L^-1 (Y, N, a, b) */
     STAGE_SQUARE_A, /* the length of a */
     STAGE_DIRECTION_A,
     STAGE_ALONG_A,  /* a few functions at a time */
-    STAGE_REMOVE_A, /* likewise */
+    STAGE_REMOVE_A, /* a few functions at a time */
     STAGE_SQUARE_B,
     STAGE_DIRECTION_B,
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
-    STAGE_FIT,    /* likewise: what the rows leave unexplained, for the gate */
-    STAGE_NOISE,  /* are the rows to be taken in? and what noise there is in them */
+    STAGE_FIT,    /* residuals of the rows for the gate, a few functions at a time */
+    STAGE_NOISE,  /* the gate, and the noise of the rows */
     STAGE_FADE,   /* in two parts: the past, while it is to be aged */
     STAGE_ADD,    /* K times: a row to the estimator */
     STAGE_SOLVE,  /* `iterations` solves of several stages each */
@@ -37,7 +39,7 @@ enum {
     STAGE_IDLE
 };
 
-/* Functions whose columns one stage takes that assembles them, looks along a direction, removes it, takes residuals. */
+/* Functions per stage of assembly, component along a direction, its removal, residuals. */
 #define ASSEMBLED_PER_STAGE 3u
 #define ALONG_PER_STAGE 6u
 #define REMOVED_PER_STAGE 3u
@@ -52,11 +54,11 @@ enum {
 #define COLUMN_LIMIT PVID_ROW_LIMIT_Q31
 
 #define COMBINATION_BITS 29 /* six of them times a Gram table of 30 bits fit an int64 */
-#define DIRECTION_BITS 27   /* squares of 64 of them likewise */
+#define DIRECTION_BITS 27   /* squares of 64 of them also fit */
 
-/* The noise in the rows is asked for to a few per cent: tables of 14 bits and rows of 13 do, whose products add up in
- * 32 bits. */
-#define GRAM_22 3u    /* the first of the three Gram tables that speak of chi'' and chi alone: 22, 20 + 02, 00 */
+/* The noise of the rows is needed to a few per cent: tables of 14 bits and rows of 13 suffice; their products add
+ * up in 32 bits. */
+#define GRAM_22 3u    /* the first of the three Gram tables of chi'' and chi: 22, 20 + 02, 00 */
 #define GRAM_DOWN 16u /* from a table's 30 bits to 14 */
 #define INVERSE_BITS 15
 #define INVERSE_LIMIT ((int32_t)1 << 26) /* 64 of them times an entry of L fit an int64 */
@@ -87,8 +89,8 @@ static factor_of_table reduced(int64_t m, int32_t bits, int32_t length)
     return result;
 }
 
-/* The residual of p has the filter chi'''' + d1 w chi'' + d2 w^2 chi: what its noise covariance is made of, beside
- * G44. The factors get one format, that of the table which needs the most of it. */
+/* The residual of p has the filter chi'''' + d1 w chi'' + d2 w^2 chi: factors of its noise covariance beside G44,
+ * in one format, that of the largest. */
 void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
                                 const pvid_estimator_q31 *estimator, pvid_scaled_q31 pivot)
 {
@@ -119,7 +121,7 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_desi
     for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
         self->trace[i] = none;
     }
-    /* in units of Y, whatever the sums were divided by */
+    /* in units of Y, independent of the sums' exponent */
     const int64_t square = (int64_t)estimator->row_sd * estimator->row_sd;
     self->expected = pvid_scaled_plus_q31(pvid_scaled_of_q31(square, -2 * PVID_ROW_SD_BITS), pivot);
     self->whitened = true;
@@ -178,7 +180,7 @@ static void assemble(const pvid_weak_design_q31 *design, int32_t sum[PVID_WEAK_T
     sum[COLUMN_SPARE] = 0;
 }
 
-/* Work on a triangle by rows, those beyond the first third in several parts each: what stage `index` does. */
+/* Work on a triangle by rows; rows beyond the first third have several parts. Sets row and part of stage `index`. */
 typedef struct {
     size_t row;
     size_t part;
@@ -204,9 +206,8 @@ static size_t parts_of_triangle(size_t functions, size_t parts)
     return whole + (parts * (functions - whole));
 }
 
-/* Entries first..last-1 of a row of L with L L^T = R0, in place. Rows of L have a length below 1, and so no sum of
- * theirs comes near PVID_WIDE, unless R0 cannot be factored: then the row's diagonal will tell, whatever its entries.
- */
+/* Entries first..last-1 of a row of L with L L^T = R0, in place. Rows of L have a length below 1, therefore none
+ * of their sums approaches PVID_WIDE unless R0 cannot be factored; then the row's diagonal shows it. */
 static void factor_entries(pvid_weak_finish_q31 *self, size_t row, size_t first, size_t last)
 {
     int32_t *l = &self->factor[row_start(row)];
@@ -296,8 +297,8 @@ static int64_t form_of(const PVID_TABLE int32_t *gram, const int32_t w[], size_t
     return sum;
 }
 
-/* Adds a row of L^-1 to the trace of R0^-1 G: the noise that the whitened rows have in the columns whose filters are
- * chi'' and chi, where they have a variance of 1 in Y. */
+/* Adds a row of L^-1 to the trace of R0^-1 G: the noise of the whitened rows in the columns with the filters chi''
+ * and chi, for unit variance in Y. */
 static void trace_row(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, size_t row, size_t which)
 {
     const size_t table = GRAM_22 + which;
@@ -307,8 +308,7 @@ static void trace_row(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
     self->trace[which] = pvid_scaled_plus_q31(self->trace[which], pvid_scaled_of_q31(form, exponent));
 }
 
-/* Three parts: the row of the inverse but for its costliest entries; these, and what it is worth in the first table;
- * and in the others. */
+/* Three parts: the row of the inverse without its costliest entries; these, and the first table; the other tables. */
 static void trace_part(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, row_part part)
 {
     const bool whole = part.parts == 1u;
@@ -359,8 +359,8 @@ static void whiten_part(pvid_weak_finish_q31 *self, row_part part, int32_t sums[
     }
 }
 
-/* A column over the functions with its length, whose reciprocal is left in self->length; 0 where the column is: no
- * drive, then there is nothing to remove either. */
+/* A column over the functions and its length; its reciprocal is stored in self->length. 0 for a zero column: no
+ * drive, nothing to remove. */
 static void find_length(pvid_weak_finish_q31 *self, size_t functions, size_t column,
                         int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
@@ -410,8 +410,8 @@ static void remove_components(pvid_weak_finish_q31 *self, size_t first, size_t l
     }
 }
 
-/* What a window's rows leave unexplained, a few functions at a time; a row that does not fit as large as can be. Only
- * the gate asks for it. */
+/* Residuals of a window's rows, a few functions at a time; the largest value for a row that does not fit. For the
+ * gate only. */
 static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *estimator, size_t first, size_t last,
                           int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
@@ -426,22 +426,22 @@ static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *
     }
 }
 
-/* Variance of the window's residuals over what is expected of it. */
+/* Residual variance of the window over its expectation. */
 static pvid_scaled_q31 variance_ratio_of(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
 {
     const pvid_scaled_q31 freedom = pvid_scaled_of_q31((int64_t)design->functions - 2, 0);
     return pvid_scaled_over_q31(pvid_scaled_of_q31(self->energy, 0), pvid_scaled_times_q31(freedom, self->expected));
 }
 
-/* Whether the window's rows are to be taken in. Those that do not fit are asked no more: they are refused as such. */
+/* Whether the window's rows are used. Rows that do not fit are refused without the gate. */
 static bool passes(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
 {
     return (self->gate.limit.m == 0) || self->saturated ||
            pvid_gate_passes_q31(&self->gate, variance_ratio_of(self, design));
 }
 
-/* Before the rows: what noise there is in the entries of N, in their formats; the last that is known where the window
- * keeps the whitening of its design. */
+/* Before the rows: sets the noise of the entries of N, in their formats; the last known one if the window keeps
+ * the whitening of its design. */
 static void set_noise(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
                       pvid_estimator_q31 *estimator)
 {
@@ -460,7 +460,7 @@ static void set_noise(const pvid_weak_finish_q31 *self, const pvid_weak_design_q
     }
 }
 
-/* A row to the estimator; its reason is told if it was refused. */
+/* Adds a row to the estimator; *reason is set if it is refused. */
 static void add_row(const pvid_weak_finish_q31 *self, const int32_t column[PVID_WEAK_TERMS_Q31],
                     pvid_estimator_q31 *estimator, pvid_reason *reason)
 {
@@ -492,7 +492,7 @@ static bool advance_solve(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_e
     self->iteration++;
     self->reason = self->solve.reason;
     self->size = self->solve.size;
-    /* not due: the divider says that this window only accumulates */
+    /* not due: by the divider this window only accumulates */
     if ((self->iteration >= iterations) || (self->reason == PVID_ACCUMULATED)) {
         return true;
     }

@@ -10,16 +10,15 @@
 /* No work. */
 void pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self);
 
-/* Starts on the window whose sums stand in self->buffer, at the estimator's present p; pivot: the variance that the
- * pivot sensor's noise gives a row [Y's integer^2]. */
+/* Starts on the window with the sums of self->buffer, at the estimator's present p; pivot: variance of a row by
+ * the pivot sensor's noise [Y's integer^2]. */
 void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design,
                                 const pvid_estimator_q31 *estimator, pvid_scaled_q31 pivot);
 
 /* Whether a window is in work. */
 bool pvid_weak_finish_is_busy_q31(const pvid_weak_finish_q31 *self);
 
-/* One stage; sums are those of self->buffer. Writes what became of it to *reason if there is something to tell: a row
- * was refused, or the window is done. */
+/* One stage; sums are those of self->buffer. Sets *reason if a row was refused or the window is complete. */
 void pvid_weak_finish_step_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design, uint8_t iterations,
                                int32_t sums[][PVID_WEAK_TERMS_Q31], pvid_estimator_q31 *estimator,
                                pvid_trust_q31 *trust, pvid_reason *reason);

@@ -1,8 +1,8 @@
-/* The schedule of the weak form: what a tick does by its place in a block, whatever the arithmetic. Private to the
- * core.
+/* The schedule of the weak form: the work of a tick by its place in a block, for both cores. Private to the core.
  *
- * Of the D ticks of a block the first half does the front end's FIR job, the second half adds its result to the two
- * windows; the stages of a complete window stand in the ticks that add nothing. */
+ * Of the D ticks of a block the first half runs the front end's FIR job, the second half adds its result to the
+ * two windows; the stages of a complete window run in the ticks that add nothing.
+ */
 #ifndef PVID_WEAK_SCHEDULE_H
 #define PVID_WEAK_SCHEDULE_H
 
@@ -24,7 +24,7 @@ static inline bool pvid_is_odd_within(uint16_t n, uint16_t low, uint16_t high)
     return ((n % 2u) == 1u) && (n >= low) && (n <= high);
 }
 
-/* What a design says of its sizes: the status names the first that is out of range. */
+/* Checks the sizes of a design: the status names the first one out of range. */
 static inline pvid_status pvid_weak_sizes(uint16_t taps, uint16_t decimation, uint16_t window, uint8_t functions,
                                           uint8_t most_functions, uint8_t lag)
 {
@@ -79,7 +79,7 @@ static inline uint8_t pvid_weak_stages_per_tick(uint32_t stages, uint16_t window
 
 /* ---- the front end's job ---- */
 
-/* Nothing in the ring, nothing to do. */
+/* Empty ring, no job. */
 static inline void pvid_weak_job_reset(pvid_weak_job *self)
 {
     self->head = 0;
@@ -115,7 +115,7 @@ static inline bool pvid_weak_job_begins(pvid_weak_job *self)
         return false;
     }
     self->wait = self->decimation;
-    /* the newest sample stands before head, the centre `half` before that */
+    /* the newest sample is before head, the centre `half` before that */
     const uint16_t back = (uint16_t)(self->half + 1u);
     const uint16_t centre =
         (uint16_t)((self->head >= back) ? (self->head - back) : ((self->head + self->length) - back));

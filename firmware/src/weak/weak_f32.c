@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
@@ -76,7 +77,7 @@ static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f3
     return pvid_estimator_init_f32(&self->estimator, &estimator);
 }
 
-/* Windows that the gate's scale remembers; it stands relative to what noise explains, below which it never falls. */
+/* Windows in the average of the gate's scale, which is relative to the sensors' noise and never below it. */
 #define GATE_MEMORY 4.0f
 
 /* Whether init has accepted a configuration. */
@@ -98,8 +99,8 @@ static void restart_window(pvid_weak_window_f32 *window, uint16_t index)
     }
 }
 
-/* The first window begins with the next decimated sample. The second is then in its middle: what
- * it sums until its own start, half a window later, is discarded. */
+/* The first window begins with the next decimated sample. The second is then in its middle: its sums until its own
+ * start, half a window later, are discarded. */
 static void restart(pvid_weak_f32 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);
@@ -185,13 +186,8 @@ static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *conf
 
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_weak_gap_f32(pvid_weak_f32 *self)
@@ -259,9 +255,8 @@ static pvid_reason drop_reason(pvid_weak_f32 *self, const pvid_weak_window_f32 *
     return PVID_ACCUMULATED;
 }
 
-/* A window that has come round hands its sums over and goes on in the buffer that is free. Its last
- * sample, which has no weight, is the first one of the next. A window that is dropped leaves its sums where
- * they are, to be cleared. */
+/* A complete window hands its sums over and continues in the free buffer. Its last sample, which has no weight, is
+ * the first one of the next window. A dropped window keeps its sums, which are then cleared. */
 static pvid_reason hand_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
 {
     const pvid_reason reason = drop_reason(self, window);

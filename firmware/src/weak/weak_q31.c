@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
@@ -15,10 +16,10 @@
 #define U_LIMIT ((int32_t)1 << 18)
 #define COUNTS_LIMIT ((int32_t)1 << 24)
 #define EXPONENT_LIMIT 200
-#define TERM_LIMIT ((int64_t)1 << 20) /* of what a test function is multiplied with */
+#define TERM_LIMIT ((int64_t)1 << 20)                                        /* of the factors of a test function */
 #define MOST_FUNCTIONS ((PVID_MAX_FUNCTIONS < 32) ? PVID_MAX_FUNCTIONS : 32) /* form_of in weak/finish_q31.c */
 
-/* Windows that the gate's scale remembers; it stands relative to what noise explains, below which it never falls. */
+/* Windows in the average of the gate's scale, which is relative to the sensors' noise and never below it. */
 #define GATE_MEMORY 4u
 
 static bool is_count(int32_t x, int32_t limit)
@@ -142,8 +143,8 @@ static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
     window->curvatures = 0;
 }
 
-/* The first window begins with the next decimated sample. The second is then in its middle: what it sums until
- * its own start, half a window later, is discarded, but must not be added to its earlier sums. */
+/* The first window begins with the next decimated sample. The second is then in its middle: its sums until its own
+ * start, half a window later, are discarded, but must not be added to its earlier sums. */
 static void restart(pvid_weak_q31 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);
@@ -213,13 +214,8 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
 
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 static void next_curvature(pvid_weak_curvature_q31 *self, uint8_t lag, int32_t f)
@@ -267,9 +263,9 @@ void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen)
     }
 }
 
-/* A window that has come round hands its sums over and goes on in the buffer that is free. Its last sample, which has
- * no weight, is the first one of the next. Returns why the window is dropped, if it is, or PVID_ACCUMULATED: its sums
- * are cleared where they are. */
+/* A complete window hands its sums over and continues in the free buffer. Its last sample, which has no weight, is
+ * the first one of the next window. Returns PVID_ACCUMULATED, or why the window is dropped; its sums are then
+ * cleared in place. */
 static pvid_reason hand_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 {
     self->warm = true;

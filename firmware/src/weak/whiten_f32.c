@@ -8,7 +8,7 @@
 #include "number/finite_f32.h"
 #include "number/unroll.h"
 
-/* The first of the three Gram tables that speak of chi'' and chi alone: G22, G20 + G02, G00. */
+/* The first of the three Gram tables of chi'' and chi: G22, G20 + G02, G00. */
 #define GRAM_22 3u
 
 static size_t row_start(size_t row)

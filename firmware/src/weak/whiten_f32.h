@@ -25,9 +25,9 @@ void pvid_weak_whiten_row_f32(const pvid_weak_whiten_f32 *self, size_t row, floa
 /* inverse[0..row] = row `row` of L^-1. */
 void pvid_weak_whiten_inverse_f32(const pvid_weak_whiten_f32 *self, size_t row, float inverse[]);
 
-/* Adds that row's part of trace number `which`: trace(R0^-1 G22), trace(R0^-1 G20), trace(R0^-1 G00), energy of noise
- * of unit variance in the columns chi'' phi and chi phi. The first row begins the sum, the last one scales it to a row
- * of the window: self->trace is then what the model's `noise` wants. */
+/* Adds a row's part of trace number `which`: trace(R0^-1 G22), trace(R0^-1 G20), trace(R0^-1 G00), the energy of
+ * unit noise in the columns chi'' phi and chi phi. The first row starts the sum, the last one scales it to a row
+ * of the window: self->trace is then the argument of the model's `noise`. */
 void pvid_weak_whiten_trace_f32(pvid_weak_whiten_f32 *self, const pvid_weak_design_f32 *design, size_t row,
                                 const float inverse[], size_t which);
 

@@ -44,7 +44,7 @@ void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, fl
     const float i2_f = integrate(self, F, phi, half_dt, correction);
     const float i2_u = integrate(self, U, u, half_dt, correction);
     observe(self, phi, u, curvature);
-    if (self->index == 0u) { /* no weight, and 0 times what is infinite would not be 0 */
+    if (self->index == 0u) { /* no weight, and 0 times infinity would not be 0 */
         memset(term, 0, PVID_WEAK_SAMPLE_TERMS * sizeof term[0]);
         return;
     }

@@ -8,8 +8,8 @@
 
 /* What a decimated sample adds, by the factor of the table: places among the terms. Integrals in dt^2/12. */
 enum {
-    PVID_TERM_UIUF_HIGH_Q31 = 0, /* chi'' (-U I2(U F)): what goes beyond a term, without a shift */
-    PVID_TERM_UIF_HIGH_Q31 = 1,  /* chi'' (-U I2(F)) likewise */
+    PVID_TERM_UIUF_HIGH_Q31 = 0, /* chi'' (-U I2(U F)): high part, without a shift */
+    PVID_TERM_UIF_HIGH_Q31 = 1,  /* chi'' (-U I2(F)): high part */
     PVID_TERM_UF_Q31 = 2,        /* chi'' (-U F) */
     PVID_TERM_F_Q31 = 3,         /* chi'' (-F) */
     PVID_TERM_UIUF_Q31 = 4,      /* chi'' (-U I2(U F)): the rest */

@@ -12,7 +12,7 @@ struct pvid_estimator_f32 {
     const pvid_model_f32 *model;
     pvid_information_f32 information;
     float p[PVID_MAX_P];
-    float theta[PVID_MAX_THETA];  /* f(p); only for models without functions of their own */
+    float theta[PVID_MAX_THETA];  /* f(p); only for models without their own project */
     float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
     float prior[PVID_MAX_P];      /* diagonal of H0 */
     float start_sd[PVID_MAX_P];
@@ -26,10 +26,10 @@ struct pvid_estimator_f32 {
     float noise_margin;
     float dead_zone;                /* squared */
     float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; written by the module that makes the rows */
-    float energy;                   /* sum of e^2 of the rows since the last group's end, at the p they met */
-    float group_weight;             /* their weight; these two only for models without functions of their own */
-    float expected;                 /* mean over the rows in the sums of the variance that the sensors' noise gives them
-                                       [units of Y^2]: no residual variance is taken for smaller. 0: nobody has said */
+    float energy;                   /* sum of e^2 of the rows of the current group, each at the p of its tick */
+    float group_weight; /* their weight; energy and group_weight only for models without their own project */
+    float expected;     /* mean over the rows in the sums of their variance by the sensors' noise [units of Y^2]: lower
+                           limit of the residual variance. 0: unknown */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
     uint8_t engine; /* by the model: set by init */
@@ -52,9 +52,9 @@ struct pvid_estimator_solve_f32 {
     const float *fallback;       /* [n_p] where p goes if it may not step; NULL: it stays */
     pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
     float size;                  /* largest |dp/p| of the step before its limit; 0 while p is held */
-    float energy;                /* sum of e^2 of the group's rows at the p they met */
+    float energy;                /* sum of e^2 of the group's rows, each at the p of its tick */
     float variance;              /* of a row's noise */
-    bool above_noise;            /* the data say more than noise does */
+    bool above_noise;            /* S contains more information than noise alone */
     bool solvable;
     uint8_t stage;
     uint8_t index; /* of the row within the stage */

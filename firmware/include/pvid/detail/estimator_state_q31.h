@@ -20,7 +20,7 @@ typedef struct {
 /* The sums M, b, rr and weight. */
 typedef struct {
     uint8_t n_theta;
-    uint8_t exponent; /* M, b and rr stand divided by 4^exponent */
+    uint8_t exponent; /* M, b and rr are divided by 4^exponent */
     uint16_t n_sums;
     uint16_t block;    /* groups of rows between acts of forgetting */
     uint16_t age;      /* groups since the last one */
@@ -36,7 +36,7 @@ struct pvid_estimator_q31 {
     int32_t p[PVID_MAX_P];
     int64_t theta[PVID_MAX_THETA_Q31];    /* f(p) */
     int32_t mantissa[PVID_MAX_THETA_Q31]; /* of theta, 30 bits, */
-    int16_t shift[PVID_MAX_THETA_Q31];    /* and what N_i mantissa_i is shifted right by to be in units of Y */
+    int16_t shift[PVID_MAX_THETA_Q31];    /* right shift of N_i mantissa_i to units of Y */
     int64_t fresh[PVID_MAX_THETA_Q31];    /* sum N e since the last solve; only while g < 1 */
     int16_t align[PVID_MAX_THETA_Q31];    /* N_i theta_i 2^-align is in units of Y */
     int16_t theta_bits[PVID_MAX_THETA_Q31];
@@ -54,8 +54,8 @@ struct pvid_estimator_q31 {
     uint32_t noise_margin;
     uint32_t dead_zone;
     pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by the module that makes the rows */
-    int64_t energy;       /* sum of e^2 of the rows since the last group's end, at the p they met, at most PVID_WIDE */
-    int64_t group_weight; /* their weight, Q16 */
+    int64_t energy; /* sum of e^2 of the rows of the current group, each at the p of its tick, at most PVID_WIDE */
+    int64_t group_weight;     /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them
                                  [units of Y's integer squared]: residual variances are at least this. 0: not set */
     uint16_t divider;
@@ -89,12 +89,12 @@ struct pvid_estimator_solve_q31 {
     uint8_t start; /* of the column of C in work among its non-zeros */
     bool ends_group;
     bool judging;     /* an assessment */
-    bool above_noise; /* the data say more than noise does */
+    bool above_noise; /* S contains more information than noise alone */
     bool has_fallback;
     bool in_dead_zone;                      /* within the dead zone: no step is taken */
     int32_t fallback[PVID_MAX_P];           /* where p goes if it may not step */
     int64_t size;                           /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
-    int64_t energy;                         /* sum of e^2 of the group's rows at the p they met */
+    int64_t energy;                         /* sum of e^2 of the group's rows, each at the p of its tick */
     pvid_scaled_q31 variance;               /* of a row's noise, divided by 4^exponent as the sums are */
     pvid_root_q31 wide;                     /* root of the variance that standard errors are made of */
     int32_t column[PVID_MAX_P][PVID_MAX_P]; /* of an inverted factor, and */
@@ -104,7 +104,7 @@ struct pvid_estimator_solve_q31 {
     int16_t h[PVID_MAX_THETA_Q31];
     int32_t c[PVID_MAX_C_Q31]; /* C_k = c_k 2^(f_column - h_row) */
     int16_t f[PVID_MAX_P];
-    int32_t force[PVID_MAX_THETA_Q31]; /* what drives the step, by rows: 2^(force_exponent + h_row) */
+    int32_t force[PVID_MAX_THETA_Q31]; /* right-hand side by rows: 2^(force_exponent + h_row) */
     int32_t force_exponent;
     int64_t s[PVID_MAX_P][PVID_MAX_P]; /* C^T M C + H0, in units of 2^(f_a + f_b + 32) */
     int64_t first_prior;               /* H0 of p[0], in the units of s */

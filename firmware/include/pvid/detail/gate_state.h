@@ -10,8 +10,8 @@ struct pvid_gate_f32 {
     float memory;   /* residuals that the scale remembers */
     float floor;    /* least scale */
     float widening; /* factor on the scale at an outlier */
-    float judged;   /* residuals taken in; stops at memory */
-    float scale;    /* mean square of what passed */
+    float judged;   /* accepted residuals; stops at memory */
+    float scale;    /* mean square of the accepted residuals */
 };
 
 #endif

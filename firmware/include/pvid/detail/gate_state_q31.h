@@ -9,10 +9,10 @@ struct pvid_gate_q31 {
     pvid_scaled_q31 limit;    /* sigmas^2; 0: no gate */
     pvid_scaled_q31 floor;    /* least scale */
     pvid_scaled_q31 widening; /* factor on the scale at an outlier */
-    pvid_scaled_q31 scale;    /* mean square of what passed */
+    pvid_scaled_q31 scale;    /* mean square of the accepted residuals */
     pvid_scaled_q31 part;     /* of it that the next one replaces: 1 / judged */
     uint32_t memory;          /* residuals that the scale remembers */
-    uint32_t judged;          /* residuals taken in; stops at memory */
+    uint32_t judged;          /* accepted residuals; stops at memory */
 };
 
 #endif

@@ -8,7 +8,7 @@
 struct pvid_misfit_f32 {
     float growth;       /* of the quietest ones, a block, >= 1: forgetting */
     float energy;       /* of the block so far: sum of e^2 */
-    float signal;       /* likewise: sum of (p[0] dY/dp[0])^2 */
+    float signal;       /* sum of (p[0] dY/dp[0])^2 of the block */
     float least_energy; /* of a block */
     float least_part;   /* q of a block */
     uint16_t block;     /* rows of a block, 1.. */

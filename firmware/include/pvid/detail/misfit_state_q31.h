@@ -7,7 +7,7 @@
 /* Only the strong form writes to it. */
 struct pvid_misfit_q31 {
     int64_t few_energy;           /* of the last rows, at most 64: sum of e^2 */
-    int64_t few_signal;           /* likewise: sum of (p[0] dY/dp[0] / 8)^2 */
+    int64_t few_signal;           /* sum of (p[0] dY/dp[0] / 8)^2 of them */
     pvid_scaled_q31 energy;       /* of the block's rows before them */
     pvid_scaled_q31 signal;       /* of (p[0] dY/dp[0])^2 */
     pvid_scaled_q31 growth;       /* of the quietest ones, a block, 1..2: forgetting */

@@ -10,7 +10,7 @@ struct pvid_strong_f32 {
     float inverse_l1;       /* [1/m] */
     float drive;            /* mean square of u over about a second [1/s^4] */
     float drive_forgetting; /* part of it that a tick replaces */
-    float drive_min;        /* mean square below which no row is taken in */
+    float drive_min;        /* mean square of u below which no row is used */
     bool frozen;
     bool alarm; /* the last block of rows was a misfit: see misfit.h */
     pvid_gate_f32 gate;

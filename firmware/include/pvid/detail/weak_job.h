@@ -1,7 +1,8 @@
-/* pvid/detail/weak_job.h - how the front end of the weak form, in either arithmetic, keeps its place.
+/* pvid/detail/weak_job.h - position of the weak form's front end, for both cores.
  *
- * Samples stand in a ring; every `decimation` samples a block is complete, and the FIR job at its centre is done in
- * slices, outwards from there, while the next samples arrive. */
+ * Samples are in a ring; every `decimation` samples a block is complete, and its FIR job runs in parts, outwards
+ * from the centre, while the next samples arrive.
+ */
 #ifndef PVID_DETAIL_WEAK_JOB_H
 #define PVID_DETAIL_WEAK_JOB_H
 

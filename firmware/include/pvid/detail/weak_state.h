@@ -22,7 +22,7 @@ typedef struct {
 /* What a window gathers for each test function: eight sums with chi'', four with chi, one with chi''''. */
 #define PVID_WEAK_TERMS 13
 
-/* What a sample brings to these sums. */
+/* Terms of a sample in these sums. */
 #define PVID_WEAK_SAMPLE_TERMS 8
 
 /* One of the two windows. */

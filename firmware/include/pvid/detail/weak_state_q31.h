@@ -48,7 +48,7 @@ typedef struct {
     uint8_t iteration;
     uint8_t buffer;
     bool whitened;     /* the Gram matrix could be factored */
-    bool saturated;    /* a column did not fit: none of the window's rows is taken in */
+    bool saturated;    /* a column did not fit: no row of the window is used */
     int16_t gram_bits; /* format of the Gram matrix at p, even */
     int32_t combination[PVID_WEAK_GRAMS];
     int16_t exponent[PVID_MAX_FUNCTIONS];            /* of the rows of the Gram matrix */

@@ -2,7 +2,7 @@
 #ifndef PVID_FREESTANDING_MATH_H
 #define PVID_FREESTANDING_MATH_H
 
-/* Correctly rounded, to nearest even, as IEEE 754 asks. With an FPU the compiler writes its instruction. */
+/* Correctly rounded, to nearest even, as IEEE 754 requires. With an FPU the compiler emits its instruction. */
 float sqrtf(float x);
 
 #endif

@@ -33,4 +33,4 @@ def toml_document(text: str) -> dict[str, Any]:
     except ValueError as error:  # an integer of more digits than Python reads
         raise PvidError("is no TOML for pvid: a number in it has thousands of digits") from error
     except RecursionError as error:
-        raise PvidError("is no TOML for pvid: its tables are nested too deeply") from error
+        raise PvidError("cannot be read as TOML: its tables are nested too deeply") from error

@@ -163,7 +163,7 @@ def collect(
             silent_at = now + patience_s
             ask_at = ask_at if sequence else now
         elif now > silent_at:
-            raise PvidError(f"{target.name} has said nothing for {patience_s:g} s")
+            raise PvidError(f"{target.name} sent nothing for {patience_s:g} s")
         for item in decoder.feed(data):
             if not isinstance(item, Frame):
                 continue

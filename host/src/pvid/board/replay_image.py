@@ -248,7 +248,7 @@ def parse_report(text: str) -> ReplayReport:
     lines = [line.strip() for line in text.splitlines()]
     if "done" not in lines:
         last = next((line for line in reversed(lines) if line), "nothing")
-        raise PvidError(f"the image did not come to its end; its last words: {last}")
+        raise PvidError(f"the image did not finish; its last output: {last}")
     values = dict(line.split(" ", 1) for line in lines if re.fullmatch(r"[a-z_0-9]+ [0-9a-f]+", line))
     number = {name: int(value) for name, value in values.items() if value.isdecimal()}
     total = int(values["total_counts_high"] + values["total_counts_low"], 16)

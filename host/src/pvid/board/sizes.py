@@ -162,7 +162,7 @@ def write_budget(path: Path, footprints: dict[Configuration, Footprint]) -> None
     """
     old = path.read_text(encoding="utf-8")
     if OPENING not in old or CLOSING not in old:
-        raise PvidError(f"{path} has no place for the budget: the lines {OPENING} and {CLOSING}")
+        raise PvidError(f"{path} does not contain the marker lines of the budget, {OPENING} and {CLOSING}")
     head, rest = old.split(OPENING, 1)
     write_whole(path, f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}")
 

@@ -57,7 +57,9 @@ def _guarded(guard: str, lines: list[str]) -> str:
 
 def headers(rig: StreamRig) -> dict[str, str]:
     """The headers of an image by file name."""
-    number = f"#define STREAM_SETTINGS 0x{settings_number(rig):08X}u /* CRC-32 of what follows and of the tables */"
+    number = (
+        f"#define STREAM_SETTINGS 0x{settings_number(rig):08X}u /* CRC-32 of the following lines and of the tables */"
+    )
     return {
         "stream_rig.h": _guarded("STREAM_RIG_H", [number, *_macros(rig)]),
         "stream_tables.h": _tables(rig),

@@ -391,8 +391,8 @@ def refusal(status: BoardStatus) -> str:
     words = {
         Code.REFUSED_SETTINGS: "its image was made for other settings or tables; build it for this rig file",
         Code.REFUSED_FORM: "its image holds the other form or the other core",
-        Code.REFUSED_SOURCE: "it knows no such source of samples",
-        Code.ARITHMETIC: "its float arithmetic is not what the bits need",
+        Code.REFUSED_SOURCE: "the source of samples is unknown to it",
+        Code.ARITHMETIC: "its float arithmetic is not bit-exact",
     }
     return words.get(Code(status.code), f"code {status.code}") if status.code in list(Code) else f"code {status.code}"
 

@@ -21,8 +21,16 @@ from pvid.run.survey import fitted
 @click.command(name="compare")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
 @form_options
-@click.option("--core", type=click.Choice(["f32", "q31", "all"]), help="Which arithmetic.  [default: the rig file's]")
-@click.option("--on", "targets", metavar="TARGET", multiple=True, help="Also there: emulator, serial port, all.")
+@click.option(
+    "--core", type=click.Choice(["f32", "q31", "all"]), help="Arithmetic: f32, q31 or both.  [default: the rig file's]"
+)
+@click.option(
+    "--on",
+    "targets",
+    metavar="TARGET",
+    multiple=True,
+    help="Also compare on TARGET (emulator, serial port or 'all'); repeatable.",
+)
 def command(
     run_path: Path,
     rig_path: Path | None,
@@ -33,10 +41,10 @@ def command(
     core: str | None,
     targets: tuple[str, ...],
 ) -> int:
-    """Compares the C core with its numpy twin on RUN, after every tick, in every bit: start and tables are those of
-    identify.
+    """Compares the C core with its numpy twin on RUN: every bit of the state after every tick.
 
-    With --on the run is streamed to targets, too, and their running hashes are held against the host's.
+    Start and tables are those of identify. With --on the run is also streamed to targets, and their running hashes are
+    compared with the host's.
     """
     from pvid.board.compare_on import Outcome, compare_here, compare_there
     from pvid.board.target import targets_of

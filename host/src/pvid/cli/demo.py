@@ -92,13 +92,18 @@ def play_demo(
 
 
 @click.command(name="demo")
-@click.option("--figure", type=FigurePath(), default=Path("pvid-demo.png"), help="Where the figure goes.")
-@click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
+@click.option(
+    "--figure",
+    type=FigurePath(),
+    default=Path("pvid-demo.png"),
+    help="File of the figure (png, svg, pdf).  [default: pvid-demo.png]",
+)
+@click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and the start.")
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
 @click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
 def command(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
-    """Simulates the standard rig and streams it into the firmware on an emulated board; compares every bit."""
+    """Simulates the standard rig, streams it to the firmware on an emulated board and compares every bit."""
     on = target()
     if on.lacking is not None:
         write_stderr(f"{on.lacking}: the firmware runs on {on.where}")

@@ -31,9 +31,9 @@ from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_RELEASE
     metavar="A,F,PHASE",
     help="Predict for this drive [m,Hz,rad]; repeatable.  [default: the standard rig's]",
 )
-@click.option("--release", nargs=2, type=float, help="phi1, phi1+phi [rad] that a predicted run starts from, at rest.")
-@click.option("--duration", type=float, help="Length to predict for [s].  [default: the run's, else 40]")
-@click.option("--json", "as_json", is_flag=True, help="Prints one JSON object.")
+@click.option("--release", nargs=2, type=float, help="Initial phi1, phi1+phi of a predicted run [rad], at rest.")
+@click.option("--duration", type=float, help="Length of the predicted run [s].  [default: the run's, else 40]")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(
     rig_path: Path | None,
     settings: tuple[str, ...],
@@ -44,7 +44,7 @@ def command(
     duration: float | None,
     as_json: bool,
 ) -> int:
-    """Predicts what the weak form's tables for a rig will give: standard errors, kappa, delay, memory, instructions.
+    """Predicts standard errors, kappa, delay, memory and instructions of the weak form for a rig.
 
     The drive comes from a recorded run or from tones, not from the rig file. The tables themselves are printed by
     tables.
@@ -56,11 +56,11 @@ def command(
         raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
     if run_path is None:
         if columns is not None:
-            raise PvidError("--columns is for the run: name it with --run")
+            raise PvidError("--columns needs --run")
         drive = tuple(tone(text) for text in tones) or STANDARD_DRIVE
         report = report_for_tones(rig, drive, release or STANDARD_RELEASE, duration or 40.0)
     elif tones or release:
-        raise PvidError("--run says how the rig was driven: leave --tone and --release out")
+        raise PvidError("--run contains the drive: omit --tone and --release")
     else:
         report = report_for_run(rig, read_input(run_path, rig, columns, whole=True), duration)
     if as_json:

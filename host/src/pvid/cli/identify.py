@@ -23,7 +23,9 @@ from pvid.run.survey import fitted
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
 @form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
-@click.option("--on", "target", metavar="TARGET", help="Also compute on an emulator, stream-host or a serial port.")
+@click.option(
+    "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 def command(
@@ -38,13 +40,13 @@ def command(
     as_json: bool,
     figure: Path | None,
 ) -> int:
-    """Identifies a recorded or simulated RUN: columns t [s], phi [rad], y [m], or what --columns names.
+    """Identifies the parameters from a recorded or simulated RUN with columns t [s], phi [rad] and y [m].
 
-    A rig file is not needed: --set l1=0.25, the length of rod 1 [m], is enough. Short gaps are interpolated, long ones
-    stay empty, a clock that is not uniform is corrected; all of these are reported.
+    --columns maps other names and units. Without a rig file --set l1=0.25, the length of rod 1 [m], is enough. Short
+    gaps are interpolated, long gaps stay empty, a non-uniform clock is corrected; each correction is reported.
 
-    With --on the run is also streamed to a target, and the result is printed only if the target computed the same
-    bits at every tick that it reported and at the end.
+    With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
+    reported tick and at the end.
     """
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
     run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)

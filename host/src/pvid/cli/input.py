@@ -34,7 +34,7 @@ def rig_options(command: Command) -> Command:
         "settings",
         metavar="KEY=VALUE",
         multiple=True,
-        help="Value of a key of the rig file; overrides the file: l1=0.25 [m] or sensor.phi_lsb=0.0015 [rad]. "
+        help="Sets a key of the rig file, overriding the file: l1=0.25 [m] or sensor.phi_lsb=0.0015 [rad]. "
         "Only l1 is needed. Repeatable.",
     )
     return rig(settings(command))
@@ -54,8 +54,14 @@ def columns_option(command: Command) -> Command:
 
 def form_options(function: Command) -> Command:
     for option in (
-        click.option("--form", type=click.Choice(["weak", "strong"]), help="Form; overrides the rig file."),
-        click.option("--law", type=click.Choice(["stationary", "pseudovelocity"]), help="Law; overrides the rig file."),
+        click.option(
+            "--form", type=click.Choice(["weak", "strong"]), help="Form of the identifier; overrides the rig file."
+        ),
+        click.option(
+            "--law",
+            type=click.Choice(["stationary", "pseudovelocity"]),
+            help="Law of the estimator; overrides the rig file.",
+        ),
         columns_option,
         rig_options,
     ):
@@ -112,7 +118,7 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
 
     if path.suffix == LOG_SUFFIX:
         if columns is not None:
-            raise PvidError(f"{path} is a log, whose columns are known: leave --columns out")
+            raise PvidError(f"{path} is a log with known columns: omit --columns")
         return aligned(run_of_log(path), rig.sensor.y_delay)
     run = aligned(read_run(path, rig.sample_rate, columns), rig.sensor.y_delay)
     run.refuse_damaged()

@@ -34,17 +34,17 @@ from pvid.show.view import LiveView
 @click.argument("port")
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file; copied into the log, for verify.")
-@click.option("--append", is_flag=True, help="OUT may exist: new segments are appended to it.")
-@click.option("--restart", is_flag=True, help="Start a new session whenever the link comes up (needs --rig).")
-@click.option("--paced", is_flag=True, help="The started board samples as fast as the line allows, not in real time.")
-@click.option("--duration", type=click.FloatRange(min=0), help="Stop after this time [s].  [default: at Ctrl-C]")
+@click.option("--append", is_flag=True, help="Append to an existing log.")
+@click.option("--restart", is_flag=True, help="Restart the board on every (re)connection (needs --rig).")
+@click.option("--paced", is_flag=True, help="Sample as fast as the line allows instead of in real time.")
+@click.option("--duration", type=click.FloatRange(min=0), help="Stop after this time [s].  [default: stop at Ctrl-C]")
 @click.option("--samples", type=click.IntRange(min=1), help="Stop after this number of samples.")
 @click.option(
     "--live",
     "live",
     metavar="URL",
     multiple=True,
-    help="Also send to udp://host:9870 (JSON: PlotJuggler) or teleplot://host:47269; repeatable.",
+    help="Send live data to udp://host:9870 (JSON for PlotJuggler) or teleplot://host:47269; repeatable.",
 )
 @click.option(
     "--allow-loss",
@@ -88,7 +88,7 @@ def command(
     if emulated and rig is None:
         rig = RigFile.standard()
     if restart and rig is None:
-        raise PvidError("--restart needs --rig: the board starts over with its settings")
+        raise PvidError("--restart needs --rig: the board is restarted with its settings")
     if append:
         refuse_to_append(out, rig)
     board = None if rig is None else _board(rig)
@@ -123,7 +123,7 @@ def command(
 def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
     if address and not is_local(address):
-        write_stderr(f"every computer that can reach this machine can open {address}")
+        write_stderr(f"every computer with access to this machine can open {address}")
     console = Console()
     if sys.stdout.isatty() and not console.is_dumb_terminal:
         return LiveView(console, title, mechanism, address)
@@ -135,7 +135,7 @@ def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
 
 def _board(rig: RigFile) -> StreamRig:
     if rig.sample_rate is None:
-        raise PvidError("the rig file has no sample_rate, and a board that samples by itself needs one")
+        raise PvidError("sample_rate is required in the rig file: the board samples on its own clock")
     return stream_rig(rig, rig.sample_rate)
 
 
@@ -167,7 +167,7 @@ def print_account(account: Account, allow_loss: float, failures: Sequence[str] =
     if wrong:
         return DIFFERENT
     if account.lost_share > allow_loss:
-        write_stderr(f"pvid: {100 * account.lost_share:.3g} % lost, {100 * allow_loss:.3g} % are allowed")
+        write_stderr(f"pvid: {100 * account.lost_share:.3g} % lost, allowed are {100 * allow_loss:.3g} %")
         return DIFFERENT
     return DONE
 
@@ -179,9 +179,9 @@ def _wrong(account: Account) -> list[str]:
         of_them = "not one frame" if not account.frames else f"not one frame in {account.garbled} of the segments"
         where = f"{account.foreign} frames of another version that did not describe itself" if account.foreign else ""
         likely = where or f"is it the right port, and is the board's baud rate {BAUD}?"
-        sentences.append(f"what came from the board holds {of_them}: {likely}")
+        sentences.append(f"the received data contain {of_them}: {likely}")
     if account.unread:
         sentences.append(
-            f"{account.unread} bytes came faster than they could be decoded: they are in the log, not in this account"
+            f"{account.unread} bytes arrived too fast to be decoded: they are in the log, not in this summary"
         )
     return sentences

@@ -19,7 +19,7 @@ def put_table(page: Path | None, marker: str, text: str) -> None:
     old = page.read_text(encoding="utf-8")
     opening, closing = f"<!-- {marker} -->", f"<!-- /{marker} -->"
     if opening not in old or closing not in old:
-        raise PvidError(f"{page} has no place for this table: the lines {opening} and {closing}")
+        raise PvidError(f"{page} does not contain the marker lines {opening} and {closing}")
     head, rest = old.split(opening, 1)
     tail = rest.split(closing, 1)[1]
     write_whole(page, f"{head}{opening}\n{text}\n{closing}{tail}")
@@ -29,7 +29,7 @@ def put_table(page: Path | None, marker: str, text: str) -> None:
 UPDATE = click.option(
     "--update",
     type=click.Path(path_type=Path, exists=True),
-    help="Write the table into this file's place for it.",
+    help="Replace the table in this file, between its two marker lines.",
 )
 
 

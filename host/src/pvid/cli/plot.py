@@ -16,7 +16,7 @@ from pvid.rig.columns import Columns
 @click.argument("log", metavar="LOG|RUN", type=click.Path(path_type=Path))
 @rig_options
 @columns_option
-@click.option("-o", "--out", type=FigurePath(), help="png, svg or pdf.  [default: LOG with .png]")
+@click.option("-o", "--out", type=FigurePath(), help="Figure file: png, svg or pdf.  [default: LOG with .png]")
 def command(
     log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
 ) -> int:

@@ -42,7 +42,7 @@ def tone(text: str) -> Tone:
 @click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no offset.")
 @click.option("--noise", type=float, help="White noise of the encoder [LSB].  [default: 0.5]")
 @click.option("--zero", default=0.0, show_default=True, help="Offset of the encoder [rad].")
-@click.option("--skew", default=0.0, show_default=True, help="Pivot sampled later than the encoder by this [s].")
+@click.option("--skew", default=0.0, show_default=True, help="Delay of the pivot's sample behind the encoder's [s].")
 @click.option("--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable.")
 @click.option(
     "--release",
@@ -50,11 +50,11 @@ def tone(text: str) -> Tone:
     type=float,
     default=STANDARD_RELEASE,
     show_default=True,
-    help="phi1, phi1+phi [rad].",
+    help="Initial phi1, phi1+phi [rad].",
 )
-@click.option("--l1", default=STANDARD_PENDULUM.l1, show_default=True, help="[m]")
-@click.option("--l2", default=STANDARD_PENDULUM.l2, show_default=True, help="[m]")
-@click.option("--rho2", default=STANDARD_PENDULUM.rho2, show_default=True, help="[m]")
+@click.option("--l1", default=STANDARD_PENDULUM.l1, show_default=True, help="Length of rod 1 [m].")
+@click.option("--l2", default=STANDARD_PENDULUM.l2, show_default=True, help="Joint to centre of mass of body 2 [m].")
+@click.option("--rho2", default=STANDARD_PENDULUM.rho2, show_default=True, help="Radius of gyration of body 2 [m].")
 @click.option("--gravity", default=STANDARD_PENDULUM.g, show_default=True, help="Gravity [m/s^2].")
 @click.option("--tilt", default=0.0, show_default=True, help="Tilt of the plane of motion [rad].")
 @click.option(
@@ -63,7 +63,7 @@ def tone(text: str) -> Tone:
 @click.option("--seed", default=0, show_default=True)
 @click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
 def command(**options: Any) -> int:
-    """Simulates a rig into OUT (.csv, .csv.gz, .npz, .parquet) and writes the rig file that goes with it."""
+    """Simulates a rig; writes the run OUT (.csv, .csv.gz, .npz, .parquet) and its rig file."""
     pendulum = Pendulum(
         l1=options["l1"],
         l2=options["l2"],

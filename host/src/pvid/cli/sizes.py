@@ -13,16 +13,20 @@ from pvid.cli.page_table import UPDATE, markdown, put_table
 
 @click.command(name="sizes")
 @UPDATE
-@click.option("--budget", type=click.Path(path_type=Path, exists=True), help="Write the figures as this file's budget.")
-@click.option("--check", type=click.Path(path_type=Path, exists=True), help="Hold the figures against this budget.")
-@click.option("--profile", "profiled", metavar="BOARD", help="Where a tick's instructions go on a board, by function.")
+@click.option(
+    "--budget", type=click.Path(path_type=Path, exists=True), help="Write the measured figures to this budget file."
+)
+@click.option(
+    "--check", type=click.Path(path_type=Path, exists=True), help="Compare the measured figures with this budget file."
+)
+@click.option("--profile", "profiled", metavar="BOARD", help="Count the instructions of a tick on BOARD by function.")
 def command(update: Path | None, budget: Path | None, check: Path | None, profiled: str | None) -> int:
-    """Flash, RAM, stack and instructions a tick on every board, built and run in its emulator."""
+    """Measures flash, RAM, stack and instructions per tick on every board, built and run in its emulator."""
     from pvid.board import sizes
 
     if profiled is not None:
         if budget is not None or check is not None:
-            raise PvidError("--profile has no budget: leave --budget and --check out")
+            raise PvidError("--profile has no budget: omit --budget and --check")
         from pvid.board import boards, profile
 
         profiles = {form: profile.profile(boards.board(profiled), form) for form in ("strong", "weak")}

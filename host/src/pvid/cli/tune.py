@@ -27,12 +27,12 @@ from pvid.run import answer
 def command(
     run_path: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
 ) -> int:
-    """Picks the weak form's settings for a recorded RUN: equations (full angles, friction), window, test functions,
+    """Chooses the weak form's settings for a recorded RUN: equations (full angles, friction), window, test functions,
     pass band, decimation, forgetting.
 
-    The rig file's own settings are kept unless others predict blocks of the run that are held back better, by more than
-    chance explains, or as well and with clearly smaller standard errors. An answer that `identify` gives is never lost.
-    Writes a rig file with all settings explicit, with which `identify` gives the answer that is printed.
+    Candidates are judged on held-out blocks of the run. The rig file's settings are kept unless others predict these
+    blocks significantly better, or equally well with clearly smaller standard errors. A result of `identify` is never
+    lost. Writes a rig file with all settings; `identify` with it gives the printed result.
     """
     from pvid.run.tune import STEPS, tune
     from pvid.run.tune_table import candidates_table

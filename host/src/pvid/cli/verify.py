@@ -18,7 +18,7 @@ _MOST_STRETCHES = 100  # that are printed
 @click.command(name="verify")
 @log_argument
 @log_rig
-@click.option("--partial", is_flag=True, help="Exit code 0 also if only a part is verified.")
+@click.option("--partial", is_flag=True, help="Exit code 0 even if only a part is verified.")
 def command(log: Path, rig_path: Path | None, partial: bool) -> int:
     """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
 

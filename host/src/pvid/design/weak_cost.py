@@ -210,5 +210,5 @@ def state_bytes_32(definitions: tuple[str, ...] = (), corrected: bool = False) -
     done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
     size = re.search(r"\.size\s+state, (\d+)", done.stdout)
     if done.returncode != 0 or size is None:
-        raise PvidError(f"gcc cannot tell the size of the state: {done.stderr.strip()[:200]}")
+        raise PvidError(f"gcc cannot determine the size of the state: {done.stderr.strip()[:200]}")
     return int(size.group(1))

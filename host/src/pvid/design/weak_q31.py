@@ -125,9 +125,7 @@ def weak_tables_q31(
     u_bits = bits_for(u_range, U_BITS)
     u_shift = second_bits - u_bits
     if u_shift < 0:
-        raise PvidError(
-            "y_lsb is too coarse for the acceleration range: U would need bits that the weights do not have"
-        )
+        raise PvidError("y_lsb is too coarse for the acceleration range: the weights have too few bits for U")
     u_max = round(u_range * 2.0**u_bits)
     # terms
     uf_shift = _shift_to(u_max * f_max, TERM_BITS)

@@ -395,7 +395,7 @@ def _symmetric(upper: tuple[float, ...]) -> Float:
 class Estimate(Message):
     """Board to PC: the estimate after the header's tick (pvid_estimate_f32).
 
-    `reason` is what became of the last group of rows: of the last tick that was more than one row accumulated.
+    `reason` is reason of the last group of rows: of the last tick that was more than one row accumulated.
     """
 
     TYPE = 6

@@ -65,7 +65,7 @@ def opening_failure(name: str, error: Exception) -> str:
         errno.EACCES: f"no permission to open the port {name}: its group (dialout) has it",
         errno.EAGAIN: f"the port {name} is in use by another program",
         errno.EBUSY: f"the port {name} is in use by another program",
-        errno.ECONNREFUSED: f"nobody listens at {name}",
+        errno.ECONNREFUSED: f"no connection to {name}: nothing listens there",
     }
     number = cause.args[0] if cause.args else None  # termios has its own exception, with nothing else
     if number in words:
@@ -78,6 +78,6 @@ def opening_failure(name: str, error: Exception) -> str:
 def loss_cause(error: Exception) -> str:
     """A few words on a port that stopped working."""
     if "returned no data" in str(error) or "disconnected" in str(error):
-        return "nothing is at its other end any more"
+        return "its other end was closed"
     number = getattr(error, "errno", None) or getattr(error.__context__, "errno", None)
     return os.strerror(number) if number else str(error)

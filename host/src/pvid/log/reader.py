@@ -410,6 +410,6 @@ class LogReader:
             raise PvidError(f"cannot read {self.path}: {error.strerror}") from error
         yield from stream.end()
         if stream.is_log and not stream.account.begun and not stream.account.frames:
-            raise PvidError(f"{self.path} is empty: the recording ended before the link had come up")
+            raise PvidError(f"{self.path} is empty: the recording ended before the link was up")
         if not stream.account.frames and not stream.account.begun:
             raise PvidError(f"{self.path} is no log of pvid: not one frame in {stream.account.bytes} bytes")

@@ -55,9 +55,9 @@ def refuse_to_append(path: Path, rig: RigFile | None) -> None:
     except OSError as error:
         raise PvidError(f"cannot read {path}: {error.strerror}") from error
     if stream.account.bytes and not stream.is_log and not stream.account.frames:
-        raise PvidError(f"{path} is no log of pvid, and nothing is added to it")
+        raise PvidError(f"{path} is not a log of pvid: nothing is appended")
     if rig is not None and stream.rig is not None and RigFile.parse(stream.rig) != rig:
-        raise PvidError(f"{path} was recorded with another rig file: a log has one, and what is new needs a new log")
+        raise PvidError(f"{path} was recorded with another rig file: record to a new log")
 
 
 def hello_of_log(path: Path) -> Hello | None:
@@ -78,9 +78,9 @@ def run_of_log(path: Path) -> Run:
     """
     hello = hello_of_log(path)
     if hello is None:
-        raise PvidError(f"{path}: the board never said who it is, and its sample rate is not known")
+        raise PvidError(f"{path}: the log contains no description of the board, so its sample rate is unknown")
     if not is_rate(hello.sample_rate):
-        raise PvidError(f"{path}: the board's sample rate is {hello.sample_rate:g} Hz, as it says, and that is none")
+        raise PvidError(f"{path}: the board reported a sample rate of {hello.sample_rate:g} Hz, which is invalid")
     values = Values(hello=hello)
     best: list[npt.NDArray[np.float64]] = []
     parts: list[npt.NDArray[np.float64]] = []

@@ -129,7 +129,7 @@ class Verdict:
     def text(self) -> str:
         """In one sentence."""
         if not self.stretches:
-            return "nothing to verify: the log holds no samples"
+            return "nothing to verify: the log contains no samples"
         parts = [f"{self.checked} estimates and hashes equal in every bit, {self.verified} samples verified"]
         if self.trailing:
             parts.append(f"{self.trailing} behind the last check")
@@ -282,10 +282,10 @@ class Verifier:
         if not opened.checks:
             stretch.open = configuration is not None and not opened.harmed and stretch.ticks <= _pace(configuration)
             raise PvidError(
-                "no check of them was due yet" if stretch.open else "no estimate and no hash came with them"
+                "no check of them was due yet" if stretch.open else "the log contains no estimate and no hash for them"
             )
         if configuration is None:
-            raise PvidError("the board's configuration did not come with them")
+            raise PvidError("the board's configuration is missing")
         config = self._config(configuration)
         samples = np.concatenate(opened.parts)
         checks: dict[int, list[Check]] = {}
@@ -401,7 +401,7 @@ class _Recomputation:
     def _compared_estimate(self, check: Estimate | EstimateQ31) -> Iterator[tuple[str, int, int]]:
         matrix = self._case.matrix
         if not hasattr(check, matrix):
-            raise PvidError("the estimates are of another core than the rig file asks for")
+            raise PvidError("the estimates are of another core than the rig file sets")
         own = self.twin.estimator.assess()[0]
         n_p = len(self.twin.estimator.p)
         upper = tuple((a, b) for a, b in _UPPER if b < n_p)

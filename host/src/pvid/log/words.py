@@ -10,19 +10,19 @@ from pvid.settings.enums import Reason
 from pvid.settings.forms import FORMS
 
 _REASONS = {
-    Reason.UPDATED: "the estimate took a step",
+    Reason.UPDATED: "the estimate was updated",
     Reason.WARMING_UP: "the first window of samples is not full yet",
-    Reason.ACCUMULATED: "samples taken in, the next step comes with the next window",
-    Reason.HELD_NOT_EXCITED: "drive or motion say too little of the parameters; the last estimate stays",
-    Reason.HELD_PIVOT: "the equations could not be solved; the last estimate stays",
-    Reason.REJECTED_NOT_FINITE: "a sample was not a number and was left out",
-    Reason.REJECTED_OUTLIER: "a sample lay far from all others and was left out",
-    Reason.REJECTED_SATURATED: "a sample was absurdly large and was left out",
-    Reason.HELD_UNCERTAIN: "standard errors too wide, or still on the way; the last trusted estimate stays",
-    Reason.HELD_OUT_OF_RANGE: "the angle went beyond what the equations are good for; that window was dropped",
-    Reason.HELD_FROZEN: "frozen: nothing is taken in",
-    Reason.NOT_READY: "the identifier has no configuration yet, or refused the one that it was given",
-    Reason.MISFIT: "the estimate took a step, but residuals exceed the sensors' noise: friction, large angles or "
+    Reason.ACCUMULATED: "samples added; the next update follows with the next window",
+    Reason.HELD_NOT_EXCITED: "insufficient excitation; the last estimate is held",
+    Reason.HELD_PIVOT: "the equations could not be solved; the last estimate is held",
+    Reason.REJECTED_NOT_FINITE: "a sample was not a number and was dropped",
+    Reason.REJECTED_OUTLIER: "an outlier was dropped",
+    Reason.REJECTED_SATURATED: "a sample beyond all bounds was dropped",
+    Reason.HELD_UNCERTAIN: "standard errors too large, or not converged; the last trusted estimate is held",
+    Reason.HELD_OUT_OF_RANGE: "the angle exceeded the range of the equations; the window was dropped",
+    Reason.HELD_FROZEN: "frozen: new data are ignored",
+    Reason.NOT_READY: "the identifier has no configuration, or refused it",
+    Reason.MISFIT: "the estimate was updated, but residuals exceed the sensors' noise: friction, large angles or "
     "another mechanism",
 }
 
@@ -34,7 +34,7 @@ _KAPPA_SHOWN = (1e-6, 1.0)
 def board_words(hello: Hello | None, account: Account) -> str:
     """Who the board is, and what it does if it does not simply run."""
     if hello is None:
-        return "has not said yet who it is"
+        return "has not described itself yet"
     form, core = (
         kinds(number).name.lower() if number in list(kinds) else str(number)
         for kinds, number in ((Form, hello.form), (Core, hello.core))

@@ -747,7 +747,7 @@ def _predicted(
     s = oracle.information()
     kappa = kappa_of(s)
     if not kappa > _UNDRIVEN_KAPPA:
-        raise PvidError("this drive says nothing of w: the pivot stands still or hardly moves")
+        raise PvidError("this drive does not identify w: the pivot rests or hardly moves")
     inverse = _inverse(s)
     alone = inverse @ noise.information() @ inverse
     shared = inverse @ c.T @ noise.q @ c @ inverse

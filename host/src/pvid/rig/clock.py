@@ -166,7 +166,7 @@ def _with_jitter(
             row = int(np.argmax(repeats)) + 1
             raise table.error(row, "t", f"{table.t[row]!s} s repeats the time before it")
         note += (
-            f"t comes in bursts, it departs from a uniform clock {size}: the samples are taken as uniform at "
+            f"t arrives in bursts and departs from a uniform clock {size}: the samples are taken as uniform at "
             f"{rate:g} Hz, and a missing one would not be seen",
         )
         return _placed(table, None, rate, note)
@@ -304,7 +304,7 @@ def _fits(table: Table, steps: FloatArray, quantum: float) -> list[_Fit]:
             raise table.error(
                 worst + 1,
                 "t",
-                f"a gap of {steps[worst]:.6g} s, {lengths.max():.4g} periods, comes before it, and more of the run is "
+                f"a gap of {steps[worst]:.6g} s, {lengths.max():.4g} periods, precedes it, and more of the run is "
                 f"missing than there (several recordings in one file?)",
             )
         ticks = np.ones(table.t.size, np.int32)  # half the memory; 2^31 of them would be 25 days at 1 kHz
@@ -360,7 +360,7 @@ def _rate(table: Table, measured: float, error: float, promised: float | None) -
             f"{promised:.6g} Hz{_cause(name, measured / promised, measured)}."
         )
     rate = _shortest_decimal(measured, max(1e-9, 0.01 * abs(off)))
-    return rate, (f"t runs at {rate:g} Hz, {100 * off:+.2g} % off the rig's sample rate: t is believed",)
+    return rate, (f"t runs at {rate:g} Hz, {100 * off:+.2g} % off the rig's sample rate: t is used",)
 
 
 def _cause(name: str, ratio: float, measured: float) -> str:

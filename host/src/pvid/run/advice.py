@@ -416,7 +416,7 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
     largest = now.largest_angle if now is not None else _swing(run)[1]
     if not rig.identifier.full_angle:
         yield Cure(
-            f"angles go to {largest:.2g} rad, and sin phi is not phi there: use --set identifier.full_angle=true"
+            f"angles reach {largest:.2g} rad, where sin phi differs from phi: use --set identifier.full_angle=true"
             + in_float,
             with_identifier(full_angle=True),
         )
@@ -502,7 +502,7 @@ def _wider_ranges(result: Identification) -> str:
     names = [name for name in ("phi", "y", "acceleration") if getattr(result.beyond, name)]
     return (
         f"{result.beyond_words}: raise {' and '.join(f'{name}_range' for name in names)} in the rig file, "
-        f"or leave out the key, and the run sets it"
+        f"or omit the key to derive it from the run"
     )
 
 
@@ -527,29 +527,29 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
         yield excitation.weak
     elif result.largest_angle > VALID_ANGLE:
         yield (
-            f"angles go to {result.largest_angle:.2g} rad, and the equations are corrected up to {VALID_ANGLE:g} rad: "
+            f"angles reach {result.largest_angle:.2g} rad, and the equations are corrected up to {VALID_ANGLE:g} rad: "
             f"release the pendulum from a smaller angle, or drive it less near its modes"
         )
     elif result.identified:
         return
     elif excitation.fading > _FADING:
         yield (
-            f"the swing dies away (to {100 / excitation.fading:.0f} % of what it was at first): friction in the joints "
+            f"the swing decays (to {100 / excitation.fading:.0f} % of its start): friction in the joints "
             f"leaves too little motion: reduce it, or drive the pivot harder"
             + ("" if case.rig.identifier.damping else ", and use --set identifier.damping=true")
         )
     elif result.status == Reason.HELD_UNCERTAIN.text:
-        yield "the standard errors are still too wide: record longer, drive the pivot harder, or use a finer encoder"
+        yield "the standard errors are too large: record longer, drive the pivot harder, or use a finer encoder"
     else:
         yield (
-            "the run does not follow the equations of a pendulum on a moving pivot, with any unit, sign or clock "
-            "that was tried: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
-            "sampled at the same time, and does nothing rub or hit?"
+            "the run does not follow the equations of a pendulum on a moving pivot with any of the tested units, "
+            "signs and clocks: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
+            "sampled at the same time, and is the motion free of impacts and dry friction?"
         )
 
 
 def _not_corrected(result: Identification) -> str:
     return (
-        f"angles go to {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
+        f"angles reach {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
         f"--core f32, or smaller angles"
     )

@@ -117,7 +117,7 @@ def report_for_tones(
     """
     _refuse_exact(rig)
     if rig.sample_rate is None:
-        raise PvidError("sample_rate is missing in the rig file, and the tables hang on it")
+        raise PvidError("sample_rate is required in the rig file to compute the tables")
     design = weak_design_of(rig, rig.sample_rate)
     nominal = Pendulum.nominal(rig)
     drive, settings = Drive(tuple(tones)), rig.identifier

@@ -48,7 +48,7 @@ class Excitation:
             if self.u == 0.0:
                 return "the pivot does not move: is y recorded, and the column right?"
             return (
-                f"the pivot's acceleration hardly stands out of its sensor's noise (rms of y''/l1 {self.u:.2g} 1/s^2, "
+                f"the pivot's acceleration is barely above its sensor's noise (rms of y''/l1 {self.u:.2g} 1/s^2, "
                 f"of the noise {self.u_noise:.2g} 1/s^2): drive it harder or faster, or use a finer sensor for y"
             )
         if self.u < _WEAK_PART * self.w:

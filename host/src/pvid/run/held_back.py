@@ -78,8 +78,8 @@ class HeldBack:
         self.halves = self._halves(self.rows)
         if min(int((self.halves == half).sum()) for half in (0, 1)) < _LEAST_WINDOWS:
             raise PvidError(
-                f"the run of {duration:.3g} s is too short for settings to be judged on a part held back: each half "
-                f"must hold {_LEAST_WINDOWS} driven windows of {self.design.window_s:.2g} s"
+                f"the run of {duration:.3g} s is too short to judge settings on held-out data: each half "
+                f"must contain {_LEAST_WINDOWS} driven windows of {self.design.window_s:.2g} s"
             )
         self.equations: dict[tuple[bool, bool], Equations] = {}
         self.kept = np.ones(len(self.halves), np.bool_)
@@ -108,7 +108,7 @@ class HeldBack:
             moments = _moments_of(rows.whitened(self.start))
             p = least_squares(moments[self.kept].sum(axis=0), p)
             if not self.rig.mechanism.model.is_plausible(p):
-                raise PvidError("the run's least squares lead to no plausible parameters")
+                raise PvidError("the least-squares solution of the run is not physical")
         return Equations(full_angle, p, moments)
 
     def residuals(self, rig: RigFile) -> Float:

@@ -214,12 +214,12 @@ class Identification:
         if self.alarm and self.chi2 is not None:
             words.append(
                 f"the residuals have {self.chi2:.1f} times the variance that the sensors' noise explains: large "
-                f"angles, friction, or a wrong phi_lsb; the errors are larger than the standard errors say"
+                f"angles, friction, or a wrong phi_lsb; the errors exceed the standard errors"
             )
         elif self.alarm:
             words.append(
-                "the rows leave more unexplained than they should: too coarse an encoder for the strong form, a jolt "
-                "in sums that do not forget it, or a mechanism that has changed; the estimate is not to be believed"
+                "the residuals of the rows are too large: the encoder is too coarse for the strong form, a jolt is in "
+                "sums without forgetting, or the mechanism has changed; do not trust the estimate"
             )
         if self.parts_disagree and self.skew != 0.0:
             when = "later" if self.skew > 0 else "earlier"
@@ -232,7 +232,7 @@ class Identification:
                 "mechanism that has changed; the standard errors cover the disagreement"
             )
         if not self.judged:
-            words.append("too few windows of the run can be compared with the estimate: a short run, or large angles")
+            words.append("too few windows can be compared with the estimate: the run is short, or its angles are large")
         if self.is_old and (self.parts_disagree or self._share_published < _RARELY):
             words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
         if words and self.unexplained is not None and self.unexplained >= _UNEXPLAINED_TOLD:
@@ -296,7 +296,7 @@ def identify(
     if len(run.t) < config.ticks_needed:
         raise PvidError(
             f"the run has {len(run.t)} samples and the {rig.identifier.form} form needs {config.ticks_needed} for its "
-            f"first answer: nothing can be identified; record longer or shorten window_s"
+            f"first estimate: record longer or shorten window_s"
         )
     every = max(1, len(run.t) // points)
     if rig.identifier.core == "f64":

@@ -97,7 +97,7 @@ def _strong(run: Run, rig: RigFile, p: Float) -> Residuals:
     u = d_y[:, 2:5] / rig.l1
     driven = oracle.driven(u[:, 0], run.sample_rate, config.drive_min)
     if not driven.any():
-        raise PvidError("the pivot stands still: there are no rows")
+        raise PvidError("the pivot rests: there are no rows")
     n, y = oracle.strong_rows(d_phi[driven], u[driven])
     e = (y - n @ oracle.theta(p[: oracle.N_P]))[-_MOST_ROWS:]
     t = run.t[2 * bank.delay :][driven][-_MOST_ROWS:]

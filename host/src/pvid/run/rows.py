@@ -106,7 +106,7 @@ class RunRows:
         if not present.all():
             usable &= _whole(present, design, len(phi_frames))
         if not usable.any():
-            raise PvidError("the pivot stands still in every window of the run")
+            raise PvidError("the pivot rests in every window of the run")
         number = np.flatnonzero(usable)
         phi_frames, u_frames = phi_frames[number], u_frames[number]
         of_both = columns(phi_frames, u_frames, design)

@@ -377,10 +377,10 @@ class _Bench:
         """Why nothing is identified, in words."""
         own = default.refusal or (default.answer.verdict if default.answer is not None else "")
         if self.held_back is None:
-            return f"nothing is identified from this run ({own}), and nothing can be tuned: {self.not_held_back}"
+            return f"nothing is identified from this run ({own}), so nothing can be tuned: {self.not_held_back}"
         return (
             f"none of {len(self.tried)} settings identifies the mechanism from this run (the rig file's own: {own}): "
-            "is the pivot driven, and are the columns phi and y what they should be?"
+            "is the pivot driven, and are the columns phi and y correct?"
         )
 
 
@@ -395,11 +395,11 @@ def _reason(chosen: Judged, default: Judged, bench: _Bench, keep: Forgetting) ->
     elif chosen.rig.identifier == _with(default.rig, forgetting_s=chosen.rig.identifier.forgetting_s).identifier:
         what = f"the rig file's own settings: none of {len(bench.tried) - 1} others is better by more than chance"
     elif not default.identified:
-        what = "the rig file's own settings identify nothing, these do"
+        what = "the rig file's settings identify nothing, these do"
     else:
         what = (
-            f"of {len(bench.tried)} settings these leave {chosen.residual_over(default):.3g} times the residuals held "
-            f"back that the rig file's own leave, with {chosen.error / default.error:.2g} times the standard errors"
+            f"of {len(bench.tried)} settings these leave {chosen.residual_over(default):.3g} times the held-out "
+            f"residuals of the rig file's settings, with {chosen.error / default.error:.2g} times the standard errors"
         )
     if keep.forgetting_s == 0:
         return f"{what}; no forgetting predicts the next window better than remembering everything"

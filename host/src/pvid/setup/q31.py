@@ -47,7 +47,7 @@ def _counting(rig: RigFile) -> Sensor:
     for name, lsb in (("phi_lsb", sensor.phi_lsb), ("y_lsb", sensor.y_lsb)):
         if not lsb > 0:
             raise PvidError(
-                f"[sensor] {name} is 0, and the fixed-point core counts in it: say what the sensor resolves"
+                f"[sensor] {name} is 0, and the fixed-point core counts in it: set it to the sensor's resolution"
             )
     return sensor
 
@@ -188,7 +188,7 @@ def forgetting_groups_q31(forgetting_s: float, groups_hz: float) -> int:
         wrong = "short" if groups < FORGETTING_MIN else "long"
         raise PvidError(
             f"[identifier] forgetting_s = {forgetting_s:g} is too {wrong} for core q31, which forgets within 4 to 2^24 "
-            f"rows or windows ({FORGETTING_MIN / groups_hz:.4g} to {FORGETTING_MAX / groups_hz:.4g} s here); 0 is never"
+            f"rows or windows ({FORGETTING_MIN / groups_hz:.4g} to {FORGETTING_MAX / groups_hz:.4g} s here); 0: never"
         )
     return groups
 
@@ -199,7 +199,7 @@ def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
     if patience > PATIENCE_MAX:
         raise PvidError(
             f"[identifier] outlier_patience_s = {gate.patience_s:g} is too long for core q31, which counts up to 2^30 "
-            f"rows or windows ({PATIENCE_MAX / groups_hz:.4g} s here); 0 is for ever"
+            f"rows or windows ({PATIENCE_MAX / groups_hz:.4g} s here); 0: never"
         )
     return GateConfigQ31(round(gate.sigmas * 2**16), max(round(patience), 1) if patience > 0 else 0)
 

@@ -272,7 +272,7 @@ def _overlay(recording: Recording, angle: Axes, difference: Axes) -> None:
     difference.set_ylabel("difference\n[mrad]")
     (angle if simulated is None else difference).set_xlabel(_clock(recording))
     if simulated is None:
-        why = "no mechanism has these parameters" if recording.estimate else "nothing is identified to simulate with"
+        why = "no mechanism has these parameters" if recording.estimate else "no estimate to simulate with"
         angle.set_title(f"Measured angle ({why})")
         difference.set_visible(False)
     else:
@@ -314,7 +314,7 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     kappa.semilogy(t, np.where(recording.kappa > 0, recording.kappa, np.nan), color="C2", label="kappa")
     if recording.rig.identifier.form_traits.publishes:
         kappa.axhline(KAPPA_MIN, color="C3", linestyle="--", label="nothing is published below")
-    kappa.set_ylabel("kappa: how far apart\nthe data tell the parameters [1]")
+    kappa.set_ylabel("kappa: identifiability\nof w [1]")
     kappa.set_xlabel(f"time {recording.clock} [s]")
     for axis in axes:
         for i, at in enumerate(recording.breaks):

@@ -125,7 +125,7 @@ class LiveView:
             shown, spread = with_error(value, error)
             table.add_row(one.shown, one.meaning, shown, f"± {spread} {one.shown_unit}", relative)
         if not self.history.newest:
-            table.add_row("none yet", "the first estimate comes when a window of samples is full")
+            table.add_row("none yet", "the first estimate follows when a window of samples is full")
         elif not self.history.is_physical:
             names = ", ".join(one.shown for one in self.history.model.physical)
             table.add_row(names, "outside the physical region")

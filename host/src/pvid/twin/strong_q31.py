@@ -92,7 +92,7 @@ def step(
     if gate is not None and gate.is_on:
         passes = gate.passes(scaled(held * held, 0), fits)
         if passes.any() != passes.all():
-            raise PvidError("lanes of one twin must let the same rows in: their estimates differ too much")
+            raise PvidError("lanes of one twin must accept the same rows: their estimates differ too much")
         if not passes.all():
             estimator.counters["rejected_outlier"] += 1
             return np.full(estimator.lanes, Reason.REJECTED_OUTLIER, np.uint8)

@@ -1,6 +1,5 @@
-/* pvid/kapitza_parameters.h - the pendulum's parameters by index, and how many there are, in either arithmetic.
- *
- * kapitza.h explains them, kapitza_weak.h those of the weak form. */
+/* pvid/kapitza_parameters.h - indices and numbers of the pendulum's parameters, for both cores. Meaning:
+ * kapitza.h, kapitza_weak.h. */
 #ifndef PVID_KAPITZA_PARAMETERS_H
 #define PVID_KAPITZA_PARAMETERS_H
 
@@ -21,7 +20,7 @@ enum { PVID_KAPITZA_W = 0, PVID_KAPITZA_D1 = 1, PVID_KAPITZA_D2 = 2 };
 #define PVID_KAPITZA_FRICTION_THETA 10
 #define PVID_KAPITZA_FRICTION_P 6
 
-/* Indices in p after PVID_KAPITZA_D2: the encoder's zero, friction at the pivot and at the joint [m^2/s]. */
+/* Indices in p after PVID_KAPITZA_D2: the encoder's offset, friction at the pivot and at the joint [m^2/s]. */
 enum { PVID_KAPITZA_C = 3, PVID_KAPITZA_C1 = 4, PVID_KAPITZA_C2 = 5 };
 
 /* Whether the bounds of pvid/config.h have room for friction. */

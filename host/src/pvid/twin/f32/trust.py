@@ -23,7 +23,7 @@ _COUNT_MAX = 0xFFFF
 
 
 def uninformative_groups(uninformative: npt.NDArray[np.int64], stepped: Mask, is_back: Mask) -> npt.NDArray[np.int64]:
-    """Groups in a row that said too little for a step [lanes]; of trust_tell.h, as `tell`."""
+    """Groups in a row that said too little for a step [lanes]; of verdict.h, as `tell`."""
     return np.where(stepped | is_back, 0, np.minimum(uninformative + 1, _COUNT_MAX))
 
 

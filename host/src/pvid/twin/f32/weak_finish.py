@@ -89,7 +89,7 @@ def _passes(gate: Gate, x: Float32, design: WeakTables, estimator: RelativeEstim
             energy = energy + e * e
         passes = gate.passes(energy / ((np.float32(design.functions) - np.float32(2)) * expected))
     if passes.any() != passes.all():
-        raise PvidError("lanes of one twin must let the same windows in: their estimates differ too much")
+        raise PvidError("lanes of one twin must accept the same windows: their estimates differ too much")
     return bool(passes.all())
 
 

@@ -240,7 +240,7 @@ def _passes(
         energy = clamp(energy + e * e, WIDE)
     passes = gate.passes(_variance_ratio(energy, design, expected), ~saturated)
     if passes.any() != passes.all():
-        raise PvidError("lanes of one twin must let the same windows in: their estimates differ too much")
+        raise PvidError("lanes of one twin must accept the same windows: their estimates differ too much")
     return bool(passes.all())
 
 

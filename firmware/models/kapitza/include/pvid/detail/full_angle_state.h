@@ -14,7 +14,7 @@ typedef struct {
 /* What the rows lack: the remainder of Y, and the columns of c1 and c2. */
 #define PVID_WEAK_REMAINDERS 3
 
-/* The samples of the window in work, and what its rows lack. Only the identifier writes to it. */
+/* The samples and the remainder of the window in work. Only the identifier writes to it. */
 struct pvid_weak_angle_f32 {
     uint16_t length; /* places of the ring in use: a window and a hop */
     uint16_t window; /* W */

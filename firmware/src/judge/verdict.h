@@ -1,13 +1,13 @@
-/* What the judgements of both cores have in common: what is counted, and what is told. Private to the core. */
-#ifndef PVID_PRIVATE_TRUST_TELL_H
-#define PVID_PRIVATE_TRUST_TELL_H
+/* Counting and reporting of verdicts, for both cores. Private to the core. */
+#ifndef PVID_PRIVATE_VERDICT_H
+#define PVID_PRIVATE_VERDICT_H
 
 #include <stdbool.h>
 
 #include "number/count.h"
 #include "pvid/status.h"
 
-/* Groups in a row that say too little for a step: none once p has stepped, or is back where it was published. */
+/* Counts consecutive uninformative groups; 0 after a step, or after p reverted to the published estimate. */
 static inline void pvid_trust_count_uninformative(uint16_t *uninformative, pvid_reason reason, bool is_back)
 {
     if ((reason == PVID_UPDATED) || is_back) {
@@ -17,7 +17,7 @@ static inline void pvid_trust_count_uninformative(uint16_t *uninformative, pvid_
     }
 }
 
-/* Counts a verdict and says what is told of it; reason is that of the solve. */
+/* Counts a verdict and returns the reason to report; `reason` is that of the solve. */
 static inline pvid_reason pvid_trust_report(pvid_counters *counters, pvid_reason verdict, pvid_reason reason,
                                             bool misfit)
 {
