@@ -99,7 +99,7 @@ def _strong(run: Run, rig: RigFile, p: Float) -> Residuals:
     if not driven.any():
         raise PvidError("the pivot rests: there are no rows")
     n, y = oracle.strong_rows(d_phi[driven], u[driven])
-    e = (y - n @ oracle.theta(p[:3]))[-_MOST_ROWS:]
+    e = (y - n @ oracle.theta(p[: oracle.N_P]))[-_MOST_ROWS:]
     t = run.t[2 * bank.delay :][driven][-_MOST_ROWS:]
     scaled = (e / e.std())[:, np.newaxis]
     return Residuals(t, scaled, 1, 1 / run.sample_rate, expected=False, shared=2 * bank.delay)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.design.weak import WeakDesign, disturbance_gram
+from pvid.models.kapitza import MODEL
 from pvid.oracle.self_consistent import self_consistent
 from pvid.oracle.weak import A, N, columns, frames, front_end, jacobian, noise_gram, packed_to_square, theta
 from pvid.rig.file import RigFile
@@ -32,7 +33,7 @@ _LONGEST_STEP = 0.5  # of log w, log d1, log d2
 _DONE = 1e-8
 # Fewer windows say nothing.
 FEWEST = 4
-_CORE = 4  # w, d1, d2, c; friction adds two
+_MAPPED, _CORE = MODEL.n_mapped, len(MODEL.published)  # without the offset, with it; friction adds two
 
 
 @dataclass(frozen=True)
@@ -250,7 +251,7 @@ def least_squares(moments: Float, p: Float) -> Float:
     damping, energy = 1e-3, float(energy_at(moments, p))
     units = np.ones(len(p))
     for _ in range(_STEPS):
-        units[:3] = p[:3]
+        units[:_MAPPED] = p[:_MAPPED]
         c = _jacobian(p) * units
         information, force = c.T @ m @ c, c.T @ (b - m @ _theta(p))
         scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -258,15 +259,15 @@ def least_squares(moments: Float, p: Float) -> Float:
         step, there, better = np.zeros(len(p)), p, False
         while not better and damping < 1e12:
             step = scale * np.linalg.solve(normal + damping * np.eye(len(p)), scale * force)
-            step[:3] = np.clip(step[:3], -_LONGEST_STEP, _LONGEST_STEP)
-            there = np.append(p[:3] * np.exp(step[:3]), p[3:] + step[3:])
+            step[:_MAPPED] = np.clip(step[:_MAPPED], -_LONGEST_STEP, _LONGEST_STEP)
+            there = np.append(p[:_MAPPED] * np.exp(step[:_MAPPED]), p[_MAPPED:] + step[_MAPPED:])
             now = float(energy_at(moments, there))
             better = math.isfinite(now) and now <= energy
             damping *= 1 / 8 if better else 4
         if not better:
             break
         p, energy = there, float(energy_at(moments, there))
-        if np.abs(step[:3]).max() < _DONE:
+        if np.abs(step[:_MAPPED]).max() < _DONE:
             break
     return p
 
