@@ -20,7 +20,7 @@ from dataclasses import MISSING, Field, fields
 from pathlib import Path
 
 from pvid.link import frames
-from pvid.rig.file import Identifier, Nominal, RigFile, Sensor
+from pvid.rig.file import Identifier, ModelTable, Nominal, RigFile, Sensor
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -66,6 +66,7 @@ def rig_file_tables() -> str:
         ("[sensor]", Sensor),
         ("[nominal]", Nominal),
         ("[identifier]", Identifier),
+        ("[model]", ModelTable),
     )
     for title, owner in tables:
         meaning = meanings(owner)
@@ -113,7 +114,7 @@ def anchors(page: Path) -> set[str]:
 def broken_links(page: Path) -> Iterator[str]:
     """Links of a page that lead nowhere."""
     text = re.sub(r"(?ms)^```.*?^```", "", page.read_text(encoding="utf-8"))
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+    for target in re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'src="([^"]+)"', text):
         if re.match(r"[a-z]+:", target):
             continue
         path, _, anchor = target.partition("#")

@@ -15,6 +15,7 @@ from bench.campaign.judge import COLUMNS, Judgement, Record, identify_rig, judge
 from bench.campaign.truth import SimulatedRig, rig_file
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
+from pvid.models.kapitza import MODEL
 from pvid.rig.file import Core
 from pvid.rig.run import Run
 from pvid.run.identify import Identification, Publications, Trajectory
@@ -37,6 +38,7 @@ def answer(errors: Any, se: Any, *, published: bool = True, alarm: bool = False,
         "se": dict(zip(NAMES, map(float, s), strict=True)),
         "kappa": 1e-3,
         "trusted_s": 9.0 if published else None,
+        "model": MODEL,
         "chi2": 3.0,
         "alarm": alarm,
         "status": "updated" if published else "held not excited",
@@ -49,7 +51,7 @@ def answer(errors: Any, se: Any, *, published: bool = True, alarm: bool = False,
         "law": "stationary",
         "on": "host",
         "trajectory": Trajectory(*(np.zeros(0),) * 6),
-        "publications": Publications.none(),
+        "publications": Publications.none(MODEL),
     }
     return Identification(**{**made, **more})
 

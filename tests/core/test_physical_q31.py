@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from pvid.core.native import Native
-from pvid.oracle import strong as oracle
+from pvid.models.kapitza.physical import linear, physical
 from pvid.rig.file import RigFile
 from pvid.settings.q31 import ScaleQ31
 from pvid.setup.q31 import ConfigQ31, covariance_of, p_of, scale_of, strong_config_q31, units_of, weak_config_q31
@@ -37,15 +37,15 @@ def estimate_of(p: npt.ArrayLike, relative_se: float, correlation: float) -> npt
 def test_values_equal_the_closed_form(native: Native, seed: int) -> None:
     random = np.random.default_rng(seed)
     g, l2, rho2 = random.uniform(2, 30), random.uniform(0.03, 0.5), random.uniform(0.03, 0.5)
-    p = oracle.linear(g, l2, rho2, RIG.l1)
+    p = linear(g, l2, rho2, RIG.l1)
     estimate = estimate_of(p, 10 ** random.uniform(-4, -1), random.uniform(-0.999, 0.999))
     answer = native.physical_q31(estimate, SCALE)
     exact = p_of(CONFIG, estimate["p"][:4])[:3]
     assert answer is not None
     value, se = (a / 2.0**24 for a in answer)
     # a unit of the result, and the 30 bits of the quotients
-    assert value == pytest.approx(oracle.physical(exact, RIG.l1), rel=1e-7, abs=2.0**-23)
-    expected = oracle.physical_errors(exact, covariance_of(CONFIG, estimate)[:3, :3], RIG.l1)
+    assert value == pytest.approx(physical(exact, RIG.l1), rel=1e-7, abs=2.0**-23)
+    expected = RIG.mechanism.physical_errors(exact, covariance_of(CONFIG, estimate)[:3, :3])
     # three roundings to a unit each; where they nearly cancel the root keeps half the digits
     assert se == pytest.approx(expected, rel=1e-4, abs=2.0**-20)
 

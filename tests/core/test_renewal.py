@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from pvid.core.native import Native
+from pvid.models.kapitza import MODEL
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.identify import LINEAR, identify
+from pvid.run.identify import identify
 from pvid.settings.f32 import TrustConfig
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
@@ -33,7 +34,7 @@ def worst(native: Native, run: Run, core: str, renewal: float, monkeypatch: pyte
     rig = replace(RIG, identifier=replace(RIG.identifier, core=core, full_angle=False, survey=False))  # type: ignore[arg-type]
     result = identify(run, rig, native, start=POOR)
     assert result.identified
-    pairs = zip(LINEAR, STANDARD_PENDULUM.linear, strict=True)
+    pairs = zip(MODEL.mapped_names, STANDARD_PENDULUM.linear, strict=True)
     return max(float(abs(result.value[name] / p - 1)) for name, p in pairs)
 
 

@@ -19,7 +19,7 @@ from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, source
 from pvid.design.c_tables import bank_header, float_array, float_literal
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import design, to_c_header
-from pvid.oracle.strong import linear
+from pvid.models.kapitza.physical import linear
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import write_run
 from pvid.run.survey import fitted

@@ -19,7 +19,7 @@ from bench.spread import Spread
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.design.weak_cost import coefficients, cost_of, fitted_definitions, instructions, state_bytes_32
-from pvid.oracle import strong as oracle
+from pvid.models.kapitza.physical import physical
 from pvid.rig.file import Nominal, RigFile, Sensor
 from pvid.run.design_report import report_for_run, report_for_tones, sensors_of
 from pvid.setup.f32 import weak_config, weak_design_of
@@ -71,7 +71,7 @@ def test_predicted_errors_are_the_spread_of_twenty_runs(
         identifier = native.identifier(weak_config(rig, 1000.0))
         identifier.run(run.phi, run.y, sums=False, hashes=False)
         p = identifier.assess()["p"][:4].astype(np.float64)
-        errors.append([*p, *oracle.physical(p[:3], rig.l1)] - truth)
+        errors.append([*p, *physical(p[:3], rig.l1)] - truth)
     spread = np.sqrt(np.mean(np.square(errors), axis=0))
     ratio = spread / [predicted.se[name] for name in NAMES]
     # 20 runs know an RMS to 16 %, of seven parameters the worst may be 2.5 of that off; R0 leaves out u, worth 10 %

@@ -8,9 +8,9 @@ import pytest
 from pvid.base.errors import PvidError
 from pvid.design.weak import WeakDesign, design
 from pvid.design.weak_sizing import Sizes
-from pvid.oracle import strong as oracle
+from pvid.models.kapitza.physical import linear
 
-NOMINAL = oracle.linear(9.8, 0.1, 0.1, 0.3)
+NOMINAL = linear(9.8, 0.1, 0.1, 0.3)
 
 
 @pytest.fixture(scope="module")

@@ -28,12 +28,14 @@ from pvid.log.file import LogWriter
 from pvid.log.live_stream import LiveStream
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.rig import run_of_log
-from pvid.log.values import TABLES, Values
+from pvid.log.values import UNKNOWN_RIG, Values, tables_of
+from pvid.rig.file import RigFile
 from pvid.rig.run import read_run
 from pvid.settings.enums import Reason
 
 TICKS = 4000
-L1 = 0.3
+MECHANISM = RigFile.standard().mechanism
+TABLES = tables_of(MECHANISM.model)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +68,7 @@ def last_estimate(sent: list[tuple[int, link.Message]]) -> tuple[int, link.Estim
 
 
 def test_csv_reads_back_with_pandas(tmp_path: Path, log: Path, sent: list[tuple[int, link.Message]]) -> None:
-    paths = export_log(log, "csv", tmp_path / "out", L1)
+    paths = export_log(log, "csv", tmp_path / "out", MECHANISM)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in paths)
     samples = pandas.read_csv(tmp_path / "out-samples.csv")
     first = samples[samples.segment == 0]
@@ -78,7 +80,7 @@ def test_csv_reads_back_with_pandas(tmp_path: Path, log: Path, sent: list[tuple[
     row = estimates[(estimates.segment == 0) & (estimates.tick == tick)].iloc[-1]
     assert [row.w, row.d1, row.d2, row.c] == list(message.p[:4])
     assert row.w_se == pytest.approx(np.sqrt(message.covariance[0]))
-    assert row.g == pytest.approx(L1 * message.p[0])
+    assert row.g == pytest.approx(0.3 * message.p[0])
     assert row.reason == Reason(message.reason).text
     events = pandas.read_csv(tmp_path / "out-events.csv")
     assert events.event.tolist() == ["segment", "close", "segment", "sequence", "gap", "close"]
@@ -91,7 +93,7 @@ def test_csv_reads_back_with_pandas(tmp_path: Path, log: Path, sent: list[tuple[
 
 
 def test_parquet_reads_back_with_pyarrow(tmp_path: Path, log: Path) -> None:
-    export_log(log, "parquet", tmp_path / "out", L1)
+    export_log(log, "parquet", tmp_path / "out", MECHANISM)
     samples = pyarrow.parquet.read_table(tmp_path / "out-samples.parquet")
     first = samples.filter(pyarrow.compute.equal(samples["segment"], 0))
     got = np.stack([first["phi"].to_numpy(), first["y"].to_numpy()], axis=1)
@@ -104,7 +106,7 @@ def test_parquet_reads_back_with_pyarrow(tmp_path: Path, log: Path) -> None:
 
 
 def test_npz_is_a_run_and_more(tmp_path: Path, log: Path) -> None:
-    (path,) = export_log(log, "npz", tmp_path / "out", L1)
+    (path,) = export_log(log, "npz", tmp_path / "out", MECHANISM)
     archive = np.load(path)
     units = json.loads(str(archive["units"]))
     assert set(units) == set(archive.files) - {"units"}
@@ -114,7 +116,7 @@ def test_npz_is_a_run_and_more(tmp_path: Path, log: Path) -> None:
 
 
 def test_mcap_reads_back_with_its_library(tmp_path: Path, log: Path, sent: list[tuple[int, link.Message]]) -> None:
-    (path,) = export_log(log, "mcap", tmp_path / "out", L1)
+    (path,) = export_log(log, "mcap", tmp_path / "out", MECHANISM)
     with path.open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
@@ -144,7 +146,7 @@ _JSON_KINDS = {"number": (int, float), "integer": (int,), "string": (str,)}
 def test_mcap_contains_the_fields_required_by_foxglove_and_plotjuggler(tmp_path: Path, log: Path) -> None:
     """By Foxglove's page on custom schema encodings: schema "jsonschema" of an object, messages "json", UTF-8, each an
     object; a plot's axis is the log time. Both programs read the summary first, and the chunks by their index."""
-    (path,) = export_log(log, "mcap", tmp_path / "out", L1)
+    (path,) = export_log(log, "mcap", tmp_path / "out", MECHANISM)
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
         assert summary is not None and summary.statistics is not None
@@ -170,9 +172,9 @@ def test_an_export_that_fails_leaves_nothing(tmp_path: Path, log: Path) -> None:
     (tmp_path / "noise").write_bytes(b"noise")
     for form in FORMATS:
         with pytest.raises(PvidError, match="is no log of pvid"):
-            export_log(tmp_path / "noise", form, tmp_path / "out", None)
+            export_log(tmp_path / "noise", form, tmp_path / "out", UNKNOWN_RIG)
         with pytest.raises(PvidError, match="cannot write .*nowhere"):
-            export_log(log, form, tmp_path / "nowhere" / "out", None)
+            export_log(log, form, tmp_path / "nowhere" / "out", UNKNOWN_RIG)
     assert [path.name for path in tmp_path.iterdir()] == ["noise"]
 
 
@@ -189,7 +191,7 @@ def test_fixed_point_is_exported_in_si() -> None:
     )
     raw = link.RawCount.of_values([4096, -2048], [1, 2])
     sent = [(0, hello), (0, configure), (0, raw), (2, estimate)]
-    values, stream = Values(L1), LogStream()
+    values, stream = Values(MECHANISM), LogStream()
     rows = [one for r in stream.feed(b"".join(field_board.frames(sent))) for one in values.rows(r)]
     samples, estimates = rows
     assert samples.columns["phi"].tolist() == [1.0, -0.5]
@@ -201,7 +203,7 @@ def test_fixed_point_is_exported_in_si() -> None:
     assert columns["c_se"] == pytest.approx(44 * 2**-24)
     assert columns["kappa"] == 2**-7
     assert columns["residual"] == 2
-    assert columns["g"] == pytest.approx(L1 * 32440 * 2**-10)
+    assert columns["g"] == pytest.approx(0.3 * 32440 * 2**-10)
 
 
 def test_a_log_is_a_run(tmp_path: Path, log: Path) -> None:
@@ -246,9 +248,9 @@ def test_an_exported_segment_without_gaps_is_a_run(tmp_path: Path, log: Path) ->
     data = log.read_bytes()
     cut = data.index(b"the end")
     whole.write_bytes(data[: data.index(b"\0", cut) + 1])
-    (path,) = export_log(whole, "npz", tmp_path / "one", L1)
+    (path,) = export_log(whole, "npz", tmp_path / "one", MECHANISM)
     assert len(read_run(path, 1000.0)) == TICKS
-    export_log(whole, "csv", tmp_path / "one", L1)
+    export_log(whole, "csv", tmp_path / "one", MECHANISM)
     assert len(read_run(tmp_path / "one-samples.csv", 1000.0)) == TICKS
 
 
@@ -265,7 +267,7 @@ def listener() -> socket.socket:
 
 
 def teed(scheme: str, listener: socket.socket, sent: list[tuple[int, link.Message]]) -> list[bytes]:
-    tee = LiveStream(f"{scheme}://127.0.0.1:{listener.getsockname()[1]}", L1)
+    tee = LiveStream(f"{scheme}://127.0.0.1:{listener.getsockname()[1]}", MECHANISM)
     stream = LogStream()
     listener.settimeout(0)
     got = []

@@ -10,7 +10,7 @@
 #include "rls_f32.h"
 #include "ud_f32.h"
 
-/* Moves the pendulum of host/docs/theory.md (1) on by `ticks` steps of fourth-order Runge-Kutta and writes phi at the
+/* Moves the pendulum of theory.md (1) on by `ticks` steps of fourth-order Runge-Kutta and writes phi at the
  * start of each.  x: phi1, phi and their rates;  p: d1, d2;  w[ticks];  u[2 ticks + 1]: at the ends and the middles of
  * steps. */
 void longevity_motion(double x[4], uint32_t ticks, double step, const double p[2], const double w[], const double u[],

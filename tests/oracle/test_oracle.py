@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pvid.base.errors import PvidError
 from pvid.oracle import strong as oracle
@@ -14,11 +12,7 @@ from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_start
 
 Float = npt.NDArray[np.float64]
 
-L1 = STANDARD_PENDULUM.l1
 TRUTH = STANDARD_PENDULUM.linear
-PHYSICAL = np.array([STANDARD_PENDULUM.g, STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2])
-
-lengths = st.floats(0.01, 10.0)
 
 
 @pytest.fixture(scope="module")
@@ -46,45 +40,6 @@ def around(start: Float, **changes: object) -> oracle.Settings:
         rate=1000.0,
     )
     return replace(settings, **changes)  # type: ignore[arg-type]
-
-
-# ---- section 1
-
-
-def test_linear_parameters_of_the_standard_rig() -> None:
-    """theory.md 6 states them."""
-    p = oracle.linear(9.5, 0.12, 0.08, 0.3)
-    np.testing.assert_allclose(p, [9.5 / 0.3, 8.875, 5.625], rtol=1e-15)
-
-
-@given(g=st.floats(0.1, 100.0), l2=lengths, rho2=lengths, l1=lengths)
-def test_physical_undoes_linear(g: float, l2: float, rho2: float, l1: float) -> None:
-    p = oracle.linear(g, l2, rho2, l1)
-    big_l2 = p[1] - p[2] - 1.0
-    # L2 = d1 - d2 - 1 cancels: a few eps of the largest term, relative to L2.
-    lost = 8.0 * 2.2e-16 * (p[1] + p[2] + 1.0) / (l2 / rho2) ** 2
-    if big_l2 > 0.0:
-        np.testing.assert_allclose(oracle.physical(p, l1), [g, l2, rho2], rtol=lost + 1e-14)
-
-
-@pytest.mark.parametrize("p", [(-1.0, 9.0, 5.0), (30.0, 9.0, -1.0), (30.0, 6.0, 5.0), (30.0, 5.0, 5.0)])
-def test_outside_the_physical_region_nothing_is_claimed(p: tuple[float, float, float]) -> None:
-    assert np.isnan(oracle.physical(p, L1)).all()
-
-
-def test_errors_of_the_physical_parameters_by_the_delta_method() -> None:
-    """Against the gradient by central differences and a covariance with every entry in play."""
-    root = np.array([[0.3, 0.0, 0.0], [-0.02, 0.05, 0.0], [0.01, 0.04, 0.02]])
-    covariance = root @ root.T
-    h = 1e-5
-    gradient = np.empty((3, 3))
-    for i in range(3):
-        step = np.zeros(3)
-        step[i] = h
-        gradient[:, i] = (oracle.physical(TRUTH + step, L1) - oracle.physical(TRUTH - step, L1)) / (2.0 * h)
-    expected = np.sqrt(np.diag(gradient @ covariance @ gradient.T))
-    # Central differences: h^2 of the third derivative, eps / h of rounding, both near 1e-10.
-    np.testing.assert_allclose(oracle.physical_errors(TRUTH, covariance, L1), expected, rtol=1e-8)
 
 
 # ---- section 2

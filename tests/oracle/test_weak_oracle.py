@@ -11,7 +11,7 @@ from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.design.weak import WeakDesign, design
 from pvid.design.weak_sizing import Bounds, Sizes
-from pvid.oracle import strong as oracle
+from pvid.models.kapitza.physical import linear, physical
 from pvid.oracle import weak
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import EstimatorConfig, TrustConfig, WeakConfig
@@ -26,7 +26,7 @@ from pvid.sim.pendulum import (
 )
 
 TRUTH = STANDARD_PENDULUM.linear
-NOMINAL = oracle.linear(9.8, 0.1, 0.1, 0.3)
+NOMINAL = linear(9.8, 0.1, 0.1, 0.3)
 LSB_14 = 2 * np.pi / 2**14
 
 
@@ -162,7 +162,7 @@ def test_full_angles_are_corrected(standard: WeakDesign) -> None:
         result = weak.identify_weak(run.phi, run.y, standard, settings(standard, seed, full_angle=True))
         assert abs(plain.p[0] / TRUTH[0] - 1) > 3e-3  # the bias is there
         assert abs(result.last.p[0] / TRUTH[0] - 1) < 6e-4  # the RMS, 0.04 %, times 1.5
-        l2 = oracle.physical(result.last.p[:3], 0.3)[1]
+        l2 = physical(result.last.p[:3], 0.3)[1]
         assert abs(l2 / 0.12 - 1) < 3.75e-3
         assert result.valid
         assert not result.corrected[:4].any() and result.corrected[-1]
@@ -175,7 +175,7 @@ def test_damping_is_estimated(standard: WeakDesign) -> None:
         more = settings(standard, seed, full_angle=True, damping=True)
         last = weak.identify_weak(run.phi, run.y, standard, more).last
         assert abs(last.p[0] / TRUTH[0] - 1) < 6.75e-4  # the RMS, 0.045 %, times 1.5
-        assert abs(oracle.physical(last.p[:3], 0.3)[1] / 0.12 - 1) < 3.75e-3
+        assert abs(physical(last.p[:3], 0.3)[1] / 0.12 - 1) < 3.75e-3
         assert last.p[5] == pytest.approx(1e-4, rel=0.2)  # 5 s.e.; that of the pivot is biased (see the docs)
         # with the exact linear truth as well, the damping's columns find nothing where there is none
     run = simulate(seed=0).run

@@ -1,5 +1,6 @@
 """Rig files: defaults, round trips, and one sentence that names the key for everything that is wrong."""
 
+import json
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -275,3 +276,17 @@ def test_oversized_files_are_refused_in_one_sentence(text: str) -> None:
 def test_a_value_is_shown_as_it_was_written(line: str) -> None:
     with pytest.raises(PvidError, match=f"not {line[-1]}$"):
         RigFile.parse(f"l1 = 0.3\n[identifier]\n{line}")
+
+
+def test_a_file_without_a_model_is_the_pendulum_and_one_may_name_it() -> None:
+    assert RigFile.parse("l1 = 0.3") == RigFile.parse('l1 = 0.3\n[model]\nname = "kapitza"')
+    assert RigFile.parse("l1 = 0.3").mechanism.model.name == "kapitza"
+
+
+def test_an_unknown_model_is_refused_with_those_that_are_known() -> None:
+    for wrong in ("furuta", 3, "", True):
+        with pytest.raises(PvidError) as told:
+            RigFile.parse(f"l1 = 0.3\n[model]\nname = {json.dumps(wrong)}")
+        assert str(told.value).startswith('[model] name must be "kapitza", not ')
+    with pytest.raises(PvidError, match=r"\[model\] 'kind' is not a key of a rig file"):
+        RigFile.parse('l1 = 0.3\n[model]\nkind = "kapitza"')

@@ -14,10 +14,11 @@ import pytest
 from bench.tuning import CASES, Case, errors
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
+from pvid.models.kapitza import MODEL
 from pvid.rig.file import RigFile, Unset, load
 from pvid.rig.run import Run, write_run
 from pvid.run.held_back import HeldBack, sigmas
-from pvid.run.identify import LINEAR, identify
+from pvid.run.identify import identify
 from pvid.run.survey import fitted
 from pvid.run.tune import STEPS, Tuned, tune
 from pvid.sim.pendulum import Pendulum, simulate, standard_sensors
@@ -133,7 +134,7 @@ def test_written_file_is_explicit_and_short() -> None:
 def test_the_defaults_answer_survives_being_rounded(native: Native) -> None:
     by_default = identify(STANDARD.run(0), STANDARD.rig, native)
     choice = tuned(STANDARD)
-    for name in LINEAR:  # 4 digits of the nominal and of the window move the estimate by a part of its error
+    for name in MODEL.mapped_names:  # 4 digits of nominal and window move the estimate by a part of its error
         assert abs(choice.answer.value[name] - by_default.value[name]) < 0.5 * by_default.se[name]
 
 

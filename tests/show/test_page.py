@@ -31,7 +31,7 @@ from pvid.show.page import is_local, listen, page
 from pvid.show.page_state import LiveState
 
 TICKS = 12_000
-PLOTS = ("parameter0", "parameter1", "parameter2", "residualPlot", "kappaPlot", "phiPlot", "yPlot")
+PLOTS = ("parameter0", "parameter1", "parameter2", "residualPlot", "kappaPlot", "signal0", "signal1")
 
 
 @pytest.fixture(scope="module")
@@ -159,11 +159,11 @@ def test_the_state_is_that_of_the_log_and_bounded(sent: list[bytes], tmp_path: P
     assert g["label"] == "g*, gravity in the plane [m/s²]"
     assert g["low"][-1] < 9.5 < g["high"][-1] and g["limits"][0] < g["value"][-1] < g["limits"][1]
     run = field_board.Field(TICKS).run
-    assert max(state["motion"]["phi"]["x"]) == pytest.approx(run.phi[2000:TICKS].max(), rel=1e-6)
-    assert min(state["motion"]["y"]["x"]) == pytest.approx(1e3 * run.y[2000:TICKS].min(), rel=1e-6)
-    assert state["motion"]["phi"]["t"][-1] == pytest.approx(TICKS / 1000, abs=0.03)
+    assert max(state["motion"][0]["x"]) == pytest.approx(run.phi[2000:TICKS].max(), rel=1e-6)
+    assert min(state["motion"][1]["x"]) == pytest.approx(1e3 * run.y[2000:TICKS].min(), rel=1e-6)
+    assert state["motion"][0]["t"][-1] == pytest.approx(TICKS / 1000, abs=0.03)
     longer = state_of(log + 8 * b"".join(sent))
-    assert len(longer["estimates"]["t"]) <= 800 and len(longer["motion"]["phi"]["x"]) <= 800
+    assert len(longer["estimates"]["t"]) <= 800 and len(longer["motion"][0]["x"]) <= 800
     assert len(json.dumps(longer)) < 250_000
 
 
@@ -241,7 +241,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
         until(lambda: all(drawn(browser, plot) and drawn(browser, plot)[-1]["points"] > 20 for plot in PLOTS))
         first = {plot: drawn(browser, plot) for plot in PLOTS}
         before = browser.execute_script("return received.textContent")
-        until(lambda: drawn(browser, "phiPlot")[0]["until"] > first["phiPlot"][0]["until"] + 3)
+        until(lambda: drawn(browser, "signal0")[0]["until"] > first["signal0"][0]["until"] + 3)
         for plot in PLOTS:
             now = drawn(browser, plot)
             assert all(one["path"] > 10 for one in now), plot  # a straight line is "M0,165L510,165"

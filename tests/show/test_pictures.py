@@ -20,6 +20,7 @@ from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
+from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
 from pvid.show.page import page
 from pvid.show.report import recording_of, write_report
@@ -71,7 +72,8 @@ def test_terminal_view_always_fits_80_by_24(
     for worst in (False, True):
         frames = [link.encode(told(message), i & 0xFFFF, tick) for i, (tick, message) in enumerate(sent)]
         console = Console(width=80, height=24, force_terminal=True, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-        view, stream = LiveView(console, "/dev/ttyACM0 -> run.pvlog", 0.3, "http://127.0.0.1:8765/"), LogStream()
+        mechanism, stream = RigFile.standard().mechanism, LogStream()
+        view = LiveView(console, "/dev/ttyACM0 -> run.pvlog", mechanism, "http://127.0.0.1:8765/")
         writer = LogWriter(tmp_path / f"{worst}.pvlog")
         writer.begin("/dev/ttyACM0", None)
         writer.take(b"".join(frames[:300] + frames[305 if worst else 300 :]))
@@ -111,7 +113,7 @@ def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Pat
         while not browser.title.startswith("pvid log /dev") and time.monotonic() < limit:
             browser.get(address)
             time.sleep(1)
-        while not browser.execute_script("return !!document.querySelector('#yPlot .scatterlayer .js-line')"):
+        while not browser.execute_script("return !!document.querySelector('#signal1 .scatterlayer .js-line')"):
             assert time.monotonic() < limit, "the plots were never drawn"
             time.sleep(0.2)
         size = browser.execute_script("return [document.body.scrollWidth, document.documentElement.scrollHeight]")

@@ -23,10 +23,10 @@ from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run, write_run
 from pvid.run.identify import identify
 from pvid.run.residuals import Residuals, residuals_of
-from pvid.run.simulated_angle import simulated_angle
 from pvid.show import report
 from pvid.show.report import recording_of, write_report
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.sim.simulated_angle import simulated_angle
 
 TICKS = 30_000
 # designed for the truth: what a wrong guess costs is not asked here
@@ -80,7 +80,7 @@ def test_residuals_at_wrong_parameters_or_of_another_mechanism_are_larger() -> N
 def test_residuals_equal_those_of_the_board(log: Path) -> None:
     recording = recording_of(log, None)
     residuals = residuals_of(recording.run, recording.rig, recording.p)
-    values, told = Values(0.3), 0.0
+    values, told = Values(STANDARD.mechanism), 0.0
     for record in LogReader(log):
         for rows in values.rows(record):
             if rows.table == "estimates":
@@ -196,8 +196,10 @@ def test_a_report_of_an_estimate_outside_the_physical_region(log: Path, tmp_path
     wild = replace(recording, physical=nowhere, physical_se=nowhere, p=p, estimate=estimate)
     write_report(wild, tmp_path / "wild.svg")
     text = shown(tmp_path / "wild.svg")
-    assert "estimate: outside the physical region: w = 11.560 ± 0.010, d1 = 0.250 ± 0.010, d2 = 0.200 ± 0.010" in text
-    assert "no pendulum has these parameters" in text
+    assert (
+        "estimate: outside the physical region: w = 11.560 ± 0.010 1/s², d1 = 0.250 ± 0.010, d2 = 0.200 ± 0.010" in text
+    )
+    assert "no mechanism has these parameters" in text
     assert "mode at" not in text and "nan" not in text
 
 

@@ -26,14 +26,17 @@ from rich.console import Console
 from pvid.base.rounding import with_error
 from pvid.core.native import Native
 from pvid.link import frames as link
-from pvid.log.history import NUMBERS, History, Thinned, envelope
+from pvid.log.history import History, Thinned, envelope
 from pvid.log.reader import Account, LogReader, LogStream, Record
-from pvid.log.values import Rows, Values
+from pvid.log.values import UNKNOWN_RIG, Rows, Values
 from pvid.log.words import kappa_share, kappa_words, reason_words
+from pvid.models.model import Mechanism
+from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
 from pvid.show.view import LiveView, sparkline
 
 TICKS = 12_000
+MECHANISM = RigFile.standard().mechanism
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +45,10 @@ def sent(native: Native) -> list[bytes]:
     return list(field_board.frames(field_board.messages(field_board.Field(TICKS, estimate_every=100), native)))
 
 
-def view_of(frames: list[bytes], l1: float | None = 0.3, width: int = 100) -> str:
+def view_of(frames: list[bytes], mechanism: Mechanism = MECHANISM, width: int = 100) -> str:
     """What is seen after these frames."""
     console = Console(width=width, force_terminal=True, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-    view = LiveView(console, "a port -> a [bold]log", l1)
+    view = LiveView(console, "a port -> a [bold]log", mechanism)
     stream = LogStream()
     for record in stream.feed(b"".join(frames)):
         view.take(record, stream.account)
@@ -58,7 +61,7 @@ def view_of(frames: list[bytes], l1: float | None = 0.3, width: int = 100) -> st
 
 def test_view_shows_every_item(sent: list[bytes]) -> None:
     seen = view_of(sent)
-    values, newest = Values(0.3), {}
+    values, newest = Values(MECHANISM), {}
     stream = LogStream()
     for record in stream.feed(b"".join(sent)):
         for rows in values.rows(record):
@@ -88,7 +91,7 @@ def test_view_before_the_first_frame_is_labelled(sent: list[bytes]) -> None:
 
 
 def test_without_the_rods_length_there_are_no_physical_parameters(sent: list[bytes]) -> None:
-    seen = view_of(sent, l1=None)
+    seen = view_of(sent, mechanism=UNKNOWN_RIG)
     assert "radius of gyration" not in seen and "L1 L2" in seen
 
 
@@ -102,7 +105,7 @@ def test_estimate_outside_the_physical_region_is_reported(sent: list[bytes]) -> 
         frames.append(link.encode(wild, item.sequence, item.tick))
     seen = view_of(frames)
     assert "g*, l2, rho2" in seen and "outside the physical region" in seen and "radius of gyration" not in seen
-    assert "outside" not in view_of(frames, l1=None)
+    assert "outside" not in view_of(frames, mechanism=UNKNOWN_RIG)
 
 
 def test_board_name_is_escaped(native: Native) -> None:
@@ -183,7 +186,7 @@ def test_an_envelope_keeps_the_extremes_where_they_are() -> None:
 
 
 def test_the_history_is_that_of_the_log_in_bounded_memory(sent: list[bytes], tmp_path: Path) -> None:
-    history, whole = History(0.3, points=20, window_s=3.0), History(0.3, points=1000, window_s=100.0)
+    history, whole = History(MECHANISM, points=20, window_s=3.0), History(MECHANISM, points=1000, window_s=100.0)
     stream = LogStream()
     for record in stream.feed(b"".join(sent)):
         history.take(record)
@@ -196,7 +199,7 @@ def test_the_history_is_that_of_the_log_in_bounded_memory(sent: list[bytes], tmp
     assert len(whole.estimates("t")) == TICKS // 100 and len(history.estimates("t")) <= 40
     late = whole.estimates("t") - np.arange(100, TICKS + 1, 100) / 1000
     assert (late > -2e-9).all() and (late < field_board.SAMPLES_A_FRAME / 1000).all()  # log_time never goes back
-    for name in NUMBERS:
+    for name in history.numbers:
         assert set(history.estimates(name)) <= set(whole.estimates(name))
         assert history.newest[name] == whole.estimates(name)[-1]
 
@@ -215,7 +218,7 @@ def test_the_view_costs_the_same_however_many_frames_come(monkeypatch: pytest.Mo
     estimate = link.Estimate(7, 1, (31.0, 9.0, 5.0, 0.0, 0.0, 0.0), (1e-6,) * 21, 0.01, 1e-4, 1.0, 0)
     spent = []
     for frames in (200, 20_000):
-        history = History(0.3, points=points)
+        history = History(MECHANISM, points=points)
         calls = 0
         for i in range(frames):
             history.take(Record(0, 1, n * i, link.Raw.of_values(np.full(n, i), np.zeros(n))))
@@ -231,14 +234,14 @@ def test_the_view_costs_the_same_however_many_frames_come(monkeypatch: pytest.Mo
 
 def test_a_flood_is_drawn_as_what_comes_slowly(sent: list[bytes]) -> None:
     """The same history, whether somebody looks after every record or only at the end."""
-    often, seldom, stream = History(0.3, points=20), History(0.3, points=20), LogStream()
+    often, seldom, stream = History(MECHANISM, points=20), History(MECHANISM, points=20), LogStream()
     for record in stream.feed(b"".join(sent)):
         often.take(record)
         often.samples()
         seldom.take(record)
     assert often.newest == seldom.newest and often.reason == seldom.reason
     assert np.array_equal(often.samples(), seldom.samples())
-    for name in ("t", *NUMBERS):
+    for name in ("t", *often.numbers):
         assert np.array_equal(often.estimates(name), seldom.estimates(name), equal_nan=True)
 
 

@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.design.weak import design
 from pvid.design.weak_sizing import Sizes
-from pvid.oracle import strong as oracle
+from pvid.models.kapitza.physical import linear
 from pvid.run.compare import first_difference
 from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import EstimatorConfig, TrustConfig, WeakConfig
@@ -23,7 +23,7 @@ from pvid.twin.weak import WeakTwin
 
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
 L1 = 0.3
-NOMINAL = oracle.linear(9.8, 0.1, 0.1, L1)
+NOMINAL = linear(9.8, 0.1, 0.1, L1)
 Samples = npt.NDArray[np.float64]
 
 

@@ -6,7 +6,7 @@
 
 #define PLANT_RATE 1000.0 /* samples a second */
 
-/* Two-link pendulum on a pivot shaken by three tones, equations (1) of host/docs/theory.md, fourth-order
+/* Two-link pendulum on a pivot shaken by three tones, equations (1) of theory.md, fourth-order
  * Runge-Kutta in double: samples phi and y. */
 typedef struct {
     double t;

@@ -17,7 +17,7 @@ from pvid.core.native import Native
 from pvid.oracle.weak import sample_sd
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.identify import LINEAR, Identification, identify
+from pvid.run.identify import Identification, identify
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
     STANDARD_PENDULUM,
@@ -204,8 +204,8 @@ def run_case(
     for seed in range(seeds):
         progress(seed)
         results.append(identify(case.run(seed), case.rig, native, start=standard_start(seed)))
-    values = np.array([[result.value[name] for name in LINEAR] for result in results])
-    standard_errors = np.array([[result.se[name] for name in LINEAR] for result in results])
+    values = np.array([[result.value[name] for name in result.model.mapped_names] for result in results])
+    standard_errors = np.array([[result.se[name] for name in result.model.mapped_names] for result in results])
     return Outcome(
         published=np.array([result.identified for result in results]),
         alarmed=np.array([result.alarm for result in results]),

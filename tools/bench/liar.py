@@ -107,7 +107,7 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
     source = RehearsedSource(behaviour)
     console = Console(file=screen, force_terminal=True, width=100)
     views: list[Observer] = [
-        LiveView(console, "title", rig().l1),
+        LiveView(console, "title", rig().mechanism),
         StatusLine(line),
         LiveStream("udp://127.0.0.1:9"),
         LiveStream("teleplot://[::1]:9"),

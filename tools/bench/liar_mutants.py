@@ -124,11 +124,11 @@ def _read(log: Path) -> Iterator[str]:
     """What goes wrong."""
     screen = io.StringIO()
     views: list[Observer] = [
-        LiveView(Console(file=screen, force_terminal=True, width=100), "title", rig().l1),
+        LiveView(Console(file=screen, force_terminal=True, width=100), "title", rig().mechanism),
         StatusLine(io.StringIO()),
-        LiveStream("udp://127.0.0.1:9", rig().l1),
+        LiveStream("udp://127.0.0.1:9", rig().mechanism),
     ]
-    values, reader = Values(rig().l1), LogReader(log)
+    values, reader = Values(rig().mechanism), LogReader(log)
     try:
         for record in reader:
             for view in views:

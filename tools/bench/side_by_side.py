@@ -12,12 +12,13 @@ from bench.references import KalmanSettings, kalman, output_error, smoothed_driv
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.design.weak import design
-from pvid.oracle import strong as oracle
+from pvid.models.kapitza.physical import physical
 from pvid.oracle.weak import WeakSettings, identify_weak, row_sd, sample_sd
 from pvid.rig.file import Identifier as Settings
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.identify import identify
+from pvid.setup.f32 import nominal_start
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, is_physical, simulate, standard_sensors, standard_start
 
 Float = npt.NDArray[np.float64]
@@ -70,7 +71,7 @@ class Outcome:
     @property
     def lengths(self) -> Float:
         """RMS relative error of l2 and rho2, [2]; NaN when a p is that of no pendulum."""
-        lengths = oracle.physical(TRUTH * (1 + self.errors), STANDARD_PENDULUM.l1)[:, 1:]
+        lengths = physical(TRUTH * (1 + self.errors), STANDARD_PENDULUM.l1)[:, 1:]
         relative = lengths / [STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2] - 1
         return np.asarray(np.sqrt(np.mean(np.square(relative), axis=0)))
 
@@ -127,7 +128,7 @@ def through_core(native: Native, **settings: object) -> Identifier:
 def through_oracle(sensors: Sensors, zero_unknown: bool = True) -> Identifier:
     """The float64 weak form with the standard rig file's tables."""
     rig = RigFile.standard()
-    nominal = oracle.linear(rig.nominal.g, rig.nominal.l2, rig.nominal.rho2, rig.l1)
+    nominal = nominal_start(rig)
 
     def run_oracle(phi: Float, y: Float, sample_rate: float, start: Float) -> tuple[Float, Float]:
         tables = design(rig.l1, sample_rate, nominal)

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from pvid.core.native import Native
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run
-from pvid.run.identify import LINEAR, Identification, identify
+from pvid.run.identify import Identification, identify
 from pvid.run.tune import Tuned, tune
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
@@ -165,7 +165,7 @@ def run_case(
 
 def errors(case: Case, found: Identification) -> Float:
     """Relative errors of w, d1, d2."""
-    return np.array([found.value[name] for name in LINEAR]) / case.truth - 1
+    return np.array([found.value[name] for name in found.model.mapped_names]) / case.truth - 1
 
 
 def row(case: Case, outcome: Outcome) -> tuple[str, ...]:

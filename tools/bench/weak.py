@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.core.native import Native
-from pvid.oracle import strong as oracle
 from pvid.rig.file import RigFile
 from pvid.setup.f32 import weak_config
 from pvid.sim.pendulum import STANDARD_DRIVE as TONES
@@ -112,7 +111,7 @@ def run_case(native: Native, case: Case) -> Outcome:
         p = last["p"][:3].astype(np.float64)
         errors.append(p / truth - 1)
         standard_errors.append(last["se"][:3] / truth)
-        lengths = oracle.physical(p, STANDARD_PENDULUM.l1)[1:]
+        lengths = rig.mechanism.physical(p)[1:]
         physical.append(lengths / [STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2] - 1)
         published += identifier.published is not None
         early += bool(np.abs(record.published[4000:, :3] / truth - 1).max() < 0.01)

@@ -128,7 +128,7 @@ def _crossed(log: Path) -> Iterator[int]:
 
 
 def _samples(log: Path, rig: RigFile) -> Iterator[Rows]:
-    values = Values(rig.l1)
+    values = Values(rig.mechanism)
     for record in LogReader(log):
         for rows in values.rows(record):
             if rows.table == "samples":
@@ -172,7 +172,7 @@ def _faults_of_exports(log: Path, rig: RigFile) -> Iterator[str]:
     """Of every format: the ticks of the samples that stand in it."""
     expected = np.concatenate([rows.columns["tick"] for rows in _samples(log, rig)])
     for form, read in {"csv": _ticks_of_csv, "npz": _ticks_of_npz, "parquet": _ticks_of_parquet, "mcap": _mcap}.items():
-        files = export_log(log, form, log.with_suffix(""), rig.l1)
+        files = export_log(log, form, log.with_suffix(""), rig.mechanism)
         if not np.array_equal(read(files), expected):
             yield f"{form} has other ticks than the log"
     if set(FORMATS) != {"csv", "npz", "parquet", "mcap"}:

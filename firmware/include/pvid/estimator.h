@@ -1,6 +1,6 @@
 /* pvid/estimator.h - estimates few parameters p from rows Y = N^T theta(p) + noise.
  *
- * Adds rows (Y, N) of a model to sums and takes damped Gauss-Newton steps on them (host/docs/theory.md 4, equation
+ * Adds rows (Y, N) of a model to sums and takes damped Gauss-Newton steps on them (theory.md 4, equation
  * (5)):
  *
  *   M = sum N N^T,   B = sum N Y,   S = C^T M C,   F = C^T (B - M theta),   C = d theta / d p

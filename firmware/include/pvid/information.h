@@ -1,6 +1,6 @@
 /* pvid/information.h - the sums M, B, yy of least squares, exact enough for any length of a run.
  *
- *   M = sum N N^T (distinct entries only),  B = sum N Y,  yy = sum Y^2,  weight = sum 1     (host/docs/theory.md 4)
+ *   M = sum N N^T (distinct entries only),  B = sum N Y,  yy = sum Y^2,  weight = sum 1     (theory.md 4)
  *
  * A plain float32 sum stops growing after 2^24 equal terms. Here each sum has two levels: terms are added to
  * `low`, and every `block` groups `low` is folded into `high`; the part that `high` cannot represent remains in

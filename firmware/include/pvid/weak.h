@@ -1,7 +1,7 @@
 /* pvid/weak.h - identifies a pendulum from an encoder and the pivot's height: the weak form in float32.
  *
  * Multiplies the equation of motion by K test functions (modulating functions) over a window of about a second and
- * integrates by parts (host/docs/theory.md 5). No derivative of the angle remains, only y_A'' of the pivot, so
+ * integrates by parts (theory.md 5). No derivative of the angle remains, only y_A'' of the pivot, so
  * that a 14-bit encoder suffices. Each window gives K rows (Y, N) for the estimator. The strong form
  * differentiates the angle four times and needs 20 bits.
  *
@@ -39,7 +39,7 @@
 #include "pvid/config.h"
 #include "pvid/estimator.h"
 #include "pvid/gate.h"
-#include "pvid/kapitza_weak.h"
+#include "pvid/mechanism.h"
 #include "pvid/trust.h"
 
 #ifdef __cplusplus

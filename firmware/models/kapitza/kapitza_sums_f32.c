@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-/* The sums of the strong form (MATH.md 2) and C^T M C from them, with its two economies.
+/* The sums of the strong form (theory.md 2) and C^T M C from them, with its two economies.
  *
  * Products repeat. With A = N_1, E = N_2, the entries 3..6 are -u^k phi'' and 7..11 are -u^k phi,
  * so M holds only the sums of A^2, AE, E^2, of A and E times each of those nine, and of

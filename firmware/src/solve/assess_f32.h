@@ -3,7 +3,7 @@
 #define PVID_ASSESS_F32_H
 
 #include "solve/cholesky_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* Whether S - margin Sn is positive definite, Sn the information of noise of the given variance alone: S contains
  * more information than noise. True if the model has no `noise`. s: upper triangle of C^T M C [n_p][n_p]. Cost: a

@@ -6,7 +6,7 @@
 
 #include "number/count.h"
 #include "number/finite_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* Relative size of a step in parameter a: over p if it is positive, else over start_sd. Returned as bits: those of
  * |x| are ordered like |x|, infinity and NaN last. */

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from bench.campaign.truth import SimulatedRig
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
+from pvid.models.kapitza import MODEL
 from pvid.rig.file import Core, RigFile
-from pvid.run.identify import LINEAR, Identification, Publications, identify
+from pvid.run.identify import Identification, Publications, identify
 
 Float = npt.NDArray[np.float64]
 
@@ -34,7 +35,7 @@ COLUMNS: dict[str, type] = {
     **dict.fromkeys(("bound_w", "bound_d1", "bound_d2"), float),
     **dict.fromkeys(("suffices", "published", "answered", "within_1", "within_5"), bool),
     **dict.fromkeys(("warned", "silently_wrong", "right", "missed", "crashed"), bool),
-    **{f"{name}{what}": float for name in LINEAR for what in ("", "_se", "_error", "_z")},
+    **{f"{name}{what}": float for name in MODEL.mapped_names for what in ("", "_se", "_error", "_z")},
     **dict.fromkeys(("worst_error", "misfit", "first_s"), float),
     **dict.fromkeys(("publications", "publications_wrong", "publications_right", "publications_right_alarmed"), int),
     **dict.fromkeys(("status", "reason", "warning"), str),
@@ -107,7 +108,7 @@ def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: st
     record["missed"] = suffices and not published
     for name in ("warned", "within_1", "within_5", "silently_wrong", "right", "answered", "crashed"):
         record[name] = False
-    for name in LINEAR:
+    for name in MODEL.mapped_names:
         record.update({name: None, f"{name}_se": None, f"{name}_error": None, f"{name}_z": None})
     record.update(warning=None, misfit=None, status=None, reason=refusal, worst_error=None)
     record.update(
@@ -120,10 +121,10 @@ def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: st
     if not published:
         record["reason"] = result.verdict
         return record
-    value = np.array([result.value[name] for name in LINEAR])
-    se = np.array([result.se[name] for name in LINEAR])
+    value = np.array([result.value[name] for name in MODEL.mapped_names])
+    se = np.array([result.se[name] for name in MODEL.mapped_names])
     judgement = Judgement.of(value, se, simulated.p)
-    for at, name in enumerate(LINEAR):
+    for at, name in enumerate(MODEL.mapped_names):
         record[name], record[f"{name}_se"] = float(value[at]), float(se[at])
         record[f"{name}_error"] = float(value[at] / simulated.p[at] - 1)
         record[f"{name}_z"] = float(judgement.z[at])
@@ -178,7 +179,7 @@ def _of_rig(simulated: SimulatedRig) -> Record:
         "y_lsb": rig.y_lsb,
         "largest_phi": simulated.largest,
         "gain": rig.gain,
-        **{f"bound_{name}": _finite(simulated.bound[at]) for at, name in enumerate(LINEAR)},
+        **{f"bound_{name}": _finite(simulated.bound[at]) for at, name in enumerate(MODEL.mapped_names)},
     }
 
 

@@ -22,7 +22,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import Comparison, compare_rig
 from pvid.run.identify import Identification, identify
-from pvid.sim.pendulum import Pendulum, simulate, standard_sensors, standard_start
+from pvid.sim.pendulum import simulate, standard_sensors, standard_start
 
 BOARD = BOARDS["mps2-an386"]
 
@@ -122,7 +122,7 @@ def command(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
         f"standard rig, {truth} equations, {bits}-bit encoder, {run.t[-1]:.0f} s at {run.sample_rate:g} Hz; "
         f"start {', '.join(f'{100 * (s / p - 1):+.0f} %' for s, p in zip(start, simulation.p, strict=True))} off"
     )
-    truths = _truths(simulation.pendulum)
+    truths = simulation.pendulum.truths
     with progress_bar(f"streaming to {on.name}, comparing with the twins", len(rigs) * len(run.t)) as advance:
         parts = play_demo(on, rigs, run, Native(), start, advance)
     for played in parts:
@@ -134,11 +134,6 @@ def command(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
         click.echo(f"streamed to {on.where}: {playback.done} ticks, {played.verdict.text} to here{hashed}")
     write_figure(parts[0].result, figure, truths)
     return DONE if all(played.equal for played in parts) else DIFFERENT
-
-
-def _truths(pendulum: Pendulum) -> dict[str, float]:
-    w, d1, d2 = pendulum.linear
-    return {"w": w, "d1": d1, "d2": d2, "g": pendulum.g, "l2": pendulum.l2, "rho2": pendulum.rho2, "c": 0.0}
 
 
 def _print_comparison(comparison: Comparison, label: str = "C core against the numpy twin") -> None:

@@ -17,7 +17,6 @@ from pvid.cli.input import columns_option, read_input, rig_options
 from pvid.cli.simulate import tone
 from pvid.log.rig_settings import rig_for
 from pvid.rig.columns import Columns
-from pvid.run.identify import UNITS, ZERO
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_RELEASE
 
 
@@ -68,9 +67,10 @@ def command(
         click.echo(json.dumps(report.as_json()))
         return DONE
     table = Table("parameter", "predicted at", "standard error", "%", title=f"a run of {report.duration:g} s")
+    model = rig.mechanism.model
     for name, value in report.value.items():
-        share = f"{100 * report.se[name] / abs(value):.2g}" if name != ZERO else ""
-        label = escape(f"{name} [{UNITS[name]}]" if UNITS[name] else name)
+        share = f"{100 * report.se[name] / abs(value):.2g}" if name != model.offset_name else ""
+        label = escape(model.answer(name).name_and_unit)
         table.add_row(label, *with_error(value, report.se[name]), share)
     Console().print(table)
     click.echo(f"kappa {report.kappa:.2g}; noise of a row {report.row_sd:.2g} rad")

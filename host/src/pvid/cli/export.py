@@ -9,6 +9,7 @@ import click
 from pvid.base.console import DONE
 from pvid.cli.input import log_argument, log_rig
 from pvid.log.rig import rig_of_log
+from pvid.log.values import UNKNOWN_RIG
 from pvid.rig.file import load
 
 
@@ -27,6 +28,6 @@ def command(log: Path, rig_path: Path | None, form: str, out: Path | None) -> in
     from pvid.log.export import export_log
 
     rig = load(rig_path) if rig_path is not None else rig_of_log(log)
-    for path in export_log(log, form, out or log.with_suffix(""), None if rig is None else rig.l1):
+    for path in export_log(log, form, out or log.with_suffix(""), UNKNOWN_RIG if rig is None else rig.mechanism):
         click.echo(path)
     return DONE

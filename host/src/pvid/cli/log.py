@@ -22,6 +22,8 @@ from pvid.log.reader import Account, Observer
 from pvid.log.recorder import EmulatorSource, Logger, PortSource
 from pvid.log.rig import refuse_to_append
 from pvid.log.status import StatusLine
+from pvid.log.values import UNKNOWN_RIG
+from pvid.models.model import Mechanism
 from pvid.rig.file import RigFile, load
 from pvid.show.page import DEFAULT as LIVE_PAGE
 from pvid.show.page import is_local, page
@@ -92,12 +94,12 @@ def command(
     board = None if rig is None else _board(rig)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)
-    l1 = None if rig is None else rig.l1
+    mechanism = UNKNOWN_RIG if rig is None else rig.mechanism
     title = f"{port} -> {out}"
     with page(web, out, title) if web is not None else nullcontext("") as address:
-        observers: list[Observer] = [LiveStream(one, l1) for one in live]
+        observers: list[Observer] = [LiveStream(one, mechanism) for one in live]
         if not quiet:
-            observers.append(_view(title, l1, address))
+            observers.append(_view(title, mechanism, address))
         logger = Logger(
             source=EmulatorSource(port, lambda: open_target(port, board)) if emulated and board else PortSource(port),
             out=out,
@@ -118,17 +120,17 @@ def command(
     return print_account(account, allow_loss, logger.failures)
 
 
-def _view(title: str, l1: float | None, address: str) -> Observer:
+def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
     if address and not is_local(address):
         write_stderr(f"every computer with access to this machine can open {address}")
     console = Console()
     if sys.stdout.isatty() and not console.is_dumb_terminal:
-        return LiveView(console, title, l1, address)
+        return LiveView(console, title, mechanism, address)
     write_stderr(f"{title}; Ctrl-C ends the recording")
     if address:
         write_stderr(f"live page: {address}")
-    return StatusLine(sys.stderr)
+    return StatusLine(sys.stderr, mechanism.model)
 
 
 def _board(rig: RigFile) -> StreamRig:

@@ -39,7 +39,7 @@ def print_result(result: Identification, rig: RigFile, truths: dict[str, float] 
     table = answer.table(result, truths)
     if table is not None:
         Console().print(table)
-    for line in (answer.error_line(result, rig.sensor.y_gain_sd, rig.l1_sd), answer.status_line(result)):
+    for line in (answer.error_line(result, rig), answer.status_line(result)):
         if line is not None:
             click.echo(line)
 

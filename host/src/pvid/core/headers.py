@@ -81,7 +81,7 @@ class Headers:
 
     def __init__(self, text: str) -> None:
         self.ffi = FFI()
-        self.ffi.cdef(text)
+        self.ffi.cdef(text.replace("extern const ", "extern "))  # a constant that is no number has no address in cffi
 
     @staticmethod
     def of(library: Path) -> Headers:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.core.headers import Headers, Tables, default_library
+from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Status
 from pvid.settings.f32 import EstimatorConfig
 from pvid.settings.forms import FORMS
@@ -41,9 +42,9 @@ _ARITHMETIC: dict[Core, _Arithmetic] = {
 
 # Models of the fixed-point core by the lengths of p and theta.
 _MODELS_Q31 = {
-    (4, 8): "pvid_kapitza_weak_q31",
-    (3, 5): "pvid_kapitza_weak_zeroed_q31",
-    (3, 11): "pvid_kapitza_strong_q31",
+    (4, 8): f"pvid_{DEFAULT}_weak_q31",
+    (3, 5): f"pvid_{DEFAULT}_weak_zeroed_q31",
+    (3, 11): f"pvid_{DEFAULT}_strong_q31",
 }
 
 
@@ -91,7 +92,7 @@ class Native:
 
     def estimator(self, config: EstimatorConfig, update_rate: float) -> Stepper:
         """An initialised float estimator of the strong form that is fed rows."""
-        model = self.headers.ffi.addressof(self.library, "pvid_kapitza_strong_f32")
+        model = self.headers.ffi.addressof(self.library, f"pvid_{DEFAULT}_strong_f32")
         return Stepper(self, "estimator", "f32", config, replay="rows", model=model, update_rate_hz=update_rate)
 
     def estimator_q31(self, config: EstimatorConfigQ31) -> Stepper:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pvid.models.registry import DEFAULT
+
 ROOT = Path(__file__).resolve().parents[4]
 FIRMWARE = ROOT / "firmware"
 SRC = FIRMWARE / "src"
-MODEL = FIRMWARE / "models" / "kapitza"
+MODEL = FIRMWARE / "models" / DEFAULT  # the one that the library is built with
 PUBLIC_FOLDERS = (FIRMWARE / "include", MODEL / "include")
 FOLDERS = (*PUBLIC_FOLDERS, SRC, MODEL)
 PUBLIC_INCLUDES = [f"-I{folder}" for folder in PUBLIC_FOLDERS]

@@ -20,7 +20,8 @@ from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
 from pvid.log.reader import LogReader
 from pvid.log.rig import hello_of_log
-from pvid.log.values import TABLES, Column, Rows, Values
+from pvid.log.values import TABLE_NAMES, Column, Rows, Tables, Values
+from pvid.models.model import Mechanism
 
 _BATCH = 1 << 15  # rows
 
@@ -28,7 +29,7 @@ _BATCH = 1 << 15  # rows
 class Writer(Protocol):
     """Takes rows in, one after the other."""
 
-    def __init__(self, base: Path, files: Mapping[str, Path]) -> None: ...
+    def __init__(self, base: Path, files: Mapping[str, Path], tables: Tables) -> None: ...
 
     @staticmethod
     def suffixes() -> list[str]: ...
@@ -41,10 +42,10 @@ class Writer(Protocol):
 class CsvWriter:
     """A file of each table; numbers as Python writes them, which read back exactly."""
 
-    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
-        self._stack = ExitStack()
+    def __init__(self, base: Path, files: Mapping[str, Path], tables: Tables) -> None:
+        self._stack, self._tables = ExitStack(), tables
         self._writers = {}
-        for table, columns in TABLES.items():
+        for table, columns in tables.items():
             file = self._stack.enter_context(files[f"-{table}.csv"].open("w", newline="", encoding="utf-8"))
             self._writers[table] = csv.writer(file)
             self._writers[table].writerow(columns)
@@ -53,7 +54,7 @@ class CsvWriter:
     @staticmethod
     def suffixes() -> list[str]:
         """Endings of what is written."""
-        return [*(f"-{table}.csv" for table in TABLES), "-metadata.json"]
+        return [*(f"-{table}.csv" for table in TABLE_NAMES), "-metadata.json"]
 
     def _metadata(self, base: Path) -> dict[str, Any]:
         kinds = {"f8": "double", "i8": "long"}
@@ -67,13 +68,13 @@ class CsvWriter:
                 "url": f"{base.name}-{table}.csv",
                 "tableSchema": {"columns": [described(name, column) for name, column in columns.items()]},
             }
-            for table, columns in TABLES.items()
+            for table, columns in self._tables.items()
         ]
         return {"@context": "http://www.w3.org/ns/csvw", "dc:creator": f"pvid {__version__}", "tables": tables}
 
     def write(self, rows: Rows) -> None:
         """See Writer."""
-        columns = [rows.columns[name].tolist() for name in TABLES[rows.table]]
+        columns = [rows.columns[name].tolist() for name in self._tables[rows.table]]
         self._writers[rows.table].writerows(zip(*columns, strict=True))
 
     def close(self) -> None:
@@ -84,9 +85,10 @@ class CsvWriter:
 class _Gathered:
     """Rows of each table, until there are enough of them."""
 
-    def __init__(self) -> None:
-        self._parts: dict[str, list[Rows]] = {table: [] for table in TABLES}
-        self._count = dict.fromkeys(TABLES, 0)
+    def __init__(self, tables: Tables) -> None:
+        self.tables = tables
+        self._parts: dict[str, list[Rows]] = {table: [] for table in tables}
+        self._count = dict.fromkeys(tables, 0)
 
     def add(self, rows: Rows) -> bool:
         """Whether a batch of this table is full."""
@@ -99,20 +101,20 @@ class _Gathered:
         parts, self._parts[table], self._count[table] = self._parts[table], [], 0
         return {
             name: np.concatenate([np.empty(0, column.kind), *(one.columns[name] for one in parts)])
-            for name, column in TABLES[table].items()
+            for name, column in self.tables[table].items()
         }
 
 
 class ParquetWriter:
     """A file of each table; unit and description are metadata of the columns."""
 
-    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
+    def __init__(self, base: Path, files: Mapping[str, Path], tables: Tables) -> None:
         import pyarrow  # 40 ms that other formats need not wait for
         import pyarrow.parquet
 
         self._arrow, self._parquet = pyarrow, pyarrow.parquet
-        self._gathered = _Gathered()
-        self._schemas = {table: self._schema(columns) for table, columns in TABLES.items()}
+        self._gathered = _Gathered(tables)
+        self._schemas = {table: self._schema(columns) for table, columns in tables.items()}
         self._writers = {
             table: self._parquet.ParquetWriter(files[f"-{table}.parquet"], schema)
             for table, schema in self._schemas.items()
@@ -121,7 +123,7 @@ class ParquetWriter:
     @staticmethod
     def suffixes() -> list[str]:
         """Endings of what is written."""
-        return [f"-{table}.parquet" for table in TABLES]
+        return [f"-{table}.parquet" for table in TABLE_NAMES]
 
     def _schema(self, columns: Mapping[str, Column]) -> Any:
         arrow = self._arrow
@@ -155,9 +157,9 @@ class ParquetWriter:
 class NpzWriter:
     """One file: the samples' columns by their names, the others' as `estimates.w`; "units" is a JSON object."""
 
-    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
+    def __init__(self, base: Path, files: Mapping[str, Path], tables: Tables) -> None:
         self._path = files[".npz"]
-        self._gathered = _Gathered()
+        self._gathered = _Gathered(tables)
 
     @staticmethod
     def suffixes() -> list[str]:
@@ -172,7 +174,7 @@ class NpzWriter:
         """See Writer."""
         arrays: dict[str, npt.NDArray[Any]] = {}
         units = {}
-        for table, columns in TABLES.items():
+        for table, columns in self._gathered.tables.items():
             front = "" if table == "samples" else f"{table}."
             arrays.update({front + name: array for name, array in self._gathered.take(table).items()})
             units.update({front + name: column.unit for name, column in columns.items()})
@@ -183,15 +185,15 @@ class NpzWriter:
 class McapWriter:
     """One file: a channel of JSON messages for each table, with a JSON schema that tells the units."""
 
-    def __init__(self, base: Path, files: Mapping[str, Path]) -> None:
+    def __init__(self, base: Path, files: Mapping[str, Path], tables: Tables) -> None:
         from mcap.writer import Writer as Mcap
 
         self._file = files[".mcap"].open("wb")
         self._mcap = Mcap(self._file)
         self._mcap.start(profile="", library=f"pvid {__version__}")
-        self._channels = {}
+        self._channels, self._tables = {}, tables
         self._sequence = 0
-        for table, columns in TABLES.items():
+        for table, columns in tables.items():
             schema = self._mcap.register_schema(
                 f"pvid.{table}", "jsonschema", json.dumps(self._schema(table, columns)).encode()
             )
@@ -214,7 +216,7 @@ class McapWriter:
 
     def write(self, rows: Rows) -> None:
         """See Writer. A number that is none is left out of its message: JSON has no NaN."""
-        names = [name for name in TABLES[rows.table] if name != "log_time"]
+        names = [name for name in self._tables[rows.table] if name != "log_time"]
         channel = self._channels[rows.table]
         times = rows.columns["log_time"].tolist()
         for log_time, *row in zip(times, *(rows.columns[name].tolist() for name in names), strict=True):
@@ -233,10 +235,10 @@ class McapWriter:
 FORMATS: dict[str, type[Writer]] = {"csv": CsvWriter, "parquet": ParquetWriter, "mcap": McapWriter, "npz": NpzWriter}
 
 
-def export_log(log: Path, form: str, base: Path, l1: float | None) -> list[Path]:
+def export_log(log: Path, form: str, base: Path, mechanism: Mechanism) -> list[Path]:
     """Writes a log as one of FORMATS under the name `base` with the format's endings; returns what was written.
 
-    `l1` [m] of the rig: without it there are no g, l2 and rho2.
+    `mechanism` of the rig: without its constants there are no physical parameters.
 
     Raises
     ------
@@ -244,11 +246,11 @@ def export_log(log: Path, form: str, base: Path, l1: float | None) -> list[Path]
         When the log cannot be read or a file cannot be written.
     """
     kind = FORMATS[form]
-    values = Values(l1, hello_of_log(log))
+    values = Values(mechanism, hello_of_log(log))
     try:
         with ExitStack() as stack:
             files = {one: stack.enter_context(appearing(base.with_name(base.name + one))) for one in kind.suffixes()}
-            writer = kind(base, files)
+            writer = kind(base, files, values.tables)
             for record in LogReader(log):
                 for rows in values.rows(record):
                     writer.write(rows)

@@ -21,11 +21,11 @@ import numpy.typing as npt
 from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Raw, RawCount
 from pvid.log.file import Segment
 from pvid.log.reader import Account, Record, Restart
-from pvid.log.values import TABLES, Rows, Values
+from pvid.log.values import UNKNOWN_RIG, Rows, Values
+from pvid.models.model import Mechanism, Model
 
 Float = npt.NDArray[np.float64]
 
-NUMBERS = tuple(name for name, column in TABLES["estimates"].items() if column.kind == "f8" and name != "t")
 _MOST_SAMPLES = 200_000
 _MOST_ASIDE = 5_000  # records that are put aside while nobody looks
 _MOST_PARTS = 1_000  # in which the samples are kept
@@ -75,7 +75,7 @@ class Thinned(Generic[T]):
 
 @dataclass(eq=False)
 class _Point:
-    """An estimate; `row` are its time [s] and NUMBERS once they have been computed."""
+    """An estimate; `row` are its time [s] and numbers once they have been computed."""
 
     record: Record
     row: tuple[float, ...] = ()
@@ -86,44 +86,57 @@ class History:
 
     Parameters
     ----------
-    l1
-        Length of rod 1 [m]; None: g, l2 and rho2 stay unknown.
+    mechanism
+        Of the rig; without its constants the physical parameters stay unknown.
     points
         Half of the most estimates that are kept.
     window_s
         How much of the samples is kept [s], as far as they are no more than 200 000.
     """
 
-    def __init__(self, l1: float | None = None, points: int = 400, window_s: float = 10.0) -> None:
+    def __init__(self, mechanism: Mechanism = UNKNOWN_RIG, points: int = 400, window_s: float = 10.0) -> None:
         self.window_s = window_s
         self.hello: Hello | None = None
-        self._values = Values(l1)
+        self._values = Values(mechanism)
         self._aside: list[Record | _Point] = []
         self._aside_samples = 0
         self._estimates: Thinned[_Point] = Thinned(points)
         self._newest: dict[str, float] = {}
         self._reason = ""
-        self._samples: deque[Float] = deque()  # t, phi, y: [3, n] each
+        self._samples: deque[Float] = deque()  # t and the channels: [1 + channels, n] each
         self._count = 0
         self._began: int | None = None
 
-    def know(self, l1: float) -> None:
-        """The length of rod 1 [m], once it is known."""
-        self._values.l1 = l1
+    def know(self, mechanism: Mechanism) -> None:
+        """That of the rig, once it is known."""
+        self._values.mechanism = mechanism
+
+    @property
+    def model(self) -> Model:
+        """The mechanism's."""
+        return self._values.mechanism.model
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the estimates' columns that hold numbers, but for the time."""
+        columns = self._values.tables["estimates"].items()
+        return tuple(name for name, column in columns if column.kind == "f8" and name != "t")
 
     @property
     def has_physical(self) -> bool:
-        """Whether g, l2 and rho2 can be computed."""
-        return self._values.l1 is not None
+        """Whether the physical parameters can be computed."""
+        return self._values.mechanism.constants is not None
 
     @property
     def is_physical(self) -> bool:
         """Whether the newest estimate lies in the physical region; so it is called where that cannot be known."""
-        return not self.has_physical or math.isfinite(self.newest.get("l2", 0.0))
+        return not self.has_physical or all(
+            math.isfinite(self.newest.get(name, 0.0)) for name in self.model.physical_names
+        )
 
     @property
     def newest(self) -> dict[str, float]:
-        """The newest estimate: NUMBERS by name; empty before the first."""
+        """The newest estimate: its numbers by name; empty before the first."""
         self._work_off()
         return self._newest
 
@@ -154,16 +167,16 @@ class History:
             self._work_off()
 
     def estimates(self, name: str) -> Float:
-        """A column of the estimates' history: "t" [s] or one of NUMBERS, [n]."""
+        """A column of the estimates' history: "t" [s] or one of `numbers`, [n]."""
         self._work_off()
-        at = 0 if name == "t" else 1 + NUMBERS.index(name)
+        at = 0 if name == "t" else 1 + self.numbers.index(name)
         return np.array([point.row[at] for point in self._estimates.rows], np.float64)
 
     def samples(self) -> Float:
-        """The last `window_s` of t [s], phi [rad], y [m]: [3, n]."""
+        """The last `window_s` of t [s] and the channels: [1 + channels, n]."""
         self._work_off()
         if not self._samples:
-            return np.zeros((3, 0))
+            return np.zeros((1 + len(self.model.channels), 0))
         joined = np.concatenate(self._samples, axis=1)
         return np.asarray(joined[:, joined[0] > joined[0, -1] - self.window_s])
 
@@ -188,10 +201,11 @@ class History:
         return np.asarray((log_time - self._began) / 1e9)
 
     def _take_samples(self, rows: Rows) -> None:
-        columns = {name: rows.columns[name][-_MOST_SAMPLES:] for name in ("log_time", "phi", "y")}
-        if not len(columns["phi"]):
+        names = ("log_time", *(one.name for one in self.model.channels))
+        log_time, *channels = (rows.columns[name][-_MOST_SAMPLES:] for name in names)
+        if not len(log_time):
             return
-        part = np.stack([self._since_began(columns["log_time"]), columns["phi"], columns["y"]])
+        part = np.stack([self._since_began(log_time), *channels])
         self._samples.append(part)
         self._count += part.shape[1]
         oldest = part[0, -1] - self.window_s
@@ -202,7 +216,7 @@ class History:
 
     def _take_estimate(self, point: _Point, rows: Rows) -> None:
         t = float(self._since_began(rows.columns["log_time"])[0])
-        self._newest = {name: float(rows.columns[name][0]) for name in NUMBERS}
+        self._newest = {name: float(rows.columns[name][0]) for name in self.numbers}
         self._reason = str(rows.columns["reason"][0])
         point.row = (t, *self._newest.values())
 

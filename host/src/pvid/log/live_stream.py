@@ -21,7 +21,8 @@ from pvid.base.errors import PvidError
 from pvid.base.hosts import addresses
 from pvid.link.frames import Loss
 from pvid.log.reader import Account, Record
-from pvid.log.values import TABLES, Rows, Values
+from pvid.log.values import UNKNOWN_RIG, Column, Rows, Tables, Values
+from pvid.models.model import Mechanism
 
 _TABLES = ("samples", "estimates")
 _LEFT_OUT = ("segment", "run", "log_time", "tick")
@@ -37,8 +38,8 @@ class LiveStream:
 
     Parameters
     ----------
-    l1
-        Length of rod 1 [m]; None: g, l2 and rho2 are not sent.
+    mechanism
+        Of the rig; without its constants no physical parameters are sent.
 
     Raises
     ------
@@ -46,7 +47,7 @@ class LiveStream:
         When the address is none.
     """
 
-    def __init__(self, address: str, l1: float | None = None) -> None:
+    def __init__(self, address: str, mechanism: Mechanism = UNKNOWN_RIG) -> None:
         try:
             parts = urlsplit(address)
             scheme, host, port = parts.scheme, parts.hostname, parts.port
@@ -55,8 +56,8 @@ class LiveStream:
         if scheme not in ("udp", "teleplot") or not host or not port:
             raise PvidError(f"{address!r} is no address to send to: udp://host:port or teleplot://host:port")
         found = addresses(host, port, socket.SOCK_DGRAM, f"cannot send to {address}")[0]
-        self._datagrams = _teleplot if scheme == "teleplot" else _json
-        self._values = Values(l1)
+        self._teleplot = scheme == "teleplot"
+        self._values = Values(mechanism)
         self._socket = socket.socket(found[0], socket.SOCK_DGRAM)
         self._to = found[1]
 
@@ -66,7 +67,7 @@ class LiveStream:
             return  # of which a line in trouble has many
         for rows in self._values.rows(record):
             if rows.table in _TABLES:
-                for datagram in self._datagrams(rows):
+                for datagram in _teleplot(rows, self._values.tables) if self._teleplot else _json(rows):
                     with contextlib.suppress(OSError):  # nobody there: the log has it all
                         self._socket.sendto(datagram, self._to)
 
@@ -91,7 +92,7 @@ def _json(rows: Rows) -> Iterator[bytes]:
         yield (json.dumps(content) + "\n").encode()
 
 
-def _teleplot(rows: Rows) -> Iterator[bytes]:
+def _teleplot(rows: Rows, tables: Tables) -> Iterator[bytes]:
     count = len(rows.columns["t"])
     for first in range(0, count, _TELEPLOT_ROWS):
         points: dict[str, list[str]] = {}
@@ -100,7 +101,7 @@ def _teleplot(rows: Rows) -> Iterator[bytes]:
             for name, value in _numbers(rows, index).items():
                 points.setdefault(name, []).append(f"{when}:{value!r}")
         yield "\n".join(
-            f"{rows.table}.{name}:{';'.join(told)}{_unit(rows.table, name)}" for name, told in points.items()
+            f"{rows.table}.{name}:{';'.join(told)}{_unit(tables[rows.table][name])}" for name, told in points.items()
         ).encode()
 
 
@@ -110,6 +111,5 @@ def _milliseconds(ns: int) -> str:
     return f"{whole}.{rest:06d}".rstrip("0") if rest else str(whole)
 
 
-def _unit(table: str, name: str) -> str:
-    unit = TABLES[table][name].unit
-    return f"§{unit}" if unit != "1" else ""
+def _unit(column: Column) -> str:
+    return f"§{column.unit}" if column.unit != "1" else ""

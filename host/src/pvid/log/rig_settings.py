@@ -10,6 +10,7 @@ from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import shown
 from pvid.log.rig import rig_of_log
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import RigFile, check_setting, load
 from pvid.rig.run import is_run
 
@@ -48,8 +49,12 @@ def rig_for(run_path: Path | None, rig_path: Path | None, settings: Iterable[str
         return load(beside, given)
     if run_path is not None and not run_path.exists():
         raise PvidError(f"{run_path} does not exist")
-    if "l1" not in given:
-        raise PvidError("no rig file, and l1, the length of rod 1 [m], is all that is needed: use --set l1=0.25")
+    model = MODELS[given.get("model", {}).get("name", DEFAULT)]
+    missing = [one for one in model.constants if one.name not in given]
+    if missing:
+        wanted = " and ".join(f"{one.name}, the {one.meaning} [{one.unit}]," for one in missing)
+        typed = " ".join(f"--set {one.name}={one.example}" for one in missing)
+        raise PvidError(f"no rig file, and {wanted} is all that is needed: use {typed}")
     return RigFile.parse("", given)
 
 

@@ -7,7 +7,8 @@ from typing import TextIO
 
 from pvid.link.frames import Estimate, EstimateQ31, Hello
 from pvid.log.reader import Account, Record
-from pvid.log.values import in_si
+from pvid.log.values import UNKNOWN_RIG, in_si
+from pvid.models.model import Model
 from pvid.settings.enums import Reason
 
 _ON_TERMINAL_S = 0.25
@@ -17,7 +18,8 @@ _ELSEWHERE_S = 10.0
 class StatusLine:
     """An observer that writes to a stream, standard error in general."""
 
-    def __init__(self, to: TextIO) -> None:
+    def __init__(self, to: TextIO, model: Model = UNKNOWN_RIG.model) -> None:
+        self._model = model
         self._to = to
         self._terminal = to.isatty()
         self._period = _ON_TERMINAL_S if self._terminal else _ELSEWHERE_S
@@ -57,7 +59,8 @@ class StatusLine:
             text += f"; waiting for the link ({account.obstacle or account.segments[-1].why})"
         hello, estimate = account.lasting.get(Hello), self._estimate
         if isinstance(hello, Hello) and estimate is not None:
-            w, d1, d2 = in_si(estimate, hello)[0][:3]
+            told = zip(self._model.parameters[: self._model.n_mapped], in_si(estimate, hello)[0], strict=False)
+            values = ", ".join(f"{one.name} {value:.5g} {one.unit}".rstrip() for one, value in told)
             reason = Reason(estimate.reason).text if estimate.reason in list(Reason) else str(estimate.reason)
-            text += f"; tick {self._tick}: w {w:.5g} 1/s^2, d1 {d1:.5g}, d2 {d2:.5g}, {reason}"
+            text += f"; tick {self._tick}: {values}, {reason}"
         return text

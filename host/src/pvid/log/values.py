@@ -1,11 +1,11 @@
 """Records of a log (pvid.log.reader) as rows of numbers in SI, for files, screens and the wire.
 
-    values = Values(l1)
+    values = Values(rig.mechanism)
     for record in reader:
         for rows in values.rows(record):
             rows.table, rows.columns["t"], ...
 
-Each of TABLES has the columns written there, with their units; a number that a record does not have is NaN.
+Each of `values.tables` has the columns written there, with their units; a number that a record does not have is NaN.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -34,15 +35,18 @@ from pvid.link.frames import (
 )
 from pvid.log.file import Close, Segment
 from pvid.log.reader import Gap, Record, Restart
-from pvid.oracle import strong as oracle
+from pvid.models.model import Mechanism, Model, Quantity
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.settings.enums import Reason
 
 _SLOWEST, _FASTEST = 1e-3, 1e9  # [Hz]
 _LONGEST_S = 3e9  # between the PC's clock and a tick: a century, which a time in ns has room for
 _MOST = (1 << 63) - 1
 
-PARAMETERS = {"w": "1/s^2", "d1": "1", "d2": "1", "c": "rad"}
-PHYSICAL = {"g": "m/s^2", "l2": "m", "rho2": "m"}
+UNKNOWN_RIG = Mechanism(MODELS[DEFAULT])  # of a log without a rig file
+
+
+Tables = Mapping[str, Mapping[str, "Column"]]
 
 
 @dataclass(frozen=True)
@@ -54,10 +58,6 @@ class Column:
     what: str
 
 
-def _errors(names: Mapping[str, str]) -> dict[str, Column]:
-    return {f"{name}_se": Column(unit, "f8", f"standard error of {name}") for name, unit in names.items()}
-
-
 _WHERE = {
     "t": Column("s", "f8", "time on the board since its tick 0"),
     "tick": Column("1", "i8", "tick on the board"),
@@ -66,34 +66,46 @@ _WHERE = {
     "log_time": Column("ns", "i8", "the PC's clock at the beginning, then the board's; never backwards"),
 }
 
-TABLES: dict[str, dict[str, Column]] = {
-    "samples": {
-        **_WHERE,
-        "phi": Column("rad", "f8", "measured relative angle"),
-        "y": Column("m", "f8", "measured height of the pivot"),
-    },
-    "estimates": {
-        **_WHERE,
-        "updates": Column("1", "i8", "solves so far"),
-        **{name: Column(unit, "f8", "estimate") for name, unit in {**PARAMETERS, **PHYSICAL}.items()},
-        **_errors({**PARAMETERS, **PHYSICAL}),
-        "kappa": Column("1", "f8", "identifiability of p[0]: 1 - R^2, 0 to 1"),
-        "residual": Column("1", "f8", "standard deviation of a row's residual over the one it was configured with"),
-        "reason": Column("", "U24", "reason of the last group of rows"),
-    },
-    "status": {
-        **_WHERE,
-        "state": Column("", "U24", "what the board does"),
-        "updates": Column("1", "i8", "solves so far"),
-        "rejected": Column("1", "i8", "samples that were not finite or absurd"),
-    },
-    "events": {
-        **_WHERE,
-        "event": Column("", "U16", "what happened to the log"),
-        "count": Column("1", "i8", "frames or samples lost, bytes spoilt"),
-        "text": Column("", "U200", "more of it"),
-    },
+_STATUS = {
+    **_WHERE,
+    "state": Column("", "U24", "what the board does"),
+    "updates": Column("1", "i8", "solves so far"),
+    "rejected": Column("1", "i8", "samples that were not finite or absurd"),
 }
+
+_EVENTS = {
+    **_WHERE,
+    "event": Column("", "U16", "what happened to the log"),
+    "count": Column("1", "i8", "frames or samples lost, bytes spoilt"),
+    "text": Column("", "U200", "more of it"),
+}
+
+
+def _number(of: Quantity, what: str) -> Column:
+    return Column(of.unit or "1", "f8", what)
+
+
+TABLE_NAMES = ("samples", "estimates", "status", "events")
+
+
+@cache
+def tables_of(model: Model) -> Tables:
+    """The tables of a model's logs."""
+    estimated = (*model.published, *model.physical)
+    return {
+        "samples": {**_WHERE, **{one.name: _number(one, f"measured {one.meaning}") for one in model.channels}},
+        "estimates": {
+            **_WHERE,
+            "updates": Column("1", "i8", "solves so far"),
+            **{one.name: _number(one, "estimate") for one in estimated},
+            **{f"{one.name}_se": _number(one, f"standard error of {one.name}") for one in estimated},
+            "kappa": Column("1", "f8", "identifiability of p[0]: 1 - R^2, 0 to 1"),
+            "residual": Column("1", "f8", "standard deviation of a row's residual over the one it was configured with"),
+            "reason": Column("", "U24", "reason of the last group of rows"),
+        },
+        "status": _STATUS,
+        "events": _EVENTS,
+    }
 
 
 @dataclass(frozen=True)
@@ -109,14 +121,14 @@ class Values:
 
     Parameters
     ----------
-    l1
-        Length of rod 1 [m], of the rig file; None: g, l2 and rho2 are not computed.
+    mechanism
+        Of the rig file; without its constants no physical parameters are computed.
     hello
         Who the board is, where that is known before its records; without it times are NaN until it has said so.
     """
 
-    def __init__(self, l1: float | None = None, hello: Hello | None = None) -> None:
-        self.l1 = l1
+    def __init__(self, mechanism: Mechanism = UNKNOWN_RIG, hello: Hello | None = None) -> None:
+        self.mechanism = mechanism
         self._hello = hello
         self._row_sd = math.nan
         self._offset = 0.0  # of the angle in fixed point [rad]
@@ -125,6 +137,11 @@ class Values:
         self._runs = 0
         self._segment = -1
         self._session: int | None = None  # None: not named in this segment
+
+    @property
+    def tables(self) -> Tables:
+        """The columns of each table."""
+        return tables_of(self.mechanism.model)
 
     @property
     def sample_rate(self) -> float:
@@ -202,7 +219,7 @@ class Values:
 
     def _one(self, table: str, record: Record, **values: float | int | str) -> Rows:
         columns = self._where(record, np.array([record.tick], np.int64))
-        for name, column in TABLES[table].items():
+        for name, column in self.tables[table].items():
             if name not in columns:
                 columns[name] = np.array([values[name]], column.kind)
         return Rows(table, columns)
@@ -212,22 +229,23 @@ class Values:
         hello = self._hello
         phi_y = item.in_si(np.array([np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]))
         columns = self._where(record, record.tick + np.arange(len(phi_y), dtype=np.int64))
-        return Rows("samples", {**columns, "phi": phi_y[:, 0], "y": phi_y[:, 1]})
+        names = (one.name for one in self.mechanism.model.channels)
+        return Rows("samples", {**columns, **dict(zip(names, phi_y.T, strict=True))})
 
     @np.errstate(all="ignore")
     def _estimate(self, record: Record, item: Estimate | EstimateQ31) -> Rows:
-        n_p = min(MAX_P if self._hello is None else self._hello.n_p, len(PARAMETERS))
+        model = self.mechanism.model
+        n_p = min(MAX_P if self._hello is None else self._hello.n_p, len(model.published))
         p, covariance = in_si(item, self._hello, self._offset)
-        numbers: dict[str, Any] = dict.fromkeys(TABLES["estimates"], np.nan)
+        numbers: dict[str, Any] = dict.fromkeys(self.tables["estimates"], np.nan)
         errors = np.sqrt(np.diag(covariance))
-        for i, name in enumerate(list(PARAMETERS)[:n_p]):
+        for i, name in enumerate(model.p_names[:n_p]):
             numbers[name], numbers[f"{name}_se"] = p[i], errors[i]
-        if self.l1 is not None:
-            physical = oracle.physical(p[:3], self.l1)
-            of_physical = oracle.physical_errors(p[:3], covariance[:3, :3], self.l1)
-            for i, name in enumerate(PHYSICAL):
-                if np.isfinite(physical).all():
-                    numbers[name], numbers[f"{name}_se"] = physical[i], of_physical[i]
+        physical = self.mechanism.physical(p)
+        if np.isfinite(physical).all():
+            of_physical = self.mechanism.physical_errors(p, covariance)
+            for i, name in enumerate(model.physical_names):
+                numbers[name], numbers[f"{name}_se"] = physical[i], of_physical[i]
         numbers["kappa"] = item.kappa / item.FULL_KAPPA
         numbers["residual"] = item.residual_sd / self._row_sd
         reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)

@@ -1,4 +1,4 @@
-"""A recording in words for the user: names of the parameters, reasons, kappa and residual in words."""
+"""A recording in words for the user: reasons, kappa and residual in words."""
 
 from __future__ import annotations
 
@@ -8,17 +8,6 @@ from pvid.link.frames import Code, Core, Form, Hello, Status
 from pvid.log.reader import Account
 from pvid.settings.enums import Reason
 from pvid.settings.forms import FORMS
-
-# Values.TABLES["estimates"] has the same names.
-PARAMETERS = {
-    "g": ("g*", "gravity in the plane", "m/s²"),
-    "l2": ("l2", "joint to centre of mass", "m"),
-    "rho2": ("rho2", "radius of gyration", "m"),
-    "w": ("w", "g*/l1", "1/s²"),
-    "d1": ("d1", "1 + L2 (1 + L1)", ""),
-    "d2": ("d2", "L1 L2", ""),
-    "c": ("c", "the encoder's zero", "rad"),
-}
 
 _REASONS = {
     Reason.UPDATED: "the estimate was updated",

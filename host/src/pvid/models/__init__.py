@@ -1,1 +1,1 @@
-"""Mechanisms: one package each."""
+"""Mechanisms: a folder each, which defines MODEL (pvid.models.model)."""

@@ -1,4 +1,4 @@
-"""The mathematics in float64, straight from theory.md 1 to 4, to be read beside it.
+"""The mathematics in float64, straight from theory.md 2 to 4, to be read beside it.
 
 Nothing here is fast or bit-exact; it is what the twin and the C core are measured against.
 """
@@ -22,49 +22,6 @@ N_P = 3
 
 # The core keeps the binomial coefficients in theta, not in N (kapitza.h): the N of theory.md = BINOMIAL * the core's.
 BINOMIAL = np.array([1, 1, 1, 3, 3, 1, 1, 4, 6, 4, 1], np.float64)
-
-
-# ---- section 1: the plant
-
-
-def linear(g: float, l2: float, rho2: float, l1: float) -> Float:
-    """p = (w, d1, d2) of a pendulum: g [m/s^2], l2, rho2, l1 [m]."""
-    ratio = (l2 / rho2) ** 2
-    return np.array([g / l1, 1 + ratio * (1 + l1 / l2), (l1 / l2) * ratio])
-
-
-def physical(p: npt.ArrayLike, l1: float) -> Float:
-    """(g, l2, rho2) of p = (w, d1, d2), shape [..., 3]; NaN outside the physical region."""
-    w, d1, d2 = np.moveaxis(np.asarray(p, np.float64), -1, 0)
-    with np.errstate(all="ignore"):
-        big_l2 = d1 - d2 - 1
-        l2 = l1 * big_l2 / d2
-        out = np.stack([w * l1, l2, l2 / np.sqrt(big_l2)], axis=-1)
-    out[~((w > 0) & (d2 > 0) & (big_l2 > 0))] = np.nan
-    return out
-
-
-def physical_gradient(p: npt.ArrayLike, l1: float) -> Float:
-    """d (g, l2, rho2) / d (w, d1, d2) at p = (w, d1, d2), [..., 3, 3]."""
-    _, d1, d2 = np.moveaxis(np.asarray(p, np.float64), -1, 0)
-    with np.errstate(all="ignore"):
-        big_l2 = d1 - d2 - 1
-        root = np.sqrt(big_l2)
-        gradient = np.zeros((*d1.shape, 3, 3))
-        gradient[..., 0, 0] = l1
-        gradient[..., 1, 1] = l1 / d2
-        gradient[..., 1, 2] = -l1 * (d2 + big_l2) / d2**2
-        gradient[..., 2, 1] = l1 / (2 * root * d2)
-        gradient[..., 2, 2] = -l1 / (2 * root * d2) - l1 * root / d2**2
-    return gradient
-
-
-def physical_errors(p: npt.ArrayLike, covariance: npt.ArrayLike, l1: float) -> Float:
-    """Standard errors of (g, l2, rho2) by the delta method from the covariance of p, [..., 3] and [..., 3, 3]."""
-    gradient = physical_gradient(p, l1)
-    with np.errstate(all="ignore"):
-        variance = np.einsum("...ia,...ab,...ib->...i", gradient, np.asarray(covariance, np.float64), gradient)
-        return np.asarray(np.sqrt(variance))
 
 
 # ---- section 2: the strong form

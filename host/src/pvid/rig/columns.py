@@ -14,32 +14,29 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import shown
+from pvid.models.model import Channel
+from pvid.models.registry import DEFAULT, MODELS
 
 FloatArray = npt.NDArray[np.float64]
 
-SIGNALS = {"t": "s", "phi": "rad", "y": "m"}
+_TIME = Channel("t", "s", "time", usual_names=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
+_CHANNELS = {one.name: one for one in (_TIME, *MODELS[DEFAULT].channels)}
+SIGNALS = {name: one.unit for name, one in _CHANNELS.items()}
 
 # (factor, divisor) to SI. A divisor gives the same bits as the decimal number in SI has: 7 ms / 1000 = 0.007 s.
-_LENGTHS = {"m": (1.0, 1.0), "cm": (1.0, 1e2), "mm": (1.0, 1e3), "um": (1.0, 1e6), "in": (0.0254, 1.0)}
-_UNITS: dict[str, dict[str, tuple[float, float]]] = {
-    "t": {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "ns": (1.0, 1e9), "min": (60.0, 1.0)},
-    "phi": {
+_UNITS_OF: dict[str, dict[str, tuple[float, float]]] = {
+    "s": {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "ns": (1.0, 1e9), "min": (60.0, 1.0)},
+    "rad": {
         "rad": (1.0, 1.0),
         "mrad": (1.0, 1e3),
         "deg": (math.pi, 180.0),
         "rev": (2.0 * math.pi, 1.0),
         "turn": (2.0 * math.pi, 1.0),
     },
-    "y": _LENGTHS,
+    "m": {"m": (1.0, 1.0), "cm": (1.0, 1e2), "mm": (1.0, 1e3), "um": (1.0, 1e6), "in": (0.0254, 1.0)},
 }
 _SAME = {"µs": "us", "μs": "us", "µm": "um", "μm": "um", "°": "deg", "turns": "turn", "revs": "rev", "sec": "s"}
 
-# How people call the signals, for a suggestion.
-_USUAL_NAMES = {
-    "t": re.compile(r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec", re.I),
-    "phi": re.compile(r"phi|φ|angle|ang|theta|winkel|enc|deg|rad|pend|°", re.I),
-    "y": re.compile(r"^y$|^y[^a-z]|height|^h$|^h[^a-z]|pivot|cart|base|pos|disp|laser|dist|^z", re.I),
-}
 _UNIT_AT_END = re.compile(r"(?:^|[\s_.\-/(\[])(?P<unit>[a-zµμ°]+)[)\]]?\s*$", re.I)
 
 
@@ -140,7 +137,7 @@ class Columns:
             if place is None and numbered and order < len(names):
                 place = order
             elif place is None:
-                alike = (k for k, name in enumerate(names) if k not in taken and _USUAL_NAMES[signal].search(name))
+                alike = (k for k, name in enumerate(names) if k not in taken and _looks_like(signal, name))
                 place = next(alike, None)
             elif signal not in self.named:
                 continue
@@ -155,12 +152,22 @@ class Columns:
         return text if re.fullmatch(r"[\w=:,.\-]+", text, re.ASCII) else f"'{text}'"
 
 
+def _looks_like(signal: str, name: str) -> bool:
+    """Whether people call the signal so."""
+    return re.search(_CHANNELS[signal].usual_names, name, re.I) is not None
+
+
+def _units(signal: str) -> dict[str, tuple[float, float]]:
+    """Units of a signal; without a table only that of SI."""
+    return _UNITS_OF.get(SIGNALS[signal], {SIGNALS[signal]: (1.0, 1.0)})
+
+
 def _scale(signal: str, text: str) -> tuple[float, float]:
     """Factor and divisor of a unit: `deg`, `-mm`, `rev/4096`, `3.8e-4`."""
     unit, slash, count = text.partition("/")
     turned = unit.startswith("-")
     unit = unit.removeprefix("-").strip()
-    known = _UNITS[signal].get(_SAME.get(unit, unit))
+    known = _units(signal).get(_SAME.get(unit, unit))
     try:
         factor, divisor = known if known is not None else (float(unit), 1.0)
         divisor *= float(count) if slash else 1.0
@@ -169,7 +176,7 @@ def _scale(signal: str, text: str) -> tuple[float, float]:
     if not (math.isfinite(factor) and factor > 0.0 and math.isfinite(divisor) and divisor > 0.0):
         raise PvidError(
             f"--columns: {shown(text)} is no unit of {signal}; "
-            f"it is {', '.join(_UNITS[signal])} or a number of {SIGNALS[signal]}, as in {signal}=NAME:0.001"
+            f"it is {', '.join(_units(signal))} or a number of {SIGNALS[signal]}, as in {signal}=NAME:0.001"
         )
     return (-factor if turned else factor), divisor
 
@@ -180,4 +187,4 @@ def _unit_in(name: str, signal: str) -> str | None:
     if match is None:
         return None
     unit = _SAME.get(match["unit"], match["unit"].lower())
-    return unit if unit in _UNITS[signal] else None
+    return unit if unit in _units(signal) else None

@@ -8,6 +8,8 @@
     l2 = 0.1                  # m
     [identifier]
     law = "stationary"
+    [model]
+    name = "kapitza"
 
 Every key is a field of the dataclasses below, which hold its unit, range and default. A wrong key or value
 becomes a PvidError that names it.
@@ -18,12 +20,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import MOST_BYTES, TOO_LONG, toml_document
+from pvid.models.model import Mechanism
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.settings.enums import Form
 from pvid.settings.forms import CORES, FORMS, AnyCore, CoreTraits, FormTraits
 
@@ -183,11 +188,6 @@ class Identifier:
         """Whether the form can be corrected for large angles in this core."""
         return self.form_traits.uses_windows and self.core_traits.corrects_angles
 
-    @property
-    def n_core(self) -> int:
-        """Parameters of the mechanism and, where it is estimated, the encoder's zero."""
-        return 4 if self.zero and self.form_traits.estimates_zero else 3
-
     def in_weak_form(self, **changed: Any) -> Identifier:
         """The same in the weak form; the length of a differentiator's window is none of its windows'."""
         window_s = self.window_s if self.form_traits.uses_windows else 0.0
@@ -215,13 +215,28 @@ class Identifier:
 
 
 @dataclass(frozen=True)
+class ModelTable:
+    """Which mechanism the rig is.
+
+    Attributes
+    ----------
+    name : the mechanism, one of the folders of pvid.models
+    """
+
+    name: str = field(default=DEFAULT, metadata={"choices": tuple(MODELS)})
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[model] ")
+
+
+@dataclass(frozen=True)
 class RigFile:
     """A rig and the way to identify it.
 
     Attributes
     ----------
     l1 : length of rod 1
-    nominal, sensor, identifier : the tables of the file
+    nominal, sensor, identifier, model : the tables of the file
     sample_rate : rate of the samples; default: that of the run
     l1_sd : relative standard deviation of l1; part of the standard errors, because no run shows it
     """
@@ -232,9 +247,28 @@ class RigFile:
     identifier: Identifier = field(default_factory=Identifier)
     sample_rate: float | None = _number(None, "Hz", 1e-3, 1e6)
     l1_sd: float = _number(0.001, "relative", 0.0, 1.0)
+    model: ModelTable = field(default_factory=ModelTable)
 
     def __post_init__(self) -> None:
         _check_fields(self, "")
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The model with the rig's known constants."""
+        model = MODELS[self.model.name]
+        return Mechanism(model, {one.name: getattr(self, one.name) for one in model.constants})
+
+    @property
+    def n_core(self) -> int:
+        """Number of the mapped parameters and, where it is estimated, of the offset."""
+        model = self.mechanism.model
+        with_offset = self.identifier.zero and self.identifier.form_traits.estimates_zero
+        return len(model.published) if with_offset else model.n_mapped
+
+    @property
+    def scale_sd(self) -> dict[str, float]:
+        """Standard deviations of the model's scales by their names, relative."""
+        return {one.name: attrgetter(one.sd_key)(self) for one in self.mechanism.model.scales}
 
     @classmethod
     def standard(cls) -> RigFile:
@@ -253,8 +287,10 @@ class RigFile:
             Keys and tables that come before those of the text.
         """
         top = _known(cls, _merged(toml_document(text), settings or {}), "")
-        if "l1" not in top:
-            raise PvidError("l1 is missing: the length of rod 1 [m]")
+        model = ModelTable(**_table(top.pop("model", {}), "model"))
+        for one in MODELS[model.name].constants:
+            if one.name not in top:
+                raise PvidError(f"{one.name} is missing: the {one.meaning} [{one.unit}]")
         tables = {name: _table(top.pop(name, {}), name) for name in _TABLES}
         top = _without_integers(cls, top)
         _check_value(_field(cls, "l1"), top["l1"], "")
@@ -264,13 +300,14 @@ class RigFile:
             nominal=Nominal(**guess),
             sensor=Sensor(**tables["sensor"]),
             identifier=Identifier(**tables["identifier"]),
+            model=model,
             **top,
         )
 
     def text(self) -> str:
         """TOML text with every key and its unit; `parse` gives the same rig back."""
         lines = _lines(self)
-        for name in ("sensor", "nominal", "identifier"):
+        for name in _TABLES:
             lines += ["", f"[{name}]", *_lines(getattr(self, name))]
         return "\n".join(lines) + "\n"
 
@@ -329,7 +366,12 @@ def check_setting(table: str, key: str, value: Any) -> Any:
     return value
 
 
-_TABLES: dict[str, type] = {"sensor": Sensor, "nominal": Nominal, "identifier": Identifier}
+_TABLES: dict[str, type] = {
+    "sensor": Sensor,
+    "nominal": Nominal,
+    "identifier": Identifier,
+    "model": ModelTable,
+}
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:

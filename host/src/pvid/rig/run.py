@@ -80,7 +80,7 @@ class Run:
         PvidError
             Naming the first.
         """
-        for name in ("phi", "y"):
+        for name in list(SIGNALS)[1:]:
             beyond = np.abs(getattr(self, name)) > _LARGEST
             if beyond.any():
                 at = int(np.argmax(beyond))

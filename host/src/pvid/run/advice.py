@@ -16,7 +16,6 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.models.kapitza.modes import modes_hz
 from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile, Unset
 from pvid.rig.run import Run
@@ -183,8 +182,8 @@ def _is_explained(result: Identification | None) -> bool:
 
 
 def _answers(trial: Identification | None) -> bool:
-    """With parameters that some pendulum has."""
-    return trial is not None and trial.identified and "g" in trial.value
+    """With parameters that some mechanism has."""
+    return trial is not None and trial.identified and all(name in trial.value for name in trial.model.physical_names)
 
 
 def _is_better(trial: Identification | None, now: Identification | None) -> bool:
@@ -447,7 +446,8 @@ def _at_rate(case: Case, factor: float) -> Case:
 def _clock(case: Case, native: Native) -> Cure | None:
     """A clock that runs too slow or too fast. Any explains a run, with another gravity: one is tried that brings what
     phi does most to the nominal slow mode, and gravity tells which is right."""
-    slow = (modes_hz(nominal_start(case.rig)) or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
+    modes = case.rig.mechanism.model.modes_hz(nominal_start(case.rig))
+    slow = (modes or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
     tried = slow / _dominant_hz(case.run)
     if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
         return None

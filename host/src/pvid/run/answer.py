@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
 
 from pvid.base.rounding import percent, with_error
-from pvid.run.identify import LINEAR, PHYSICAL, UNITS, ZERO, Identification
-
-NAMES = (*PHYSICAL, *LINEAR, ZERO)
+from pvid.models.model import Quantity, Scale
+from pvid.rig.file import RigFile
+from pvid.run.identify import Identification
 
 
 def as_json(result: Identification) -> dict[str, Any]:
     """The object of `identify --json` (host/docs/index.md): null where nothing is identified or judged."""
-    parameters = {name: _parameter(result, name) for name in NAMES}
+    parameters = {one.name: _parameter(result, one) for one in result.model.answers}
     beyond = result.beyond
     return {
         "identified": result.identified,
@@ -47,23 +48,17 @@ def as_json(result: Identification) -> dict[str, Any]:
     }
 
 
-def _parameter(result: Identification, name: str) -> dict[str, Any]:
+def _parameter(result: Identification, of: Quantity) -> dict[str, Any]:
     """Value, standard error and what this is made of; nulls for what is not identified."""
-    known = result.identified and name in result.value
+    name, known = of.name, result.identified and of.name in result.value
     parts = result.parts.get(name) if known else None
     return {
         "value": result.value[name] if known else None,
         "se": result.se[name] if known else None,
-        "unit": UNITS[name],
+        "unit": of.unit,
         "se_noise": parts.noise if parts else None,
-        "se_y_gain": parts.y_gain if parts else None,
-        "se_l1": parts.l1 if parts else None,
+        **{f"se_{one.name}": parts.scales[one.name] if parts else None for one in result.model.scales},
     }
-
-
-def label(name: str) -> str:
-    """A parameter with its unit."""
-    return f"{name} [{UNITS[name]}]" if UNITS[name] else name
 
 
 def table(result: Identification, truths: dict[str, float] | None = None) -> Table | None:
@@ -78,14 +73,15 @@ def table(result: Identification, truths: dict[str, float] | None = None) -> Tab
     out.add_column("standard error", justify="right")
     if truths:
         out.add_column("error %", justify="right")
-    for name in NAMES:
+    for one in result.model.answers:
+        name = one.name
         if name not in result.value:
             continue
         cells = [*with_error(result.value[name], result.se[name])]
         if truths:
             cells.insert(0, f"{truths[name]:.6g}")
             cells.append(f"{100 * (result.value[name] / truths[name] - 1):+.4f}" if truths[name] else "")
-        out.add_row(escape(label(name)), *cells)
+        out.add_row(escape(one.name_and_unit), *cells)
     return out
 
 
@@ -107,26 +103,28 @@ def status_line(result: Identification) -> str:
     )
 
 
-def error_line(result: Identification, y_gain_sd: float, l1_sd: float) -> str | None:
-    """What the standard errors of g, l2, rho2 are made of; None where nothing is identified.
-
-    Parameters
-    ----------
-    y_gain_sd, l1_sd
-        The rig file's, relative.
-    """
+def error_line(result: Identification, rig: RigFile) -> str | None:
+    """What the standard errors of the physical parameters are made of; None where nothing is identified."""
     if not result.identified:
         return None
-    names = [name for name in PHYSICAL if name in result.value] or list(LINEAR)
+    model, scale_sd = result.model, rig.scale_sd
+    names = [name for name in model.physical_names if name in result.value] or list(model.mapped_names)
 
-    def of_each(part: str) -> str:
-        sizes = [(name, abs(getattr(result.parts[name], part) / result.value[name])) for name in names]
+    def of_each(part: Mapping[str, float]) -> str:
+        sizes = [(name, abs(part[name] / result.value[name])) for name in names]
         return ", ".join(f"{name} {percent(size)}" for name, size in sizes if size > 1e-12)
 
-    noise = f"standard errors: from the run's noise {of_each('noise')}"
-    if y_gain_sd == 0.0 and l1_sd == 0.0:
-        return f"{noise}; the gain of y and l1 count as exact (y_gain_sd and l1_sd are 0 in the rig file)"
-    return (
-        f"{noise}; from the gain of y, known to {percent(y_gain_sd)} (y_gain_sd), {of_each('y_gain') or 'none'}; "
-        f"from l1, known to {percent(l1_sd)} (l1_sd), {of_each('l1') or 'none'}"
-    )
+    noise = f"standard errors: from the run's noise {of_each({name: result.parts[name].noise for name in names})}"
+    if not any(scale_sd.values()):
+        scales, keys = " and ".join(one.meaning for one in model.scales), " and ".join(map(_key, model.scales))
+        return f"{noise}; {scales} count as exact ({keys} are 0 in the rig file)" if model.scales else noise
+    parts = [noise]
+    for one in model.scales:
+        of = of_each({name: result.parts[name].scales[one.name] for name in names})
+        parts.append(f"from {one.meaning}, known to {percent(scale_sd[one.name])} ({_key(one)}), {of or 'none'}")
+    return "; ".join(parts)
+
+
+def _key(scale: Scale) -> str:
+    """Its key of the rig file without the table."""
+    return scale.sd_key.rpartition(".")[2]

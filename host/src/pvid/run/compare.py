@@ -10,13 +10,14 @@ import numpy.typing as npt
 
 from pvid.cases import case_of
 from pvid.core.native import Native
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.settings.kinds import Settings
 from pvid.settings.record import Record
 from pvid.twin import fnv
 
-P_NAMES = ("w", "d1", "d2", "c", "c1", "c2")
+P_NAMES = MODELS[DEFAULT].p_names  # the library holds one mechanism
 
 # The float strong form stores equal moments once: number of its sums, moments and entries of B.
 _SHARED_MOMENTS = {58: (45, 11)}

@@ -11,7 +11,6 @@ import numpy as np
 from pvid.base.errors import PvidError
 from pvid.design.weak import WeakDesign
 from pvid.design.weak_cost import WeakCost, cost_of
-from pvid.oracle import strong as oracle
 from pvid.oracle.weak import Prediction, WeakSettings, identify_weak, predict, predict_rig
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -33,8 +32,8 @@ class DesignReport:
     ----------
     design : the tables
     duration : of the run that is predicted [s]
-    value, se : parameters (w, d1, d2, c where unknown, g, l2, rho2) that the prediction is made at, and standard errors
-    kappa : part of w's information that d1 and d2 cannot imitate
+    value, se : published parameters, and physical ones, that the prediction is made at, and standard errors
+    kappa : part of the first parameter's information that the others cannot imitate
     row_sd : noise of a row [rad]
     cost : on a device
     """
@@ -120,7 +119,7 @@ def report_for_tones(
     if rig.sample_rate is None:
         raise PvidError("sample_rate is required in the rig file to compute the tables")
     design = weak_design_of(rig, rig.sample_rate)
-    nominal = Pendulum(l1=rig.l1, l2=rig.nominal.l2, rho2=rig.nominal.rho2, g=rig.nominal.g)
+    nominal = Pendulum.nominal(rig)
     drive, settings = Drive(tuple(tones)), rig.identifier
     prediction = predict_rig(
         design, nominal, drive, sensors_of(rig), duration, release, settings.zero, settings.forgetting_s
@@ -140,7 +139,7 @@ def report_for_run(rig: RigFile, run: Run, duration: float | None = None) -> Des
     config = weak_config(rig, run.sample_rate)
     settings = WeakSettings(config.estimator.start.astype(np.float64), config.estimator.row_sd)
     last = identify_weak(run.phi, run.y, design, settings).last
-    found = bool((last.p[:3] > 0).all()) and last.se[0] < WORST_SE * last.p[0]
+    found = bool((last.p[: rig.mechanism.model.n_mapped] > 0).all()) and last.se[0] < WORST_SE * last.p[0]
     p = last.p if found else settings.start
     prediction = predict(run.phi, run.y, design, p, sensors_of(rig), rig.identifier.forgetting_s)
     recorded = len(run.t) / run.sample_rate
@@ -164,14 +163,16 @@ def _report(
         covariance = covariance * (recorded / duration)
     settings = rig.identifier
     corrected = settings.core == "f32" and (settings.full_angle or settings.damping)
-    names = ("w", "d1", "d2", "c")[: len(p)]
+    mechanism = rig.mechanism
+    model = mechanism.model
+    names = model.p_names[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
     se = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
-    physical = oracle.physical(p[:3], rig.l1)
+    physical = mechanism.physical(p)
     if np.isfinite(physical).all():
-        errors = oracle.physical_errors(p[:3], covariance[:3, :3], rig.l1)
-        value.update(zip(("g", "l2", "rho2"), map(float, physical), strict=True))
-        se.update(zip(("g", "l2", "rho2"), map(float, errors), strict=True))
+        errors = mechanism.physical_errors(p, covariance)
+        value.update(zip(model.physical_names, map(float, physical), strict=True))
+        se.update(zip(model.physical_names, map(float, errors), strict=True))
     return DesignReport(
         design=design,
         duration=recorded if duration is None else duration,

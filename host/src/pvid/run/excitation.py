@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.models.kapitza.modes import modes_hz
 from pvid.rig.file import Identifier, RigFile
 from pvid.rig.run import Run
 from pvid.setup.f32 import NOISE_LSB, nominal_start, weak_config
@@ -77,7 +76,7 @@ def excitation_of(run: Run, rig: RigFile) -> Excitation:
     from scipy.signal import welch  # takes a quarter of a second that a good run need not wait for
 
     rate, p = run.sample_rate, nominal_start(rig)
-    fast = (modes_hz(p) or (float(np.sqrt(p[0])) / (2 * np.pi),))[-1]
+    fast = (rig.mechanism.model.modes_hz(p) or (float(np.sqrt(p[0])) / (2 * np.pi),))[-1]
     length = min(len(run.t), max(16, round(_SEGMENT_S * rate)))
     finite = np.isfinite(run.y)
     height = np.where(finite, run.y, run.y[finite].mean() if finite.any() else 0.0)

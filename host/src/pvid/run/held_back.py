@@ -20,7 +20,7 @@ from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.rows import JOLT, RunRows, energy_at, least_squares
-from pvid.run.survey import is_pendulum, sized_for
+from pvid.run.survey import sized_for
 from pvid.setup.f32 import nominal_start, weak_design_of
 
 Float = npt.NDArray[np.float64]
@@ -40,7 +40,7 @@ _OVERLAP = 2.0
 
 
 @dataclass(frozen=True)
-class Model:
+class Equations:
     """The equations that a rig file asks for, with p of the whole run and the moments of the reference rows there.
 
     Attributes
@@ -64,7 +64,7 @@ class HeldBack:
     """
 
     def __init__(self, run: Run, rig: RigFile) -> None:
-        """`rig` has the run's survey as its nominal pendulum; its own sizes are not used."""
+        """`rig` has the run's survey as its nominal; its own sizes are not used."""
         identifier = replace(rig.identifier, window_s=0.0, test_functions=HOST.functions, decimation=0, smoothing_s=0.0)
         wide = sized_for(replace(rig, identifier=replace(identifier, pass_hz=_WIDEST_HZ)), run)
         self.run, self.rig = run, rig
@@ -81,35 +81,35 @@ class HeldBack:
                 f"the run of {duration:.3g} s is too short to judge settings on held-out data: each half "
                 f"must contain {_LEAST_WINDOWS} driven windows of {self.design.window_s:.2g} s"
             )
-        self.models: dict[tuple[bool, bool], Model] = {}
+        self.equations: dict[tuple[bool, bool], Equations] = {}
         self.kept = np.ones(len(self.halves), np.bool_)
         linear = self._fitted(full_angle=False, damping=False)
         residuals = energy_at(linear.moments, linear.p)
         self.kept = residuals <= JOLT * np.median(residuals)
 
-    def model_of(self, rig: RigFile) -> Model:
+    def equations_of(self, rig: RigFile) -> Equations:
         """The equations that a rig file asks for, fitted to all reference rows.
 
         Raises
         ------
         PvidError
-            When they do not lead to a pendulum.
+            When they lead to no plausible parameters.
         """
         asked = (rig.identifier.full_angle, rig.identifier.damping)
-        if asked not in self.models:
-            self.models[asked] = self._fitted(*asked)
-        return self.models[asked]
+        if asked not in self.equations:
+            self.equations[asked] = self._fitted(*asked)
+        return self.equations[asked]
 
-    def _fitted(self, full_angle: bool, damping: bool) -> Model:
+    def _fitted(self, full_angle: bool, damping: bool) -> Equations:
         p = np.append(self.start, [0.0, 0.0]) if damping else self.start
         moments = np.empty(0)
         for _ in range(_ROUNDS if full_angle or damping else 1):
             rows = self.rows.corrected(p, full_angle) if full_angle or damping else self.rows
             moments = _moments_of(rows.whitened(self.start))
             p = least_squares(moments[self.kept].sum(axis=0), p)
-            if not is_pendulum(p):
+            if not self.rig.mechanism.model.is_plausible(p):
                 raise PvidError("the least-squares solution of the run is not physical")
-        return Model(full_angle, p, moments)
+        return Equations(full_angle, p, moments)
 
     def residuals(self, rig: RigFile) -> Float:
         """Energy of the reference windows held back, predicted with a rig file's settings [windows held back].
@@ -117,9 +117,9 @@ class HeldBack:
         Raises
         ------
         PvidError
-            When a half holds too few windows of these settings, or leads to no pendulum.
+            When a half holds too few windows of these settings, or leads to no plausible parameters.
         """
-        model = self.model_of(rig)
+        model = self.equations_of(rig)
         design = weak_design_of(rig, self.run.sample_rate)
         rows = RunRows.of(rig, self.run, design)
         if model.full_angle:  # the core leaves out what it cannot correct
@@ -135,8 +135,8 @@ class HeldBack:
             if int(seen.sum()) < _LEAST_WINDOWS:
                 raise PvidError(f"windows of {design.window_s:.3g} s are too long for a half of the run")
             p = least_squares(moments[seen].sum(axis=0), model.p)
-            if not is_pendulum(p):
-                raise PvidError("half of the run leads to no pendulum")
+            if not self.rig.mechanism.model.is_plausible(p):
+                raise PvidError("half of the run leads to no plausible parameters")
             held = self.halves == 1 - half
             predicted[held] = energy_at(model.moments[held], p)
         return predicted[self.kept & (self.halves >= 0)]
@@ -149,7 +149,7 @@ class HeldBack:
         forgetting_s
             Time constant of forgetting [s]; 0: none.
         """
-        model = self.model_of(rig)
+        model = self.equations_of(rig)
         moments = model.moments[self.kept]
         keep = math.exp(-self.design.hop_s / forgetting_s) if forgetting_s > 0 else 1.0
         settled = max(len(moments) // 4, _LEAST_WINDOWS)

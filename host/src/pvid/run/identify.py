@@ -12,9 +12,8 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.cases import case_of
 from pvid.core.native import Native
-from pvid.models.kapitza.modes import modes_hz
+from pvid.models.model import Model
 from pvid.oracle import strong as oracle
-from pvid.oracle.scale_errors import added_covariance, scale_errors
 from pvid.oracle.weak import WeakSettings, identify_weak
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -30,11 +29,7 @@ from pvid.setup.ranges_q31 import Beyond
 
 Float = npt.NDArray[np.float64]
 
-LINEAR = ("w", "d1", "d2")
-NAMED = 4  # parameters that are published; what friction the weak form estimates beside them only absorbs
-ZERO = "c"
-
-# With w known no better than this, relative, nothing is identified.
+# With the first parameter known no better than this, relative, nothing is identified.
 WORST_SE = 0.1
 # The fixed-point core's linear rows err by more at angles at which nothing is identified; as the core's own se_max.
 WORST_LINEAR = 0.05
@@ -52,10 +47,6 @@ SATURATED = "saturated"
 # Of a run that is driven and moves, and in which the core sees no drive: its equations do not explain it.
 UNEXPLAINED = "held not explained"
 
-PHYSICAL = ("g", "l2", "rho2")
-UNITS = {"w": "1/s^2", "d1": "", "d2": "", "c": "rad", "g": "m/s^2", "l2": "m", "rho2": "m"}
-
-
 # Samples beyond the fixed-point core's ranges: of an answer, from this share on they are worth a warning.
 _BEYOND_WARNED = 0.01
 # Each of them costs a window: with so many, one or two a second at 1 kHz, nothing else needs to be wrong.
@@ -72,8 +63,9 @@ _UNEXPLAINED_TOLD = 1e-3
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Estimates over time, for a figure: t [n] in s, p and se [n, 3]; physical and its errors [n, 3], NaN outside
-    the physical region; kappa [n]. Standard errors contain those of the scales, as Identification.se does."""
+    """Estimates over time, for a figure: t [n] in s, mapped parameters p and their se [n, n_mapped]; physical ones and
+    their errors [n, n_physical], NaN outside the physical region; kappa [n]. Standard errors contain those of the
+    scales, as Identification.se does."""
 
     t: Float
     p: Float
@@ -85,8 +77,8 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Publications:
-    """Every estimate that was published during a run: t [n] in s, p = (w, d1, d2) and its standard errors [n, 3], and
-    whether the alarm stood beside it [n]."""
+    """Every estimate that was published during a run: t [n] in s, the mapped parameters p and their standard errors
+    [n, n_mapped], and whether the alarm stood beside it [n]."""
 
     t: Float
     p: Float
@@ -94,34 +86,41 @@ class Publications:
     alarm: npt.NDArray[np.bool_]
 
     @classmethod
-    def none(cls) -> Publications:
+    def none(cls, model: Model) -> Publications:
         """Of a run in which nothing was published, or of a form that publishes nothing."""
-        return cls(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.bool_))
+        nothing = np.zeros((0, model.n_mapped))
+        return cls(np.zeros(0), nothing, nothing, np.zeros(0, np.bool_))
 
 
 @dataclass(frozen=True)
 class ErrorParts:
     """What a standard error is made of, in the parameter's unit: the larger of the core's own and of the scatter of the
-    run's windows; the gain of y; l1."""
+    run's windows; those of the model's scales by name."""
 
     noise: float
-    y_gain: float
-    l1: float
+    scales: Mapping[str, float]
+
+    @property
+    def whole(self) -> float:
+        """The standard error."""
+        return float(np.sqrt(sum((one**2 for one in self.scales.values()), self.noise**2)))
 
 
 @dataclass(frozen=True)
 class Identification:
     """What a run gave.
 
+    model
+        of the mechanism: names and units of what is estimated
     value, se
-        w, d1, d2 [1/s^2, -, -], c [rad] where it is estimated and, inside the physical region, g, l2, rho2
-        [m/s^2, m, m], with their standard errors. Where `identified` is false they are the start, not an estimate.
+        the mapped parameters, the offset where it is estimated and, inside the physical region, the physical
+        parameters, with their standard errors. Where `identified` is false they are the start, not an estimate.
     parts
         of the standard errors, where something is identified
     friction
-        c1, c2 [m^2/s] of pivot and joint, where they are estimated; else ()
+        the nuisance parameters, where they are estimated; else ()
     kappa
-        part of w's information that d1 and d2 cannot imitate
+        part of the first parameter's information that the others cannot imitate
     trusted_s, first_publication_s
         when the core published last and first [s]; None: never. In the strong form, which publishes whatever it has,
         trusted_s is None
@@ -134,8 +133,8 @@ class Identification:
     judged
         whether the run had enough windows to compare the estimate with; True where no verdict is asked for
     linear_error
-        what the fixed-point core's linear rows put into the standard errors, the largest of w, d1, d2, relative; 0 in
-        other cores
+        what the fixed-point core's linear rows put into the standard errors, the largest of the mapped parameters,
+        relative; 0 in other cores
     parts_disagree
         the run's windows, corrected for large angles, want another estimate than the one published, or scatter, by
         much more than the core's standard errors say
@@ -161,6 +160,7 @@ class Identification:
         None where the core has none (f64)
     """
 
+    model: Model
     value: dict[str, float]
     se: dict[str, float]
     kappa: float
@@ -196,13 +196,16 @@ class Identification:
     @property
     def identified(self) -> bool:
         """Whether this is an answer: one that was trusted; in the strong form, whose last word is no refusal and whose
-        w is known."""
-        return _is_answer(self.form, self.trusted_s, self.updates, self.status, self.se["w"], self.value["w"])
+        first parameter is known."""
+        first = self.model.p_names[0]
+        return _is_answer(self.form, self.trusted_s, self.updates, self.status, self.se[first], self.value[first])
 
     @property
     def modes_hz(self) -> tuple[float, ...]:
-        """The slow and the fast mode of the estimate [Hz]; () where nothing is identified."""
-        return modes_hz(np.array([self.value[name] for name in LINEAR])) if self.identified else ()
+        """Natural frequencies of the estimate [Hz], the slowest first; () where nothing is identified."""
+        if not self.identified:
+            return ()
+        return self.model.modes_hz(np.array([self.value[name] for name in self.model.mapped_names]))
 
     @property
     def warning(self) -> str | None:
@@ -255,14 +258,15 @@ class Identification:
     def verdict(self) -> str:
         """Why nothing was identified, in words."""
         if not FORMS[self.form].publishes and self.updates and self.status in _GOOD:
-            return f"the standard error of w is {100 * self.se['w'] / abs(self.value['w']):.0f} % of it"
+            first = self.model.p_names[0]
+            return f"the standard error of {first} is {100 * self.se[first] / abs(self.value[first]):.0f} % of it"
         return f"{self.status}: {self.beyond_words}" if self.status == SATURATED else self.status
 
 
-def _is_answer(form: Form, trusted_s: float | None, updates: int, status: str, se_w: float, w: float) -> bool:
+def _is_answer(form: Form, trusted_s: float | None, updates: int, status: str, se: float, value: float) -> bool:
     if FORMS[form].publishes:
         return trusted_s is not None
-    return updates > 0 and status in _GOOD and se_w <= WORST_SE * abs(w)
+    return updates > 0 and status in _GOOD and se <= WORST_SE * abs(value)
 
 
 def identify(
@@ -308,16 +312,16 @@ def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, na
     identifier = native.identifier(config)
     record = identifier.run(*samples, sums=False, estimate_every=every)
     counters, last = identifier.counters, identifier.estimate
-    n_all = record.p.shape[1]
-    n_p = min(n_all, NAMED)
+    model, n_all = rig.mechanism.model, record.p.shape[1]
+    n, n_p = model.n_mapped, min(n_all, len(model.published))
     p = case.p_of(config, last["p"][:n_all])
-    friction, p = tuple(map(float, p[NAMED:])), p[:n_p]
-    if n_p > 3:
-        p[3] += case.zero_shift(rig, run, samples[0])
+    friction, p = tuple(map(float, p[n_p:])), p[:n_p]
+    if n_p > n:
+        p[n] += case.zero_shift(rig, run, samples[0])
     trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
     status, linear = _final_status(record.reason), None
     if case.linear_rows_only and case.publishes:
-        linear = np.zeros(3)
+        linear = np.zeros(n)
         if rig.identifier.full_angle and len(trusted):
             found = linear_error(rig, run, p)
             if found is None or np.abs(found).max() > WORST_LINEAR:
@@ -325,10 +329,10 @@ def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, na
             else:
                 linear = found
     any_trusted = len(trusted) > 0
-    publications = Publications.none()
+    publications = Publications.none(model)
     if case.publishes:
-        published = case.p_of(config, record.published[trusted])[:, :3]
-        se = case.se_of(config, record.published_se[trusted])[:, :3]
+        published = case.p_of(config, record.published[trusted])[:, :n]
+        se = case.se_of(config, record.published_se[trusted])[:, :n]
         publications = Publications(
             t=run.t[trusted],
             p=published,
@@ -360,20 +364,19 @@ def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, na
         updates=counters["updates"],
         lost=counters["rejected_not_finite"] + counters["rejected_saturated"],
         running_hash=identifier.running_hash,
-        trajectory=_trajectory(
-            run.t[::every], estimates[:, :3], covariances[:, :3, :3], rig, case.kappa_of(record.estimate)
-        ),
+        trajectory=_trajectory(run.t[::every], estimates, covariances, rig, case.kappa_of(record.estimate)),
         publications=publications,
         linear=linear,
     )
 
 
 def _with_linear_error(covariance: Float, p: Float, linear: Float | None) -> Float:
-    """Covariance [..., n_p, n_p] at p [..., n_p] with the error that linear rows make, relative of w, d1, d2 [3]."""
+    """Covariance [..., n_p, n_p] at p [..., n_p] with the error that linear rows make, relative of the mapped
+    parameters [n_mapped]."""
     if linear is None:
         return covariance
-    error = np.zeros_like(p)
-    error[..., :3] = p[..., :3] * linear
+    error, n = np.zeros_like(p), len(linear)
+    error[..., :n] = p[..., :n] * linear
     return np.asarray(covariance + error[..., :, None] * error[..., None, :])
 
 
@@ -439,7 +442,8 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> 
     if config.estimator.law is not Law.STATIONARY or config.estimator.divider != 1:
         raise PvidError("core f64 has the weak form's stationary law with a solve at every window only: use f32")
     settings = config.estimator
-    n_p = min(len(settings.start), NAMED)
+    model = rig.mechanism.model
+    n, n_p = model.n_mapped, min(len(settings.start), len(model.published))
     result = identify_weak(
         run.phi,
         run.y,
@@ -462,7 +466,7 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> 
     )
     # the gate and the alarm of pvid/trust.h, without the question how much of the information noise makes
     trust = config.trust
-    relative = (result.se[:, :3] / result.p[:, :3]).max(axis=1)
+    relative = (result.se[:, :n] / result.p[:, :n]).max(axis=1)
     arrived = np.arange(len(result.t)) + 1 >= trust.groups_min
     good = result.updated & arrived & (result.kappa >= trust.kappa_min) & (relative <= trust.se_max)
     trusted = np.flatnonzero(good)
@@ -501,7 +505,7 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> 
         updates=config.iterations * int(result.updated.sum()),
         lost=0,
         running_hash=None,
-        trajectory=_trajectory(run.t[0] + result.t, result.p[:, :3], result.covariance[:, :3, :3], rig, result.kappa),
+        trajectory=_trajectory(run.t[0] + result.t, result.p, result.covariance, rig, result.kappa),
     )
 
 
@@ -535,15 +539,19 @@ def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
 
 
 def _trajectory(t: Float, p: Float, covariance: Float, rig: RigFile, kappa: Float) -> Trajectory:
-    wide = covariance + added_covariance(p, rig.sensor.y_gain_sd, rig.l1_sd)
-    scales = scale_errors(p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
-    noise = oracle.physical_errors(p, covariance, rig.l1)
+    """Of p [n, n_p] and its covariance [n, n_p, n_p]."""
+    mechanism = rig.mechanism
+    n = mechanism.model.n_mapped
+    p, covariance = p[:, :n], covariance[:, :n, :n]
+    wide = covariance + mechanism.added_covariance(p, rig.scale_sd)
+    noise = mechanism.physical_errors(p, covariance)
+    scales = mechanism.scale_errors(p, rig.scale_sd).values()
     return Trajectory(
         t=t,
         p=p,
         se=np.sqrt(np.diagonal(wide, axis1=-2, axis2=-1)),
-        physical=oracle.physical(p, rig.l1),
-        physical_se=np.sqrt(noise**2 + scales.y_gain_physical**2 + scales.l1_physical**2),
+        physical=mechanism.physical(p),
+        physical_se=np.sqrt(sum((one.physical**2 for one in scales), noise**2)),
         kappa=kappa,
     )
 
@@ -616,33 +624,36 @@ def _identification(
     beyond_words: str | None = None,
     linear: Float | None = None,
 ) -> Identification:
-    """`linear`: relative errors of w, d1, d2 [3] that linear rows make, which the covariance contains."""
-    names = (*LINEAR, ZERO)[: len(p)]
+    """`linear`: relative errors of the mapped parameters [n_mapped] that linear rows make; they are in the
+    covariance."""
+    mechanism = rig.mechanism
+    model, n = mechanism.model, mechanism.model.n_mapped
+    names = model.p_names[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
     unexplained, parts_disagree, skew, judged = None, False, 0.0, True
     if rig.identifier.form_traits.publishes and trusted_s is not None:
         unbiased = np.append(p, friction)
         if linear is not None:  # the verdict's rows are corrected
-            unbiased[:3] /= 1 + linear
+            unbiased[:n] /= 1 + linear
         over_run = verdict(rig, run, unbiased)
         own = np.sqrt(np.diag(covariance))
         wider = np.maximum(over_run.se[: len(p)] / own, 1.0)
         covariance = covariance * np.outer(wider, wider)
-        unexplained, parts_disagree = over_run.unexplained, bool(wider[:3].max() > DISAGREES)
+        unexplained, parts_disagree = over_run.unexplained, bool(wider[:n].max() > DISAGREES)
         skew, judged = over_run.skew, over_run.judged
         if publications is not None:  # windows that scatter by more than the core expects did so from the first one on
-            scatter = np.maximum(over_run.scatter[:3] / own[:3], 1.0)
+            scatter = np.maximum(over_run.scatter[:n] / own[:n], 1.0)
             publications = replace(publications, se=publications.se * scatter)
     noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
-    physical = oracle.physical(p[:3], rig.l1)
+    physical = mechanism.physical(p)
     if np.isfinite(physical).all():
-        value.update(zip(PHYSICAL, map(float, physical), strict=True))
-        noise.update(zip(PHYSICAL, map(float, oracle.physical_errors(p[:3], covariance[:3, :3], rig.l1)), strict=True))
+        value.update(zip(model.physical_names, map(float, physical), strict=True))
+        noise.update(zip(model.physical_names, map(float, mechanism.physical_errors(p, covariance)), strict=True))
     se, parts = noise, {}
-    answered = _is_answer(rig.identifier.form, trusted_s, updates, status, noise["w"], value["w"])
+    answered = _is_answer(rig.identifier.form, trusted_s, updates, status, noise[names[0]], value[names[0]])
     if answered:
-        parts = _parts(noise, p[:3], rig)
-        se = {name: float(np.sqrt(one.noise**2 + one.y_gain**2 + one.l1**2)) for name, one in parts.items()}
+        parts = _parts(noise, p, rig)
+        se = {name: one.whole for name, one in parts.items()}
     elif beyond is not None and beyond.share >= _BEYOND_FATAL:
         status = SATURATED
     elif (
@@ -652,6 +663,7 @@ def _identification(
     ):
         status = UNEXPLAINED
     return Identification(
+        model=model,
         value=value,
         se=se,
         parts=parts,
@@ -671,7 +683,7 @@ def _identification(
         ticks=ticks,
         updates=updates,
         lost=lost,
-        largest_angle=largest_angle(run, value.get(ZERO) if answered else None),
+        largest_angle=largest_angle(run, value.get(model.offset_name) if answered else None),
         beyond=beyond,
         beyond_words=beyond_words,
         hash=running_hash,
@@ -680,23 +692,26 @@ def _identification(
         law=rig.identifier.law,
         on="host",
         trajectory=trajectory,
-        publications=Publications.none() if publications is None else _widened(publications, rig),
+        publications=Publications.none(model) if publications is None else _widened(publications, rig),
     )
 
 
 def _widened(published: Publications, rig: RigFile) -> Publications:
     """With the scales' errors in the standard errors."""
-    scales = scale_errors(published.p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
-    se = np.sqrt(published.se**2 + scales.y_gain_p**2 + scales.l1_p**2)
+    scales = rig.mechanism.scale_errors(published.p, rig.scale_sd).values()
+    se = np.sqrt(sum((one.p**2 for one in scales), published.se**2))
     return Publications(published.t, published.p, se, published.alarm)
 
 
 def _parts(noise: Mapping[str, float], p: Float, rig: RigFile) -> dict[str, ErrorParts]:
     """Of the standard errors of every parameter whose own is in `noise`."""
-    scales = scale_errors(p, rig.l1, rig.sensor.y_gain_sd, rig.l1_sd)
-    gain = dict(zip((*LINEAR, *PHYSICAL), (*scales.y_gain_p, *scales.y_gain_physical), strict=True))
-    rod = dict(zip((*LINEAR, *PHYSICAL), (*scales.l1_p, *scales.l1_physical), strict=True))
+    model, scales = rig.mechanism.model, rig.mechanism.scale_errors(p, rig.scale_sd)
+    order = (*model.mapped_names, *model.physical_names)
+    sizes = {
+        scale: dict(zip(order, np.abs(np.append(error.p, error.physical)), strict=True))
+        for scale, error in scales.items()
+    }
     return {
-        name: ErrorParts(one, abs(float(gain.get(name, 0.0))), abs(float(rod.get(name, 0.0))))
+        name: ErrorParts(one, {scale: float(of.get(name, 0.0)) for scale, of in sizes.items()})
         for name, one in noise.items()
     }

@@ -14,7 +14,6 @@ from pvid.base.errors import PvidError
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.rows import FEWEST, RunRows
-from pvid.run.survey import is_pendulum
 from pvid.setup.f32 import weak_design_of
 
 Float = npt.NDArray[np.float64]
@@ -24,10 +23,12 @@ _CORRECTIONS = 3
 
 
 def linear_error(rig: RigFile, run: Run, p: Float) -> Float | None:
-    """Relative errors of w, d1, d2 [3] from the linear rows of a run, at an estimate p = (w, d1, d2) or (w, d1, d2, c).
+    """Relative errors of the mapped parameters [n_mapped] from the linear rows of a run, at an estimate p, with the
+    offset or without it.
 
     None if the run's angles are too large for the correction.
     """
+    model = rig.mechanism.model
     try:
         rows = RunRows.of(rig, run, weak_design_of(rig, run.sample_rate)).thinned(_WINDOWS)
         at = rows.fitted(p if len(p) > 3 else np.append(p, 0.0)).p
@@ -36,9 +37,9 @@ def linear_error(rig: RigFile, run: Run, p: Float) -> Float | None:
             if len(corrected.phi) < FEWEST:
                 return None
             at = corrected.fitted(at).p
-            if not is_pendulum(at):
+            if not model.is_plausible(at):
                 return None
         linear = rows.only(np.isin(rows.number, corrected.number)).fitted(at)
     except (PvidError, np.linalg.LinAlgError):
         return None
-    return np.asarray(linear.p[:3] / at[:3] - 1)
+    return np.asarray(linear.p[: model.n_mapped] / at[: model.n_mapped] - 1)

@@ -76,7 +76,7 @@ def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
 def _weak(run: Run, rig: RigFile, p: Float) -> Residuals:
     config: WeakConfig = weak_config(rig, run.sample_rate)
     design = weak_design_of(rig, run.sample_rate)
-    n_core = 4 if rig.identifier.zero else 3
+    n_core = rig.n_core
     settings = WeakSettings(
         start=p[:n_core],
         row_sd=config.estimator.row_sd,

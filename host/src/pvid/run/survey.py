@@ -7,7 +7,7 @@ Of the minima found the one with the smallest chi^2 is taken. There the rows are
 friction, where the rig file asks for it, and what still exceeds the encoder's noise becomes a white disturbance of the
 joints: rows are weighted by both from then on.
 
-`fitted` returns the rig file with the outcome as its nominal pendulum: what a board would be given after a first run.
+`fitted` returns the rig file with the outcome as its nominal: what a board would be given after a first run.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.design.weak_sizing import pass_hz_of, window_for_run
-from pvid.oracle import strong as oracle
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
@@ -47,8 +46,6 @@ _WINDOWS = 300
 _UNEXPLAINED = 1.3
 _HALVINGS = 16
 _DISTURBANCES = (1e-4, 1e4)  # of what gives the rows as much as the encoder does
-# Of a pendulum: L2 = d1 - d2 - 1 is (l2 / rho2)^2.
-_LEAST_L2, _MOST_L2 = 0.02, 1e4
 
 
 @dataclass(frozen=True)
@@ -72,12 +69,12 @@ class Survey:
 
 
 def fitted(rig: RigFile, run: Run) -> RigFile:
-    """The rig file with the run's survey as its nominal pendulum, the disturbance found, and a window that the run
+    """The rig file with the run's survey as its nominal, the disturbance found, and a window that the run
     holds often enough.
 
     The encoder's resolution is what the run shows where the rig file does not give it. All else is unchanged where the
-    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds no
-    pendulum the guess stays.
+    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds nothing
+    plausible the guess stays.
     """
     rig = resolved(rig, run)
     if not rig.identifier.form_traits.uses_windows or not rig.identifier.survey:
@@ -101,7 +98,7 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
 def survey(rig: RigFile, run: Run) -> Survey | None:
-    """Searches a run for p; None where no start leads to a pendulum."""
+    """Searches a run for p; None where no start leads to plausible parameters."""
     if not np.isfinite(run.phi).any():
         return None
     outcomes: list[tuple[RigFile, Fit]] = []
@@ -123,20 +120,21 @@ def survey(rig: RigFile, run: Run) -> Survey | None:
     rows = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).thinned(_WINDOWS)
     asked = rig.identifier
     if (asked.full_angle or asked.damping) and asked.core_traits.corrects_angles:
-        rows, fit = _corrected(rows, fit, asked.full_angle, asked.damping)
+        rows, fit = _corrected(rig, rows, fit)
     ratio = _disturbance(rows, fit)
     if ratio > 0:
         fit = rows.fitted(fit.p, ratio)
     density = ratio * rows.row_sd * math.sqrt(rows.design.dt)
-    if not (is_pendulum(fit.p[:4]) and math.isfinite(fit.chi2) and math.isfinite(density)):
+    if not (rig.mechanism.model.is_plausible(fit.p[:4]) and math.isfinite(fit.chi2) and math.isfinite(density)):
         return None
     return Survey(fit.p[:4], fit.chi2, density, agreeing, tried)
 
 
 def with_nominal(rig: RigFile, p: Float) -> RigFile:
-    """The rig file with p's pendulum as its nominal."""
-    g, l2, rho2 = (_rounded(float(x), 4) for x in oracle.physical(p[:3], rig.l1))
-    return replace(rig, nominal=Nominal(g=g, l2=l2, rho2=rho2))
+    """The rig file with p as its nominal."""
+    mechanism = rig.mechanism
+    guess = [_rounded(float(x), 4) for x in mechanism.physical(p)]
+    return replace(rig, nominal=Nominal(**dict(zip(mechanism.model.physical_names, guess, strict=True))))
 
 
 def _rounded(x: float, digits: int) -> float:
@@ -164,38 +162,34 @@ def _best(outcomes: list[tuple[RigFile, Fit]]) -> tuple[RigFile, Fit]:
 
 
 def _agreeing(outcomes: list[tuple[RigFile, Fit]], fit: Fit) -> int:
-    return sum(_apart(one.p, fit.p) < _SAME for _, one in outcomes)
+    return sum(_apart(one.p, fit.p, rig.mechanism.model.n_mapped) < _SAME for rig, one in outcomes)
 
 
-def _apart(p: Float, q: Float) -> float:
-    """Largest difference of log w, log d1, log d2."""
-    return float(np.abs(np.log(p[:3] / q[:3])).max())
-
-
-def is_pendulum(p: Float) -> bool:
-    """Whether p = (w, d1, d2, ..) is that of a pendulum, within what rigs are."""
-    return bool(np.isfinite(p).all() and (p[:3] > 0).all() and _LEAST_L2 < p[1] - p[2] - 1 < _MOST_L2)
+def _apart(p: Float, q: Float, n: int) -> float:
+    """Largest difference of the logarithms of the first `n` parameters."""
+    return float(np.abs(np.log(p[:n] / q[:n])).max())
 
 
 def _search(rig: RigFile, run: Run) -> tuple[RigFile, Fit] | None:
-    """The minimum that a start leads to, and the rig file of its design; None if it is no pendulum."""
-    p = np.append(nominal_start(rig), np.nanmean(run.phi))
+    """The minimum that a start leads to, and the rig file of its design; None if it is not plausible."""
+    p, model = np.append(nominal_start(rig), np.nanmean(run.phi)), rig.mechanism.model
     for _ in range(_RENEWALS):
         at = sized_for(rig, run)
         fit = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).fitted(p)
-        if not is_pendulum(fit.p) or not math.isfinite(fit.chi2):
+        if not model.is_plausible(fit.p) or not math.isfinite(fit.chi2):
             return None
-        moved, p = _apart(fit.p, p), fit.p
+        moved, p = _apart(fit.p, p, model.n_mapped), fit.p
         if moved < _MOVED:
             break
         rig = with_nominal(rig, p)
     return at, fit
 
 
-def _corrected(rows: RunRows, fit: Fit, full_angle: bool, damping: bool) -> tuple[RunRows, Fit]:
+def _corrected(rig: RigFile, rows: RunRows, fit: Fit) -> tuple[RunRows, Fit]:
     """Rows corrected for large angles at p, or with friction in p, and the fit to them, where that explains more; else
     as they were."""
-    linear = rows, fit
+    linear, model = (rows, fit), rig.mechanism.model
+    full_angle, damping = rig.identifier.full_angle, rig.identifier.damping
     corrected, p = rows, np.append(fit.p, [0.0, 0.0]) if damping else fit.p
     for _ in range(_CORRECTIONS):
         try:
@@ -205,9 +199,9 @@ def _corrected(rows: RunRows, fit: Fit, full_angle: bool, damping: bool) -> tupl
             better = corrected.fitted(p)
         except np.linalg.LinAlgError:
             return linear
-        if not is_pendulum(better.p):
+        if not model.is_plausible(better.p):
             return linear
-        moved, fit, p = _apart(better.p, p), better, better.p
+        moved, fit, p = _apart(better.p, p, model.n_mapped), better, better.p
         if moved < _SETTLED:
             break
     return (corrected, fit) if fit.chi2 < linear[0].judged(linear[1].p).chi2 else linear

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from pvid.rig.file import Identifier, Nominal, RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.held_back import HeldBack, sigmas
-from pvid.run.identify import LINEAR, Identification, identify, largest_angle
+from pvid.run.identify import Identification, identify, largest_angle
 from pvid.run.survey import fitted, sized_for
 from pvid.setup.f32 import weak_design_of
 
@@ -86,11 +86,11 @@ class Judged:
 
     @property
     def error(self) -> float:
-        """Expected relative error, RMS over w, d1, d2: standard errors, and the bias of linear equations; infinite
-        where nothing is identified."""
+        """Expected relative error, RMS over the mapped parameters: standard errors, and the bias of linear equations;
+        infinite where nothing is identified."""
         if self.answer is None or not self.answer.identified:
             return math.inf
-        relative = [self.answer.se[name] / self.answer.value[name] for name in LINEAR]
+        relative = [self.answer.se[name] / self.answer.value[name] for name in self.answer.model.mapped_names]
         bias = 0.0 if self.rig.identifier.full_angle else _LINEAR_BIAS * self.answer.largest_angle**2
         return math.hypot(math.sqrt(sum(one**2 for one in relative) / len(relative)), bias)
 
@@ -98,7 +98,8 @@ class Judged:
         """Whether both answers are the same but for rounding: within a standard error, and as good."""
         if self.answer is None or other.answer is None or self.identified != other.identified:
             return False
-        near = [abs(self.answer.value[x] - other.answer.value[x]) <= other.answer.se[x] for x in LINEAR]
+        names = self.answer.model.mapped_names
+        near = [abs(self.answer.value[x] - other.answer.value[x]) <= other.answer.se[x] for x in names]
         return not self.identified or (all(near) and self.warned == other.warned)
 
     @property
@@ -243,8 +244,7 @@ def _decimations(rig: RigFile) -> Iterator[tuple[str, RigFile]]:
 
 def _written(rig: RigFile, sample_rate: float, digits: int) -> RigFile:
     """The rig file with all that it leaves open, rounded to so many digits."""
-    guess = rig.nominal
-    nominal = Nominal(*(_rounded(x, digits) for x in (guess.l2, guess.rho2, guess.g)))
+    nominal = Nominal(**{name: _rounded(x, digits) for name, x in asdict(rig.nominal).items()})
     rig = replace(rig, nominal=nominal)
     design = weak_design_of(rig, sample_rate)
     return _with(
@@ -363,7 +363,7 @@ class _Bench:
             return tuple(out)
         try:
             reference = self.held_back.innovations(rig, 0.0)
-        except PvidError:  # its equations lead to no pendulum
+        except PvidError:  # its equations lead to no plausible parameters
             return tuple(out)
         hop_s = weak_design_of(rig, self.run.sample_rate).hop_s
         for forgetting_s in _FORGETTING_S:
@@ -379,8 +379,8 @@ class _Bench:
         if self.held_back is None:
             return f"nothing is identified from this run ({own}), so nothing can be tuned: {self.not_held_back}"
         return (
-            f"none of {len(self.tried)} settings identifies a pendulum from this run (the rig file's own: {own}): is "
-            "the pivot driven, and are the columns phi and y correct?"
+            f"none of {len(self.tried)} settings identifies the mechanism from this run (the rig file's own: {own}): "
+            "is the pivot driven, and are the columns phi and y correct?"
         )
 
 

@@ -26,8 +26,9 @@ _HEADINGS = (
 
 def candidates_table(tuned: Tuned) -> Table:
     """All settings in the order in which they were tried; residuals over those of the rig file's own settings."""
+    names = ", ".join(tuned.chosen.rig.mechanism.model.mapped_names)
     table = Table(
-        title="residuals held back, over those of the rig file's own settings; expected errors: of w, d1, d2, rms"
+        title=f"residuals held back, over those of the rig file's own settings; expected errors: of {names}, rms"
     )
     for heading in _HEADINGS:
         table.add_column(heading, justify="right")

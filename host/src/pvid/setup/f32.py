@@ -11,7 +11,6 @@ from pvid.base.errors import PvidError
 from pvid.design.fir import FirBank, finite_difference, savitzky_golay
 from pvid.design.weak import WeakDesign, design
 from pvid.design.weak_sizing import Sizes, decimation_of
-from pvid.oracle import strong as oracle
 from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile
 from pvid.settings.bounds import MAX_WINDOW
@@ -29,8 +28,9 @@ LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
 
 def nominal_start(rig: RigFile) -> npt.NDArray[np.float64]:
-    """p = (w, d1, d2) of the rig file's rough guess."""
-    return oracle.linear(rig.nominal.g, rig.nominal.l2, rig.nominal.rho2, rig.l1)
+    """The mapped parameters, p = (w, d1, d2), of the rig file's rough guess."""
+    mechanism = rig.mechanism
+    return mechanism.mapped([getattr(rig.nominal, name) for name in mechanism.model.physical_names])
 
 
 def bank_of(rig: RigFile, sample_rate: float) -> FirBank:

@@ -18,7 +18,6 @@ from pvid.log.history import History, Rates, envelope
 from pvid.log.reader import LogStream
 from pvid.log.tail import LogTail
 from pvid.log.words import (
-    PARAMETERS,
     board_words,
     kappa_share,
     kappa_words,
@@ -82,9 +81,9 @@ class LiveState(threading.Thread):
     def _load_rig(self) -> None:
         if self._rig is not None:
             try:
-                self._history.know(RigFile.parse(self._rig).l1)
+                self._history.know(RigFile.parse(self._rig).mechanism)
             except PvidError:
-                return  # of another version: the page does without g, l2 and rho2
+                return  # of another version: the page does without physical parameters
 
     def as_json(self) -> bytes:
         """The state of now; page.js says what becomes of it."""
@@ -116,29 +115,30 @@ class LiveState(threading.Thread):
 
     def _table(self) -> list[dict[str, str]]:
         rows = []
-        for name, (symbol, meaning, unit) in PARAMETERS.items():
-            value = self._history.newest.get(name, math.nan)
+        model = self._history.model
+        for one in model.answers:
+            value = self._history.newest.get(one.name, math.nan)
             if not math.isnan(value):
-                shown, spread = with_error(value, self._history.newest[f"{name}_se"])
-                rows.append(
-                    {"symbol": symbol, "meaning": meaning, "unit": unit, "value": shown, "error": f"± {spread}"}
-                )
+                shown, spread = with_error(value, self._history.newest[f"{one.name}_se"])
+                row = {"symbol": one.shown, "meaning": one.meaning, "unit": one.shown_unit, "value": shown}
+                rows.append({**row, "error": f"± {spread}"})
         if not self._history.is_physical:
             meaning = "outside the physical region"
-            rows.append({"symbol": "g*, l2, rho2", "meaning": meaning, "unit": "", "value": "", "error": ""})
+            names = ", ".join(one.shown for one in model.physical)
+            rows.append({"symbol": names, "meaning": meaning, "unit": "", "value": "", "error": ""})
         return rows
 
     def _estimates(self) -> dict[str, Any]:
-        """Of the physical parameters, or of the linear ones where rod 1 is not known."""
+        """Of the physical parameters, or of the mapped ones where the rig is not known."""
         history = self._history
         curves = []
-        for name in ("g", "l2", "rho2") if history.has_physical else ("w", "d1", "d2"):
-            symbol, meaning, unit = PARAMETERS[name]
-            value, band = history.estimates(name), 2 * history.estimates(f"{name}_se")
+        model = history.model
+        for one in model.physical if history.has_physical else model.parameters[: model.n_mapped]:
+            value, band = history.estimates(one.name), 2 * history.estimates(f"{one.name}_se")
             limits = interesting(value, band)
             curves.append(
                 {
-                    "label": f"{symbol}, {meaning}" + (f" [{unit}]" if unit else ""),
+                    "label": f"{one.shown}, {one.meaning}" + (f" [{one.shown_unit}]" if one.unit else ""),
                     "value": _numbers(value),
                     "low": _numbers(value - band),
                     "high": _numbers(value + band),
@@ -156,13 +156,14 @@ class LiveState(threading.Thread):
             "kappa": _numbers(np.where(kappa > 0, kappa, np.nan)),
         }
 
-    def _motion(self) -> dict[str, Any]:
-        t, phi, y = self._history.samples()
-        angle, drive = envelope(t, phi, _BINS), envelope(t, 1e3 * y, _BINS)
-        return {
-            "phi": {"t": _numbers(angle[0]), "x": _numbers(angle[1])},
-            "y": {"t": _numbers(drive[0]), "x": _numbers(drive[1])},
-        }
+    def _motion(self) -> list[dict[str, Any]]:
+        """Of each channel its curve over the last seconds."""
+        t, *signals = self._history.samples()
+        curves = []
+        for one, x in zip(self._history.model.channels, signals, strict=True):
+            times, values = envelope(t, one.shown_in[1] * x, _BINS)
+            curves.append({"label": one.label, "t": _numbers(times), "x": _numbers(values)})
+        return curves
 
 
 def _numbers(x: Float) -> list[float | None]:

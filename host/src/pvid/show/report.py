@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import textwrap
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -30,23 +31,21 @@ from pvid.log.rig import run_of_log
 from pvid.log.rig_settings import rig_for
 from pvid.log.values import Values
 from pvid.log.words import KAPPA_MIN, reason_words
-from pvid.models.kapitza.modes import modes_hz
 from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run, is_run, read_run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advice import advice, advice_on_refusal, behind
-from pvid.run.identify import LINEAR, PHYSICAL, ZERO, identify
+from pvid.run.identify import identify
 from pvid.run.residuals import Residuals, residuals_of
-from pvid.run.simulated_angle import simulated_angle
 from pvid.run.survey import fitted
 from pvid.settings.enums import Reason
 from pvid.show.axis_limits import interesting
-from pvid.show.figures import LABELS
+from pvid.sim.simulated_angle import simulated_angle
 
 Float = npt.NDArray[np.float64]
 
-_UNITS = {"g": "m/s²", "l2": "m", "rho2": "m"}
+_RIGHT = 4  # pictures beside those of convergence
 _LAGS = 24
 _RESOLUTION_HZ = 0.05  # of the spectra, where the run is long enough
 _LEAST_SHOWN_HZ = 10.0
@@ -62,7 +61,7 @@ _PUBLISHED = (Reason.UPDATED.text, Reason.MISFIT.text)
 class Recording:
     """What is drawn.
 
-    t : of the estimates, `clock` says since when [n, s];  physical, physical_se : g, l2, rho2 [n, 3];  kappa [n]
+    t : of the estimates, `clock` says since when [n, s];  physical, physical_se : [n, n_physical];  kappa [n]
     p : the last estimate, as residuals_of takes it, or the start;  estimate : value and standard error by name; empty
         where nothing is identified
     reasons : how many estimates came with each;  state : the last, with what it means
@@ -112,9 +111,9 @@ def recording_of(path: Path, rig: RigFile | None, columns: Columns | None = None
 
 def _of_log(path: Path, rig: RigFile) -> Recording | None:
     """What the board said; None when that was no estimate."""
-    reader, values = LogReader(path), Values(rig.l1)
+    reader, values, model = LogReader(path), Values(rig.mechanism), rig.mechanism.model
     columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason")}
-    columns |= {name: [] for one in (*LINEAR, ZERO, *PHYSICAL) for name in (one, f"{one}_se")}
+    columns |= {name: [] for one in model.answers for name in (one.name, f"{one.name}_se")}
     # the board's tables are those of its rig file, whatever the run says
     rig = replace(rig, identifier=replace(rig.identifier, survey=False))
     hello, began = None, None
@@ -123,7 +122,7 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         if isinstance(record.item, Hello):
             hello = record.item
         if isinstance(record.item, Estimate):
-            friction = record.item.p[4:6]
+            friction = record.item.p[len(model.published) : len(model.parameters)]
         for rows in values.rows(record):
             if rows.table == "samples" and began is None:
                 began = int(rows.columns["log_time"][0])
@@ -134,7 +133,6 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         return None
     told = {name: np.array(column) for name, column in columns.items()}
     t = (told["log_time"] - (told["log_time"][0] if began is None else began)) / 1e9
-    n_core = rig.identifier.n_core
     counts = zip(*np.unique(told["reason"], return_counts=True), strict=True)
     if hello is None:
         title = path.name
@@ -148,13 +146,13 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         rig=rig,
         run=run_of_log(path),
         t=t,
-        physical=np.stack([told[name] for name in PHYSICAL], axis=1),
-        physical_se=np.stack([told[f"{name}_se"] for name in PHYSICAL], axis=1),
+        physical=np.stack([told[name] for name in model.physical_names], axis=1),
+        physical_se=np.stack([told[f"{name}_se"] for name in model.physical_names], axis=1),
         kappa=told["kappa"],
-        p=np.array([*(told[name][-1] for name in (*LINEAR, ZERO)[:n_core]), *friction]),
+        p=np.array([*(told[name][-1] for name in model.p_names[: rig.n_core]), *friction]),
         estimate={
             name: (float(told[name][-1]), float(told[f"{name}_se"][-1]))
-            for name in (*PHYSICAL, *LINEAR)
+            for name in (*model.physical_names, *model.mapped_names)
             if np.isin(told["reason"], _PUBLISHED).any() and np.isfinite(told[name][-1])
         },
         reasons={str(reason): int(count) for reason, count in counts},
@@ -175,7 +173,7 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
         result = identify(given, rig, native)
     except PvidError as error:
         raise behind(advice_on_refusal(given, rig, native), error) from error
-    names = [name for name in (*LINEAR, ZERO) if name in result.value]
+    names = [name for name in result.model.p_names if name in result.value]
     advices = tuple(f"advice: {sentence}" for sentence in advice(given, rig, result, native))
     return Recording(
         title=f"{path.name}: {result.form} form, {result.law} law, core {result.core}, {run.sample_rate:g} samples per "
@@ -214,12 +212,14 @@ def write_report(recording: Recording, path: Path) -> None:
     figure = plt.figure(figsize=(15, 17), layout="constrained")
     try:
         rows: list[Any] = [["angle", "angle"], ["difference", "difference"]]
-        rows += [[f"left{k}", f"right{k}"] for k in range(4)]
+        count = {"left": len(recording.rig.mechanism.model.physical) + 1, "right": _RIGHT}
+        names = {side: [f"{side}{k}" for k in range(n)] for side, n in count.items()}
+        rows += [list(pair) for pair in zip_longest(*names.values(), fillvalue=".")]
         axes = figure.subplot_mosaic(
             rows,
-            height_ratios=[1.0, 0.45, 1.0, 1.0, 1.0, 1.0],
+            height_ratios=[1.0, 0.45, *[1.0] * max(count.values())],
         )
-        left, right = (np.array([axes[f"{side}{k}"] for k in range(4)]) for side in ("left", "right"))
+        left, right = (np.array([axes[name] for name in side]) for side in names.values())
         _overlay(recording, axes["angle"], axes["difference"])
         _converge(recording, left)
         _residuals(recording, residuals, right[0])
@@ -242,12 +242,12 @@ def _last(recording: Recording) -> list[str]:
     if not known:
         told = f"nothing identified: {recording.state}"
     else:
-        physical = all(name in known for name in PHYSICAL)
-        names = PHYSICAL if physical else LINEAR
+        model = recording.rig.mechanism.model
+        physical = all(name in known for name in model.physical_names)
         parts = []
-        for name in names:
-            value, error = with_error(*known[name])
-            parts.append(f"{name} = {value} ± {error} {_UNITS.get(name, '')}".rstrip())
+        for one in model.physical if physical else model.parameters[: model.n_mapped]:
+            value, error = with_error(*known[one.name])
+            parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())
         where = "" if physical else "outside the physical region: "
         told = f"estimate: {where}{', '.join(parts)}  (± standard error)"
     reasons = ", ".join(f"{count} {reason}" for reason, count in recording.reasons.items())
@@ -261,7 +261,7 @@ def _last(recording: Recording) -> list[str]:
 
 def _overlay(recording: Recording, angle: Axes, difference: Axes) -> None:
     """Measured against simulated angle, and their difference, over the last seconds of the run."""
-    n_core = recording.rig.identifier.n_core
+    n_core = recording.rig.n_core
     p, friction = recording.p[:n_core], tuple(map(float, recording.p[n_core:]))
     run = recording.run
     simulated = simulated_angle(run, p, recording.rig.l1, friction) if recording.estimate else None
@@ -272,7 +272,7 @@ def _overlay(recording: Recording, angle: Axes, difference: Axes) -> None:
     difference.set_ylabel("difference\n[mrad]")
     (angle if simulated is None else difference).set_xlabel(_clock(recording))
     if simulated is None:
-        why = "no pendulum has these parameters" if recording.estimate else "no estimate to simulate with"
+        why = "no mechanism has these parameters" if recording.estimate else "no estimate to simulate with"
         angle.set_title(f"Measured angle ({why})")
         difference.set_visible(False)
     else:
@@ -300,24 +300,25 @@ def _clock(recording: Recording) -> str:
 
 def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     t = recording.t
-    for column, (name, axis) in enumerate(zip(PHYSICAL, axes, strict=False)):
+    shown = recording.rig.mechanism.model.physical
+    for column, (one, axis) in enumerate(zip(shown, axes[:-1], strict=True)):
         value, band = recording.physical[:, column], 2 * recording.physical_se[:, column]
         axis.fill_between(t, value - band, value + band, alpha=0.25, color="C0", label="±2 standard errors")
         axis.plot(t, value, color="C0", linewidth=1.2, label="estimate" if recording.estimate else "not published")
         low, high = interesting(value, band)
         if math.isfinite(low) and low < high:
             axis.set_ylim(low, high)
-        axis.set_ylabel(f"{LABELS[name]} [{_UNITS[name]}]")
+        axis.set_ylabel(one.label)
     axes[0].set_title("Convergence")
-    kappa = axes[3]
+    kappa = axes[len(shown)]
     kappa.semilogy(t, np.where(recording.kappa > 0, recording.kappa, np.nan), color="C2", label="kappa")
     if recording.rig.identifier.form_traits.publishes:
         kappa.axhline(KAPPA_MIN, color="C3", linestyle="--", label="nothing is published below")
     kappa.set_ylabel("kappa: identifiability\nof w [1]")
     kappa.set_xlabel(f"time {recording.clock} [s]")
     for axis in axes:
-        for i, one in enumerate(recording.breaks):
-            axis.axvline(one, color="0.5", linestyle=":", label="the board began anew" if i == 0 else None)
+        for i, at in enumerate(recording.breaks):
+            axis.axvline(at, color="0.5", linestyle=":", label="the board began anew" if i == 0 else None)
         axis.set_xlim(min(0.0, float(t[0])), max(float(t[-1]), 1e-9))
         axis.grid(alpha=0.3)
         axis.legend(loc="best", fontsize=9)
@@ -369,7 +370,7 @@ def _spectra(recording: Recording, axis: Axes) -> None:
     length = min(len(run.t), round(run.sample_rate / _RESOLUTION_HZ))
     frequency, height = welch(run.y - run.y.mean(), run.sample_rate, "hann", length)
     _, angle = welch(run.phi - run.phi.mean(), run.sample_rate, "hann", length)
-    found = modes_hz(recording.p)
+    found = recording.rig.mechanism.model.modes_hz(recording.p)
     shown = (frequency > 0) & (frequency <= max((_LEAST_SHOWN_HZ, *(4 * one for one in found))))
     acceleration = np.sqrt(height) * (2 * np.pi * frequency) ** 2
     drive = _amplitude(axis, frequency[shown], acceleration[shown], color="C0", label="pivot's acceleration")

@@ -18,9 +18,9 @@ from rich.text import Text
 from pvid.base.rounding import with_error
 from pvid.log.history import History, Rates
 from pvid.log.reader import Account, Record
+from pvid.log.values import UNKNOWN_RIG
 from pvid.log.words import (
     KAPPA_WEAK,
-    PARAMETERS,
     board_words,
     kappa_share,
     kappa_words,
@@ -30,6 +30,7 @@ from pvid.log.words import (
     received_words,
     residual_words,
 )
+from pvid.models.model import Mechanism
 
 _PERIOD_S = 0.25
 _BAR, _SHORT_BAR = 30, 18  # in a terminal of 100 columns and more, and in a narrower one
@@ -44,14 +45,14 @@ class LiveView:
     ----------
     title
         What is recorded where.
-    l1
-        Length of rod 1 [m]; None: w, d1, d2 are shown, g, l2, rho2 are not.
+    mechanism
+        Of the rig; without its constants no physical parameters are shown.
     page
         Address of the live page; empty: none.
     """
 
-    def __init__(self, console: Console, title: str, l1: float | None = None, page: str = "") -> None:
-        self.history = History(l1)
+    def __init__(self, console: Console, title: str, mechanism: Mechanism = UNKNOWN_RIG, page: str = "") -> None:
+        self.history = History(mechanism)
         self._console = console
         self._title = title
         self._page = page
@@ -114,18 +115,20 @@ class LiveView:
         table.add_column("estimate", justify="right", min_width=12)
         table.add_column("± standard error", justify="left", min_width=12)
         table.add_column("in %", justify="right", min_width=8)
-        for name, (symbol, meaning, unit) in PARAMETERS.items():
+        for one in self.history.model.answers:
+            name = one.name
             value = self.history.newest.get(name, math.nan)
             error = self.history.newest.get(f"{name}_se", math.nan)
             if math.isnan(value):
                 continue
-            relative = f"{100 * error / abs(value):.2g} %" if name != "c" and value else ""
+            relative = f"{100 * error / abs(value):.2g} %" if name != self.history.model.offset_name and value else ""
             shown, spread = with_error(value, error)
-            table.add_row(symbol, meaning, shown, f"± {spread} {unit}", relative)
+            table.add_row(one.shown, one.meaning, shown, f"± {spread} {one.shown_unit}", relative)
         if not self.history.newest:
             table.add_row("none yet", "the first estimate follows when a window of samples is full")
         elif not self.history.is_physical:
-            table.add_row("g*, l2, rho2", "outside the physical region")
+            names = ", ".join(one.shown for one in self.history.model.physical)
+            table.add_row(names, "outside the physical region")
         return table
 
     def _quality(self) -> Table:
@@ -143,12 +146,13 @@ class LiveView:
             Text(line.ljust(length), style="cyan")
             + Text(f"  {residual:.3g} {residual_words(history.hello)}" if line else "  none yet"),
         )
-        t, phi, y = history.samples()
+        t, *signals = history.samples()
         if len(t):
-            rows.add_row(
-                "motion",
-                f"angle {_span(phi)} rad, pivot {_span(1e3 * y)} mm ({t[-1] - t[0]:.0f} s)",
+            shown = (
+                f"{one.short} {_span(one.shown_in[1] * x)} {one.shown_unit}"
+                for one, x in zip(history.model.channels, signals, strict=True)
             )
+            rows.add_row("motion", f"{', '.join(shown)} ({t[-1] - t[0]:.0f} s)")
         rows.add_row("state", Text(history.reason or "no estimate yet", style="bold"))
         rows.add_row("", Text(reason_words(history.reason), style="dim"))
         return rows

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -16,6 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.models.kapitza import MODEL
+from pvid.models.kapitza.physical import linear
+from pvid.rig.file import RigFile
 from pvid.rig.run import MIN_ROWS, Run
 
 FloatArray = npt.NDArray[np.float64]
@@ -77,9 +80,13 @@ class Pendulum:
     @property
     def linear(self) -> FloatArray:
         """Parameters p = (w, d1, d2) of the linear model, shape (3,), w in 1/s^2."""
-        ratio1 = self.l1 / self.l2
-        ratio2 = (self.l2 / self.rho2) ** 2
-        return np.array([self.g / self.l1, 1.0 + ratio2 * (1.0 + ratio1), ratio1 * ratio2])
+        return linear(self.g, self.l2, self.rho2, self.l1)
+
+    @property
+    def truths(self) -> dict[str, float]:
+        """Every number that an identification gives, by its name; an encoder without an offset."""
+        physical = {name: float(getattr(self, name)) for name in MODEL.physical_names}
+        return {**dict(zip(MODEL.mapped_names, self.linear, strict=True)), **physical, MODEL.offset_name: 0.0}
 
     @classmethod
     def from_linear(cls, p: Sequence[float] | FloatArray, l1: float) -> Pendulum:
@@ -96,6 +103,11 @@ class Pendulum:
         ratio2 = d1 - d2 - 1.0
         l2 = l1 * ratio2 / d2
         return cls(l1=l1, l2=l2, rho2=l2 / math.sqrt(ratio2), g=w * l1)
+
+    @classmethod
+    def nominal(cls, rig: RigFile) -> Pendulum:
+        """The one of a rig file's rough guess."""
+        return cls(**asdict(rig.nominal), **(rig.mechanism.constants or {}))
 
     def tilted(self, tilt_rad: float) -> Pendulum:
         """The same pendulum with its plane tilted by ``tilt_rad`` from the vertical: g* = g cos(tilt)."""

@@ -2,7 +2,7 @@
  *
  * Massless rod 1 of known length l1 hangs from the pivot A, body 2 from its end (centre of mass at l2, radius of
  * gyration rho2). The pivot's motion y_A(t) along Oy and the relative angle phi are measured. Free parameters
- * (host/docs/theory.md 1):
+ * (theory.md 1):
  *
  *   p = (w, d1, d2),  w = g/l1 [1/s^2],  d1 = 1 + L2 (1 + L1),  d2 = L1 L2,  L1 = l1/l2,  L2 = (l2/rho2)^2
  *
@@ -16,6 +16,11 @@
 #include "pvid/estimator.h"
 #include "pvid/kapitza_parameters.h"
 #include "pvid/model.h"
+
+#if !defined(PVID_PLAIN_NAMES) /* see sized.h */
+#define pvid_kapitza_linear_f32 PVID_SIZED(pvid_kapitza_linear_f32)
+#define pvid_kapitza_physical_f32 PVID_SIZED(pvid_kapitza_physical_f32)
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -35,7 +40,7 @@ void pvid_kapitza_linear_f32(const pvid_kapitza_f32 *physical, float l1, float p
 bool pvid_kapitza_physical_f32(const pvid_estimate_f32 *estimate, float l1, pvid_kapitza_f32 *value,
                                pvid_kapitza_f32 *se);
 
-/* One row of the strong form (host/docs/theory.md 2) from phi[k] = d^k phi / dt^k, k = 0..4, and u = y_A''/l1, u',
+/* One row of the strong form (theory.md 2) from phi[k] = d^k phi / dt^k, k = 0..4, and u = y_A''/l1, u',
  * u'' [1/s^2 ..]. Writes Y and N[11] in the order of the theory page; the binomial coefficients 3, 3 and 4, 6, 4
  * are in theta instead of N,
  *

@@ -1,6 +1,6 @@
 /* pvid/kapitza_q31.h - physical parameters of the pendulum from a fixed-point estimate, with integers only.
  *
- *   g = w l1,   l2 = l1 (d1 - d2 - 1)/d2,   rho2 = l1 sqrt(d1 - d2 - 1)/d2          (host/docs/theory.md 1)
+ *   g = w l1,   l2 = l1 (d1 - d2 - 1)/d2,   rho2 = l1 sqrt(d1 - d2 - 1)/d2          (theory.md 1)
  *
  * Lengths and g are int32 with 24 fractional bits: up to 127 m in steps of 60 nm, m/s^2 likewise.
  */
@@ -11,6 +11,10 @@
 #include <stdint.h>
 
 #include "pvid/estimator_q31.h"
+
+#if !defined(PVID_PLAIN_NAMES) /* see sized.h */
+#define pvid_kapitza_physical_q31 PVID_SIZED(pvid_kapitza_physical_q31)
+#endif
 
 #ifdef __cplusplus
 extern "C" {

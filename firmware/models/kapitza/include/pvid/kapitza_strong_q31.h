@@ -1,4 +1,4 @@
-/* pvid/kapitza_strong_q31.h - the strong form of Kapitza's pendulum in integers (host/docs/theory.md 2).
+/* pvid/kapitza_strong_q31.h - the strong form of Kapitza's pendulum in integers (theory.md 2).
  *
  * A row consists of derivatives in one time unit: all orders of phi in one format, u, u', u'' in another, so that
  * products with equal total order have equal formats. Each entry of the row is shifted to its own format, which
@@ -13,6 +13,10 @@
 #include "pvid/differentiator_q31.h"
 #include "pvid/kapitza_parameters.h"
 #include "pvid/model_q31.h"
+
+#if !defined(PVID_PLAIN_NAMES) /* see sized.h */
+#define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
+#endif
 
 #ifdef __cplusplus
 extern "C" {

@@ -1,6 +1,6 @@
 /* pvid/kapitza_weak.h - Kapitza's pendulum in the weak form: five, eight or ten entries of theta.
  *
- * The weak form (host/docs/theory.md 5) multiplies the equation of motion by test functions and integrates by
+ * The weak form (theory.md 5) multiplies the equation of motion by test functions and integrates by
  * parts; no derivative of the angle remains. It is linear, Y = N^T theta, with
  *
  *   theta = (d1, d1 w, d2, d2 w, d2 w^2, d2 c, d2 c w, d2 c w^2),   p = (w, d1, d2, c)

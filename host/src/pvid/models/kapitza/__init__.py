@@ -1,1 +1,5 @@
 """The two-link Kapitza pendulum."""
+
+from pvid.models.kapitza.model import MODEL
+
+__all__ = ["MODEL"]

@@ -27,6 +27,14 @@ function draw(id, label, traces, axis = {}, legendTop = 1, below = "time since t
   return Plotly.react(place(id), traces, layout, { displayModeBar: false, responsive: true });
 }
 
+// The id of a plot, which is appended to the section the first time.
+function made(id, section) {
+  if (place(id) === null) {
+    document.querySelector(`.plots${section}`).append(Object.assign(document.createElement("div"), { id }));
+  }
+  return id;
+}
+
 function curve(t, x, color, more = {}) {
   return { x: t, y: x, mode: "lines", line: { color, width: 1.5, simplify: false }, showlegend: false, ...more };
 }
@@ -69,15 +77,16 @@ function drawWords(state) {
 async function drawPlots({ estimates, motion }) {
   const t = estimates.t;
   for (const [i, one] of estimates.curves.entries()) {
-    await drawParameter(`parameter${i}`, t, one);
+    await drawParameter(made(`parameter${i}`, ".parameters"), t, one);
   }
   await draw("residualPlot", estimates.residualLabel, [curve(t, estimates.residual, ORANGE)], within(estimates.residualLimits));
   await draw("kappaPlot", "kappa: are the parameters identifiable?", [
     curve(t, estimates.kappa, GREEN, { name: "kappa", showlegend: true }),
     curve(t, t.map(() => 3e-5), RED, { name: "nothing is published below", showlegend: true, line: { color: RED, dash: "dash" } }),
   ], { type: "log", dtick: 1 }, 0.5);
-  await draw("phiPlot", "angle phi [rad]", [curve(motion.phi.t, motion.phi.x, BLUE)]);
-  await draw("yPlot", "drive: height of the pivot y [mm]", [curve(motion.y.t, motion.y.x, BLUE)]);
+  for (const [i, one] of motion.entries()) {
+    await draw(made(`signal${i}`, ".signals"), one.label, [curve(one.t, one.x, BLUE)]);
+  }
 }
 
 async function once() {

@@ -7,16 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
 
 from pvid.cli.main import commands
 from pvid.core.native import Native
-from pvid.oracle import strong as oracle
-from pvid.oracle.scale_errors import added_covariance, scale_errors
+from pvid.models.kapitza import MODEL
+from pvid.models.model import ScaleError
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run, write_run
-from pvid.run.identify import LINEAR, PHYSICAL, Identification, identify
+from pvid.run.identify import Identification, identify
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
 
 P = STANDARD_PENDULUM.linear
@@ -25,11 +26,22 @@ STEP = 1e-3
 STANDARD = RigFile.standard()
 # linear equations, as the truth has them, and the same design whatever the scales
 RIG = replace(STANDARD, identifier=replace(STANDARD.identifier, full_angle=False, survey=False))
+MECHANISM = STANDARD.mechanism
+LINEAR, PHYSICAL = MODEL.mapped_names, MODEL.physical_names
 
 
 @pytest.fixture(scope="module")
 def run() -> Run:
     return simulate(sensors=Sensors(), truth="linear", duration=15.0).run
+
+
+def scale_errors(p: npt.ArrayLike, y_gain: float, l1: float) -> tuple[ScaleError, ScaleError]:
+    found = MECHANISM.scale_errors(p, {"y_gain": y_gain, "l1": l1})
+    return found["y_gain"], found["l1"]
+
+
+def added_covariance(p: npt.ArrayLike, y_gain: float, l1: float) -> npt.NDArray[np.float64]:
+    return MECHANISM.added_covariance(p, {"y_gain": y_gain, "l1": l1})
 
 
 def exact(result: Identification) -> dict[str, float]:
@@ -41,10 +53,10 @@ def exact(result: Identification) -> dict[str, float]:
 def test_too_large_y_scale_moves_the_estimate_as_predicted(native: Native, run: Run, core: str) -> None:
     rig = RIG
     rig = replace(rig, identifier=replace(rig.identifier, core=core))  # type: ignore[arg-type]
-    told = scale_errors(P, L1, STEP, 0.0)
+    told, _ = scale_errors(P, STEP, 0.0)
     right = exact(identify(run, rig, native))
     wrong = exact(identify(replace(run, y=(1 + STEP) * run.y), rig, native))
-    for names, shifts in ((LINEAR, told.y_gain_p), (PHYSICAL, told.y_gain_physical)):
+    for names, shifts in ((LINEAR, told.p), (PHYSICAL, told.physical)):
         for name, shift in zip(names, shifts, strict=True):
             # the next order is 0.1 to 0.5 % of the step; float32 rounds by some 1e-6 of the value
             assert wrong[name] - right[name] == pytest.approx(shift, rel=0.02, abs=1e-5 * right[name]), name
@@ -56,31 +68,31 @@ def test_too_large_y_scale_moves_the_estimate_as_predicted(native: Native, run: 
 def test_too_long_l1_moves_the_estimate_as_predicted(native: Native, run: Run) -> None:
     rig = RIG
     rig = replace(rig, identifier=replace(rig.identifier, core="f64"))
-    told = scale_errors(P, L1, 0.0, STEP)
+    _, told = scale_errors(P, 0.0, STEP)
     right = exact(identify(run, rig, native))
     wrong = exact(identify(run, replace(rig, l1=(1 + STEP) * L1), native))
-    for names, shifts in ((LINEAR, told.l1_p), (PHYSICAL, told.l1_physical)):
+    for names, shifts in ((LINEAR, told.p), (PHYSICAL, told.physical)):
         for name, shift in zip(names, shifts, strict=True):
             assert wrong[name] - right[name] == pytest.approx(shift, rel=0.02, abs=1e-7 * right[name]), name
-    assert told.l1_physical[0] == pytest.approx(0.0, abs=1e-12)  # g* = w l1 does not hang on l1
+    assert told.physical[0] == pytest.approx(0.0, abs=1e-12)  # g* = w l1 does not hang on l1
 
 
 def test_the_covariance_of_both_scales_is_their_products() -> None:
-    gain, rod = scale_errors(P, L1, 0.003, 0.0).y_gain_p, scale_errors(P, L1, 0.0, 0.001).l1_p
+    gain, rod = (one.p for one in scale_errors(P, 0.003, 0.001))
     expected = np.outer(gain, gain) + np.outer(rod, rod)
     np.testing.assert_allclose(added_covariance(P, 0.003, 0.001), expected, rtol=1e-12)
     np.testing.assert_allclose(added_covariance(np.stack([P, 2 * P]), 0.003, 0.001)[0], expected, rtol=1e-12)
 
 
 def test_physical_errors_of_the_gain_are_those_of_its_covariance() -> None:
-    through = oracle.physical_errors(P, added_covariance(P, 0.003, 0.0), L1)
-    np.testing.assert_allclose(np.abs(scale_errors(P, L1, 0.003, 0.0).y_gain_physical), through, rtol=1e-9)
+    through = MECHANISM.physical_errors(P, added_covariance(P, 0.003, 0.0))
+    np.testing.assert_allclose(np.abs(scale_errors(P, 0.003, 0.0)[0].physical), through, rtol=1e-9)
 
 
 def test_outside_the_physical_region_there_are_no_physical_errors() -> None:
-    told = scale_errors(np.array([11.56, 0.25, 0.2]), L1, 0.003, 0.001)
-    assert np.isnan(told.y_gain_physical).all() and np.isnan(told.l1_physical).all()
-    assert np.isfinite(told.y_gain_p).all()
+    for told in scale_errors(np.array([11.56, 0.25, 0.2]), 0.003, 0.001):
+        assert np.isnan(told.physical).all()
+        assert np.isfinite(told.p).all()
 
 
 @pytest.mark.parametrize("core", ["f32", "q31", "f64"])
@@ -95,8 +107,8 @@ def test_standard_errors_contain_the_scales_and_keep_the_cores_own(native: Nativ
     assert wide.se["w"] == pytest.approx(np.hypot(alone.se["w"], 0.00316 * wide.value["w"]), rel=1e-3)
     for name in (*LINEAR, *PHYSICAL):
         assert wide.parts[name].noise == alone.se[name] == alone.parts[name].noise
-        assert alone.parts[name].y_gain == alone.parts[name].l1 == 0
-    assert wide.parts["g"].l1 < 1e-9 < wide.parts["l2"].l1
+        assert not any(alone.parts[name].scales.values())
+    assert wide.parts["g"].scales["l1"] < 1e-9 < wide.parts["l2"].scales["l1"]
     assert wide.trajectory.se[-1, 0] > alone.trajectory.se[-1, 0]
     assert (wide.trajectory.physical_se[-1] > alone.trajectory.physical_se[-1]).all()
 
