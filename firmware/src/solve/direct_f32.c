@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-/* The engine of models that project their sums by themselves: B = sum N Y as it is, a solve in one go. */
+/* The engine for models with their own `project`: the sums are B = sum N Y and yy, and a solve is one call. */
 #include "solve/direct_f32.h"
 
 #include <math.h>
@@ -103,7 +103,7 @@ pvid_reason pvid_direct_solve_f32(pvid_estimator_f32 *self, bool ends_group)
     return reason;
 }
 
-/* As pvid_direct_add_f32 and pvid_direct_solve_f32, without reading the sums back in between. */
+/* As pvid_direct_add_f32 and pvid_direct_solve_f32, without storing and reloading the sums in between. */
 pvid_reason pvid_direct_step_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     float gradient[PVID_MAX_P] = {0};

@@ -331,9 +331,9 @@ static void advance_finish(pvid_weak_f32 *self, pvid_reason *reason)
     }
 }
 
-/* A tick does one of three things (schedule.h): the front end completes a decimated sample, which may complete a
- * window; or the decimated sample is added to some functions of a window; or stages of a complete window run. A tick of
- * the first kind also runs stages, unless it drops a window. */
+/* Every tick runs the front end. If this completes a decimated sample, the sample begins in both windows and may
+ * complete one of them. In the second half of a block the tick adds the decimated sample to some functions of a window.
+ * All other ticks run stages of a complete window (schedule.h). */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
 {
     if (!is_ready(self)) {
