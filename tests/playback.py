@@ -1,18 +1,21 @@
-"""All that one build of the core shows of a few seconds of data, under every setting, as one number a variant.
+"""All that one build of the core shows of a few seconds of data, under every setting, as one number a variant; and what
+its inits answer to every edge of every setting, as one number.
 
-What tools/mutate.py asks first, beside the CMocka programs: whether a change of the core shows. What the core as it is
-shows stands under the tests that compare these settings with the numpy twin bit for bit: test_bits, test_weak_bits,
-test_gate, test_freeze and their fixed-point counterparts. tools/coverage.py asks the same of its branches.
+tools/mutate.py plays it before the CMocka programs: a change of the core shows, or not. The bits of the core as it is
+are compared with the numpy twin under these settings by test_bits, test_weak_bits, test_gate, test_freeze and their
+fixed-point counterparts; the answers are those of test_bad_config. tools/coverage.py counts the branches of both.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import configurations
 import numpy as np
 import numpy.typing as npt
 from linear_rig import LINEAR_RIG
@@ -282,3 +285,10 @@ def digest(native: Native, variant: Variant) -> str:
                 told.update(np.ascontiguousarray(getattr(record, name)).tobytes())
         look(core, native, variant.config, told)
     return told.hexdigest()[:16]
+
+
+def digests(native: Native) -> Iterator[tuple[str, str]]:
+    """Every variant and what it shows, at last what init answers to every edge of every setting."""
+    for variant in variants():
+        yield variant.name, digest(native, variant)
+    yield "configurations", configurations.digest(native)

@@ -114,7 +114,7 @@ def anchors(page: Path) -> set[str]:
 def broken_links(page: Path) -> Iterator[str]:
     """Links of a page that lead nowhere."""
     text = re.sub(r"(?ms)^```.*?^```", "", page.read_text(encoding="utf-8"))
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+    for target in re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'src="([^"]+)"', text):
         if re.match(r"[a-z]+:", target):
             continue
         path, _, anchor = target.partition("#")

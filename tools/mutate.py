@@ -306,7 +306,7 @@ def passes(program: Path, folder: Path) -> bool:
 def digests_apart(library: Path, expected: dict[str, str] | None) -> dict[str, str]:
     """What a library shows, by variant, from a process of its own: a mutant may crash, or never end. Ends at the first
     that is not what is expected, when something is."""
-    settings = playback.variants()  # made here, once
+    playback.variants()  # made here, once
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
@@ -314,11 +314,9 @@ def digests_apart(library: Path, expected: dict[str, str] | None) -> dict[str, s
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         with os.fdopen(writer, "w") as pipe:
             try:
-                native = Native(library)
-                for variant in settings:
-                    shown = playback.digest(native, variant)
-                    pipe.write(f"{variant.name}\t{shown}\n")
-                    if expected is not None and shown != expected[variant.name]:
+                for name, shown in playback.digests(Native(library)):
+                    pipe.write(f"{name}\t{shown}\n")
+                    if expected is not None and shown != expected[name]:
                         break
             finally:
                 pipe.flush()

@@ -57,7 +57,7 @@ class Proof:
 
 
 ESTIMATOR = (
-    *("src/solve/estimator_q31.c", "src/solve/staged_q31.c", "src/solve/system_q31.c"),
+    *("src/solve/estimator_q31.c", "src/solve/row_q31.c", "src/solve/staged_q31.c", "src/solve/system_q31.c"),
     *(
         "src/solve/assess_q31.c",
         "src/solve/information_q31.c",

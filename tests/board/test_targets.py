@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from conftest import ROOT
 
 from pvid.base.errors import PvidError
-from pvid.board import sizes
+from pvid.board import replay_image, sizes
 from pvid.board.boards import BOARDS, run
 from pvid.board.replay_image import (
     REPORT_EVERY,
@@ -73,12 +74,26 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("form", ["strong", "weak"])
+@pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)
 @pytest.mark.parametrize("name", LONG)
-def test_long_runs_end_with_the_bits_of_the_host(name: str, form: str, native: Native) -> None:
-    replay = standard_run(form, 40_000)
+def test_long_runs_end_with_the_bits_of_the_host(name: str, form: str, core: str, native: Native) -> None:
+    replay = standard_run(form, 40_000, core)
     image, _ = build_image(BOARDS[name], replay)
     assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), replay, native)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("core", ["f32", "q31"])
+def test_missing_samples_have_the_bits_of_the_host(core: str, native: Native, monkeypatch: pytest.MonkeyPatch) -> None:
+    # by way of long runs: their samples stand in a file that the assembler takes in
+    monkeypatch.setattr(replay_image, "MANY_TICKS", 1000)
+    replay = standard_run("weak", 4000, core)
+    counts = replay.counts.copy()
+    counts[1500:1507], counts[2222, 1] = replay_image.MISSING, replay_image.MISSING
+    replay = replace(replay, counts=counts)
+    assert np.isnan(replay.phi).any() or core == "q31"
+    image, _ = build_image(BOARDS["mps2-an386"], replay)
+    assert_same_hashes(play(BOARDS["mps2-an386"], image, TIMEOUT_S), replay, native)
 
 
 @pytest.mark.slow

@@ -1,381 +1,299 @@
 """Bad configurations: every field of every public config, out of range, no number, contradictory.
 
 Each is refused with the status that names the field; and what is accepted, however odd, never becomes infinite or no
-number, whatever the samples.
+number, whatever the samples. tests/unit/test_own_models.c has what takes a model of the user's own.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from configurations import HEADERS, HUGE, IDENTIFIERS, RANGES, RIG, SIZES, SMALLEST, Range, Subject, rig_with, subjects
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pvid.core.headers import Headers, Scalar, default_library
+from pvid.core.headers import Scalar
 from pvid.core.native import Identifier, Native
-from pvid.rig.file import RigFile
-from pvid.settings.enums import Status
+from pvid.settings.enums import Law, Status
 from pvid.settings.f32 import EstimatorConfig
 from pvid.setup.f32 import strong_config, weak_config
-from pvid.setup.q31 import strong_config_q31, weak_config_q31
+from pvid.setup.q31 import counts_of
 from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.twin import fnv
 from pvid.twin.strong import StrongTwin
 from pvid.twin.weak import WeakTwin
 
-Samples = npt.NDArray[Any]
+Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
-RIG = RigFile.standard()
 TICKS = 5000
-HEADERS = Headers.of(default_library())
-HUGE = float(np.finfo(np.float32).max)
-
-
-def rig_with(**settings: Any) -> RigFile:
-    return replace(RIG, identifier=replace(RIG.identifier, **settings))
-
-
-@dataclass(repr=False)
-class Subject:
-    """An identifier whose configuration may be spoilt, and comes back as it was."""
-
-    name: str
-    identifier: Identifier
-    phi: Samples
-    y: Samples
-
-    def __post_init__(self) -> None:
-        headers, config = self.identifier.native.headers, self.identifier.config_struct
-        self.fields = {field.name: field for field in headers.scalars(config)}
-        structs = [config, *([config.design[0]] if "design.taps" in self.fields else [])]
-        self._memory = [headers.ffi.buffer(headers.ffi.addressof(struct)) for struct in structs]
-        self._good = [bytes(memory) for memory in self._memory]
-
-    def restore(self) -> None:
-        """The good configuration again."""
-        for memory, good in zip(self._memory, self._good, strict=True):
-            memory[:] = good
-
-    def status_with(self, values: dict[str, Any]) -> Status:
-        """What init says of the good configuration with other values."""
-        self.restore()
-        for name, value in values.items():
-            self.fields[name].set(value)
-        return self.identifier.initialise()
-
-    def assert_finite(self, phi: Samples, y: Samples) -> None:
-        """Steps the accepted configuration through samples and looks at all that it shows."""
-        one = self.identifier
-        record = one.run(phi, y, hashes=False)
-        assert np.isfinite(record.p.astype(np.float64)).all()
-        assert np.isfinite(record.sums.astype(np.float64)).all()
-        lower, upper = (
-            np.array([self.fields[f"estimator.{side}[{i}]"].value for i in range(one.n_p)])
-            for side in ("lower", "upper")
-        )
-        assert (record.p >= lower).all()
-        assert (record.p <= upper).all()
-        shown = [one.assess()] + ([one.estimate] if one.publishes else [])
-        for estimate in shown:
-            for name in estimate.dtype.names or ():
-                assert np.isfinite(np.asarray(estimate[name], np.float64)).all(), name
+NAMES = tuple(RANGES)
+LEAST = -(2**31)
 
 
 @pytest.fixture(scope="module")
-def subjects(native: Native) -> dict[str, Subject]:
-    """One of each form and core."""
+def shared(native: Native) -> dict[str, Subject]:
+    """With the tables of their designs."""
+    return subjects(native)
+
+
+@pytest.fixture
+def empty(native: Native) -> dict[str, Subject]:
+    """With long tables of zeros."""
+    made = subjects(native)
+    for subject in made.values():
+        subject.empty_tables()
+    return made
+
+
+@pytest.fixture(scope="module")
+def samples() -> dict[str, Samples]:
+    """phi and y of the standard rig by core."""
     run = simulate(sensors=standard_sensors(14), truth="linear", duration=TICKS / 1000, seed=1).run
-    counts = [
-        np.rint(x / lsb).astype(np.int64) for x, lsb in ((run.phi, RIG.sensor.phi_lsb), (run.y, RIG.sensor.y_lsb))
-    ]
-    with_friction = rig_with(full_angle=True, damping=True)
-    strong = native.identifier(strong_config(rig_with(form="strong"), 1000.0))
-    weak, corrected = (native.identifier(weak_config(rig, 1000.0)) for rig in (RIG, with_friction))
-    weak_q31 = native.identifier(weak_config_q31(RIG, 1000.0))
-    strong_q31 = native.identifier(strong_config_q31(rig_with(form="strong"), 1000.0))
-    made = (
-        Subject("strong", strong, run.phi, run.y),
-        Subject("weak", weak, run.phi, run.y),
-        Subject("corrected", corrected, run.phi, run.y),
-        Subject("weak q31", weak_q31, *counts),
-        Subject("strong q31", strong_q31, *counts),
+    return {"f32": (run.phi, run.y), "q31": counts_of(RIG, run)}
+
+
+def assert_finite(subject: Subject, phi: npt.NDArray[Any], y: npt.NDArray[Any]) -> None:
+    """Steps the accepted configuration through samples and looks at all that it shows."""
+    one = subject.identifier
+    assert isinstance(one, Identifier)
+    record = one.run(phi, y, hashes=False)
+    assert np.isfinite(record.p.astype(np.float64)).all()
+    assert np.isfinite(record.sums.astype(np.float64)).all()
+    lower, upper = (
+        np.array([subject.fields[f"estimator.{side}[{i}]"].value for i in range(one.n_p)])
+        for side in ("lower", "upper")
     )
-    return {subject.name: subject for subject in made}
+    assert (record.p >= lower).all()
+    assert (record.p <= upper).all()
+    shown = [one.assess()] + ([one.estimate] if one.publishes else [])
+    for estimate in shown:
+        for name in estimate.dtype.names or ():
+            assert np.isfinite(np.asarray(estimate[name], np.float64)).all(), name
 
 
 # ---- one field at a time ----
 
 
-@dataclass(frozen=True)
-class Range:
-    """What a field may hold; outside of it init answers `status`, inside it may contradict others: `also`."""
-
-    low: float
-    high: float
-    status: Status
-    also: tuple[Status, ...] = ()
-    besides: tuple[float, ...] = ()  # allowed values outside low..high
-
-    def holds(self, value: float) -> bool:
-        """Whether it may be `value`, as C compares them."""
-        if not isinstance(value, int):
-            single = np.float32(value)
-            return value in self.besides or bool(np.float32(self.low) <= single <= np.float32(self.high))
-        return value in self.besides or self.low <= value <= self.high
+@pytest.mark.parametrize("name", NAMES)
+def test_every_field_is_tested(name: str, shared: dict[str, Subject]) -> None:
+    subject = shared[name]
+    tried = {field.group for ranges in (RANGES, SIZES) for field, _ in subject.ranged(ranges)}
+    pointers = {field.group for field, _ in subject.pointers()}
+    assert tried | pointers == {field.group for field in subject.fields.values() if subject.is_used(field)}
 
 
-BOUNDS = Range(-HUGE, HUGE, Status.BAD_BOUNDS, (Status.BAD_BOUNDS, Status.BAD_START))
-ESTIMATOR = {
-    "estimator.start": Range(-HUGE, HUGE, Status.BAD_START, (Status.BAD_START,)),
-    "estimator.start_sd": Range(1e-12, 1e12, Status.BAD_START_SD),
-    "estimator.lower": BOUNDS,
-    "estimator.upper": BOUNDS,
-    "estimator.row_sd": Range(1e-12, 1e12, Status.BAD_ROW_SD),
-    "estimator.forgetting_s": Range(0.0, 1e12, Status.BAD_FORGETTING, (Status.BAD_FORGETTING,)),
-    "estimator.feedback_hz": Range(0.0, 1e12, Status.BAD_FEEDBACK),
-    "estimator.step_limit": Range(1e-6, 0.9, Status.BAD_STEP_LIMIT),
-    "estimator.kappa_min": Range(0.0, 0.999, Status.BAD_KAPPA_MIN),
-    "estimator.noise_margin": Range(0.0, 1e6, Status.BAD_NOISE_MARGIN),
-    "estimator.dead_zone": Range(0.0, 100.0, Status.BAD_DEAD_ZONE),
-    "estimator.law": Range(0, 1, Status.BAD_LAW),
-    "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
-}
-RIG_FIELDS = {
-    "sample_rate_hz": Range(1e-3, 1e6, Status.BAD_SAMPLE_RATE, (Status.BAD_FORGETTING, Status.BAD_UPDATE_RATE)),
-    "l1": Range(1e-6, 1e6, Status.BAD_LENGTH),
-    "drive_min": Range(0.0, 1e9, Status.BAD_DRIVE_MIN),
-    "gate.sigmas": Range(2.0, 1e3, Status.BAD_GATE_SIGMAS, besides=(0.0,)),
-    "gate.patience_s": Range(0.0, 1e12, Status.BAD_GATE_PATIENCE),
-}
-STRONG = {
-    **RIG_FIELDS,
-    **ESTIMATOR,
-    "estimator.correlation": Range(1.0, 1e6, Status.BAD_CORRELATION),
-    "estimator.row_weight": Range(1.0, 1.0, Status.BAD_ROW_WEIGHT),
-}
-WEAK = {
-    **RIG_FIELDS,
-    **ESTIMATOR,
-    "pivot_noise": Range(0.0, 1e9, Status.BAD_PIVOT_NOISE),
-    "angle_limit": Range(0.0, 1e9, Status.BAD_ANGLE_LIMIT),
-    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
-    "design.overlap": Range(1.0, 1e6, Status.BAD_OVERLAP),
-    "trust.kappa_min": Range(0.0, 0.999, Status.BAD_PUBLISH_KAPPA),
-    "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
-    "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
-    "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
-    "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.revert_after": Range(0, 65535, Status.OK),
-}
-LEAST = -(2**31)
-FORMAT = Range(-64, 64, Status.BAD_FORMAT)
-ESTIMATOR_Q31 = {
-    "estimator.start": Range(LEAST, 2**31 - 1, Status.BAD_START, (Status.BAD_START,)),
-    "estimator.start_sd": Range(1, 2**31 - 1, Status.BAD_START_SD),
-    "estimator.lower": Range(LEAST + 1, 2**31 - 1, Status.BAD_BOUNDS, (Status.BAD_BOUNDS, Status.BAD_START)),
-    "estimator.upper": Range(LEAST + 1, 2**31 - 1, Status.BAD_BOUNDS, (Status.BAD_BOUNDS, Status.BAD_START)),
-    "estimator.p_bits": FORMAT,
-    "estimator.n_bits": FORMAT,
-    "estimator.y_bits": FORMAT,
-    "estimator.row_sd": Range(1, 2**31 - 1, Status.BAD_ROW_SD),
-    "estimator.forgetting_groups": Range(4, 2**24, Status.BAD_FORGETTING, besides=(0,)),
-    "estimator.gain": Range(0, 2**30, Status.BAD_FEEDBACK),
-    "estimator.correlation": Range(2**16, 2**31, Status.BAD_CORRELATION),
-    "estimator.row_weight": Range(1, 2**16, Status.BAD_ROW_WEIGHT),
-    "estimator.step_limit": Range(1, 58982, Status.BAD_STEP_LIMIT),
-    "estimator.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_KAPPA_MIN),
-    "estimator.noise_margin": Range(0, 2**30, Status.BAD_NOISE_MARGIN),
-    "estimator.dead_zone": Range(0, 100 << 16, Status.BAD_DEAD_ZONE),
-    "gate.sigmas": Range(2 << 16, 1000 << 16, Status.BAD_GATE_SIGMAS, besides=(0,)),
-    "gate.patience_groups": Range(0, 2**30, Status.BAD_GATE_PATIENCE),
-    "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
-}
-WEAK_Q31 = {
-    **ESTIMATOR_Q31,
-    "drive_min": Range(0, 2**18, Status.BAD_DRIVE_MIN),
-    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
-    "pivot_noise.m": Range(0, 2**30, Status.BAD_PIVOT_NOISE),
-    "pivot_noise.e": Range(-200, 200, Status.BAD_PIVOT_NOISE),
-    "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
-    "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
-    "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
-    "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
-    "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.revert_after": Range(0, 65535, Status.OK),
-}
-SHIFT = Range(0, 62, Status.BAD_SHIFT)
-STRONG_Q31 = {
-    **ESTIMATOR_Q31,
-    **{f"row.{name}": SHIFT for name in ("n_a", "n_e", "n_phi2", "n_phi0", "part", "y")},
-    "u_multiplier": Range(1, 2**31 - 1, Status.BAD_U_MULTIPLIER),
-    "u_shift": SHIFT,
-    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "drive_min": Range(0, 2**30, Status.BAD_DRIVE_MIN),
-    "drive_ticks": Range(1, 2**30, Status.BAD_DRIVE_TICKS),
-    # what counts within full scale could overflow is refused, too
-    "bank.phi_max": Range(1, 2**24, Status.BAD_FULL_SCALE, (Status.BAD_FULL_SCALE, Status.BAD_SHIFT)),
-    "bank.y_max": Range(1, 2**24, Status.BAD_FULL_SCALE, (Status.BAD_FULL_SCALE, Status.BAD_SHIFT)),
-    "bank.centre": Range(1, 2**30, Status.BAD_CENTRE, (Status.BAD_SHIFT,)),
-    "bank.phi_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
-    "bank.y_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
-}
-RANGES = {
-    "strong": STRONG,
-    "weak": WEAK,
-    "corrected": {**WEAK, "passes": Range(1, 8, Status.BAD_ANGLE, (Status.BAD_ITERATIONS,))},
-    "weak q31": WEAK_Q31,
-    "strong q31": STRONG_Q31,
-}
-# Filled in by init, or a flag that another subject has set, or the sizes and tables below.
-NOT_HERE = {"estimator.model", "estimator.update_rate_hz", "full_angle", "friction", "zero_unknown", "angle", "passes"}
-NOT_WEAK = {"estimator.correlation", "estimator.row_weight"}  # of the design
-
-# What a design and a bank refuse besides; sizes beyond those of the tables must not be accepted by chance.
-NAMED = {  # the others by their own names
-    "bank.weights": Status.BAD_BANK,
-    "angle": Status.BAD_ANGLE,
-    **{f"design.{table}": Status.BAD_DESIGN for table in ("smooth", "second", "chi", "gram", "multiplier")},
-    **{f"design.{name}": Status.BAD_FULL_SCALE for name in ("phi_max", "y_max", "u_max")},
-}
-REFUSED = {
-    "strong": {"bank.half": (0, 1, 65535), "bank.stride": (0, 65535), "bank.weights": (HEADERS.ffi.NULL,)},
-    "weak": {
-        "design.taps": (0, 1, 3, 6, 65535),
-        "design.decimation": (0, 65, 65535),
-        "design.window": (0, 7, 156, 65535),
-        "design.functions": (0, 3, 255),
-        "design.lag": (0,),
-        **{f"design.{table}": (HEADERS.ffi.NULL,) for table in ("smooth", "second", "chi", "gram")},
-    },
-    "weak q31": {
-        "design.taps": (0, 1, 3, 6, 65535),
-        "design.decimation": (0, 65, 65535),
-        "design.window": (0, 7, 156, 65535),
-        "design.functions": (0, 3, 255),
-        "design.smooth_bits": (32, 255),
-        "design.lag": (0,),
-        **{f"design.{shift}": (63, 255) for shift in ("phi_shift", "u_shift", "uf_shift")},
-        **{f"design.{full_scale}": (0, -1, LEAST, 2**31 - 1) for full_scale in ("phi_max", "y_max", "u_max")},
-        "design.sum_shift": (0, 31, 255),
-        "design.integral_shift[1]": (63, 255),
-        "design.high_shift[1]": (62, 255),
-        "design.product_shift[4]": (63, 255),
-        "design.shift[3]": (63, 255),
-        **{f"design.{table}": (HEADERS.ffi.NULL,) for table in ("smooth", "second", "chi", "gram", "multiplier")},
-    },
-}
-REFUSED["strong q31"] = REFUSED["strong"]
-REFUSED["corrected"] = {**REFUSED["weak"], "angle": (HEADERS.ffi.NULL,)}
-NAMES = tuple(RANGES)
+@pytest.mark.parametrize("name", NAMES)
+def test_every_field_ends_at_its_bounds_and_a_refused_init_leaves_zeros(name: str, empty: dict[str, Subject]) -> None:
+    subject = empty[name]
+    for field, value, answers in subject.edges():
+        status = subject.status_with({field: value})
+        assert status in answers, (field, value)
+        assert status is Status.OK or not any(subject.identifier.state_bytes), field
+    assert subject.status_with({}) is Status.OK
 
 
-def is_used(field: Scalar, n_p: int, n_theta: int) -> bool:
-    """Whether the model has such an entry."""
-    name = field.group.removeprefix("estimator.")
-    if name in ("start", "start_sd", "lower", "upper", "p_bits"):
-        return field.place < n_p
-    return name != "n_bits" or field.place < n_theta
-
-
-def ranged(subject: Subject) -> Iterator[tuple[Scalar, Range]]:
-    """Every field that is to be used, with what it may hold."""
-    for field in subject.fields.values():
-        known = RANGES[subject.name].get(field.group)
-        if known is not None and is_used(field, subject.identifier.n_p, 11 if subject.name.startswith("strong") else 8):
-            yield field, known
-
-
-def integers_of(field: Scalar) -> tuple[int, int]:
-    """Least and largest of its C type."""
-    limits = np.iinfo(HEADERS.dtype(field.kind))
-    return int(limits.min), int(limits.max)
+@pytest.mark.parametrize("name", NAMES)
+def test_start_lies_within_its_bounds(name: str, shared: dict[str, Subject]) -> None:
+    subject = shared[name]
+    is_float = subject.identifier.core == "f32"
+    below, above = (float(np.nextafter(np.float32(8), np.float32(way))) if is_float else way for way in (7, 9))
+    least = SMALLEST if is_float else 1
+    cases = [
+        ((8, 8, 9), Status.OK),
+        ((8, 7, 8), Status.OK),
+        ((least, least, 9), Status.OK),
+        ((below, 8, 9), Status.BAD_START),
+        ((above, 7, 8), Status.BAD_START),
+        ((8, 8, 8), Status.BAD_BOUNDS),
+        ((8, 9, 7), Status.BAD_BOUNDS),
+    ]
+    for i in range(subject.identifier.n_p):
+        signed = i >= 3  # the encoder's zero may have any sign
+        for negative in ((8, 0, 9), (8, -1, 9)):
+            cases.append((negative, Status.OK if signed else Status.BAD_BOUNDS))
+        for values, status in cases:
+            fields = zip((f"estimator.{key}[{i}]" for key in ("start", "lower", "upper")), values, strict=True)
+            assert subject.status_with(dict(fields)) is status, (i, values)
+        del cases[-2:]
 
 
 def values_for(field: Scalar, known: Range) -> st.SearchStrategy[Any]:
     """Anything its type can hold, and its range's edges."""
-    if isinstance(field.value, float):
-        with np.errstate(over="ignore"):
-            edges = [
-                float(np.nextafter(np.float32(edge), np.float32(way)))
-                for edge in (known.low, known.high)
-                for way in (-np.inf, np.inf)
-            ]
-        return st.floats(width=32) | st.sampled_from([*edges, known.low, known.high, math.nan, math.inf, -math.inf])
-    low, high = integers_of(field)
-    near = [int(edge) + step for edge in (known.low, known.high) for step in (-1, 0, 1)]
-    return st.integers(low, high) | st.sampled_from([value for value in (low, high, 0, *near) if low <= value <= high])
+    limits = None if isinstance(field.value, float) else np.iinfo(HEADERS.dtype(field.kind))
+    anything = st.floats(width=32) if limits is None else st.integers(int(limits.min), int(limits.max))
+    return anything | st.sampled_from(known.edges(field))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_field_is_tested(name: str, subjects: dict[str, Subject]) -> None:
-    known = {field.group for field, _ in ranged(subjects[name])}
-    refused = {entry.partition("[")[0] for entry in REFUSED[name]}
-    leave = NOT_HERE | (NOT_WEAK if name in ("weak", "corrected") else set()) | {"design.gram_bits"}
-    assert {field.group for field in subjects[name].fields.values()} - leave == (known | refused) - leave
-
-
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", IDENTIFIERS)
 @settings(max_examples=400, deadline=None)
 @given(data=st.data())
-def test_a_field_out_of_its_range_is_refused_by_name(name: str, subjects: dict[str, Subject], data: Any) -> None:
-    subject = subjects[name]
-    choices = list(ranged(subject))
-    field, known = data.draw(st.sampled_from(choices), label="field")
+def test_a_field_out_of_its_range_is_refused_by_name(
+    name: str, shared: dict[str, Subject], samples: dict[str, Samples], data: Any
+) -> None:
+    subject = shared[name]
     subject.restore()
+    field, known = data.draw(st.sampled_from(list(subject.ranged())), label="field")
     value = data.draw(values_for(field, known), label="value")
-    field.set(value)
-    status = subject.identifier.initialise()
-    if known.holds(value):
-        assert status in (Status.OK, *known.also)
-    else:
-        assert status is known.status
+    status = subject.status_with({field.name: value})
+    assert status in known.answers(value)
     if status is Status.OK:
-        subject.assert_finite(subject.phi, subject.y)
+        assert_finite(subject, *samples[subject.identifier.core])
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_not_a_number_is_always_refused(name: str, subjects: dict[str, Subject]) -> None:
-    for field, known in ranged(subjects[name]):
-        if isinstance(field.value, float):
-            for value in (math.nan, math.inf, -math.inf):
-                assert subjects[name].status_with({field.name: value}) is known.status, (field.name, value)
+# ---- tables ----
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_sizes_formats_and_missing_tables_are_refused(name: str, subjects: dict[str, Subject]) -> None:
-    for field, values in REFUSED[name].items():
-        own = field.rpartition(".")[2].partition("[")[0]
-        shift = Status.BAD_SHIFT if own.endswith(("shift", "_bits")) else None
-        named = NAMED.get(field) or shift or Status[f"BAD_{own.upper()}"]
-        for value in values:
-            assert subjects[name].status_with({field: value}) is named, (field, value)
-    subjects[name].restore()
-    assert subjects[name].identifier.initialise() is Status.OK
+@pytest.mark.parametrize("name", ("strong", "weak"))
+def test_a_table_entry_that_is_not_finite_is_refused(name: str, empty: dict[str, Subject]) -> None:
+    subject = empty[name]
+    assert subject.status_with({}) is Status.OK
+    for field, entries in subject.entries.items():
+        for place in range(entries + 1):  # the last is none of them
+            subject.tables[field][place] = math.nan
+            assert (subject.identifier.initialise() is not Status.OK) == (place < entries), (field, place)
+            subject.tables[field][place] = 0.0
 
 
-def test_an_estimator_of_its_own_needs_a_model_and_a_rate(native: Native) -> None:
-    config = strong_config(rig_with(form="strong"), 1000.0).estimator
-    estimator = native.estimator(config, 1000.0)
-    struct = estimator.config_struct
-    for rate in (0.0, -1.0, 9e-7, 1.1e6, math.nan, math.inf):
-        struct.update_rate_hz = rate
-        assert estimator.initialise() is Status.BAD_UPDATE_RATE
-    struct.update_rate_hz = 1000.0
-    struct.model = native.headers.ffi.NULL
-    assert estimator.initialise() is Status.BAD_MODEL
+def test_a_table_that_would_overflow_is_refused(empty: dict[str, Subject]) -> None:
+    subject = empty["weak q31"]
+    design = subject.design
+    # F = 2^20 - 1 at full scale is what the smoothing weights may add up to
+    room = ((2**20 << design.phi_shift) - 1) // design.phi_max
+    limits = {
+        "second": (2**31 - 1) // (4 * design.y_max),
+        "smooth": min((room - 2**design.smooth_bits) // 4, (2**31 - 1) // (4 * design.phi_max)),
+        "chi": (2**31 - 1 - 2 ** (design.sum_shift - 1)) >> 20,
+        "gram": 2**30,
+    }
+    for name, limit in limits.items():
+        table, entries = subject.tables[f"design.{name}"], subject.entries[f"design.{name}"]
+        for place, sign in ((0, 1), (entries - 1, -1), (entries, 1)):  # the last is none of them
+            for value in (limit, limit + 1):
+                table[place] = sign * value
+                accepted = subject.identifier.initialise() is Status.OK
+                assert accepted == (value == limit or place == entries), (name, place, value)
+            table[place] = 0
+    assert subject.identifier.initialise() is Status.OK
 
 
-def test_friction_with_a_known_zero_is_a_contradiction(subjects: dict[str, Subject]) -> None:
-    assert subjects["corrected"].status_with({"zero_unknown": False}) is Status.BAD_ANGLE
+def test_full_scale_ends_where_a_product_would_overflow(shared: dict[str, Subject]) -> None:
+    # the five points' fourth derivative: its outermost products are 48 times four full scales, and fit 32 bits
+    subject = shared["strong q31"]
+    shifts = {name: 2 for name in subject.fields if name.startswith(("bank.phi_shift", "bank.y_shift"))}
+    for name in ("bank.phi_max", "bank.y_max"):
+        limit = (2**31 - 1) // (48 * 4)
+        assert subject.status_with({**shifts, name: limit}) is Status.OK
+        assert subject.status_with({**shifts, name: limit + 1}) is Status.BAD_FULL_SCALE
+
+
+# ---- fields that depend on each other, and what init makes of them ----
+
+
+@pytest.mark.parametrize("name", ("weak", "corrected", "weak q31"))
+def test_a_weak_form_needs_a_design(name: str, native: Native) -> None:
+    subject = subjects(native)[name]
+    subject.identifier.config_struct.design = HEADERS.ffi.NULL
+    assert subject.identifier.initialise() is Status.BAD_DESIGN
+
+
+def test_friction_with_a_known_zero_is_a_contradiction(shared: dict[str, Subject]) -> None:
+    assert shared["corrected"].status_with({"zero_unknown": False}) is Status.BAD_ANGLE
+
+
+def test_a_correction_that_is_not_asked_for_needs_nothing(shared: dict[str, Subject]) -> None:
+    one, off = shared["corrected"], {"full_angle": False, "friction": False, "passes": 0}
+    assert one.status_with(off) is Status.OK
+    assert not one.identifier.state.angle
+
+
+def test_a_window_is_worked_off_in_time_or_refused(empty: dict[str, Subject]) -> None:
+    # a window of nine samples has 4 free ticks at D = 1; what does not fit into 32 stages each is refused
+    subject = empty["weak q31"]
+    for decimation, iterations, stages in ((64, 10, range(2, 9)), (1, 1, range(9, 33)), (1, 10, None)):
+        sizes = {"design.window": 9, "design.functions": 6, "design.decimation": decimation, "iterations": iterations}
+        assert subject.status_with(sizes) is (Status.BAD_ITERATIONS if stages is None else Status.OK)
+        assert stages is None or subject.identifier.state.stages_per_tick in stages
+
+
+def test_feedback_is_a_rate(shared: dict[str, Subject]) -> None:
+    # g = feedback_hz * time between solves, at most 1; 0 asks for Gauss-Newton, and the other law for none
+    subject = shared["estimator"]
+    for hz, divider, law, gain in (
+        (0.5, 1, Law.STATIONARY, 0.125),
+        (0.5, 2, Law.STATIONARY, 0.25),
+        (100.0, 2, Law.STATIONARY, 1.0),
+        (0.0, 2, Law.STATIONARY, 1.0),
+        (0.5, 2, Law.PSEUDOVELOCITY, 0.0),
+    ):
+        given = {"feedback_hz": hz, "divider": divider, "law": int(law), "update_rate_hz": 4.0}
+        assert subject.status_with({f"estimator.{name}": value for name, value in given.items()}) is Status.OK
+        assert subject.identifier.estimator.gain == gain
+
+
+@pytest.mark.parametrize(("name", "feedback"), (("weak", {"feedback_hz": 0.01}), ("weak q31", {"gain": 2**30 - 1})))
+def test_feedback_takes_one_step_a_window(name: str, feedback: dict[str, Any], shared: dict[str, Subject]) -> None:
+    subject = shared[name]
+    assert subject.status_with({f"estimator.{key}": value for key, value in feedback.items()}) is Status.OK
+    assert subject.identifier.state.iterations == 1
+
+
+def test_zero_that_is_known_is_no_parameter(shared: dict[str, Subject]) -> None:
+    for name in ("weak", "weak q31"):
+        for unknown, n_p in ((True, 4), (False, 3)):
+            assert shared[name].status_with({"zero_unknown": unknown}) is Status.OK
+            assert shared[name].identifier.estimator.model.n_p == n_p
+
+
+def test_settings_of_the_strong_form_in_its_units(shared: dict[str, Subject]) -> None:
+    subject = shared["strong"]
+    given = {"drive_min": 3.0, "gate.sigmas": 3.0, "estimator.row_sd": 2.0**-13, "estimator.forgetting_s": 0.0}
+    for rate, ticks in ((1024.0, 1024.0), (0.5, 1.0)):  # a mean over less than a tick is the tick's own value
+        assert subject.status_with({**given, "sample_rate_hz": rate}) is Status.OK
+        state = subject.identifier.state
+        assert (state.drive_min, state.drive_forgetting, state.gate.limit) == (9.0, 1.0 / ticks, 9.0)
+        assert state.gate.memory == max(0.25 * rate, 1.0)
+        assert state.gate.floor == pytest.approx(1e-6 * 2.0**-26)
+    fixed = shared["strong q31"]
+    assert fixed.status_with({"drive_min": 3, "drive_ticks": 4}) is Status.OK
+    assert (fixed.identifier.state.drive_min, fixed.identifier.state.drive_forgetting) == (9, (2**31 - 1) // 4)
+
+
+def test_settings_of_the_weak_form_in_its_units(shared: dict[str, Subject]) -> None:
+    subject = shared["weak"]
+    design = subject.design
+    given = {
+        "drive_min": 3.0,
+        "pivot_noise": 16.0,
+        "gate.sigmas": 3.0,
+        "gate.patience_s": 2.0,
+        "sample_rate_hz": 1024.0,
+    }
+    own = {"row_sd": 0.5, "forgetting_s": 64.0}
+    assert subject.status_with(given | {f"estimator.{name}": value for name, value in own.items()}) is Status.OK
+    state = subject.identifier.state
+    dt = design.decimation / 1024.0
+    windows_hz = 1.0 / (dt * ((design.window - 1) // 2))
+    assert (state.drive_min, state.dt, state.row_variance) == (9.0, dt, 0.25)
+    assert state.pivot_noise == pytest.approx(16.0 / (design.lag * dt) ** 4, rel=1e-6)
+    information = state.estimator.information
+    assert information.row_weight == pytest.approx((design.functions - 2) / design.functions, rel=1e-6)
+    assert state.estimator.correlation == design.overlap
+    # groups that long-term trust remembers: those of the forgetting, by its own roundings within a factor 1.5
+    assert 64.0 * windows_hz / 1.5 <= state.trust.long_memory <= 64.0 * windows_hz * 1.5
+    assert (state.finish.gate.memory, state.finish.gate.floor) == (4.0, 1.0)
+    # a factor of 1e4 within the time of patience
+    assert state.finish.gate.widening - 1.0 == pytest.approx(math.log(1e4) / (2.0 * windows_hz), rel=1e-3)
+    fixed = shared["weak q31"]
+    for unknown, bits in ((True, fixed.fields["estimator.p_bits[3]"].value), (False, 0)):
+        assert fixed.status_with({"drive_min": 3, "zero_unknown": unknown}) is Status.OK
+        assert fixed.identifier.state.drive_min == (3 * (fixed.design.window - 1)) ** 2
+        assert fixed.identifier.state.zero_bits == bits
 
 
 # ---- many at once: what is accepted stays finite ----
@@ -420,9 +338,9 @@ def odd_configs(draw: Callable[..., Any], subject: Subject) -> dict[str, float]:
 
 
 @st.composite
-def odd_samples(draw: Callable[..., Any], subject: Subject) -> tuple[Samples, Samples]:
+def odd_samples(draw: Callable[..., Any], samples: Samples) -> Samples:
     """The rig's samples, or these scaled to any size, or with anything in between."""
-    phi, y = subject.phi.astype(np.float64), subject.y.astype(np.float64)
+    phi, y = (x.astype(np.float64) for x in samples)
     kind = draw(st.sampled_from(("plain", "phi scaled", "y scaled", "spoilt")))
     with np.errstate(over="ignore"):
         if kind == "phi scaled":
@@ -441,28 +359,33 @@ def odd_samples(draw: Callable[..., Any], subject: Subject) -> tuple[Samples, Sa
 @pytest.mark.parametrize("name", ("strong", "weak", "corrected"))
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
-def test_accepted_configurations_stay_finite(name: str, subjects: dict[str, Subject], data: Any) -> None:
-    subject = subjects[name]
+def test_accepted_configurations_stay_finite(
+    name: str, shared: dict[str, Subject], samples: dict[str, Samples], data: Any
+) -> None:
+    subject = shared[name]
     subject.restore()
     status = subject.status_with(data.draw(odd_configs(subject), label="config"))
     contradictions = (Status.OK, Status.BAD_FORGETTING, Status.BAD_UPDATE_RATE, Status.BAD_BOUNDS, Status.BAD_START)
     assert status in contradictions
     if status is Status.OK:
-        subject.assert_finite(*data.draw(odd_samples(subject), label="samples"))
+        assert_finite(subject, *data.draw(odd_samples(samples["f32"]), label="samples"))
 
 
 @pytest.mark.parametrize("name", ("weak q31", "strong q31"))
 @settings(max_examples=100, deadline=None)
 @given(data=st.data())
-def test_fixed_point_core_keeps_its_bounds(name: str, subjects: dict[str, Subject], data: Any) -> None:
-    subject = subjects[name]
+def test_fixed_point_core_keeps_its_bounds(
+    name: str, shared: dict[str, Subject], samples: dict[str, Samples], data: Any
+) -> None:
+    subject = shared[name]
     subject.restore()
-    many = st.lists(st.sampled_from(list(ranged(subject))), min_size=1, max_size=6)
+    many = st.lists(st.sampled_from(list(subject.ranged())), min_size=1, max_size=6)
     values = {field.name: data.draw(values_for(field, known)) for field, known in data.draw(many)}
     if subject.status_with(values) is Status.OK:
         scale = 2.0 ** data.draw(st.integers(-3, 24))
         limits = (LEAST, 2**31 - 1)
-        subject.assert_finite(np.clip(subject.phi * scale, *limits).astype(np.int64), subject.y)
+        phi, y = samples["q31"]
+        assert_finite(subject, np.clip(phi * scale, *limits).astype(np.int64), y)
 
 
 # ---- what was found ----

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from configurations import FLAGS, IDENTIFIERS, Subject, subjects
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pvid.core import snapshot
-from pvid.core.headers import Scalar
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
-from pvid.settings.enums import SnapshotStatus
+from pvid.settings.enums import SnapshotStatus, Status
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import strong_config_q31, weak_config_q31
 from pvid.sim.pendulum import Simulation
@@ -115,23 +115,6 @@ def test_another_form_or_core_is_refused(maker: Maker, native: Native) -> None:
         assert snapshot.restore(maker(native), snapshot.save(other(native))) is status
 
 
-# Filled in by the identifiers, or a pointer of which the contents are hashed.
-NOT_SETTINGS: dict[Maker, set[str]] = {
-    strong_of: {"estimator.model", "estimator.update_rate_hz", "bank.weights"},
-    weak_of: {
-        *(f"estimator.{name}" for name in ("model", "update_rate_hz", "correlation", "row_weight")),
-        *(f"design.{name}" for name in ("smooth", "second", "chi", "gram")),
-        "angle",
-        "passes",  # of a correction that is not asked for
-    },
-    strong_fixed_point_of: {"estimator.model", "bank.weights"},
-    fixed_point_of: {
-        "estimator.model",
-        *(f"design.{name}" for name in ("smooth", "second", "chi", "gram", "multiplier")),
-    },
-}
-
-
 def changed(value: Any) -> Any:
     """Another value; a size gets smaller, so that no table is read beyond its end."""
     if isinstance(value, bool):
@@ -141,54 +124,41 @@ def changed(value: Any) -> Any:
     return value - 1 if value > 0 else value + 1
 
 
-def is_unused(field: Scalar, n_p: int, n_theta: int) -> bool:
-    """An entry beyond those of the model."""
-    name = field.group.removeprefix("estimator.")
-    if name in ("start", "start_sd", "lower", "upper", "p_bits"):
-        return field.place >= n_p
-    return name == "n_bits" and field.place >= n_theta
+@pytest.mark.parametrize("name", IDENTIFIERS)
+@pytest.mark.parametrize("zero_unknown", (True, False))
+def test_every_setting_that_differs_is_seen_and_no_other(name: str, zero_unknown: bool, native: Native) -> None:
+    subject = subjects(native)[name]
+    identifier = subject.identifier
+    assert isinstance(identifier, Identifier)
+    if not zero_unknown and name.startswith("weak"):  # c is a parameter only where the zero is unknown
+        assert subject.status_with({"zero_unknown": False}) is Status.OK
+        identifier.n_p = 3
+        subject = Subject(name, identifier)
+    image, before = snapshot.save(identifier), identifier.state_bytes
+    for field in subject.fields.values():
+        if field.kind.kind != "pointer":
+            kept = field.value
+            field.set(changed(kept))
+            seen = snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG
+            assert seen == (subject.is_used(field) or field.name in FLAGS), field.name
+            field.set(kept)
+    assert identifier.state_bytes == before
+    assert snapshot.restore(identifier, image) is SnapshotStatus.RESTORED
 
 
-@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
-def test_every_setting_that_differs_is_seen(maker: Maker, native: Native) -> None:
-    identifier = maker(native)
+@pytest.mark.parametrize("name", IDENTIFIERS)
+def test_every_table_entry_that_differs_is_seen_and_no_other(name: str, native: Native) -> None:
+    subject = subjects(native)[name]
+    identifier, tables = subject.identifier, subject.empty_tables()
+    assert isinstance(identifier, Identifier)
+    assert subject.status_with({}) is Status.OK
     image = snapshot.save(identifier)
-    before = identifier.state_bytes
-    tried = 0
-    for field in identifier.native.headers.scalars(identifier.config_struct):
-        if field.name in NOT_SETTINGS[maker] or is_unused(
-            field, identifier.n_p, 11 if maker is strong_fixed_point_of else 8
-        ):
-            continue
-        kept = field.value
-        field.set(changed(kept))
-        assert snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG, field.name
-        field.set(kept)
-        assert identifier.state_bytes == before
-        tried += 1
-    assert tried >= 25
-    assert snapshot.restore(identifier, image) is SnapshotStatus.RESTORED
-
-
-def test_every_table_that_differs_is_seen(native: Native) -> None:
-    for maker in FOUR:
-        identifier = maker(native)
-        image = snapshot.save(identifier)
-        assert identifier.tables
-        for table in identifier.tables.values():
-            # the arrays are read-only for Python, as the tables are for the core
-            raw = native.headers.ffi.cast("uint8_t *", table.ctypes.data)
-            for place in (0, table.nbytes // 2, table.nbytes - 1):
-                raw[place] ^= 1
-                assert snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG
-                raw[place] ^= 1
-
-
-def test_disabled_correction_has_no_passes(native: Native) -> None:
-    image = snapshot.save(weak_of(native))
-    identifier = weak_of(native)
-    identifier.config_struct.passes += 1
-    assert snapshot.restore(identifier, image) is SnapshotStatus.RESTORED
+    for field, entries in subject.entries.items():
+        for place in range(entries + 1):  # the last is none of them
+            tables[field][place] = 1
+            seen = snapshot.restore(identifier, image) is SnapshotStatus.OTHER_CONFIG
+            assert seen == (place < entries), (field, place)
+            tables[field][place] = 0
 
 
 @pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)

@@ -2,7 +2,8 @@
 #ifndef STRONG_CONTRACTS_H
 #define STRONG_CONTRACTS_H
 
-#include "solve/estimator_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
 #include "judge/misfit_q31.h"
 #include "pvid/differentiator_q31.h"
 #include "pvid/gate_q31.h"

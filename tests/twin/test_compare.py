@@ -14,11 +14,8 @@ from pvid.core.sources import INCLUDES, core_sources, source
 from pvid.settings.bounds import SIZES
 
 MUTANTS = {
-    "estimator_f32.c": (
-        "    s[a][a] += self->prior[a];\n",
-        "    s[a][a] += 1.0000001f * self->prior[a];\n",
-    ),
-    "kapitza_strong_f32.c": ("four_d2 = 4.0f * d2;", "four_d2 = 4.0000005f * d2;"),
+    "kapitza_step_f32.c": ("(self, 0, part * dp[0], &bounded)", "(self, 0, 1.0000001f * (part * dp[0]), &bounded)"),
+    "kapitza_sums_f32.c": ("four_d2 = 4.0f * d2;", "four_d2 = 4.0000005f * d2;"),
     "information_f32.c": (
         "*low = (kept_high - (total - part)) + (kept_low - part);",
         "*low = 0.0f * part;",

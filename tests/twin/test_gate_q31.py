@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pvid.base.errors import PvidError
+from pvid.cases import case_of
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -21,8 +22,6 @@ from pvid.settings.enums import Reason, Status
 from pvid.settings.f32 import GateConfig
 from pvid.settings.q31 import GateConfigQ31, StrongConfigQ31, WeakConfigQ31
 from pvid.setup.q31 import config_for_run, counts_of, gate_config_q31, p_of, strong_config_q31, weak_config_q31
-from pvid.setup.strong_header_q31 import strong_header_q31
-from pvid.setup.weak_header_q31 import to_c_header_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.twin.f32.gate import Gate
 from pvid.twin.q31.gate import GateQ31
@@ -181,8 +180,9 @@ def test_a_rig_file_s_gate_reaches_the_core_and_the_board(jolted: Run) -> None:
     assert weak.gate == GateConfigQ31(round(4.5 * 2**16), round(windows))
     strong = strong_config_q31(rig_with(form="strong", stride=8, **settings), 1000.0)
     assert strong.gate == GateConfigQ31(round(4.5 * 2**16), 60_000)
-    assert ".gate = {294912u, 60000u}," in strong_header_q31(strong, RIG.l1, "strong", "a test")
-    assert f".gate = {{294912u, {round(windows)}u}}," in to_c_header_q31(weak, RIG.l1, "weak", "a test")
+    for config, groups in ((strong, 60_000), (weak, round(windows))):
+        header = " ".join(case_of(config).header(config, RIG.l1, config.form, "a test").split())
+        assert f".gate = {{ .sigmas = 294912u, .patience_groups = {groups}u, }}," in header
 
 
 def test_a_patience_that_cannot_be_counted_is_refused() -> None:

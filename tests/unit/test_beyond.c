@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "solve/estimator_q31.h"
+#include "solve/state_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "solve/assess_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "pvid/pvid.h"
 
 #define INFINITE (3.4e38f * 10.0f)
@@ -244,83 +244,6 @@ static void b_follows_the_estimate(void **state)
     assert_float_equal(sums[9], (float)rr, 0.003f);
 }
 
-/* ---- what it refuses ---- */
-
-typedef struct {
-    pvid_status status;
-    size_t offset;
-    float bad[5];
-} bad_field;
-
-static void every_bad_field_has_its_own_status(void **state)
-{
-    (void)state;
-    static const bad_field fields[] = {
-        {PVID_BAD_START, offsetof(pvid_estimator_config_f32, start), {INFINITE, -1.0f, 0.0f, 20.0f, 0.05f}},
-        {PVID_BAD_START_SD, offsetof(pvid_estimator_config_f32, start_sd), {INFINITE, -1.0f, 0.0f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, lower), {INFINITE, -1.0f, 0.0f, 20.0f, -INFINITE}},
-        {PVID_BAD_BOUNDS, offsetof(pvid_estimator_config_f32, upper), {INFINITE, -1.0f, 0.0f, 0.05f, -INFINITE}},
-        {PVID_BAD_ROW_SD, offsetof(pvid_estimator_config_f32, row_sd), {INFINITE, -1.0f, 0.0f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_UPDATE_RATE,
-         offsetof(pvid_estimator_config_f32, update_rate_hz),
-         {INFINITE, -1.0f, 0.0f, 1.0e9f, 1.0e-9f}},
-        {PVID_BAD_FORGETTING,
-         offsetof(pvid_estimator_config_f32, forgetting_s),
-         {INFINITE, -1.0f, 0.03f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_FEEDBACK,
-         offsetof(pvid_estimator_config_f32, feedback_hz),
-         {INFINITE, -1.0f, -1.0e-9f, 1.0e30f, -INFINITE}},
-        {PVID_BAD_CORRELATION,
-         offsetof(pvid_estimator_config_f32, correlation),
-         {INFINITE, -1.0f, 0.0f, 0.5f, 1.0e30f}},
-        {PVID_BAD_STEP_LIMIT,
-         offsetof(pvid_estimator_config_f32, step_limit),
-         {INFINITE, -1.0f, 0.0f, 1.0f, -INFINITE}},
-        {PVID_BAD_KAPPA_MIN, offsetof(pvid_estimator_config_f32, kappa_min), {INFINITE, -1.0f, -1.0e-9f, 1.0f, 2.0f}},
-    };
-    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
-        for (int k = 0; k < 6; k++) {
-            const float bad = (k < 5) ? fields[i].bad[k] : NOT_A_NUMBER;
-            pvid_estimator_config_f32 config = own_config();
-            pvid_estimator_f32 estimator;
-            memcpy((char *)&config + fields[i].offset, &bad, sizeof bad);
-            assert_int_equal(pvid_estimator_init_f32(&estimator, &config), fields[i].status);
-        }
-    }
-    pvid_estimator_config_f32 config = own_config();
-    pvid_estimator_f32 estimator;
-    config.divider = 0;
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_DIVIDER);
-    config = own_config();
-    config.law = (pvid_law)7;
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_LAW);
-}
-
-static void every_bad_model_is_refused(void **state)
-{
-    (void)state;
-    pvid_model_f32 bad[8];
-    for (int i = 0; i < 8; i++) {
-        bad[i] = own_model;
-    }
-    bad[0].n_theta = PVID_MAX_THETA + 1;
-    bad[1].n_p = PVID_MAX_P + 1;
-    bad[2].n_p = 0;
-    bad[3].n_moments = 5;
-    bad[4].c_row = NULL;
-    bad[5].theta = NULL;
-    bad[6].jacobian = NULL;
-    bad[7].project = pvid_kapitza_strong_f32.project; /* one optional function without the others */
-    pvid_estimator_f32 estimator;
-    pvid_estimator_config_f32 config = own_config();
-    for (int i = 0; i < 8; i++) {
-        config.model = &bad[i];
-        assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_MODEL);
-    }
-    config.model = NULL;
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_BAD_MODEL);
-}
-
 static void unusable_row_changes_nothing_but_its_counter(void **state)
 {
     (void)state;
@@ -491,8 +414,6 @@ int main(void)
         cmocka_unit_test(the_misfit_is_the_residual_variance_over_what_is_explained),
         cmocka_unit_test(rounding_of_long_steps_widens_the_errors),
         cmocka_unit_test(b_follows_the_estimate),
-        cmocka_unit_test(every_bad_field_has_its_own_status),
-        cmocka_unit_test(every_bad_model_is_refused),
         cmocka_unit_test(unusable_row_changes_nothing_but_its_counter),
         cmocka_unit_test(divider_solves_every_third_row),
         cmocka_unit_test(add_and_update_have_the_bits_of_step),

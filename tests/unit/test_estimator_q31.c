@@ -131,55 +131,6 @@ static void a_wider_dead_zone_is_left_less_often(void **state)
     }
 }
 
-static void assert_refused(pvid_status status)
-{
-    memset(&estimator, 0x5A, sizeof estimator);
-    static const pvid_estimator_q31 none;
-    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), status);
-    assert_memory_equal(&none, &estimator, sizeof none); /* nothing is half made */
-    (void)start_again(NULL);
-}
-
-static void init_names_what_it_refuses(void **state)
-{
-    (void)state;
-    config.model = NULL;
-    assert_refused(PVID_BAD_MODEL);
-    config.p_bits[2] = 65;
-    assert_refused(PVID_BAD_FORMAT);
-    config.n_bits[7] = -65;
-    assert_refused(PVID_BAD_FORMAT);
-    config.y_bits = 100;
-    assert_refused(PVID_BAD_FORMAT);
-    config.lower[0] = 0; /* w is positive */
-    assert_refused(PVID_BAD_BOUNDS);
-    config.upper[3] = config.lower[3];
-    assert_refused(PVID_BAD_BOUNDS);
-    config.start[1] = config.upper[1] + 1;
-    assert_refused(PVID_BAD_START);
-    config.start_sd[0] = 0;
-    assert_refused(PVID_BAD_START_SD);
-    config.row_sd = 0;
-    assert_refused(PVID_BAD_ROW_SD);
-    config.forgetting_groups = 3;
-    assert_refused(PVID_BAD_FORGETTING);
-    config.gain = -1;
-    assert_refused(PVID_BAD_FEEDBACK);
-    config.correlation = 65535;
-    assert_refused(PVID_BAD_CORRELATION);
-    config.row_weight = 0;
-    assert_refused(PVID_BAD_ROW_WEIGHT);
-    config.step_limit = 0;
-    assert_refused(PVID_BAD_STEP_LIMIT);
-    config.kappa_min = 1 << 30;
-    assert_refused(PVID_BAD_KAPPA_MIN);
-    config.noise_margin = (1u << 30) + 1u;
-    assert_refused(PVID_BAD_NOISE_MARGIN);
-    config.divider = 0;
-    assert_refused(PVID_BAD_DIVIDER);
-    begin();
-}
-
 static void gauss_newton_steps_end_at_the_parameters_that_made_the_rows(void **state)
 {
     (void)state;
@@ -292,7 +243,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(within_the_dead_zone_p_stays, start_again),
         cmocka_unit_test_setup(a_wider_dead_zone_is_left_less_often, start_again),
-        cmocka_unit_test_setup(init_names_what_it_refuses, start_again),
         cmocka_unit_test_setup(gauss_newton_steps_end_at_the_parameters_that_made_the_rows, start_again),
         cmocka_unit_test_setup(a_row_beyond_its_format_changes_nothing_but_the_counter, start_again),
         cmocka_unit_test_setup(a_solve_in_stages_is_the_solve_at_once, start_again),

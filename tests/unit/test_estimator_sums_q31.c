@@ -12,7 +12,8 @@
 #include <cmocka.h>
 
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/state_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"

@@ -125,14 +125,13 @@ def bench_hard(update: Path | None) -> int:
 
 
 @bench.command(name="longevity")
-@click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7; 10^6 held out or on a board.")
+@click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7; 10^6 held out.")
 @click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
 @click.option(
     "--columns", "columns", multiple=True, help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, peers."
 )
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")
-@click.option("--on", "board", metavar="BOARD", help="In this emulator, hash for hash with this machine: mps2-an386.")
 @UPDATE
 def bench_longevity(
     ticks: int | None,
@@ -140,7 +139,6 @@ def bench_longevity(
     columns: tuple[str, ...],
     processes: int,
     held_out: bool,
-    board: str | None,
     update: Path | None,
 ) -> int:
     """Millions of ticks of every disturbance, beside textbook and UD recursive least squares (needs gcc).
@@ -148,22 +146,14 @@ def bench_longevity(
     What is done is kept in build/longevity, for the present core: the next call goes on from there.
     """
     from bench import longevity_tables as kept
-    from bench import longevity_target
     from bench.longevity import COLUMNS, OURS
     from bench.longevity_signals import HELD_OUT, SCENARIOS
-    from pvid.board.boards import board as board_of
 
     for name, given, known in (("scenario", chosen, SCENARIOS), ("column", columns, COLUMNS)):
         unknown = set(given) - set(known)
         if unknown:
             raise PvidError(f"no such {name}: {', '.join(sorted(unknown))}; there are {', '.join(known)}")
     scenarios = chosen or tuple(SCENARIOS)
-    if board is not None:
-        runs = longevity_target.combinations(scenarios, columns or OURS)
-        with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(runs)) as advance:
-            rows = longevity_target.run_missing_on(board_of(board), ticks or 1_000_000, runs, Path(folder), advance)
-        put_table(update, "longevity-board", markdown(longevity_target.HEADER, rows))
-        return DONE if all(row[-1] == "equal" for row in rows) else DIFFERENT
     if held_out:
         ticks = ticks or kept.HELD_OUT_TICKS
         tasks = kept.tasks_of((one for one in HELD_OUT if one.kind in scenarios), columns or OURS, ticks)

@@ -183,26 +183,17 @@ def _fate(one: Outcome) -> str:
 
 
 def held_out_table(ticks: int = HELD_OUT_TICKS) -> Table:
-    """How many cells of each column are right / told / silent, and which are silent or broken, by how many s.e."""
-    rows, total = [], Counter[tuple[str, str]]()
-    for disturbance in HELD_OUT:
-        cells, wrong = [], []
-        for column in OURS:
-            task = Task(disturbance, column, ticks)
-            stored = task.stored()
-            if stored is None:
-                cells.append("-")
-                continue
-            outcomes = {label: Outcome(**one) for label, one in stored["lanes"].items()}
-            fates = Counter(_fate(one) for one in outcomes.values())
-            total.update({(column, fate): number for fate, number in fates.items()})
-            cells.append("/".join(str(fates[fate]) for fate in ("right", "told", "silent")))
-            wrong += [
-                f"{label}: {abs(one.error_after):.2g} %, {one.errors:.1f} s.e." if one.silent else f"{label}: broken"
-                for label, one in outcomes.items()
-                if _fate(one) in ("silent", "broken")
-            ]
-        rows.append((disturbance.title, *cells, "; ".join(wrong)))
-    sums = ["/".join(str(total[column, fate]) for fate in ("right", "told", "silent")) for column in OURS]
-    rows.append(("**all**", *sums, ""))
-    return "longevity-held-out", ("disturbance", *(column.replace("-", " ") for column in OURS), "silent"), rows
+    """How many cells of each column end right, with an alarm or silently wrong, and the signals of the latter."""
+    rows = []
+    for column in OURS:
+        fates, wrong = Counter[str](), []
+        for disturbance in HELD_OUT:
+            stored = Task(disturbance, column, ticks).stored()
+            for one in (stored["lanes"] if stored else {}).values():
+                fate = _fate(Outcome(**one))
+                fates[fate] += 1
+                wrong += [disturbance.title] if fate in ("silent", "broken") else []
+        counts = [str(fates[fate]) for fate in ("right", "told", "silent", "broken")]
+        rows.append((column.replace("-", " "), str(fates.total()), *counts, "; ".join(sorted(set(wrong)))))
+    header = ("form", "cells", "right", "alarm", "silently wrong", "not finite", "wrong after")
+    return "longevity-held-out", header, rows

@@ -15,6 +15,7 @@
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "pvid/config.h"
@@ -57,9 +58,11 @@ struct pvid_model_f32 {
     void (*noise)(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P]);
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
-    /* pvid_estimator_step_f32 in one call, with the same bits, given innovate's results at p (needed while g < 1):
-     * saves storing and reloading sums and S where a solve follows every row. NULL: one after the other. */
-    pvid_reason (*step)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[]);
+    /* pvid_estimator_step_f32 in one call, or pvid_estimator_add_f32 for a row that does not end a group, with the same
+     * bits, given innovate's results at p (needed while g < 1): saves storing and reloading sums and S where a solve
+     * follows every row. NULL: one after the other. */
+    pvid_reason (*take_row)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[],
+                            bool ends_group);
 };
 
 #ifdef __cplusplus

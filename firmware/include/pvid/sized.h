@@ -96,16 +96,6 @@
 #define pvid_information_read_f32 PVID_SIZED(pvid_information_read_f32)
 #define pvid_information_tail_f32 PVID_SIZED(pvid_information_tail_f32)
 
-/* kapitza.h */
-#define pvid_kapitza_linear_f32 PVID_SIZED(pvid_kapitza_linear_f32)
-#define pvid_kapitza_physical_f32 PVID_SIZED(pvid_kapitza_physical_f32)
-
-/* kapitza_q31.h */
-#define pvid_kapitza_physical_q31 PVID_SIZED(pvid_kapitza_physical_q31)
-
-/* kapitza_strong_q31.h */
-#define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
-
 /* publication.h */
 #define pvid_publication_put_f32 PVID_SIZED(pvid_publication_put_f32)
 #define pvid_publication_read_f32 PVID_SIZED(pvid_publication_read_f32)

@@ -19,7 +19,7 @@
 #include "pvid/differentiator.h"
 #include "pvid/estimator.h"
 #include "pvid/gate.h"
-#include "pvid/kapitza.h"
+#include "pvid/mechanism.h"
 #include "pvid/misfit.h"
 
 #ifdef __cplusplus

@@ -26,7 +26,7 @@
 #include "pvid/differentiator_q31.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/gate_q31.h"
-#include "pvid/kapitza_strong_q31.h"
+#include "pvid/mechanism_q31.h"
 #include "pvid/misfit_q31.h"
 
 #ifdef __cplusplus

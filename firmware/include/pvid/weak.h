@@ -39,7 +39,7 @@
 #include "pvid/config.h"
 #include "pvid/estimator.h"
 #include "pvid/gate.h"
-#include "pvid/kapitza_weak.h"
+#include "pvid/mechanism.h"
 #include "pvid/trust.h"
 
 #ifdef __cplusplus

@@ -25,7 +25,7 @@
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/gate_q31.h"
-#include "pvid/kapitza_weak_q31.h"
+#include "pvid/mechanism_q31.h"
 #include "pvid/trust_q31.h"
 
 #ifdef __cplusplus

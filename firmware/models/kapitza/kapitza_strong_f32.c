@@ -1,13 +1,16 @@
 #include "number/uncontracted.h"
 
 /* The strong form of Kapitza's pendulum (theory.md 2) as a model: row, theta, C. */
-#include "pvid/kapitza.h"
+#include "kapitza_strong_f32.h"
 
 #include <stddef.h>
 
 #include "kapitza_row_f32.h"
-#include "kapitza_step_f32.h"
+#include "kapitza_solve_f32.h"
 #include "kapitza_sums_f32.h"
+#include "number/unroll.h"
+#include "solve/row_f32.h"
+#include "solve/step_f32.h"
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
@@ -82,6 +85,40 @@ static float innovate_of(const float p[], const float n[], float y, float gradie
     return (y - (w * (n[PVID_N_A] + (w * n[PVID_N_E])))) - ((d1 * n_1) + (d2 * n_2));
 }
 
+/* pvid_row_squares_f32 of 11 entries. */
+static inline float sum_of_squares_strong(const float n[], float y)
+{
+    float squares = y * y;
+    PVID_UNROLL
+    for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
+        squares += n[i] * n[i];
+    }
+    return squares;
+}
+
+pvid_reason pvid_kapitza_take_row_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                      const float gradient[], bool ends_group)
+{
+    pvid_reason reason = pvid_row_accept_f32(self, n, y, sum_of_squares_strong(n, y));
+    if (reason != PVID_ACCUMULATED) {
+        return reason;
+    }
+    if (self->gain < 1.0f) {
+        pvid_row_accumulate_innovation_f32(self, PVID_KAPITZA_P, gradient, e);
+    }
+    pvid_count_up(&self->counters.rows);
+    if (ends_group && pvid_estimator_is_due_f32(self)) {
+        reason = pvid_kapitza_solve_f32(self, n, y);
+    } else {
+        float sums[PVID_MAX_SUMS];
+        pvid_kapitza_accumulate_f32(n, y, self->information.high, self->information.low, sums);
+    }
+    if (ends_group) {
+        pvid_information_end_group_f32(&self->information);
+    }
+    return reason;
+}
+
 const pvid_model_f32 pvid_kapitza_strong_f32 = {
     .n_theta = PVID_KAPITZA_STRONG_THETA,
     .n_p = PVID_KAPITZA_P,
@@ -95,5 +132,5 @@ const pvid_model_f32 pvid_kapitza_strong_f32 = {
     .accumulate = pvid_kapitza_accumulate_f32,
     .project = pvid_kapitza_project_f32,
     .innovate = innovate_of,
-    .step = pvid_kapitza_step_f32,
+    .take_row = pvid_kapitza_take_row_f32,
 };

@@ -8,7 +8,7 @@
 
 #include "number/count.h"
 #include "solve/assess_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
 #include "judge/verdict.h"

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/state_q31.h"
 #include "judge/publication.h"
 #include "judge/verdict.h"
 

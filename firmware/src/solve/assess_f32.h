@@ -3,7 +3,7 @@
 #define PVID_ASSESS_F32_H
 
 #include "solve/cholesky_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* Returns whether S contains more information than noise: S - noise_margin Sn is positive definite, where Sn is the
  * information of noise of the given variance alone. True if the model has no `noise`. s: upper triangle of C^T M C

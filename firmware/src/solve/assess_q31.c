@@ -1,7 +1,8 @@
 /* What is known of p: standard errors, kappa, residual. */
 #include <string.h>
 
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/system_q31.h"
 #include "number/scaled_q31.h"
 
 #define UNIT_BITS (PVID_RHS_BITS - 1)
@@ -134,22 +135,5 @@ void pvid_estimator_errors_q31(const pvid_estimator_q31 *self, const pvid_estima
         const int64_t in_roots = pvid_scale_q31(sum, own.e + solve->root[b].e);
         estimate->correlation[a][b] = part_of(in_roots, own.r, solve->root[b].r);
         estimate->correlation[b][a] = estimate->correlation[a][b];
-    }
-}
-
-void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31 *estimate)
-{
-    if (estimate == NULL) {
-        return;
-    }
-    if (!pvid_estimator_is_ready_q31(self)) {
-        memset(estimate, 0, sizeof *estimate);
-        return;
-    }
-    pvid_estimator_solve_q31 solve;
-    pvid_estimator_begin_assessment_q31(self, &solve, estimate);
-    bool done = false;
-    for (uint16_t left = pvid_estimator_assessment_stages_q31(self); (left > 0u) && !done; left--) {
-        done = pvid_estimator_assess_advance_q31(self, &solve, estimate);
     }
 }

@@ -15,33 +15,6 @@
 /* Rounding floor of yy - 2 B^T theta + theta^T M theta, relative to yy: a few ulp of each term. */
 #define RESIDUAL_FLOOR 4.8e-7f
 
-/* ---- rows ---- */
-
-/* Before a row is added to the sums: checks it and accumulates its innovation. */
-static inline pvid_reason begin_row(pvid_estimator_f32 *self, const float n[], float y, float e, const float gradient[])
-{
-    const pvid_reason reason = pvid_row_accept_f32(self, n, y, pvid_row_squares_f32(self->model->n_theta, n, y));
-    if (reason == PVID_ACCUMULATED) {
-        if (self->gain < 1.0f) {
-            pvid_row_accumulate_innovation_f32(self, gradient, e);
-        }
-        pvid_count_up(&self->counters.rows);
-    }
-    return reason;
-}
-
-pvid_reason pvid_direct_add_f32(pvid_estimator_f32 *self, const float n[], float y)
-{
-    float gradient[PVID_MAX_P] = {0};
-    const float e = pvid_direct_innovation_f32(self, n, y, gradient);
-    const pvid_reason reason = begin_row(self, n, y, e, gradient);
-    if (reason == PVID_ACCUMULATED) {
-        float sums[PVID_MAX_SUMS];
-        pvid_information_add_f32(&self->information, self->model, n, y, sums);
-    }
-    return reason;
-}
-
 /* ---- the solve ---- */
 
 /* s^2 of a row. */
@@ -103,18 +76,23 @@ pvid_reason pvid_direct_solve_f32(pvid_estimator_f32 *self, bool ends_group)
     return reason;
 }
 
-/* As pvid_direct_add_f32 and pvid_direct_solve_f32, without storing and reloading the sums in between. */
-pvid_reason pvid_direct_step_f32(pvid_estimator_f32 *self, const float n[], float y)
+/* ---- rows ---- */
+
+pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                     const float gradient[], bool ends_group)
 {
-    float gradient[PVID_MAX_P] = {0};
-    const float e = pvid_direct_innovation_f32(self, n, y, gradient);
-    if (self->model->step != NULL) {
-        return self->model->step(self, n, y, e, gradient);
+    const size_t n_theta = self->model->n_theta;
+    pvid_reason reason = pvid_row_accept_f32(self, n, y, pvid_row_squares_f32(n_theta, n, y));
+    if (reason != PVID_ACCUMULATED) {
+        return reason;
     }
-    pvid_reason reason = begin_row(self, n, y, e, gradient);
-    if (reason == PVID_ACCUMULATED) {
-        float sums[PVID_MAX_SUMS];
-        pvid_information_add_f32(&self->information, self->model, n, y, sums);
+    if (self->gain < 1.0f) {
+        pvid_row_accumulate_innovation_f32(self, self->model->n_p, gradient, e);
+    }
+    pvid_count_up(&self->counters.rows);
+    float sums[PVID_MAX_SUMS];
+    pvid_information_add_f32(&self->information, self->model, n, y, sums);
+    if (ends_group) {
         if (pvid_estimator_is_due_f32(self)) {
             reason = solve_at_once(self, self->gain, sums);
         }

@@ -1,13 +1,15 @@
-/* The engine of models with their own `project`, and the parts shared with their `step`. Private to the core. */
+/* The engine of models with their own `project`, and the parts shared with their `take_row`. Private to the core. */
 #ifndef PVID_DIRECT_F32_H
 #define PVID_DIRECT_F32_H
 
 #include "number/count.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
-/* pvid_estimator_add_f32, _step_f32 and _assess_f32 of such a model. */
-pvid_reason pvid_direct_add_f32(pvid_estimator_f32 *self, const float n[], float y);
-pvid_reason pvid_direct_step_f32(pvid_estimator_f32 *self, const float n[], float y);
+/* `take_row` of model.h, for a model without one. */
+pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
+                                     const float gradient[], bool ends_group);
+
+/* pvid_estimator_assess_f32. */
 void pvid_direct_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate);
 
 /* A solve of the present sums: at the end of a group, or a further Gauss-Newton step. */
@@ -18,13 +20,6 @@ pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, const flo
                                  float s[][PVID_MAX_P], const float force[]);
 
 /* ---- inlined ---- */
-
-/* The model's innovation while g < 1; otherwise it is not needed, and 0. */
-static inline float pvid_direct_innovation_f32(const pvid_estimator_f32 *self, const float n[], float y,
-                                               float gradient[])
-{
-    return (self->gain < 1.0f) ? self->model->innovate(self->p, n, y, gradient) : 0.0f;
-}
 
 /* Counts and returns the reason why p is held. */
 static inline pvid_reason pvid_direct_hold_f32(uint32_t *counter, pvid_reason reason)

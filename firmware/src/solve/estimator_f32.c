@@ -7,9 +7,11 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 #include "solve/direct_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "solve/staged_f32.h"
 
 const pvid_estimator_config_f32 pvid_estimator_defaults_f32 = {
@@ -33,7 +35,7 @@ static bool model_is_valid(const pvid_model_f32 *model)
            (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
            ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
-           ((model->step == NULL) || (model->project != NULL)) &&
+           ((model->take_row == NULL) || (model->project != NULL)) &&
            ((model->accumulate != NULL) ||
             (model->n_moments == ((uint16_t)model->n_theta * (model->n_theta + 1u)) / 2u));
 }
@@ -152,13 +154,8 @@ static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config
 
 pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
@@ -177,12 +174,22 @@ void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
 
 /* ---- by the engine that init has chosen ---- */
 
+/* A row of a model with functions of its own. */
+PVID_ALWAYS_INLINE pvid_reason take_row(pvid_estimator_f32 *self, const float n[], float y, bool ends_group)
+{
+    const pvid_model_f32 *model = self->model;
+    float gradient[PVID_MAX_P] = {0};
+    const float e = (self->gain < 1.0f) ? model->innovate(self->p, n, y, gradient) : 0.0f;
+    return (model->take_row != NULL) ? model->take_row(self, n, y, e, gradient, ends_group)
+                                     : pvid_direct_take_row_f32(self, n, y, e, gradient, ends_group);
+}
+
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    return (self->engine == PVID_ENGINE_DIRECT) ? pvid_direct_add_f32(self, n, y) : pvid_staged_add_f32(self, n, y);
+    return (self->engine == PVID_ENGINE_DIRECT) ? take_row(self, n, y, false) : pvid_staged_add_f32(self, n, y);
 }
 
 /* All stages of a solve. */
@@ -216,7 +223,7 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
         return PVID_NOT_READY;
     }
     if (self->engine == PVID_ENGINE_DIRECT) {
-        return pvid_direct_step_f32(self, n, y);
+        return take_row(self, n, y, true);
     }
     const pvid_reason added = pvid_staged_add_f32(self, n, y);
     return (added == PVID_ACCUMULATED) ? pvid_estimator_update_f32(self) : added;

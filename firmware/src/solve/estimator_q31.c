@@ -1,15 +1,16 @@
-#include "solve/estimator_q31.h"
+#include "solve/row_q31.h"
+#include "solve/system_q31.h"
+#include "solve/state_q31.h"
 
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "solve/information_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 
-#define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
-#define TERM_DOWN 18                /* right shift of a row's limit times 30 bits to that range */
 #define FORMAT_MAX 64
 #define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
 #define DEAD_ZONE_MAX ((uint32_t)100 << 16)
@@ -102,25 +103,6 @@ static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
 }
 
-int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior)
-{
-    const int64_t ratio = ((int64_t)sd << 31) / start_sd;
-    const int32_t up = 31 - (int32_t)pvid_bit_length_q31((uint64_t)ratio);
-    const int64_t mantissa = pvid_clamp_q31(pvid_scale_q31(ratio, -up), (int64_t)1 << 31); /* 31 bits, rounded */
-    *prior = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(mantissa * mantissa, 31), INT32_MAX);
-    return (2 * ((31 + up) - exponent)) - 31;
-}
-
-void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[])
-{
-    for (size_t i = 0; i < self->model->n_theta; i++) {
-        const pvid_scaled_q31 clamped = pvid_scaled_of_q31(theta[i], 0);
-        self->theta[i] = theta[i];
-        self->mantissa[i] = clamped.m;
-        self->shift[i] = (int16_t)(self->align[i] - clamped.e);
-    }
-}
-
 static void init_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
 {
     const pvid_model_q31 *model = config->model;
@@ -171,13 +153,8 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
 
 pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t value)
@@ -193,42 +170,6 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
 }
 
 /* ---- rows ---- */
-
-/* x 2^-shift within +-TERM_MAX, |x| <= 2^58. */
-static int64_t term_of(int64_t x, int32_t shift)
-{
-    return (shift >= TERM_DOWN) ? pvid_round_shift_q31(x, (uint32_t)shift)
-                                : pvid_clamp_q31(pvid_scale_q31(x, shift), TERM_MAX);
-}
-
-bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e)
-{
-    bool fits = (y >= -PVID_ROW_LIMIT_Q31) && (y <= PVID_ROW_LIMIT_Q31);
-    int64_t rest = y;
-    for (size_t i = 0; i < self->model->n_theta; i++) {
-        fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
-        const int32_t below = (n[i] > PVID_ROW_LIMIT_Q31) ? PVID_ROW_LIMIT_Q31 : n[i];
-        const int32_t clamped = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
-        term[i] = term_of(pvid_product_q31(clamped, self->mantissa[i]), self->shift[i]);
-        rest -= term[i];
-    }
-    *e = rest;
-    return fits && (*e >= -PVID_ROW_LIMIT_Q31) && (*e <= PVID_ROW_LIMIT_Q31);
-}
-
-bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e)
-{
-    int64_t term[PVID_MAX_THETA_Q31];
-    return pvid_estimator_terms_q31(self, n, y, term, e);
-}
-
-void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
-{
-    self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
-    self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
-    pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
-    pvid_count_up(&self->counters.rows);
-}
 
 pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
 {
@@ -268,4 +209,23 @@ pvid_reason pvid_estimator_update_q31(pvid_estimator_q31 *self)
 pvid_reason pvid_estimator_iterate_q31(pvid_estimator_q31 *self)
 {
     return solve_at_once(self, false);
+}
+
+/* ---- an assessment at once ---- */
+
+void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31 *estimate)
+{
+    if (estimate == NULL) {
+        return;
+    }
+    if (!pvid_estimator_is_ready_q31(self)) {
+        memset(estimate, 0, sizeof *estimate);
+        return;
+    }
+    pvid_estimator_solve_q31 solve;
+    pvid_estimator_begin_assessment_q31(self, &solve, estimate);
+    bool done = false;
+    for (uint16_t left = pvid_estimator_assessment_stages_q31(self); (left > 0u) && !done; left--) {
+        done = pvid_estimator_assess_advance_q31(self, &solve, estimate);
+    }
 }

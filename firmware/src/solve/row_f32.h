@@ -4,21 +4,13 @@
 
 #include "number/count.h"
 #include "number/finite_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
-/* y^2 + N^T N, in the order of the entries; four per pass, because the loop itself is as expensive. */
+/* y^2 + N^T N, in the order of the entries. */
 static inline float pvid_row_squares_f32(size_t n_theta, const float n[], float y)
 {
     float squares = y * y;
-    size_t i = 0;
-    for (size_t fours = n_theta / 4u; fours > 0u; fours--) {
-        squares += n[i] * n[i];
-        squares += n[i + 1u] * n[i + 1u];
-        squares += n[i + 2u] * n[i + 2u];
-        squares += n[i + 3u] * n[i + 3u];
-        i += 4u;
-    }
-    for (; i < n_theta; i++) {
+    for (size_t i = 0; i < n_theta; i++) {
         squares += n[i] * n[i];
     }
     return squares;
@@ -40,9 +32,10 @@ static inline pvid_reason pvid_row_accept_f32(pvid_estimator_f32 *self, const fl
 }
 
 /* innovation += C^T N e */
-static inline void pvid_row_accumulate_innovation_f32(pvid_estimator_f32 *self, const float gradient[], float e)
+static inline void pvid_row_accumulate_innovation_f32(pvid_estimator_f32 *self, size_t n_p, const float gradient[],
+                                                      float e)
 {
-    for (size_t a = 0; a < self->model->n_p; a++) {
+    for (size_t a = 0; a < n_p; a++) {
         self->innovation[a] += gradient[a] * e;
     }
 }

@@ -70,7 +70,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float
         return PVID_REJECTED_SATURATED;
     }
     if (self->gain < 1.0f) {
-        pvid_row_accumulate_innovation_f32(self, gradient, e);
+        pvid_row_accumulate_innovation_f32(self, self->model->n_p, gradient, e);
     }
     self->energy += e * e;
     self->group_weight += self->information.row_weight;

@@ -2,7 +2,9 @@
 #include <string.h>
 
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/row_q31.h"
+#include "solve/system_q31.h"
 #include "number/scaled_q31.h"
 
 enum {

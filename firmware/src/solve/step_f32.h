@@ -5,7 +5,7 @@
 
 #include "number/count.h"
 #include "number/finite_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 
 /* Relative size of a step in parameter a: relative to p if it is a positive parameter, else to start_sd. Returns the
  * bits of the float: the bits of |x| are ordered like |x|, infinity and NaN last. */

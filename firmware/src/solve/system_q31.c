@@ -1,5 +1,5 @@
 /* The system S dp = F in integers: M, C and S scaled by powers of two such that 30 bits hold all that matters. */
-#include "solve/estimator_q31.h"
+#include "solve/system_q31.h"
 #include "number/scaled_q31.h"
 
 /* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
@@ -104,6 +104,15 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
         s[model->c_column[k]] += pvid_product_q31(c[k], (int32_t)t[model->c_row[k]]);
     }
     return end;
+}
+
+int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior)
+{
+    const int64_t ratio = ((int64_t)sd << 31) / start_sd;
+    const int32_t up = 31 - (int32_t)pvid_bit_length_q31((uint64_t)ratio);
+    const int64_t mantissa = pvid_clamp_q31(pvid_scale_q31(ratio, -up), (int64_t)1 << 31); /* 31 bits, rounded */
+    *prior = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(mantissa * mantissa, 31), INT32_MAX);
+    return (2 * ((31 + up) - exponent)) - 31;
 }
 
 int64_t pvid_system_prior_q31(int32_t prior, int32_t prior_exponent, int32_t f)

@@ -3,9 +3,9 @@
 #include "pvid/differentiator.h"
 
 #include <stddef.h>
-#include <string.h>
 
 #include "strong/differentiator_f32.h"
+#include "number/init.h"
 #include "number/finite_f32.h"
 #include "strong/fir_window.h"
 
@@ -61,13 +61,8 @@ static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f3
 pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
                                          float sample_rate_hz)
 {
-    const bool given = (self != NULL) && (bank != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, bank, sample_rate_hz) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, bank) ? prepare(self, bank, sample_rate_hz) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)

@@ -1,9 +1,9 @@
 #include "pvid/differentiator_q31.h"
 
 #include <stddef.h>
-#include <string.h>
 
 #include "strong/fir_window.h"
+#include "number/init.h"
 #include "number/integer_q31.h"
 
 enum { PHI = 0, Y = 1 };
@@ -107,13 +107,8 @@ static pvid_status prepare(pvid_differentiator_q31 *self, const pvid_fir_bank_q3
 
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
 {
-    const bool given = (self != NULL) && (bank != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, bank) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, bank) ? prepare(self, bank) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self)

@@ -5,12 +5,13 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "strong/differentiator_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "kapitza_row_f32.h"
-#include "kapitza_step_f32.h"
+#include "kapitza_strong_f32.h"
 #include "judge/misfit_f32.h"
 
 /* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
@@ -59,13 +60,8 @@ static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *
 
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen)
@@ -130,7 +126,7 @@ static inline pvid_reason take_row(pvid_strong_f32 *self, const float n[PVID_KAP
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    const pvid_reason reason = pvid_kapitza_step_f32(estimator, n, y, e, gradient);
+    const pvid_reason reason = pvid_kapitza_take_row_f32(estimator, n, y, e, gradient, true);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;
     }

@@ -4,8 +4,11 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
 #include "number/integer_q31.h"
 #include "judge/misfit_q31.h"
 #include "number/scaled_q31.h"
@@ -88,13 +91,8 @@ static pvid_status prepare(pvid_strong_q31 *self, const pvid_strong_config_q31 *
 
 pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 static void restart(pvid_strong_q31 *self)

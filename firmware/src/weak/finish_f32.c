@@ -9,7 +9,7 @@
 #include "solve/cholesky_f32.h"
 #include "number/count.h"
 #include "solve/assess_f32.h"
-#include "solve/estimator_f32.h"
+#include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
 #include "full_angle_f32.h"

@@ -5,7 +5,9 @@
 
 #include "solve/cholesky_q31.h"
 #include "number/count.h"
-#include "solve/estimator_q31.h"
+#include "solve/assess_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 #include "weak/window_q31.h"

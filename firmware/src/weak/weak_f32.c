@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
@@ -185,13 +186,8 @@ static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *conf
 
 pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 void pvid_weak_gap_f32(pvid_weak_f32 *self)

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/init.h"
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
@@ -213,13 +214,8 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
 
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
 {
-    const bool given = (self != NULL) && (config != NULL);
-    PVID_ASSERT(given);
-    const pvid_status status = given ? prepare(self, config) : PVID_BAD_POINTER;
-    if ((status != PVID_OK) && (self != NULL)) {
-        memset(self, 0, sizeof *self); /* not ready */
-    }
-    return status;
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
 }
 
 static void next_curvature(pvid_weak_curvature_q31 *self, uint8_t lag, int32_t f)

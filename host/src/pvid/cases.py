@@ -26,10 +26,8 @@ from pvid.settings.forms import FORMS
 from pvid.settings.kinds import Settings
 from pvid.setup import q31 as fixed
 from pvid.setup.f32 import config_of
-from pvid.setup.header_f32 import header_f32
+from pvid.setup.header import fixed_notes, scale_lines, settings_header
 from pvid.setup.ranges_q31 import Beyond, with_ranges_of
-from pvid.setup.strong_header_q31 import strong_header_q31
-from pvid.setup.weak_header_q31 import to_c_header_q31
 from pvid.twin.record import Twin
 from pvid.twin.strong import StrongTwin
 from pvid.twin.strong_q31 import StrongTwinQ31
@@ -229,7 +227,7 @@ class _Float(Case):
         return config_of(rig, run.sample_rate, start)
 
     def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
-        return header_f32(config, name, made_by)
+        return settings_header(config, name, made_by, self.umbrella)
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
         more = {"PVID_MAX_P": str(frames.MAX_P), "PVID_MAX_MOMENTS": str(MAX_MOMENTS)}
@@ -290,7 +288,8 @@ class _Fixed(Case):
         return with_ranges_of(rig, run)
 
     def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
-        return (to_c_header_q31 if self.form == "weak" else strong_header_q31)(config, l1, name, made_by)
+        more = scale_lines(config, l1, name)
+        return settings_header(config, name, made_by, self.umbrella, fixed_notes(config), more)
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
         more = {"PVID_MAX_THETA_Q31": str(len(config.estimator.n_bits))}

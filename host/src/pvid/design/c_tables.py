@@ -60,7 +60,17 @@ def bank_header(bank: FirBank, name: str, made_by: str) -> str:
     return _guarded(name, banner, [array])
 
 
-def struct_initializer(headers: Headers, struct: Any, pointers: Mapping[str, str]) -> str:
+def array(name: str, values: npt.NDArray[Any], comment: str) -> str:
+    """A constant array `name` [n] of floats or integers, with one line for each row of the last axis of `values`."""
+    rows = values.reshape(-1, values.shape[-1])
+    if values.dtype.kind == "f":
+        return float_array(name, rows, comment)
+    lines = ["    " + ", ".join(map(str, row)) + "," for row in rows.tolist()]
+    head = f"static const PVID_TABLE {values.dtype}_t {name}[{values.size}] = {{"
+    return "\n".join([f"/* {comment} */", head, *lines, "};"])
+
+
+def struct_initializer(headers: Headers, struct: Any, pointers: Mapping[str, str], indent: str = "") -> str:
     """The C99 initializer, by field names, that makes a struct equal to `struct`.
 
     Parameters
@@ -70,22 +80,32 @@ def struct_initializer(headers: Headers, struct: Any, pointers: Mapping[str, str
     struct
         Its fields are numbers, arrays of them, structs and pointers.
     pointers
-        What stands for each pointer, by its field's name: "replay_weights", "&replay_design"; NULL without an entry.
+        What stands for each pointer, by its field's name: "replay_weights", "&replay_design"; null without an entry.
+    indent
+        Of the line where it begins.
     """
-    fields = []
+    inner = f"{indent}    "
+    lines = []
     for name, field in headers.ffi.typeof(struct).fields:
         value, kind = getattr(struct, name), field.type.kind
+        if kind == "pointer" and name not in pointers:
+            continue
         if kind == "struct":
-            text = struct_initializer(headers, value, pointers)
+            text = struct_initializer(headers, value, pointers, inner)
         elif kind == "array":
             # C fills up with zeros; the device's bounds may be narrower than those of this machine
             used = max((place + 1 for place, entry in enumerate(value) if entry != 0), default=1)
-            text = "{" + ", ".join(float_literal(np.float32(entry)) for entry in value[0:used]) + "}"
-        elif kind == "pointer":
-            text = pointers.get(name, "NULL")
-        elif isinstance(value, float):
-            text = float_literal(np.float32(value))
+            text = "{" + ", ".join(_literal(entry, field.type.item) for entry in value[0:used]) + "}"
         else:
-            text = str(int(value))
-        fields.append(f".{name} = {text}")
-    return "{" + ", ".join(fields) + "}"
+            text = pointers[name] if kind == "pointer" else _literal(value, field.type)
+        lines.append(f"{inner}.{name} = {text},")
+    return "\n".join(["{", *lines, f"{indent}}}"])
+
+
+def _literal(value: Any, kind: Any) -> str:
+    """A number in C."""
+    if isinstance(value, float):
+        return float_literal(np.float32(value))
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{int(value)}{'u' if kind.cname == 'uint32_t' else ''}"

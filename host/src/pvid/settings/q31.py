@@ -74,6 +74,7 @@ class WeakConfigQ31:
 
     form: ClassVar[Form] = "weak"
     core: ClassVar[Core] = "q31"
+    corrects_angles: ClassVar[bool] = False
     counts_about_rest: ClassVar[bool] = True  # phi_offset is where the encoder rests
     limits_acceleration: ClassVar[bool] = True  # samples are rejected for the pivot's acceleration, too
 
@@ -102,6 +103,7 @@ class StrongConfigQ31:
 
     form: ClassVar[Form] = "strong"
     core: ClassVar[Core] = "q31"
+    corrects_angles: ClassVar[bool] = False
     counts_about_rest: ClassVar[bool] = False  # the encoder's zero is taken for the equilibrium
     limits_acceleration: ClassVar[bool] = False
 

@@ -14,6 +14,10 @@
 #include "pvid/kapitza_parameters.h"
 #include "pvid/model_q31.h"
 
+#if !defined(PVID_PLAIN_NAMES) /* see sized.h */
+#define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif

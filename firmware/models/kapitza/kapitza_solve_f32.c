@@ -1,28 +1,15 @@
 #include "number/uncontracted.h"
 
-/* pvid_direct_step_f32 for the strong form, at every tick: its eleven entries and three parameters written out, the
- * same bits in half the instructions. */
-#include "kapitza_step_f32.h"
+/* A row and a solve of the strong form, at every tick: its three parameters written out, the same bits in half the
+ * instructions. */
+#include "kapitza_solve_f32.h"
 
 #include <stddef.h>
 
 #include "kapitza_sums_f32.h"
-#include "number/unroll.h"
 #include "solve/cholesky_f32.h"
 #include "solve/direct_f32.h"
-#include "solve/row_f32.h"
 #include "solve/step_f32.h"
-
-/* pvid_row_squares_f32 of 11 entries. */
-static inline float sum_of_squares_strong(const float n[], float y)
-{
-    float squares = y * y;
-    PVID_UNROLL
-    for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
-        squares += n[i] * n[i];
-    }
-    return squares;
-}
 
 static inline float step_size_three(const pvid_estimator_f32 *self, const float dp[])
 {
@@ -70,8 +57,7 @@ static pvid_reason move_three(pvid_estimator_f32 *self, float gain, float s[][PV
     return PVID_UPDATED;
 }
 
-/* Adds a row to the sums and solves with them. */
-static inline pvid_reason add_and_solve(pvid_estimator_f32 *self, const float n[], float y)
+pvid_reason pvid_kapitza_solve_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     pvid_information_f32 *information = &self->information;
     float s[PVID_MAX_P][PVID_MAX_P];
@@ -84,24 +70,4 @@ static inline pvid_reason add_and_solve(pvid_estimator_f32 *self, const float n[
     }
     pvid_kapitza_absorb_f32(self->p, n, y, information->high, information->low, s, force);
     return move_three(self, self->gain, s, force);
-}
-
-pvid_reason pvid_kapitza_step_f32(pvid_estimator_f32 *self, const float n[], float y, float e, const float gradient[])
-{
-    pvid_reason reason = pvid_row_accept_f32(self, n, y, sum_of_squares_strong(n, y));
-    if (reason != PVID_ACCUMULATED) {
-        return reason;
-    }
-    if (self->gain < 1.0f) {
-        pvid_row_accumulate_innovation_f32(self, gradient, e);
-    }
-    pvid_count_up(&self->counters.rows);
-    if (pvid_estimator_is_due_f32(self)) {
-        reason = add_and_solve(self, n, y);
-    } else {
-        float sums[PVID_MAX_SUMS];
-        pvid_kapitza_accumulate_f32(n, y, self->information.high, self->information.low, sums);
-    }
-    pvid_information_end_group_f32(&self->information);
-    return reason;
 }

@@ -1,6 +1,6 @@
 /* Shared by all parts of the estimator. Private to the core. */
-#ifndef PVID_ESTIMATOR_F32_H
-#define PVID_ESTIMATOR_F32_H
+#ifndef PVID_SOLVE_STATE_F32_H
+#define PVID_SOLVE_STATE_F32_H
 
 #include <stdbool.h>
 #include <stddef.h>

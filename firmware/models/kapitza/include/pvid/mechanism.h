@@ -1,0 +1,8 @@
+/* pvid/mechanism.h - the mechanism that this build is for (the CMake variable PVID_MODEL): Kapitza's pendulum. */
+#ifndef PVID_MECHANISM_H
+#define PVID_MECHANISM_H
+
+#include "pvid/kapitza.h"
+#include "pvid/kapitza_weak.h"
+
+#endif

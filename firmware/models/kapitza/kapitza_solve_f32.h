@@ -1,0 +1,10 @@
+/* The solve at every tick of the strong form. Private to the core. */
+#ifndef PVID_KAPITZA_SOLVE_F32_H
+#define PVID_KAPITZA_SOLVE_F32_H
+
+#include "pvid/kapitza.h"
+
+/* Adds an accepted row to the sums and takes the step that they ask for. */
+pvid_reason pvid_kapitza_solve_f32(pvid_estimator_f32 *self, const float n[], float y);
+
+#endif

@@ -1,0 +1,57 @@
+#include "solve/row_q31.h"
+
+#include <stddef.h>
+
+#include "number/count.h"
+#include "number/integer_q31.h"
+#include "number/scaled_q31.h"
+#include "solve/information_q31.h"
+
+#define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
+#define TERM_DOWN 18                /* a shift that brings a row's limit times 30 bits there */
+
+void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[])
+{
+    for (size_t i = 0; i < self->model->n_theta; i++) {
+        const pvid_scaled_q31 clamped = pvid_scaled_of_q31(theta[i], 0);
+        self->theta[i] = theta[i];
+        self->mantissa[i] = clamped.m;
+        self->shift[i] = (int16_t)(self->align[i] - clamped.e);
+    }
+}
+
+/* x 2^-shift within +-TERM_MAX, |x| <= 2^58. */
+static int64_t term_of(int64_t x, int32_t shift)
+{
+    return (shift >= TERM_DOWN) ? pvid_round_shift_q31(x, (uint32_t)shift)
+                                : pvid_clamp_q31(pvid_scale_q31(x, shift), TERM_MAX);
+}
+
+bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e)
+{
+    bool fits = (y >= -PVID_ROW_LIMIT_Q31) && (y <= PVID_ROW_LIMIT_Q31);
+    int64_t rest = y;
+    for (size_t i = 0; i < self->model->n_theta; i++) {
+        fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
+        const int32_t below = (n[i] > PVID_ROW_LIMIT_Q31) ? PVID_ROW_LIMIT_Q31 : n[i];
+        const int32_t clamped = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
+        term[i] = term_of(pvid_product_q31(clamped, self->mantissa[i]), self->shift[i]);
+        rest -= term[i];
+    }
+    *e = rest;
+    return fits && (*e >= -PVID_ROW_LIMIT_Q31) && (*e <= PVID_ROW_LIMIT_Q31);
+}
+
+bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e)
+{
+    int64_t term[PVID_MAX_THETA_Q31];
+    return pvid_estimator_terms_q31(self, n, y, term, e);
+}
+
+void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
+{
+    self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
+    self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
+    pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
+    pvid_count_up(&self->counters.rows);
+}

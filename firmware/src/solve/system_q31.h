@@ -1,0 +1,36 @@
+/* The system S dp = F of the fixed-point estimator, made of the sums. Private to the core. */
+#ifndef PVID_SOLVE_SYSTEM_Q31_H
+#define PVID_SOLVE_SYSTEM_Q31_H
+
+#include "solve/state_q31.h"
+
+/* (sd 2^exponent / start_sd)^2 = prior 2^-(returned), prior of 31 bits; 0 < sd < 2^31. */
+int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior);
+
+/* s less what noise of solve->variance puts into C^T M C, so many times over as the margin says. */
+void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
+                                   int64_t rest[][PVID_MAX_P]);
+
+/* h: powers of two that bring M's diagonal into [2^28, 2^30). */
+void pvid_system_exponents_q31(const pvid_information_q31 *information, int16_t h[]);
+
+/* m: the packed M with these exponents, its rows from `row` on, a few; returns the next row. */
+size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const int16_t h[], size_t row, int32_t m[]);
+
+/* c and f: C at p, its rows scaled as M's, the largest entry of a column of 29 bits. */
+void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[], int32_t c[], int16_t f[]);
+
+/* Row a of s = C^T M C from its diagonal entry on, `start` the first non-zero of column a; returns that of the next. */
+size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], const int32_t c[], size_t start,
+                               int64_t s[]);
+
+/* H0 = prior 2^-prior_exponent in the unit of s. */
+int64_t pvid_system_prior_q31(int32_t prior, int32_t prior_exponent, int32_t f);
+
+/* q: s with the diagonal that Cholesky wants, q_ab = s_ab 2^-(g_a + g_b). */
+void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int16_t g[], int32_t q[][PVID_MAX_P]);
+
+/* Calls of pvid_system_scale_rows_q31 that scale all of M. */
+size_t pvid_system_row_stages_q31(size_t n_theta);
+
+#endif

@@ -1,0 +1,388 @@
+"""Configurations of every identifier, and what each of their fields may hold: both ends of a range are accepted, and
+what lies beyond is refused with the status that names the field.
+
+tests/core/test_bad_config.py asserts it; tools/mutate.py and tools/coverage.py play `digest`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pvid.core import snapshot
+from pvid.core.headers import Headers, Scalar, default_library
+from pvid.core.native import Identifier, Native, Stepper
+from pvid.rig.file import RigFile
+from pvid.settings.enums import Status
+from pvid.setup.f32 import strong_config, weak_config
+from pvid.setup.q31 import strong_config_q31, weak_config_q31
+
+RIG = RigFile.standard()
+HEADERS = Headers.of(default_library())
+HUGE = float(np.finfo(np.float32).max)
+SMALLEST = float(np.nextafter(np.float32(0), np.float32(1)))
+OWN_RATE = 1024.0  # Hz, of the estimator without a form: four ticks are 2^-8 s exactly
+ROOM = 20_000  # entries of a table of zeros, which is longer than any size asks for
+
+
+def rig_with(**settings: Any) -> RigFile:
+    """The standard rig with other settings of its identifier."""
+    return replace(RIG, identifier=replace(RIG.identifier, **settings))
+
+
+# ---- what a field may hold ----
+
+
+@dataclass(frozen=True)
+class Range:
+    """What a field may hold; outside of it init answers `status`, inside it may contradict others: `also`."""
+
+    low: float
+    high: float
+    status: Status
+    also: tuple[Status, ...] = ()
+    besides: tuple[float, ...] = ()  # allowed values outside low..high
+    odd: bool = False  # no even values
+
+    def holds(self, value: float) -> bool:
+        """Whether it may be `value`, as C compares them."""
+        if not isinstance(value, int):
+            single = np.float32(value)
+            return value in self.besides or bool(np.float32(self.low) <= single <= np.float32(self.high))
+        return value in self.besides or (self.low <= value <= self.high and not (self.odd and value % 2 == 0))
+
+    def answers(self, value: float) -> tuple[Status, ...]:
+        """What init may answer to it."""
+        return (Status.OK, *self.also) if self.holds(value) else (self.status,)
+
+    def edges(self, field: Scalar) -> list[Any]:
+        """Its ends, what lies beyond, the extremes of the field's type, and for a float what is no number."""
+        if isinstance(field.value, float):
+            ends = [np.float32(end) for end in (self.low, self.high)]
+            with np.errstate(over="ignore"):
+                beyond = [np.nextafter(end, np.float32(way)) for end in ends for way in (-np.inf, np.inf)]
+            numbers = [float(x) for x in (*ends, *beyond, -HUGE, HUGE, 0.0, SMALLEST, -SMALLEST)]
+            return [*numbers, *self.besides, math.nan, math.inf, -math.inf]
+        limits = np.iinfo(HEADERS.dtype(field.kind))
+        near = [int(end) + step for end in (self.low, self.high) for step in (-2, -1, 0, 1, 2)]
+        values = (int(limits.min), int(limits.max), 0, *map(int, self.besides), *near)
+        return [value for value in values if limits.min <= value <= limits.max]
+
+
+BOUNDS = Range(-HUGE, HUGE, Status.BAD_BOUNDS, (Status.BAD_BOUNDS, Status.BAD_START))
+ESTIMATOR = {
+    "estimator.start": Range(-HUGE, HUGE, Status.BAD_START, (Status.BAD_START,)),
+    "estimator.start_sd": Range(1e-12, 1e12, Status.BAD_START_SD),
+    "estimator.lower": BOUNDS,
+    "estimator.upper": BOUNDS,
+    "estimator.row_sd": Range(1e-12, 1e12, Status.BAD_ROW_SD),
+    "estimator.forgetting_s": Range(0.0, 1e12, Status.BAD_FORGETTING, (Status.BAD_FORGETTING,)),
+    "estimator.feedback_hz": Range(0.0, 1e12, Status.BAD_FEEDBACK),
+    "estimator.step_limit": Range(1e-6, 0.9, Status.BAD_STEP_LIMIT),
+    "estimator.kappa_min": Range(0.0, 0.999, Status.BAD_KAPPA_MIN),
+    "estimator.noise_margin": Range(0.0, 1e6, Status.BAD_NOISE_MARGIN),
+    "estimator.dead_zone": Range(0.0, 100.0, Status.BAD_DEAD_ZONE),
+    "estimator.law": Range(0, 1, Status.BAD_LAW),
+    "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
+}
+RIG_FIELDS = {
+    "sample_rate_hz": Range(1e-3, 1e6, Status.BAD_SAMPLE_RATE, (Status.BAD_FORGETTING, Status.BAD_UPDATE_RATE)),
+    "l1": Range(1e-6, 1e6, Status.BAD_LENGTH),
+    "drive_min": Range(0.0, 1e9, Status.BAD_DRIVE_MIN),
+    "gate.sigmas": Range(2.0, 1e3, Status.BAD_GATE_SIGMAS, besides=(0.0,)),
+    "gate.patience_s": Range(0.0, 1e12, Status.BAD_GATE_PATIENCE),
+}
+STRONG = {
+    **RIG_FIELDS,
+    **ESTIMATOR,
+    "estimator.correlation": Range(1.0, 1e6, Status.BAD_CORRELATION),
+    "estimator.row_weight": Range(1.0, 1.0, Status.BAD_ROW_WEIGHT),
+}
+WEAK = {
+    **RIG_FIELDS,
+    **ESTIMATOR,
+    "pivot_noise": Range(0.0, 1e9, Status.BAD_PIVOT_NOISE),
+    "angle_limit": Range(0.0, 1e9, Status.BAD_ANGLE_LIMIT),
+    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
+    "trust.kappa_min": Range(0.0, 0.999, Status.BAD_PUBLISH_KAPPA),
+    "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
+    "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
+    "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
+    "trust.groups_min": Range(0, 65535, Status.OK),
+    "trust.revert_after": Range(0, 65535, Status.OK),
+}
+LEAST = -(2**31)
+FORMAT = Range(-64, 64, Status.BAD_FORMAT)
+ESTIMATOR_Q31 = {
+    "estimator.start": Range(LEAST, 2**31 - 1, Status.BAD_START, (Status.BAD_START,)),
+    "estimator.start_sd": Range(1, 2**31 - 1, Status.BAD_START_SD),
+    "estimator.lower": Range(LEAST + 1, 2**31 - 1, Status.BAD_BOUNDS, (Status.BAD_BOUNDS, Status.BAD_START)),
+    "estimator.upper": Range(LEAST + 1, 2**31 - 1, Status.BAD_BOUNDS, (Status.BAD_BOUNDS, Status.BAD_START)),
+    "estimator.p_bits": FORMAT,
+    "estimator.n_bits": FORMAT,
+    "estimator.y_bits": FORMAT,
+    "estimator.row_sd": Range(1, 2**31 - 1, Status.BAD_ROW_SD),
+    "estimator.forgetting_groups": Range(4, 2**24, Status.BAD_FORGETTING, besides=(0,)),
+    "estimator.gain": Range(0, 2**30, Status.BAD_FEEDBACK),
+    "estimator.correlation": Range(2**16, 2**31, Status.BAD_CORRELATION),
+    "estimator.row_weight": Range(1, 2**16, Status.BAD_ROW_WEIGHT),
+    "estimator.step_limit": Range(1, 58982, Status.BAD_STEP_LIMIT),
+    "estimator.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_KAPPA_MIN),
+    "estimator.noise_margin": Range(0, 2**30, Status.BAD_NOISE_MARGIN),
+    "estimator.dead_zone": Range(0, 100 << 16, Status.BAD_DEAD_ZONE),
+    "gate.sigmas": Range(2 << 16, 1000 << 16, Status.BAD_GATE_SIGMAS, besides=(0,)),
+    "gate.patience_groups": Range(0, 2**30, Status.BAD_GATE_PATIENCE),
+    "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
+}
+WEAK_Q31 = {
+    **ESTIMATOR_Q31,
+    "drive_min": Range(0, 2**18, Status.BAD_DRIVE_MIN),
+    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
+    "pivot_noise.m": Range(0, 2**30, Status.BAD_PIVOT_NOISE),
+    "pivot_noise.e": Range(-200, 200, Status.BAD_PIVOT_NOISE),
+    "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
+    "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
+    "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
+    "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
+    "trust.groups_min": Range(0, 65535, Status.OK),
+    "trust.revert_after": Range(0, 65535, Status.OK),
+}
+SHIFT = Range(0, 62, Status.BAD_SHIFT)
+COUNTS = Range(1, 2**24, Status.BAD_FULL_SCALE)
+STRONG_Q31 = {
+    **ESTIMATOR_Q31,
+    **{f"row.{name}": SHIFT for name in ("n_a", "n_e", "n_phi2", "n_phi0", "part", "y")},
+    "u_multiplier": Range(1, 2**31 - 1, Status.BAD_U_MULTIPLIER),
+    "u_shift": SHIFT,
+    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
+    "drive_min": Range(0, 2**30, Status.BAD_DRIVE_MIN),
+    "drive_ticks": Range(1, 2**30, Status.BAD_DRIVE_TICKS),
+    # what counts within full scale could overflow is refused, too
+    **dict.fromkeys(("bank.phi_max", "bank.y_max"), replace(COUNTS, also=(Status.BAD_FULL_SCALE, Status.BAD_SHIFT))),
+    "bank.centre": Range(1, 2**30, Status.BAD_CENTRE, (Status.BAD_SHIFT,)),
+    "bank.phi_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
+    "bank.y_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
+}
+
+# Sizes, formats and full scales of the tables. Ends of a size may leave a window that cannot be worked off in time, and
+# ends of a shift terms beyond 21 bits.
+IN_TIME = (Status.BAD_ITERATIONS,)
+IN_BITS = (Status.BAD_ITERATIONS, Status.BAD_SHIFT)
+BANK = {
+    "bank.half": Range(2, 160, Status.BAD_HALF),
+    "bank.stride": Range(1, 80, Status.BAD_STRIDE),
+}
+WEAK_SIZES = {
+    "design.taps": Range(5, 401, Status.BAD_TAPS, IN_TIME, odd=True),
+    "design.decimation": Range(1, 64, Status.BAD_DECIMATION, IN_TIME),
+    "design.window": Range(9, 251, Status.BAD_WINDOW, IN_TIME, odd=True),
+    "design.functions": Range(4, 16, Status.BAD_FUNCTIONS, IN_TIME),
+    "design.lag": Range(1, 255, Status.BAD_LAG),
+}
+DESIGN = {**WEAK_SIZES, "design.overlap": Range(1.0, 1e6, Status.BAD_OVERLAP)}
+DESIGN_Q31 = {
+    **WEAK_SIZES,
+    "design.smooth_bits": Range(0, 31, Status.BAD_SHIFT, IN_BITS),
+    **{f"design.{name}": replace(SHIFT, also=IN_BITS) for name in ("phi_shift", "uf_shift")},
+    **{f"design.{name}": SHIFT for name in ("u_shift", "integral_shift", "product_shift", "shift")},
+    "design.high_shift": Range(0, 61, Status.BAD_SHIFT),
+    "design.sum_shift": Range(1, 30, Status.BAD_SHIFT),
+    "design.gram_bits": Range(-128, 127, Status.OK),
+    "design.phi_max": replace(COUNTS, also=IN_BITS),
+    "design.y_max": COUNTS,
+    "design.u_max": Range(1, 2**18, Status.BAD_FULL_SCALE, IN_BITS),
+}
+OWN = {
+    **ESTIMATOR,
+    "estimator.forgetting_s": Range(4.0 / OWN_RATE, 1e12, Status.BAD_FORGETTING, besides=(0.0,)),
+    "estimator.update_rate_hz": Range(1e-6, 1e6, Status.BAD_UPDATE_RATE),
+    "estimator.correlation": Range(1.0, 1e6, Status.BAD_CORRELATION),
+    "estimator.row_weight": Range(1e-6, 1.0, Status.BAD_ROW_WEIGHT),
+}
+RANGES = {
+    "strong": STRONG,
+    "weak": WEAK,
+    "corrected": {**WEAK, "passes": Range(1, 8, Status.BAD_ANGLE, IN_TIME)},
+    "weak q31": WEAK_Q31,
+    "strong q31": STRONG_Q31,
+    "estimator": OWN,
+}
+IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
+SIZES = {
+    "strong": BANK,
+    "weak": DESIGN,
+    "corrected": DESIGN,
+    "weak q31": DESIGN_Q31,
+    "strong q31": BANK,
+    "estimator": {},
+}
+WITHOUT = {
+    "weights": Status.BAD_BANK,
+    "angle": Status.BAD_ANGLE,
+    "model": Status.BAD_MODEL,
+}  # else BAD_DESIGN: its tables
+# Flags; what a form's init fills in; what is used with a correction alone.
+SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}
+SET_BY_WEAK_INIT = SET_BY_INIT | {"estimator.correlation", "estimator.row_weight"}
+FLAGS = {"full_angle", "friction", "zero_unknown"}
+UNUSED = {
+    "strong": SET_BY_INIT,
+    "weak": {*SET_BY_WEAK_INIT, *FLAGS, "angle", "passes"},
+    "corrected": {*SET_BY_WEAK_INIT, *FLAGS},
+    "weak q31": {*SET_BY_INIT, *FLAGS},
+    "strong q31": SET_BY_INIT,
+    "estimator": set(),
+}
+
+
+# ---- the configurations ----
+
+
+def is_table(field: Scalar) -> bool:
+    """Whether it points to numbers."""
+    return bool(field.kind.kind == "pointer" and field.kind.item.kind == "primitive")
+
+
+@dataclass(repr=False)
+class Subject:
+    """An identifier, or an estimator by itself, whose configuration may be spoilt and comes back as it was."""
+
+    name: str
+    identifier: Stepper
+
+    def __post_init__(self) -> None:
+        headers, config = self.identifier.native.headers, self.identifier.config_struct
+        prefix = "estimator." if self.name == "estimator" else ""
+        sizes = {name: table.size for name, table in self.identifier.tables.items()}
+        self.tables: dict[str, Any] = {}
+        self.fields = {field.name: field for field in headers.scalars(config, prefix)}
+        self.n_theta = int(self.identifier.estimator.model.n_theta)
+        self.design: Any = config.design[0] if "design.taps" in self.fields else None
+        self.entries = {name: sizes[name.rpartition(".")[2]] for name, field in self.fields.items() if is_table(field)}
+        structs = [config, *([self.design] if self.design is not None else [])]
+        self._memory = [headers.ffi.buffer(headers.ffi.addressof(struct)) for struct in structs]
+        self.keep()
+
+    def keep(self) -> None:
+        """The configuration as it stands is the good one."""
+        self._good = [bytes(memory) for memory in self._memory]
+
+    def restore(self) -> None:
+        """The good configuration again."""
+        for memory, good in zip(self._memory, self._good, strict=True):
+            memory[:] = good
+
+    def status_with(self, values: dict[str, Any]) -> Status:
+        """What init says of the good configuration with other values."""
+        self.restore()
+        for name, value in values.items():
+            self.fields[name].set(value)
+        return self.identifier.initialise()
+
+    def empty_tables(self) -> dict[str, Any]:
+        """Gives it tables of zeros that are longer than any size asks for, by name, and a window of five samples."""
+        for field in self.fields.values():
+            if is_table(field):
+                self.tables[field.name] = HEADERS.ffi.new(f"{field.kind.item.cname.removeprefix('const ')}[]", ROOM)
+                field.set(self.tables[field.name])
+        if "bank.stride" in self.fields:
+            self.fields["bank.stride"].set(1)
+        self.keep()
+        return self.tables
+
+    def is_used(self, field: Scalar) -> bool:
+        """Whether init reads it: it is no flag, and the model has such an entry."""
+        name = field.group.removeprefix("estimator.")
+        if name in ("start", "start_sd", "lower", "upper", "p_bits"):
+            return field.place < self.identifier.n_p
+        return field.group not in UNUSED[self.name] and (name != "n_bits" or field.place < self.n_theta)
+
+    def ranged(self, ranges: dict[str, dict[str, Range]] = RANGES) -> Iterator[tuple[Scalar, Range]]:
+        """Every field that is used, with what it may hold."""
+        for field in self.fields.values():
+            known = ranges[self.name].get(field.group)
+            if known is not None and self.is_used(field):
+                yield field, known
+
+    def pointers(self) -> Iterator[tuple[Scalar, Status]]:
+        """Every pointer, and what init answers to NULL."""
+        for field in self.fields.values():
+            if field.kind.kind == "pointer" and self.is_used(field):
+                yield field, WITHOUT.get(field.name.rpartition(".")[2], Status.BAD_DESIGN)
+
+    def edges(self) -> Iterator[tuple[str, Any, tuple[Status, ...]]]:
+        """Field, value and what init may answer, for all edges of all fields."""
+        for ranges in (RANGES, SIZES):
+            for field, known in self.ranged(ranges):
+                yield from ((field.name, value, known.answers(value)) for value in known.edges(field))
+        for field, status in self.pointers():
+            yield field.name, HEADERS.ffi.NULL, (status,)
+
+
+def subjects(native: Native) -> dict[str, Subject]:
+    """One of each form and core, one with every correction, and an estimator by itself."""
+    weak, strong = RIG, rig_with(form="strong", differentiator="finite-difference", stride=20)
+    own = replace(weak_config(weak, OWN_RATE).estimator, forgetting_s=0.0)
+    model = native.headers.ffi.addressof(native.library, "pvid_kapitza_weak_f32")
+    made: dict[str, Stepper] = {
+        "strong": native.identifier(strong_config(strong, 1000.0)),
+        "weak": native.identifier(weak_config(rig_with(full_angle=False), 1000.0)),
+        "corrected": native.identifier(weak_config(rig_with(full_angle=True, damping=True), 1000.0)),
+        "weak q31": native.identifier(weak_config_q31(weak, 1000.0)),
+        "strong q31": native.identifier(strong_config_q31(strong, 1000.0)),
+        "estimator": Stepper(native, "estimator", "f32", own, replay="rows", model=model, update_rate_hz=OWN_RATE),
+    }
+    return {name: Subject(name, stepper) for name, stepper in made.items()}
+
+
+# Fields that contradict each other, or the flags: for the identifiers that have them.
+TOGETHER: tuple[dict[str, Any], ...] = (
+    {"zero_unknown": False},
+    {"zero_unknown": False, "estimator.start_sd[3]": 0},
+    {"friction": True},
+    {"full_angle": False, "friction": False, "passes": 0},
+    {"design.window": 9, "design.decimation": 1, "iterations": 10},
+    {"design.window": 9, "design.decimation": 64, "iterations": 10},
+    {"gate.sigmas": 4.0, "gate.patience_s": 2.0},
+    {"estimator.feedback_hz": 0.01},
+    {"estimator.gain": 2**29},
+)
+
+
+def digest(native: Native) -> str:
+    """What init answers to all edges of all fields and tables, and the states that it makes."""
+    told = hashlib.sha256()
+
+    def tell(subject: Subject, what: object, status: Status) -> None:
+        told.update(f"{what} {status}\n".encode())
+        if status is Status.OK and isinstance(subject.identifier, Identifier):
+            told.update(snapshot.save(subject.identifier))
+
+    for subject in subjects(native).values():
+        subject.empty_tables()
+        for name, value, _ in subject.edges():
+            tell(subject, (name, value), subject.status_with({name: value}))
+        for values in TOGETHER:
+            if values.keys() <= subject.fields.keys():
+                tell(subject, values, subject.status_with(values))
+        subject.restore()
+        for name, table in subject.tables.items():
+            kind = HEADERS.dtype(subject.fields[name].kind.item)
+            extremes = [math.nan] if kind.kind == "f" else [np.iinfo(kind).min, np.iinfo(kind).max]
+            for place in (0, subject.entries[name] - 1, subject.entries[name]):
+                for value in extremes:
+                    table[place] = value
+                    tell(subject, (name, place, value), subject.identifier.initialise())
+                table[place] = 0
+        if subject.design is not None:
+            subject.identifier.config_struct.design = HEADERS.ffi.NULL
+            tell(subject, "no design", subject.identifier.initialise())
+    return told.hexdigest()[:16]
