@@ -113,8 +113,8 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
 
 
 def _offset(counts: Int64, limit: int, given: int = 0) -> int:
-    """Offset of a sensor [counts]: `given`, if the median is within half of the full scale `limit` from it and the whole
-    travel fits; else the middle of the travel, the median or `given`, whichever has most samples in range."""
+    """Offset of a sensor [counts]: `given`, if the median is within half of the full scale `limit` and the whole
+    travel fits; else the middle of the travel, the median or `given`, that with most samples in range."""
     ordinary = counts[np.abs(counts) < 2**31 - 1]
     middle, median = round(middle_of_travel(ordinary)), round(float(np.median(ordinary))) if len(ordinary) else 0
     if abs(median - given) <= limit // 2 and reach(ordinary.astype(np.float64), float(given)) <= limit:
