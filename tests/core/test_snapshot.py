@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +13,11 @@ from configurations import FLAGS, IDENTIFIERS, Subject, subjects
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pvid.cases import CASES
 from pvid.core import snapshot
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.settings.enums import SnapshotStatus, Status
-from pvid.setup.f32 import strong_config, weak_config
-from pvid.setup.q31 import strong_config_q31, weak_config_q31
 from pvid.sim.pendulum import Simulation
 
 TICKS = 20_000
@@ -34,54 +32,37 @@ def rig_with(**settings: Any) -> RigFile:
     return replace(RIG, identifier=replace(RIG.identifier, **settings))
 
 
-def strong_of(native: Native) -> Identifier:
-    return native.identifier(strong_config(rig_with(form="strong", forgetting_s=3.0), 1000.0))
+MADE: dict[str, tuple[str, dict[str, Any]]] = {
+    "strong": ("f32", {"form": "strong", "forgetting_s": 3.0}),
+    "weak": ("f32", {"full_angle": False}),
+    "strong q31": ("q31", {"form": "strong", "forgetting_s": 3.0, "outlier_gate": 6.0}),
+    "weak q31": ("q31", {}),
+    "savitzky-golay": ("f32", {"form": "strong", "differentiator": "savitzky-golay"}),
+    "forgetting": ("f32", {"forgetting_s": 5.0}),
+    "corrected": ("f32", {"full_angle": True, "damping": True}),
+}
+FOUR = tuple(MADE)[:4]  # every form and core
 
 
-def savitzky_golay_of(native: Native) -> Identifier:
-    return native.identifier(strong_config(rig_with(form="strong", differentiator="savitzky-golay"), 1000.0))
+def made(native: Native, name: str) -> Identifier:
+    """A fresh identifier of MADE."""
+    core, settings = MADE[name]
+    rig = rig_with(**settings)
+    return native.identifier(CASES[rig.identifier.form, core].settings(rig, 1000.0))
 
 
-def weak_of(native: Native) -> Identifier:
-    return native.identifier(weak_config(rig_with(full_angle=False), 1000.0))
+def samples_for(name: str, simulation: Simulation) -> tuple[Samples, Samples]:
+    phi, y = CASES["weak", MADE[name][0]].samples(RIG, simulation.run)
+    return phi[:TICKS], y[:TICKS]
 
 
-def forgetting_of(native: Native) -> Identifier:
-    return native.identifier(weak_config(rig_with(forgetting_s=5.0), 1000.0))
-
-
-def corrected_of(native: Native) -> Identifier:
-    return native.identifier(weak_config(rig_with(full_angle=True, damping=True), 1000.0))
-
-
-def fixed_point_of(native: Native) -> Identifier:
-    return native.identifier(weak_config_q31(RIG, 1000.0))
-
-
-def strong_fixed_point_of(native: Native) -> Identifier:
-    rig = rig_with(form="strong", forgetting_s=3.0, outlier_gate=6.0)
-    return native.identifier(strong_config_q31(rig, 1000.0))
-
-
-FOUR = (strong_of, weak_of, strong_fixed_point_of, fixed_point_of)  # every form and core
-KINDS = (*FOUR, savitzky_golay_of, forgetting_of, corrected_of)
-Maker = Callable[[Native], Identifier]
-
-
-def samples_for(identifier: Identifier, simulation: Simulation) -> tuple[Samples, Samples]:
-    phi, y = simulation.run.phi[:TICKS], simulation.run.y[:TICKS]
-    if identifier.core == "q31":
-        return np.rint(phi / RIG.sensor.phi_lsb).astype(np.int64), np.rint(y / RIG.sensor.y_lsb).astype(np.int64)
-    return phi, y
-
-
-@pytest.mark.parametrize("maker", KINDS, ids=lambda maker: maker.__name__)
-def test_a_restored_run_continues_bit_for_bit(maker: Maker, native: Native, standard_20_bits: Simulation) -> None:
-    phi, y = samples_for(maker(native), standard_20_bits)
-    whole = maker(native)
+@pytest.mark.parametrize("name", MADE)
+def test_a_restored_run_continues_bit_for_bit(name: str, native: Native, standard_20_bits: Simulation) -> None:
+    phi, y = samples_for(name, standard_20_bits)
+    whole = made(native, name)
     uninterrupted = whole.run(phi, y, sums=False)
     for place in PLACES:
-        first, second = maker(native), maker(native)
+        first, second = made(native, name), made(native, name)
         record = first.run(phi[:place], y[:place], sums=False)
         assert snapshot.restore(second, snapshot.save(first)) is SnapshotStatus.RESTORED
         second.running_hash = first.running_hash  # the hash is kept beside the identifier, not in it
@@ -96,23 +77,23 @@ def test_a_restored_run_continues_bit_for_bit(maker: Maker, native: Native, stan
 def test_every_build_of_a_machine_restores_what_another_saved(
     matrix: dict[str, Native], standard_20_bits: Simulation
 ) -> None:
-    for maker in FOUR:
+    for name in FOUR:
         images = set()
         for native in matrix.values():
-            identifier = maker(native)
-            phi, y = samples_for(identifier, standard_20_bits)
+            identifier = made(native, name)
+            phi, y = samples_for(name, standard_20_bits)
             identifier.run(phi[:3000], y[:3000], sums=False)
             images.add(snapshot.save(identifier))
         for native in matrix.values():
             for image in images:
-                assert snapshot.restore(maker(native), image) is SnapshotStatus.RESTORED
+                assert snapshot.restore(made(native, name), image) is SnapshotStatus.RESTORED
 
 
-@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
-def test_another_form_or_core_is_refused(maker: Maker, native: Native) -> None:
+@pytest.mark.parametrize("name", FOUR)
+def test_another_form_or_core_is_refused(name: str, native: Native) -> None:
     for other in FOUR:
-        status = SnapshotStatus.RESTORED if other is maker else SnapshotStatus.OTHER_KIND
-        assert snapshot.restore(maker(native), snapshot.save(other(native))) is status
+        status = SnapshotStatus.RESTORED if other == name else SnapshotStatus.OTHER_KIND
+        assert snapshot.restore(made(native, name), snapshot.save(made(native, other))) is status
 
 
 def changed(value: Any) -> Any:
@@ -161,9 +142,9 @@ def test_every_table_entry_that_differs_is_seen_and_no_other(name: str, native: 
             tables[field][place] = 0
 
 
-@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
-def test_bad_snapshot_changes_nothing(maker: Maker, native: Native) -> None:
-    identifier = maker(native)
+@pytest.mark.parametrize("name", FOUR)
+def test_bad_snapshot_changes_nothing(name: str, native: Native) -> None:
+    identifier = made(native, name)
     image = snapshot.save(identifier)
     before = identifier.state_bytes
     for place in (*range(0, 28, 4), 28, len(image) // 2, len(image) - 5, len(image) - 1):
@@ -180,12 +161,12 @@ def test_bad_snapshot_changes_nothing(maker: Maker, native: Native) -> None:
     assert snapshot.restore(identifier, image + b"and what follows") is SnapshotStatus.RESTORED
 
 
-@pytest.mark.parametrize("maker", FOUR, ids=lambda maker: maker.__name__)
+@pytest.mark.parametrize("name", FOUR)
 def test_power_that_fails_at_any_byte_leaves_the_older_slot(
-    maker: Maker, native: Native, standard_20_bits: Simulation
+    name: str, native: Native, standard_20_bits: Simulation
 ) -> None:
-    identifier = maker(native)
-    phi, y = samples_for(identifier, standard_20_bits)
+    identifier = made(native, name)
+    phi, y = samples_for(name, standard_20_bits)
     identifier.run(phi[:1500], y[:1500], sums=False)
     older = snapshot.save(identifier, 1)
     identifier.run(phi[1500:2000], y[1500:2000], sums=False)
@@ -196,7 +177,7 @@ def test_power_that_fails_at_any_byte_leaves_the_older_slot(
         if torn != newer:
             assert snapshot.choose(native, older, torn) == snapshot.Choice(0, 1, 2), cut
     assert snapshot.choose(native, older, newer) == snapshot.Choice(1, 0, 3)
-    restored = maker(native)
+    restored = made(native, name)
     assert snapshot.restore(restored, older) is SnapshotStatus.RESTORED
     restored.run(phi[1500:2000], y[1500:2000], sums=False)
     assert snapshot.save(restored, 2) == newer
@@ -205,14 +186,14 @@ def test_power_that_fails_at_any_byte_leaves_the_older_slot(
 @given(noise=st.binary(max_size=200))
 def test_noise_is_never_a_snapshot(noise: bytes) -> None:
     native = Native()
-    identifier = weak_of(native)
+    identifier = made(native, "weak")
     assert snapshot.restore(identifier, noise) is not SnapshotStatus.RESTORED
     slot = noise.ljust(200, b"\xff")
     assert snapshot.choose(native, slot, slot[::-1]) == snapshot.Choice(None, 0, 1)
 
 
 def test_slots_are_chosen_by_generation(native: Native) -> None:
-    older, newer = (snapshot.save(strong_of(native), generation) for generation in (7, 8))
+    older, newer = (snapshot.save(made(native, "strong"), generation) for generation in (7, 8))
     assert snapshot.choose(native, older, newer) == snapshot.Choice(1, 0, 9)
     assert snapshot.choose(native, newer, older) == snapshot.Choice(0, 1, 9)
     assert snapshot.choose(native, older, newer[:-1] + b"?") == snapshot.Choice(0, 1, 8)

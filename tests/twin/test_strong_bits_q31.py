@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hostile_counts import HOSTILE, hostile
 from lanes import assert_lanes_equal
 
 from pvid.core.native import Native
@@ -97,61 +98,11 @@ def assert_rows_equal(native: Native, lanes: list[EstimatorConfigQ31], n: Counts
         assert core.assess().tobytes() == twin.assess()[lane].tobytes()
 
 
-HOSTILE = (
-    "square waves",
-    "slow square waves",
-    "steps",
-    "stuck",
-    "wrap",
-    "zeros",
-    "random words",
-    "random counts",
-    "full scale in phase",
-    "one count",
-    "beyond full scale",
-)
-
-
-def hostile(name: str, config: StrongConfigQ31, ticks: int = 700) -> tuple[Counts, Counts]:
-    """Counts that no mechanism makes."""
+def hostile_to(name: str, config: StrongConfigQ31, ticks: int = 700) -> tuple[Counts, Counts]:
+    """For the bank's full scales; the pivot swings by 10 mm."""
     bank = config.design.bank
-    random = np.random.default_rng(7)
-    t = np.arange(ticks)
-    phi, y = np.zeros(ticks, np.int64), np.zeros(ticks, np.int64)
-    swing = np.rint(2000 * np.sin(2 * np.pi * 4.0 * t / 1000)).astype(np.int64)  # of the pivot, 10 mm
-    if name == "square waves":
-        phi = bank.phi_max * np.where(t // 50 % 2, 1, -1)
-        y = bank.y_max * np.where(t // 70 % 2, 1, -1)
-    elif name == "slow square waves":
-        phi = bank.phi_max * np.where(t // 125 % 2, 1, -1)
-        y = swing
-    elif name == "steps":
-        phi = bank.phi_max * (t > 350)
-        y = np.where(t > 500, bank.y_max, 0)
-    elif name == "stuck":
-        phi = np.full(ticks, bank.phi_max)
-        y = swing
-    elif name == "wrap":
-        phi = (t * 700) % 2**20 - 2**19
-        y = swing
-    elif name == "random words":
-        phi = random.integers(-(2**31), 2**31, ticks)
-        y = random.integers(-(2**31), 2**31, ticks)
-    elif name == "random counts":
-        phi = random.integers(-bank.phi_max, bank.phi_max + 1, ticks)
-        y = swing
-    elif name == "full scale in phase":
-        phi = np.where(swing > 0, bank.phi_max, -bank.phi_max)
-        y = swing
-    elif name == "one count":
-        phi = (t // 150) % 2
-        y = swing
-    elif name == "beyond full scale":
-        phi = swing // 4
-        y = swing.copy()
-        phi[300] = bank.phi_max + 1
-        y[601] = -(2**31)
-    return np.asarray(phi, np.int64), np.asarray(y, np.int64)
+    swing = np.rint(2000 * np.sin(2 * np.pi * 4.0 * np.arange(ticks) / 1000)).astype(np.int64)
+    return hostile(name, (bank.phi_max, bank.y_max), swing, 2**20)
 
 
 @pytest.mark.parametrize("differentiator", STRIDE)
@@ -159,8 +110,8 @@ def hostile(name: str, config: StrongConfigQ31, ticks: int = 700) -> tuple[Count
 def test_hostile_counts_equal_the_twin(native: Native, name: str, differentiator: Differentiator) -> None:
     for law, tau in zip(LAWS, (0.0, 0.5), strict=True):
         config = configuration(rig_of(differentiator, law, tau))
-        reasons_of([native], config, *hostile(name, config))
-        reasons_of([native], replace(config, gate=GateConfigQ31(2 << 16, 50)), *hostile(name, config))
+        reasons_of([native], config, *hostile_to(name, config))
+        reasons_of([native], replace(config, gate=GateConfigQ31(2 << 16, 50)), *hostile_to(name, config))
 
 
 def test_hostile_counts_reach_the_arithmetic(native: Native) -> None:
@@ -168,7 +119,7 @@ def test_hostile_counts_reach_the_arithmetic(native: Native) -> None:
     for name in HOSTILE:
         config = configuration(rig_of("finite-difference"))
         core = native.identifier(config)
-        core.run(*hostile(name, config))
+        core.run(*hostile_to(name, config))
         taken += core.counters["rows"] > 250
     assert taken >= 5
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hostile_counts import HOSTILE, hostile
 from lanes import assert_lanes_equal
 
 from pvid.core.native import Native
@@ -29,8 +30,7 @@ HASHED_TICKS = 3000  # past the work on the first two windows
 def counts() -> tuple[Counts, Counts]:
     """The standard rig's counts, linear truth, 14 bits, 40 s at 1 kHz."""
     run = simulate(sensors=standard_sensors(14), truth="linear", seed=1).run
-    phi = np.rint(run.phi / RIG.sensor.phi_lsb).astype(np.int64)
-    return phi, np.rint(run.y / RIG.sensor.y_lsb).astype(np.int64)
+    return counts_of(RIG, run)
 
 
 @cache
@@ -106,64 +106,15 @@ def test_other_sizes_equal_the_twin(native: Native, counts: tuple[Counts, Counts
     compared([native], config, [config.estimator], *(c[:8020] for c in counts))
 
 
-HOSTILE = (
-    "square waves",
-    "slow square waves",
-    "steps",
-    "stuck",
-    "wrap",
-    "zeros",
-    "random words",
-    "full scale in phase",
-    "one count",
-    "beyond full scale",
-)
-
-
-def hostile(name: str, config: WeakConfigQ31, ticks: int = 8000) -> tuple[Counts, Counts]:
-    """Counts that no mechanism makes."""
+def hostile_to(name: str, config: WeakConfigQ31, ticks: int = 8000) -> tuple[Counts, Counts]:
+    """For the design's full scales: the largest swing of the pivot at 8 Hz that u_max lets pass, and a little less."""
     design = config.design
-    random = np.random.default_rng(7)
-    t = np.arange(ticks)
-    phi, y = np.zeros(ticks, np.int64), np.zeros(ticks, np.int64)
-    # the largest swing of the pivot at 8 Hz that u_max lets pass, and a little less
     largest_u = 0.9 * design.u_max * 2.0**-design.u_bits / design.dt**2
     rate = 2 * np.pi * 8.0
     amplitude = largest_u * RIG.l1 / rate**2 / RIG.sensor.y_lsb
     assert amplitude < design.y_max
-    swing = np.rint(amplitude * np.sin(rate * t / 1000)).astype(np.int64)
-    if name == "square waves":
-        phi = design.phi_max * np.where(t // 50 % 2, 1, -1)
-        y = design.y_max * np.where(t // 70 % 2, 1, -1)
-    elif name == "slow square waves":
-        phi = design.phi_max * np.where(t // 125 % 2, 1, -1)
-        y = swing
-    elif name == "steps":
-        phi = design.phi_max * (t > 4000)
-        y = np.where(t > 6000, design.y_max, 0)
-    elif name == "stuck":
-        phi = np.full(ticks, design.phi_max)
-        y = swing
-    elif name == "wrap":
-        phi = (t * 7) % 2**14 - 2**13
-        y = swing
-    elif name == "random words":
-        phi = random.integers(-(2**31), 2**31, ticks)
-        y = random.integers(-(2**31), 2**31, ticks)
-        phi[2000:] = random.integers(-design.phi_max, design.phi_max + 1, ticks - 2000)
-        y[2000:] = swing[2000:]
-    elif name == "full scale in phase":
-        phi = np.where(swing > 0, design.phi_max, -design.phi_max)
-        y = swing
-    elif name == "one count":
-        phi = (t // 300) % 2
-        y = swing
-    elif name == "beyond full scale":
-        phi = swing // 4
-        y = swing
-        phi[5000] = design.phi_max + 1
-        y[7001] = -(2**31)
-    return np.asarray(phi, np.int64), np.asarray(y, np.int64)
+    swing = np.rint(amplitude * np.sin(rate * np.arange(ticks) / 1000)).astype(np.int64)
+    return hostile(name, (design.phi_max, design.y_max), swing, 2**14)
 
 
 @pytest.mark.parametrize("name", HOSTILE)
@@ -171,15 +122,15 @@ def test_hostile_counts_equal_the_twin(native: Native, name: str) -> None:
     config = configuration()
     for tau in (0.0, 5.0):
         lanes = [configuration(seed, forgetting_s=tau).estimator for seed in range(2)]
-        compared([native], config, lanes, *hostile(name, config))
+        compared([native], config, lanes, *hostile_to(name, config))
     gated = replace(config, gate=GateConfigQ31(2 << 16, 20))
-    compared([native], gated, [config.estimator], *hostile(name, config))
+    compared([native], gated, [config.estimator], *hostile_to(name, config))
 
 
 def test_a_quarter_of_full_scale_in_phase_becomes_rows(native: Native) -> None:
     """What no mechanism does still passes the windows: hostile counts are not merely refused at the door."""
     config = configuration()
-    phi, y = hostile("full scale in phase", config)
+    phi, y = hostile_to("full scale in phase", config)
     core = native.identifier(config)
     core.run(phi // 4, y)
     assert core.counters["rows"] >= 8 * config.design.functions
