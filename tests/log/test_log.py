@@ -686,7 +686,7 @@ def test_unwritable_folder_is_reported(tmp_path: Path, boards: Boards) -> None:
 @pytest.mark.parametrize(
     ("error", "told"),
     [
-        (serial.SerialException("device reports readiness to read but returned no data (...)"), "nothing is at its"),
+        (serial.SerialException("device reports readiness to read but returned no data (...)"), "its other end"),
         (serial.SerialException("socket disconnected"), "its other end was closed"),
         (OSError(5, "Input/output error"), "Input/output error"),
         (serial.SerialException("something else"), "something else"),
