@@ -1,4 +1,4 @@
-"""Figures as files: which format a name asks for, and one sentence where it cannot be written."""
+"""Figure files: the format by the file's suffix, and one sentence if the file cannot be written."""
 
 from __future__ import annotations
 

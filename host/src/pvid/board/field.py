@@ -2,7 +2,7 @@
 
     target = open_target("mps2-an386", rig)
     record = collect(target, 5000, begin=rig)          # starts the board over; without begin: joins in
-    phi, y = record.samples(0, 5000)                   # exactly what the identifier got
+    phi, y = record.samples(0, 5000)                   # exactly the identifier's input
 
 link.py describes the frames. The image's settings, the configuration and every sample from the session's first tick on
 are enough to compute every bit again.

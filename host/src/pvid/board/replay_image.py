@@ -1,4 +1,4 @@
-"""The run that firmware/apps/replay plays: its header, what the host expects of it, and what the image reports."""
+"""The run of firmware/apps/replay: its header, the expected result on the host, and the report of the image."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 `open_target` starts an emulator (a name of `boards.BOARDS`), the host's own build ("stream-host") or opens a port
 (/dev/tty..., a pseudo-terminal, socket://host:port); `play` does the rest. Time is bounded: without progress for
-`patience_s` the play ends and the account says how far it came.
+`patience_s` the play ends, and the account contains the progress.
 """
 
 from __future__ import annotations

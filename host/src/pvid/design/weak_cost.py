@@ -1,8 +1,8 @@
-"""What a weak-form design costs on a device: RAM, delay, and instructions a sample by a fitted formula.
+"""Cost of a weak-form design on a device: RAM, delay, and instructions per sample by a fitted formula.
 
 The instructions are those of x86-64 at -O2, counted by callgrind: a measure to compare designs by, of the size that
-cores with an FPU need too. Their number depends on the design's sizes alone (pvid/weak.h: what a tick does never hangs
-on the data), through the counts of `Schedule`; the coefficients stand in weak_cost.toml, which
+cores with an FPU need too. Their number depends on the design's sizes alone (pvid/weak.h: the work of a tick does not
+depend on the data), through the counts of `Schedule`; the coefficients are in weak_cost.toml, which
 `pvid bench design-cost --update` measures anew and tests/design/test_weak_cost.py holds against the core.
 """
 

@@ -13,7 +13,7 @@ every header and firmware/link/schema.h are generated from them (`pvid schema`).
     decoder = Decoder()
     for item in decoder.feed(port.read(...)):
         match item:
-            case Loss(): ...                      # what did not come through, and why
+            case Loss(): ...                      # lost data, and why
             case Frame(message=Estimate() as e): ...
 """
 

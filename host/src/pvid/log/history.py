@@ -1,10 +1,10 @@
-"""What a view of a recording remembers, in bounded memory however long it lasts.
+"""History of a recording for a view, in bounded memory for any length.
 
 Of the estimates the whole history, thinned evenly; of the samples the last seconds. Times are seconds since the
 first record, by the PC's clock when a segment began and the board's from there on.
 
-A record is only put aside when it comes. What it means in numbers is computed when somebody looks, and only of what is
-then to be seen: a board that sends ten thousand frames a second costs the view no more than one that sends ten.
+Arriving records are only stored. Their values are computed when the view is drawn, and only for the visible part: ten
+thousand frames per second cost the view no more than ten.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Records from a log (pvid.log.file), in constant memory: from a file, or from its bytes as they come.
+"""Records from a log (pvid.log.file), in constant memory: from a file, or from its bytes as they arrive.
 
     reader = LogReader(path)                      stream = LogStream()
     for record in reader:                         for record in stream.feed(data): ...

@@ -1,4 +1,4 @@
-"""What a log tells of the rig it was recorded on, and the run in it."""
+"""The rig of a log, and the run in it."""
 
 from __future__ import annotations
 

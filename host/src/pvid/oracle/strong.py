@@ -1,6 +1,6 @@
-"""The mathematics in float64, straight from theory.md 2 to 4, to be read beside it.
+"""The mathematics in float64, as in theory.md 2 to 4; read both together.
 
-Nothing here is fast or bit-exact; it is what the twin and the C core are measured against.
+Neither fast nor bit-exact: the reference for twin and C core.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""The weak form in float64, straight from theory.md 5, to be read beside it.
+"""The weak form in float64, as in theory.md 5; read both together.
 
-Nothing here is fast or bit-exact; it is what the twin and the C core are measured against, and where what the
-core does not have yet is tried: the full-angle correction and the two damping regressors.
+Neither fast nor bit-exact: the reference for twin and C core, and the place to try new terms.
 
     samples -> front_end -> frames -> columns -> rows (whitened at p, no a and b) -> WeakOracle -> p, s.e.
 """

@@ -1,4 +1,4 @@
-"""What a sensor resolves, seen from what it recorded."""
+"""Resolution of a sensor, from its recorded values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a weak-form design promises for a rig: standard errors, kappa, and what it costs on a device."""
+"""Prediction for a weak-form design: standard errors, kappa, and its cost on a device."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""A recording on one page: measured against simulated angle, how the estimate converged, what it leaves unexplained,
-what excited it, how it moved."""
+"""A recording on one page: measured against simulated angle, convergence, residuals, excitation, motion."""
 
 from __future__ import annotations
 
