@@ -16,7 +16,7 @@ FORMATS = ("png", "svg", "pdf")
 
 
 def format_of(path: Path) -> str:
-    """The format that the suffix of a figure's name asks for; png where it has none.
+    """The format by the suffix of a figure's name; png without suffix.
 
     Raises
     ------

@@ -127,7 +127,7 @@ def collect(
     estimate_every: int = 500,
     patience_s: float = 20.0,
 ) -> FieldRecord:
-    """Collects what a board in field mode says, for `ticks` samples from the first that arrives.
+    """Collects the frames of a board in field mode, for `ticks` samples from the first that arrives.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def collect(
     Raises
     ------
     PvidError
-        When the board refuses, says nothing for `patience_s`, or the port is gone.
+        When the board refuses, sends nothing for `patience_s`, or the port is gone.
     """
     record = FieldRecord()
     decoder = Decoder(record.received)

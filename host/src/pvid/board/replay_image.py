@@ -216,7 +216,7 @@ def twin_hashes(run: ReplayRun) -> npt.NDArray[np.uint32]:
     return fnv.running_hashes(case_of(run.config).twin(run.config).run(*run.samples).lane())
 
 
-# ---- what the image says
+# ---- report of the image
 
 
 @dataclass(frozen=True)

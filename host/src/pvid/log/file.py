@@ -66,7 +66,7 @@ class Segment(Message, messages=LOG_MESSAGES):
 
     @property
     def port(self) -> str:
-        """The port's name; empty when it is not told."""
+        """The port's name; empty if unknown."""
         return printable(str(self.description.get("port", "")))
 
 

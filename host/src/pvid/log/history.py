@@ -27,7 +27,7 @@ from pvid.models.model import Mechanism, Model
 Float = npt.NDArray[np.float64]
 
 _MOST_SAMPLES = 200_000
-_MOST_ASIDE = 5_000  # records that are put aside while nobody looks
+_MOST_ASIDE = 5_000  # records stored while the view is not drawn
 _MOST_PARTS = 1_000  # in which the samples are kept
 
 T = TypeVar("T")
@@ -41,7 +41,7 @@ class Rates:
         self._counts: deque[tuple[float, int, int]] = deque()  # when, samples, bytes
 
     def now(self, account: Account, when: float) -> tuple[float, float]:
-        """At the time `when` (of time.monotonic), which may be asked often."""
+        """At the time `when` (of time.monotonic); cheap to call often."""
         counts = self._counts
         counts.append((when, account.samples, account.bytes))
         while len(counts) > 2 and when - counts[1][0] > self._over_s:

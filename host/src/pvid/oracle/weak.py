@@ -686,7 +686,7 @@ def row_sd(design: WeakDesign, sensors: Sensors) -> float:
     """Standard deviation of a row's residual [rad]: white noise of the angle sensor, through the front end.
 
     About the samples' own over sqrt(D): the rows look at frequencies that the smoother lets pass, so that
-    `WeakDesign.smoothing_gain`, which averages over all frequencies, says too little.
+    `WeakDesign.smoothing_gain`, which averages over all frequencies, is too small.
     """
     energy = _energy(residual_filters(design, design.nominal), _taps(design.smooth, 1.0), design.decimation)
     return sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb) * math.sqrt(energy / design.functions)
@@ -704,7 +704,7 @@ def predict(
     Raises
     ------
     PvidError
-        When the run does not fill a window, or says nothing of w, or its numbers are beyond those of float64.
+        When the run does not fill a window, or does not excite w, or its numbers are beyond those of float64.
     """
     beyond = "nothing can be predicted: lengths, drive or resolutions are too far apart for numbers of 64 bits"
     try:

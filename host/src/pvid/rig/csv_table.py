@@ -165,7 +165,7 @@ def _data_lines(block: bytes, first: int) -> Iterator[tuple[int, str]]:
 
 
 def _line_of_row(path: Path, body: int, row: int) -> int:
-    """Line of the row counted from 0: looked for only when it is asked for."""
+    """Line of the row counted from 0: searched only on request."""
     first = 1
     for block in _blocks(path):
         for number, _ in _data_lines(block, first):

@@ -272,7 +272,7 @@ class RigFile:
 
     @classmethod
     def standard(cls) -> RigFile:
-        """The standard rig of theory.md 6, as written by a user who knows only l1 and the sensors, both exactly: a
+        """The standard rig of theory.md 6, as written by a user with exact l1 and sensors only: a
         simulation has no error of l1 or of the gain of y."""
         sensor = Sensor(y_gain_sd=0.0)
         return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sensor=sensor, sample_rate=1000.0, l1_sd=0.0)
@@ -461,7 +461,7 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else text[:40] + "..."
 
 
-# Fields that say nothing by default, and the property that holds what follows from the others.
+# Fields without a default, and the property with the value that follows from the others.
 _DERIVED = {"outlier_gate": "gate", "outlier_patience_s": "patience_s"}
 
 

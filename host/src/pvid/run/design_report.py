@@ -113,7 +113,7 @@ def report_for_tones(
     Raises
     ------
     PvidError
-        When the rig file does not suffice, the run does not fill a window or the drive says nothing of w.
+        When the rig file does not suffice, the run does not fill a window or the drive does not excite w.
     """
     _refuse_exact(rig)
     if rig.sample_rate is None:

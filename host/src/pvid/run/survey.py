@@ -73,7 +73,7 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     holds often enough.
 
     The encoder's resolution is what the run shows where the rig file does not give it. All else is unchanged where the
-    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds nothing
+    rig file disables the survey (`[identifier] survey = false`) or sets the strong form. If the survey finds nothing
     plausible the guess stays.
     """
     rig = resolved(rig, run)
