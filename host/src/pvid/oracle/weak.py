@@ -1,7 +1,6 @@
-"""The weak form in float64, written from theory.md 5; read both side by side.
+"""The weak form in float64, as in theory.md 5; read both together.
 
-Nothing here is fast or bit-exact; it is what the twin and the C core are measured against, and where what the
-core does not have yet is tried: the full-angle correction and the two damping regressors.
+Neither fast nor bit-exact: the reference for twin and C core, and the place to try new terms.
 
     samples -> front_end -> frames -> columns -> rows (whitened at p, no a and b) -> WeakOracle -> p, s.e.
 """
@@ -686,7 +685,7 @@ def row_sd(design: WeakDesign, sensors: Sensors) -> float:
     """Standard deviation of a row's residual [rad]: white noise of the angle sensor, through the front end.
 
     About the samples' own over sqrt(D): the rows look at frequencies that the smoother lets pass, so that
-    `WeakDesign.smoothing_gain`, which averages over all frequencies, says too little.
+    `WeakDesign.smoothing_gain`, which averages over all frequencies, is too small.
     """
     energy = _energy(residual_filters(design, design.nominal), _taps(design.smooth, 1.0), design.decimation)
     return sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb) * math.sqrt(energy / design.functions)
@@ -704,7 +703,7 @@ def predict(
     Raises
     ------
     PvidError
-        When the run does not fill a window, or says nothing of w, or its numbers are beyond those of float64.
+        When the run does not fill a window, or does not excite w, or its numbers are beyond those of float64.
     """
     beyond = "nothing can be predicted: lengths, drive or resolutions are too far apart for numbers of 64 bits"
     try:
