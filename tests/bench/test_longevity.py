@@ -7,11 +7,12 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from lanes import assert_lanes_equal
 
 from bench import longevity, longevity_tables
 from bench.longevity import (
@@ -42,16 +43,10 @@ from bench.longevity_signals import (
 )
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.run.compare import first_difference
 from pvid.settings.enums import Reason
-from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
 from pvid.setup.f32 import strong_config, weak_config
 from pvid.setup.q31 import counts_of_samples
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Sensors, simulate
-from pvid.twin.strong import StrongTwin
-from pvid.twin.strong_q31 import StrongTwinQ31
-from pvid.twin.weak import WeakTwin
-from pvid.twin.weak_q31 import WeakTwinQ31
 
 TICKS = 100_000
 SLOW_TICKS = 50_000  # of the strong form in fixed point
@@ -189,13 +184,10 @@ def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: c
     config = weak_config(rig_of(Lane("weak", 0.0)), RATE_HZ)
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in longevity.WEAK_FORGETTING_S]
     try:
-        together = WeakTwin(config, lanes).run(phi, y)
-        expected = [(together, lane) for lane in range(len(lanes))]
+        assert_lanes_equal([native], config, phi, y, lanes)
     except PvidError:  # their gates let different windows in: one by one
-        expected = [(WeakTwin(config, [alone]).run(phi, y), 0) for alone in lanes]
-    for estimator, (twin, lane) in zip(lanes, expected, strict=True):
-        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-        assert first_difference(record, twin.lane(lane)) is None
+        for alone in lanes:
+            assert_lanes_equal([native], config, phi, y, [alone])
 
 
 @pytest.mark.parametrize(
@@ -203,13 +195,9 @@ def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: c
     [*((name, TWIN_TICKS["strong"]) for name in SCENARIOS), ("stuck sensor", 9_000)],  # two blocks of its verdict
 )
 def test_the_strong_form_equals_its_twin(scenario: str, ticks: int, native: Native, library: ctypes.CDLL) -> None:
-    phi, y = samples(library, scenario, ticks, ENCODER)
     config = strong_config(rig_of(Lane("strong", 0.0)), RATE_HZ)
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in STRONG_FORGETTING_S]
-    expected = StrongTwin(config, lanes).run(phi, y)
-    for lane, estimator in enumerate(lanes):
-        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-        assert first_difference(record, expected.lane(lane)) is None
+    assert_lanes_equal([native], config, *samples(library, scenario, ticks, ENCODER), lanes)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -218,22 +206,15 @@ def test_the_weak_form_equals_its_twin_in_fixed_point(scenario: str, native: Nat
     configs = [config_q31_of(lane) for lane in WEAK_Q31_LANES]
     for gate in {config.gate for config in configs}:  # lanes of the twin share the gate
         alike = [config for config in configs if config.gate == gate]
-        twin = WeakTwinQ31(cast(WeakConfigQ31, alike[0]), [config.estimator for config in alike])
-        expected = twin.run(phi, y)
-        for lane, config in enumerate(alike):
-            record = native.identifier(config).run(phi, y, hashes=False)
-            assert first_difference(record, expected.lane(lane)) is None
+        assert_lanes_equal([native], alike[0], phi, y, [config.estimator for config in alike])
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_the_strong_form_equals_its_twin_in_fixed_point(scenario: str, native: Native, library: ctypes.CDLL) -> None:
-    phi, y = counts(library, scenario, TWIN_TICKS["strong q31"], FINE)
-    config = cast(StrongConfigQ31, config_q31_of(Lane("strong", 0.0, core="q31")))
+    config = config_q31_of(Lane("strong", 0.0, core="q31"))
     lanes = [config.estimator, replace(config.estimator, forgetting_groups=10_000)]
-    expected = StrongTwinQ31(config, lanes).run(phi, y)
-    for lane, estimator in enumerate(lanes):
-        record = native.identifier(replace(config, estimator=estimator)).run(phi, y, hashes=False)
-        assert first_difference(record, expected.lane(lane)) is None
+    phi, y = counts(library, scenario, TWIN_TICKS["strong q31"], FINE)
+    assert_lanes_equal([native], config, phi, y, lanes)
 
 
 # ---- the bench itself ----

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.board.replay_image import SAMPLING, ReplayRun, native_hashes, standard_run
@@ -306,20 +305,28 @@ def test_an_image_has_room_for_a_design_beyond_the_default_bounds(native: Native
 
 
 def test_identify_and_compare_on_targets(tmp_path: Path) -> None:
-    def pvid(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "pvid", *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
-
-    assert pvid("simulate", "run.csv", "--duration", "8", "--truth", "linear").returncode == 0
-    done = pvid("identify", "run.csv", "--rig", "run.toml", "--on", "mps2-an386", "--json")
+    assert pvid(tmp_path, "simulate", "run.csv", "--duration", "8", "--truth", "linear").returncode == 0
+    done = pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--on", "mps2-an386", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["on"] == "mps2-an386"
-    fixed = pvid("identify", "run.csv", "--rig", "run.toml", "--core", "q31", "--on", "virt-rv32imac", "--json")
+    fixed = pvid(
+        tmp_path, "identify", "run.csv", "--rig", "run.toml", "--core", "q31", "--on", "virt-rv32imac", "--json"
+    )
     assert fixed.returncode == 0, fixed.stderr
     assert json.loads(fixed.stdout)["core"] == "q31"
     both = pvid(
-        "compare", "run.csv", "--rig", "run.toml", "--core", "all", "--on", HOST_TARGET, "--on", "virt-rv32imac"
+        tmp_path,
+        "compare",
+        "run.csv",
+        "--rig",
+        "run.toml",
+        "--core",
+        "all",
+        "--on",
+        HOST_TARGET,
+        "--on",
+        "virt-rv32imac",
     )
     assert both.returncode == 0, both.stderr
     assert both.stdout.count("equal") == 12 and "DIFFERENT" not in both.stdout
-    assert pvid("identify", "run.csv", "--rig", "run.toml", "--on", "nowhere").returncode == 2
+    assert pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--on", "nowhere").returncode == 2

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from program import pvid
 
 from pvid.cli.demo import target
 from pvid.rig.file import RigFile
@@ -17,21 +16,11 @@ from pvid.rig.run import write_run
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 
-def pvid(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-P", "-m", "pvid", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-    )
-
-
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a good run (run.csv, 20 bits, 12 s) and its rig file (run.toml)."""
     folder = tmp_path_factory.mktemp("cli")
-    done = pvid("simulate", "run.csv", "--duration", "12", "--bits", "20", "--truth", "linear", cwd=folder)
+    done = pvid(folder, "simulate", "run.csv", "--duration", "12", "--bits", "20", "--truth", "linear")
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -46,7 +35,7 @@ def test_simulate_writes_a_run_and_its_rig_file(place: Path) -> None:
 
 
 def test_identify_json_has_all_documented_keys(place: Path) -> None:
-    done = pvid(*strong("identify", "run.csv", "--json"), cwd=place)
+    done = pvid(place, *strong("identify", "run.csv", "--json"))
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     names = {"w", "d1", "d2", "g", "l2", "rho2", "kappa", "status", "ticks", "updates", "lost", "hash"}
@@ -58,8 +47,8 @@ def test_identify_json_has_all_documented_keys(place: Path) -> None:
 
 
 def test_both_cores_agree(place: Path) -> None:
-    single = json.loads(pvid(*strong("identify", "run.csv", "--json", "--core", "f32"), cwd=place).stdout)
-    double = json.loads(pvid(*strong("identify", "run.csv", "--json", "--core", "f64"), cwd=place).stdout)
+    single = json.loads(pvid(place, *strong("identify", "run.csv", "--json", "--core", "f32")).stdout)
+    double = json.loads(pvid(place, *strong("identify", "run.csv", "--json", "--core", "f64")).stdout)
     assert double["hash"] is None
     for name in ("w", "d1", "d2"):
         # float32 differentiates with about 1e-6 relative noise of its own: far below a standard error
@@ -68,7 +57,7 @@ def test_both_cores_agree(place: Path) -> None:
 
 def test_both_cores_of_the_weak_form_agree(place: Path) -> None:
     answers = [
-        pvid("identify", "run.csv", "--rig", "run.toml", "--json", "--core", core, cwd=place) for core in ("f32", "f64")
+        pvid(place, "identify", "run.csv", "--rig", "run.toml", "--json", "--core", core) for core in ("f32", "f64")
     ]
     single, double = (json.loads(answer.stdout) for answer in answers)
     assert double["hash"] is None
@@ -81,13 +70,13 @@ def test_both_cores_of_the_weak_form_agree(place: Path) -> None:
 
 
 def test_the_float64_weak_form_corrects_full_angles(tmp_path: Path) -> None:
-    assert pvid("simulate", "run.csv", "--duration", "20", "--truth", "full", cwd=tmp_path).returncode == 0
+    assert pvid(tmp_path, "simulate", "run.csv", "--duration", "20", "--truth", "full").returncode == 0
     rig = tmp_path / "run.toml"
     errors = []
     for corrected in ("false", "true"):
         rig.write_text(re.sub("full_angle = .*", f"full_angle = {corrected}", rig.read_text()), encoding="utf-8")
         answer = json.loads(
-            pvid("identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--json", cwd=tmp_path).stdout
+            pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--json").stdout
         )
         errors.append(abs(answer["g"]["value"] / STANDARD_PENDULUM.g - 1))
     assert errors[0] > 2e-3  # README: 0.4 % at 0.107 rad
@@ -95,14 +84,14 @@ def test_the_float64_weak_form_corrects_full_angles(tmp_path: Path) -> None:
 
 
 def test_the_float64_weak_form_refuses_the_other_law(place: Path) -> None:
-    done = pvid("identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--law", "pseudovelocity", cwd=place)
+    done = pvid(place, "identify", "run.csv", "--rig", "run.toml", "--core", "f64", "--law", "pseudovelocity")
     assert done.returncode == 2
     assert "stationary law" in done.stderr
 
 
 def test_the_law_can_be_chosen(place: Path) -> None:
     answers = [
-        json.loads(pvid(*strong("identify", "run.csv", "--json", "--law", law), cwd=place).stdout)
+        json.loads(pvid(place, *strong("identify", "run.csv", "--json", "--law", law)).stdout)
         for law in ("stationary", "pseudovelocity")
     ]
     assert [answer["law"] for answer in answers] == ["stationary", "pseudovelocity"]
@@ -110,13 +99,13 @@ def test_the_law_can_be_chosen(place: Path) -> None:
 
 
 def test_compare_finds_both_laws_equal(place: Path) -> None:
-    done = pvid(*strong("compare", "run.csv"), cwd=place)
+    done = pvid(place, *strong("compare", "run.csv"))
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count("equal") == 2
 
 
 def test_demo_prints_its_table_and_draws_its_figure(tmp_path: Path) -> None:
-    done = pvid("demo", cwd=tmp_path)
+    done = pvid(tmp_path, "demo")
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count("streamed to mps2-an386, Cortex-M4F in QEMU: 40000 ticks, equal to here, hash ") == 2
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -147,7 +136,7 @@ def test_a_run_without_motion_is_not_identified(tmp_path: Path) -> None:
     run.phi[:] = 0.0
     write_run(tmp_path / "still.csv", run)
     RigFile.standard().write(tmp_path / "run.toml")
-    done = pvid(*strong("identify", "still.csv"), cwd=tmp_path)
+    done = pvid(tmp_path, *strong("identify", "still.csv"))
     assert done.returncode == 3
     assert "nothing identified" in done.stderr
 
@@ -168,7 +157,7 @@ BAD_RUNS = {
 def test_a_bad_run_is_one_sentence_and_exit_code_2(case: str, place: Path, tmp_path: Path) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text(BAD_RUNS[case], encoding="utf-8")
-    done = pvid("identify", bad, "--rig", place / "run.toml", "--form", "strong", cwd=tmp_path)
+    done = pvid(tmp_path, "identify", bad, "--rig", place / "run.toml", "--form", "strong")
     assert done.returncode == 2, done.stdout
     assert done.stdout == ""
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
@@ -191,7 +180,7 @@ def test_a_bad_run_is_one_sentence_and_exit_code_2(case: str, place: Path, tmp_p
     ],
 )
 def test_bad_usage_is_one_sentence_that_names_it(arguments: tuple[str, ...], named: str, place: Path) -> None:
-    done = pvid(*arguments, cwd=place)
+    done = pvid(place, *arguments)
     assert done.returncode == 2, done.stdout
     assert named in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr

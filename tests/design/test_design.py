@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from program import pvid
 
 from bench.cost import state_bytes
 from bench.design_cost import GRID, Sizes, as_toml, fit, measured
@@ -171,18 +170,13 @@ def test_less_noise_and_a_longer_run_are_better() -> None:
     assert se(14, 40.0) < se(14, 20.0)
 
 
-def pvid(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-P", "-m", "pvid", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
-
-
 def test_the_command_prints_a_table_and_an_object(tmp_path: Path) -> None:
     RigFile.standard().write(tmp_path / "rig.toml")
-    shown = pvid("design", "--rig", "rig.toml", "--duration", "20", cwd=tmp_path)
+    shown = pvid(tmp_path, "design", "--rig", "rig.toml", "--duration", "20")
     assert shown.returncode == 0, shown.stderr
     for word in ("w [1/s^2]", "rho2 [m]", "c [rad]", "kappa", "delay", "RAM", "flash", "instructions", "a run of 20 s"):
         assert word in shown.stdout
-    answer = json.loads(pvid("design", "--rig", "rig.toml", "--json", "--tone", "0.005,2,0", cwd=tmp_path).stdout)
+    answer = json.loads(pvid(tmp_path, "design", "--rig", "rig.toml", "--json", "--tone", "0.005,2,0").stdout)
     assert set(NAMES) < set(answer)
     assert answer["duration_s"] == 40.0
     assert 0 < answer["w"]["se"] < answer["w"]["value"]
@@ -202,7 +196,7 @@ def test_the_command_prints_a_table_and_an_object(tmp_path: Path) -> None:
 )
 def test_unpredictable_rig_is_one_sentence(arguments: tuple[str, ...], named: str, tmp_path: Path) -> None:
     RigFile.standard().write(tmp_path / "rig.toml")
-    done = pvid("design", "--rig", "rig.toml", *arguments, cwd=tmp_path)
+    done = pvid(tmp_path, "design", "--rig", "rig.toml", *arguments)
     assert done.returncode == 2
     assert named in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr

@@ -6,8 +6,6 @@ import contextlib
 import csv
 import json
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +17,7 @@ import pandas
 import pyarrow.parquet
 import pytest
 from mcap.reader import make_reader
+from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
@@ -216,11 +215,6 @@ def test_a_log_is_a_run(tmp_path: Path, log: Path) -> None:
     writer.close()
     with pytest.raises(PvidError, match="contains no description of the board"):
         run_of_log(tmp_path / "empty.pvlog")
-
-
-def pvid(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pvid", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
 
 
 def test_identify_and_export_take_a_log(tmp_path: Path, log: Path) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +11,7 @@ from typing import Any
 import field_board
 import numpy as np
 import pytest
+from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.board.target import HOST_TARGET
@@ -329,11 +328,6 @@ def test_empty_log_is_reported(tmp_path: Path) -> None:
 
 
 # ---- the program
-
-
-def pvid(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pvid", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
 
 
 def altered(log: Path, out: Path, change: Callable[[link.Message], link.Message | None], behind: int) -> int:

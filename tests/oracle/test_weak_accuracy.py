@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -12,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linear_rig import LINEAR_RIG
+from program import pvid
 
 from bench.weak import LSB_14, Case, Outcome, cramer_rao, run_case
 from pvid.core.native import Native
@@ -159,17 +158,13 @@ def test_an_hour_without_a_drive_changes_no_bit_of_the_estimate(native: Native) 
 
 
 def test_the_command_line_publishes_the_zero(tmp_path: Path) -> None:
-    def pvid(*arguments: str) -> str:
-        command = [sys.executable, "-P", "-m", "pvid", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True).stdout
-
-    pvid("simulate", "run.csv", "--truth", "linear", "--zero", "0.02", "--duration", "20")
-    answer = json.loads(pvid("identify", "run.csv", "--rig", "run.toml", "--json"))
+    pvid(tmp_path, "simulate", "run.csv", "--truth", "linear", "--zero", "0.02", "--duration", "20")
+    answer = json.loads(pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--json").stdout)
     assert answer["form"] == "weak"
     # the encoder's grid lies within half an LSB of the zero, at random
     assert answer["c"]["value"] == pytest.approx(0.02, abs=LSB_14)
     assert 0 < answer["c"]["se"] < LSB_14
-    assert pvid("compare", "run.csv", "--rig", "run.toml").count("equal") == 2
+    assert pvid(tmp_path, "compare", "run.csv", "--rig", "run.toml").stdout.count("equal") == 2
 
 
 @pytest.mark.parametrize("bits", [12, 14, 16])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from program import pvid
 
 from bench.tuning import CASES, Case, errors
 from pvid.base.errors import PvidError
@@ -247,21 +246,16 @@ def test_untunable_run_is_reported(native: Native) -> None:
 # ---- the command
 
 
-def pvid(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-P", "-m", "pvid", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
-
-
 def test_the_command_writes_a_rig_file_that_identifies(tmp_path: Path) -> None:
     write_run(tmp_path / "run.csv", simulate(sensors=standard_sensors(13), truth="full", duration=SHORT_S, seed=4).run)
     (tmp_path / "run.toml").write_text("l1 = 0.3\n", encoding="utf-8")
-    done = pvid("tune", "run.csv", cwd=tmp_path)
+    done = pvid(tmp_path, "tune", "run.csv")
     assert done.returncode == 0, done.stderr
     for words in ("held back", "window s", "chosen:", "identifies w", "run-tuned.toml", "phi moves in steps of"):
         assert words in done.stdout
     written = load(tmp_path / "run-tuned.toml")
     assert RigFile.parse(written.text()) == written
-    again = pvid("identify", "run.csv", "--rig", "run-tuned.toml", cwd=tmp_path)
+    again = pvid(tmp_path, "identify", "run.csv", "--rig", "run-tuned.toml")
     assert again.returncode == 0, again.stderr
 
 
@@ -275,7 +269,7 @@ def test_the_command_writes_a_rig_file_that_identifies(tmp_path: Path) -> None:
 def test_bad_input_is_one_sentence(content: str, arguments: tuple[str, ...], named: str, tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text(content, encoding="utf-8")
     RigFile.standard().write(tmp_path / "rig.toml")
-    done = pvid("tune", "run.csv", *arguments, cwd=tmp_path)
+    done = pvid(tmp_path, "tune", "run.csv", *arguments)
     assert done.returncode == 2, done.stdout
     assert named in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from program import pvid
 
 from pvid.core.sources import INCLUDES, core_sources, source
 from pvid.settings.bounds import SIZES
@@ -29,17 +28,6 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recorded")
     assert pvid(folder, "simulate", "run.csv", "--duration", "2", "--bits", "20").returncode == 0
     return folder
-
-
-def pvid(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-P", "-m", "pvid", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        env={**os.environ, **environment},
-        check=False,
-    )
 
 
 @pytest.mark.parametrize("name", MUTANTS)

@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lanes import assert_lanes_equal
 from linear_rig import LINEAR_RIG
-from strong_lanes import strong_lanes
 
 from pvid.base.errors import PvidError
 from pvid.cases import CASES, case_of
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare import compare_run, first_difference
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
 from pvid.settings.q31 import GateConfigQ31
@@ -178,15 +177,8 @@ def test_the_core_equals_its_twin(
     config, samples = case.settings(rig, 1000.0), case.samples(rig, jolted)
     if case.form == "strong":
         samples = samples[0][28_500:31_000], samples[1][28_500:31_000]
-    twin = case.twin(config)
-    expected = twin.run(*samples)
-    for native in matrix.values():
-        one = native.identifier(config)
-        record = one.run(*samples, hashes=False)
-        assert first_difference(record, expected.lane()) is None, native.build
-        assert one.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
-        assert (record.reason == OUTLIER).sum() == one.counters["rejected_outlier"] > 0
-        assert not one.publishes or one.estimate.tobytes() == twin.trust.estimate[0].tobytes()
+    (lane,) = assert_lanes_equal(matrix.values(), config, *samples)
+    assert (lane.record.reason == OUTLIER).sum() == lane.counters["rejected_outlier"] > 0
 
 
 def test_the_strong_form_equals_its_twin_in_every_lane(matrix: dict[str, Native], jolted: Run) -> None:
@@ -194,8 +186,8 @@ def test_the_strong_form_equals_its_twin_in_every_lane(matrix: dict[str, Native]
     rig = rig_with(form="strong", stride=8, outlier_gate=6.0, outlier_patience_s=5.0)
     config = strong_config(rig, 1000.0)
     lanes = [replace(config.estimator, forgetting_s=tau, feedback_hz=f) for tau in (0.0, 2.0) for f in (0.0, 10.0)]
-    for counters, reason in strong_lanes(config, lanes, phi, y, matrix):
-        assert counters["rejected_outlier"] == (reason == OUTLIER).sum() > 0
+    for lane in assert_lanes_equal(matrix.values(), config, phi, y, lanes):
+        assert lane.counters["rejected_outlier"] == (lane.record.reason == OUTLIER).sum() > 0
 
 
 @pytest.mark.parametrize("core", CORES)
@@ -225,10 +217,7 @@ def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
     y = np.rint(2000 * np.sin(2 * np.pi * 4.0 * t / 1000)).astype(np.int64)
     phi = np.where(y > 0, bank.phi_max, -bank.phi_max).astype(np.int64)
     config = replace(config, drive_min=0)
-    assert compare_run(native, config, phi, y).equal
-    core = native.identifier(config)
-    core.run(phi, y, hashes=False)
-    assert core.counters["rejected_saturated"] > 0
+    assert assert_lanes_equal([native], config, phi, y)[0].counters["rejected_saturated"] > 0
 
 
 @pytest.mark.parametrize("core", CORES)

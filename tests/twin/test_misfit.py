@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from strong_lanes import strong_lanes
+from lanes import assert_lanes_equal
 
 from pvid.cases import CASES
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare import first_difference
 from pvid.run.identify import identify
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start, strong_config
@@ -56,15 +55,16 @@ def changed() -> Run:
     return replace(before, phi=np.where(np.arange(len(before.phi)) < CHANGE, before.phi, after.phi))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["stationary", "pseudovelocity"])
 def test_float32_equals_its_twin_under_the_alarm(law: str, matrix: dict[str, Native], changed: Run) -> None:
-    phi, y = changed.phi[:2000], changed.y[:2000]
     config = strong_config(rig_of(FINE_BITS, law=law), SLOW_HZ)
     lanes = [replace(config.estimator, forgetting_s=tau, feedback_hz=f) for tau in (0.0, 1.0) for f in (0.0, 10.0)]
-    counters, _ = strong_lanes(config, lanes, phi, y, matrix)[0]
-    assert counters["misfits"] > 0
+    compared = assert_lanes_equal(matrix.values(), config, changed.phi[:2000], changed.y[:2000], lanes)
+    assert compared[0].counters["misfits"] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "identifier",
     [{}, {"forgetting_s": 1.0, "outlier_gate": 0.0}, {"feedback_hz": 0.0, "divider": 3}, {"law": "pseudovelocity"}],
@@ -74,14 +74,8 @@ def test_fixed_point_equals_its_twin_under_the_alarm(
 ) -> None:
     rig = rig_of(FINE_BITS, **identifier)
     phi, y = (counts[:2000] for counts in counts_of(rig, changed))
-    config = strong_config_q31(rig, SLOW_HZ)
-    twin = StrongTwinQ31(config)
-    expected = twin.run(phi, y)
-    assert twin.estimator.counters["misfits"][0] > 0
-    for native in matrix.values():
-        core = native.identifier(config)
-        assert first_difference(core.run(phi, y, hashes=False), expected.lane()) is None, native.build
-        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+    (lane,) = assert_lanes_equal(matrix.values(), strong_config_q31(rig, SLOW_HZ), phi, y)
+    assert lane.counters["misfits"] > 0
 
 
 @both_cores

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 import pytest
+from lanes import assert_lanes_equal
 
 from pvid.core.native import Native
 from pvid.rig.file import Differentiator, RigFile
@@ -17,7 +18,6 @@ from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, StrongConfigQ31
 from pvid.setup.q31 import counts_of, strong_config_q31
 from pvid.sim.pendulum import STANDARD_DRIVE, Drive, Simulation, simulate, standard_sensors, standard_start
-from pvid.twin import fnv
 from pvid.twin.kapitza import strong_q31 as kapitza_strong_q31
 from pvid.twin.q31.estimator import EstimatorQ31
 from pvid.twin.rows import run_rows
@@ -54,23 +54,9 @@ def counts(run: Run) -> tuple[Counts, Counts]:
     return counts_of(rig_of(), run)
 
 
-def assert_equal(
-    natives: list[Native], config: StrongConfigQ31, phi: Counts, y: Counts
-) -> tuple[StrongTwinQ31, npt.NDArray[np.uint8]]:
-    """Runs every build and the twin; returns the twin and its reasons."""
-    twin = StrongTwinQ31(config)
-    expected = twin.run(phi, y)
-    hashes = fnv.running_hashes(expected.lane())
-    for native in natives:
-        core = native.identifier(config)
-        record = core.run(phi, y)
-        assert first_difference(record, expected.lane()) is None, native.build
-        assert np.array_equal(record.hash, hashes), native.build
-        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
-        assert core.assess().tobytes() == twin.estimator.assess()[0].tobytes()
-        assert (record.p >= np.array(config.estimator.lower)).all()
-        assert (record.p <= np.array(config.estimator.upper)).all()
-    return twin, expected.reason[:, 0]
+def reasons_of(natives: list[Native], config: StrongConfigQ31, phi: Counts, y: Counts) -> npt.NDArray[np.uint8]:
+    """Compares every build with the twin; what every tick told."""
+    return assert_lanes_equal(natives, config, phi, y, hashed_ticks=len(phi))[0].record.reason
 
 
 @pytest.mark.parametrize("differentiator", STRIDE)
@@ -79,7 +65,7 @@ def test_the_whole_identifier_equals_the_twin_in_every_build(
 ) -> None:
     phi, y = counts(standard_20_bits.run)
     config = configuration(rig_of(differentiator))
-    _, reason = assert_equal([matrix[name] for name in BUILDS], config, phi[:3000], y[:3000])
+    reason = reasons_of([matrix[name] for name in BUILDS], config, phi[:3000], y[:3000])
     assert (reason == Reason.UPDATED).sum() >= 2700
 
 
@@ -93,10 +79,10 @@ def test_twenty_starts_with_both_laws_with_and_without_forgetting_equal_the_twin
     rigs = [rig_of(law=law, tau=tau) for law in LAWS for tau in (0.0, 2.0)]
     lanes = [configuration(rig, seed).estimator for rig in rigs for seed in range(STARTS)]
     assert len({(lane.gain, lane.forgetting_groups) for lane in lanes}) == 4
-    assert_lanes_equal(native, lanes, n[ready][:ticks], y[ready][:ticks])
+    assert_rows_equal(native, lanes, n[ready][:ticks], y[ready][:ticks])
 
 
-def assert_lanes_equal(native: Native, lanes: list[EstimatorConfigQ31], n: Counts, y: Counts) -> None:
+def assert_rows_equal(native: Native, lanes: list[EstimatorConfigQ31], n: Counts, y: Counts) -> None:
     twin = EstimatorQ31(lanes, kapitza_strong_q31.STRONG)
     cores = [native.estimator_q31(lane) for lane in lanes]
     for first in range(0, len(y), PIECE):
@@ -173,8 +159,8 @@ def hostile(name: str, config: StrongConfigQ31, ticks: int = 700) -> tuple[Count
 def test_hostile_counts_equal_the_twin(native: Native, name: str, differentiator: Differentiator) -> None:
     for law, tau in zip(LAWS, (0.0, 0.5), strict=True):
         config = configuration(rig_of(differentiator, law, tau))
-        assert_equal([native], config, *hostile(name, config))
-        assert_equal([native], replace(config, gate=GateConfigQ31(2 << 16, 50)), *hostile(name, config))
+        reasons_of([native], config, *hostile(name, config))
+        reasons_of([native], replace(config, gate=GateConfigQ31(2 << 16, 50)), *hostile(name, config))
 
 
 def test_hostile_counts_reach_the_arithmetic(native: Native) -> None:
@@ -206,7 +192,7 @@ def test_a_drive_that_comes_and_goes_equals_the_twin(native: Native) -> None:
     drive = Drive(STANDARD_DRIVE, on=((1.0, 2.0),))
     run = simulate(drive=drive, sensors=standard_sensors(20), duration=4.0).run
     config = strong_config_q31(rig_of(), 1000.0)
-    _, reason = assert_equal([native], config, *counts(run))
+    reason = reasons_of([native], config, *counts(run))
     assert set(reason[:1000]) == {Reason.WARMING_UP, Reason.HELD_NOT_EXCITED}
     assert (reason[1500:2000] == Reason.UPDATED).all()
 

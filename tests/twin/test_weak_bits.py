@@ -7,18 +7,17 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from lanes import assert_lanes_equal
 
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.design.weak import design
 from pvid.design.weak_sizing import Sizes
 from pvid.models.kapitza.physical import linear
-from pvid.run.compare import first_difference
 from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import EstimatorConfig, TrustConfig, WeakConfig
 from pvid.settings.record import Record
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
-from pvid.twin import fnv
 from pvid.twin.weak import WeakTwin
 
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
@@ -64,34 +63,17 @@ def configuration(zero_unknown: bool = True, sizes: Sizes | None = None) -> Weak
     return WeakConfig(1000.0, L1, tables, estimator(0, zero_unknown), zero_unknown=zero_unknown)
 
 
-def assert_lanes_equal(
+def records_of(
     natives: list[Native], config: WeakConfig, lanes: list[EstimatorConfig], phi: Samples, y: Samples
 ) -> list[Record]:
-    """Runs every build and one pass of the twin; returns the records of the last build."""
-    twin = WeakTwin(config, lanes)
-    expected = twin.run(phi, y)
-    records = []
-    for lane, one in enumerate(lanes):
-        own = expected.lane(lane)
-        hashes = fnv.running_hashes(own)
-        for native in natives:
-            core = native.identifier(replace(config, estimator=one))
-            record = core.run(phi, y)
-            assert first_difference(record, own) is None, native.build
-            assert np.array_equal(record.hash, hashes), native.build
-            assert core.counters == {name: int(of[lane]) for name, of in twin.estimator.counters.items()}
-            assert core.assess().tobytes() == twin.estimator.assess()[lane].tobytes()
-            assert core.estimate.tobytes() == twin.trust.estimate[lane].tobytes()
-            assert (core.published is not None) == twin.trust.published[lane]
-            assert np.isfinite(record.p).all() and np.isfinite(record.sums).all()
-        records.append(record)
-    return records
+    """Compares every build with the twin, the running hash at every tick; the records of the last build."""
+    return [lane.record for lane in assert_lanes_equal(natives, config, phi, y, lanes, len(phi))]
 
 
 def test_twelve_lanes_equal_the_twin_in_every_build(matrix: dict[str, Native], standard_14_bits: Simulation) -> None:
     run = standard_14_bits.run
     lanes = [replace(estimator(seed), forgetting_s=tau) for seed in range(4) for tau in (0.0, 5.0, 40.0)]
-    records = assert_lanes_equal([matrix[name] for name in BUILDS], configuration(), lanes, run.phi, run.y)
+    records = records_of([matrix[name] for name in BUILDS], configuration(), lanes, run.phi, run.y)
     for record in records:
         # a window every 0.855 s; this configuration takes the pivot's sensor for exact
         assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 19
@@ -109,7 +91,7 @@ def test_the_correction_equals_the_twin_in_every_build(
     lanes = [with_friction(estimator(seed)) if friction else estimator(seed) for seed in range(3)]
     config = replace(configuration(), full_angle=full_angle, friction=friction, angle_limit=0.12)
     config = replace(config, trust=TrustConfig(misfit_max=6.0))
-    records = assert_lanes_equal([matrix[name] for name in BUILDS], config, lanes, run.phi, run.y)
+    records = records_of([matrix[name] for name in BUILDS], config, lanes, run.phi, run.y)
     for record in records:
         assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 14
         assert record.published[-1, :3] == pytest.approx(STANDARD_PENDULUM.linear, rel=0.02)
@@ -118,7 +100,7 @@ def test_the_correction_equals_the_twin_in_every_build(
 def test_the_correction_of_hostile_samples_equals_the_twin(native: Native, standard_14_bits: Simulation) -> None:
     phi, y = hostile(standard_14_bits)
     config = replace(configuration(), full_angle=True, friction=True)
-    assert_lanes_equal([native], config, [with_friction(estimator(seed)) for seed in range(3)], phi, y)
+    records_of([native], config, [with_friction(estimator(seed)) for seed in range(3)], phi, y)
 
 
 def test_a_zeroed_encoder_equals_the_twin_in_every_build(
@@ -127,7 +109,7 @@ def test_a_zeroed_encoder_equals_the_twin_in_every_build(
     run = standard_14_bits.run
     lanes = [estimator(seed, zero_unknown=False) for seed in range(3)]
     config = replace(configuration(zero_unknown=False), iterations=2)
-    assert_lanes_equal([matrix[name] for name in BUILDS], config, lanes, run.phi[:8000], run.y[:8000])
+    records_of([matrix[name] for name in BUILDS], config, lanes, run.phi[:8000], run.y[:8000])
 
 
 @pytest.mark.parametrize(
@@ -139,7 +121,7 @@ def test_laws_and_divider_equal_the_twin(
 ) -> None:
     run = standard_14_bits.run
     lanes = [replace(estimator(seed), law=law, feedback_hz=feedback_hz, divider=divider) for seed in range(3)]
-    assert_lanes_equal([native], configuration(), lanes, run.phi[:10000], run.y[:10000])
+    records_of([native], configuration(), lanes, run.phi[:10000], run.y[:10000])
 
 
 @pytest.mark.parametrize(
@@ -156,7 +138,7 @@ def test_laws_and_divider_equal_the_twin(
 )
 def test_every_size_equals_the_twin(native: Native, standard_14_bits: Simulation, sizes: Sizes) -> None:
     run = standard_14_bits.run
-    records = assert_lanes_equal([native], configuration(sizes=sizes), [estimator(0)], run.phi[:8000], run.y[:8000])
+    records = records_of([native], configuration(sizes=sizes), [estimator(0)], run.phi[:8000], run.y[:8000])
     assert (records[0].reason != Reason.WARMING_UP).any()
 
 
@@ -168,7 +150,7 @@ def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
     config = WeakConfig(200.0, L1, tables, with_friction(estimator(0)), full_angle=True, friction=True)
     assert tables.window == 61
     assert WeakTwin(config).stages_per_tick >= 8
-    record = assert_lanes_equal([native], config, [config.estimator], run.phi, run.y)[0]
+    record = records_of([native], config, [config.estimator], run.phi, run.y)[0]
     assert (record.reason == Reason.HELD_UNCERTAIN).any()  # windows are worked off, short as they are
 
 
@@ -195,7 +177,7 @@ def test_hostile_samples_equal_the_twin(
     phi, y = hostile(standard_14_bits)
     config = replace(configuration(), drive_min=drive_min)
     lanes = [replace(estimator(seed), kappa_min=kappa_min) for seed in range(3)]
-    records = assert_lanes_equal([native], config, lanes, phi, y)
+    records = records_of([native], config, lanes, phi, y)
     rejected = np.flatnonzero(records[0].reason == Reason.REJECTED_NOT_FINITE)
     assert set(np.flatnonzero(~(np.isfinite(phi) & np.isfinite(y)))) <= set(rejected)
 
@@ -210,7 +192,7 @@ def test_absurd_parameters_stay_finite_and_equal_the_twin(native: Native, standa
         upper=np.array([1e30, 1e30, 1e30, 1], np.float32),
         kappa_min=0.0,
     )
-    assert_lanes_equal([native], configuration(), [absurd], run.phi[:8000], run.y[:8000])
+    records_of([native], configuration(), [absurd], run.phi[:8000], run.y[:8000])
 
 
 def test_without_motion_or_drive_p_does_not_move(native: Native, standard_14_bits: Simulation) -> None:
@@ -218,7 +200,7 @@ def test_without_motion_or_drive_p_does_not_move(native: Native, standard_14_bit
     config = replace(configuration(), drive_min=0.4)
     still = np.zeros(8000)
     for phi, drive in ((still, still), (standard_14_bits.run.phi[:8000], still), (still, y)):
-        record = assert_lanes_equal([native], config, [estimator(0)], phi, drive)[0]
+        record = records_of([native], config, [estimator(0)], phi, drive)[0]
         assert np.array_equal(record.p[-1, :3], estimator(0).start[:3])
         assert (record.reason == Reason.HELD_NOT_EXCITED).any()
 
@@ -227,7 +209,7 @@ def test_a_pause_of_the_drive_freezes_p_and_the_sums(native: Native, standard_14
     phi, y = standard_14_bits.run.phi, standard_14_bits.run.y.copy()
     y[8000:16000] = y[8000]
     config = replace(configuration(), drive_min=0.4)
-    record = assert_lanes_equal([native], config, [estimator(0)], phi, y)[0]
+    record = records_of([native], config, [estimator(0)], phi, y)[0]
     # the last window that saw the drive is complete 1.79 s after it stops, and worked off 0.3 s later
     paused = slice(8000 + 2100, 16000)
     assert (record.p[paused] == record.p[paused.start]).all()

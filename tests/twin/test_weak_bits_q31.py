@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from lanes import assert_lanes_equal
 
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
-from pvid.run.compare import first_difference
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, WeakConfigQ31
-from pvid.settings.record import Record
 from pvid.setup.q31 import counts_of, p_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
-from pvid.twin import fnv
 from pvid.twin.weak_q31 import WeakTwinQ31
 
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
@@ -42,12 +40,7 @@ def configuration(seed: int = 0, zero_unknown: bool = True, **identifier: Any) -
     return weak_config_q31(rig, 1000.0, standard_start(seed))
 
 
-def first_ticks(record: Record, ticks: int) -> Record:
-    """The beginning of a run."""
-    return Record(record.p[:ticks], record.sums[:ticks], record.reason[:ticks], record.exponent[:ticks])
-
-
-def assert_lanes_equal(
+def compared(
     natives: list[Native],
     config: WeakConfigQ31,
     lanes: list[EstimatorConfigQ31],
@@ -56,32 +49,16 @@ def assert_lanes_equal(
     *,
     hashed_ticks: int = HASHED_TICKS,
 ) -> WeakTwinQ31:
-    """Runs every build and one pass of the twin: every integer after every tick, and the running hash in every lane
-    for its first ticks (it is a function of these integers, and slow in Python)."""
-    twin = WeakTwinQ31(config, lanes)
-    expected = twin.run(phi, y)
-    assessed = twin.estimator.assess()
-    for lane, one in enumerate(lanes):
-        own = expected.lane(lane)
-        hashes = fnv.running_hashes(first_ticks(own, hashed_ticks))
-        for native in natives:
-            core = native.identifier(replace(config, estimator=one))
-            record = core.run(phi, y)
-            assert first_difference(record, own) is None, native.build
-            assert np.array_equal(record.hash[:hashed_ticks], hashes)
-            assert core.running_hash == record.hash[-1]
-            assert core.estimate.tobytes() == twin.trust.estimate[lane].tobytes()
-            assert core.counters == {name: int(of[lane]) for name, of in twin.estimator.counters.items()}
-            assert core.assess().tobytes() == assessed[lane].tobytes()
-            assert (record.p >= np.array(one.lower)).all() and (record.p <= np.array(one.upper)).all()
+    """Compares every build with the twin, and returns that."""
+    twin: WeakTwinQ31 = assert_lanes_equal(natives, config, phi, y, lanes, hashed_ticks)[0].twin
     return twin
 
 
 def test_twenty_starts_equal_the_twin_in_every_build(matrix: dict[str, Native], counts: tuple[Counts, Counts]) -> None:
     lanes = [configuration(seed).estimator for seed in range(20)]
     config = configuration()
-    twin = assert_lanes_equal([matrix[name] for name in BUILDS], config, lanes, *counts)
-    assert_lanes_equal([matrix["gcc-O2"]], config, lanes[:1], *counts, hashed_ticks=len(counts[0]))
+    twin = compared([matrix[name] for name in BUILDS], config, lanes, *counts)
+    compared([matrix["gcc-O2"]], config, lanes[:1], *counts, hashed_ticks=len(counts[0]))
     # from every start: 1.5 times what the standard errors of this run promise
     assert p_of(config, twin.estimator.p.T)[:, :3] == pytest.approx(
         np.tile(STANDARD_PENDULUM.linear, (20, 1)), rel=0.001
@@ -92,7 +69,7 @@ def test_twenty_starts_equal_the_twin_in_every_build(matrix: dict[str, Native], 
 def test_forgetting_equals_the_twin(native: Native, counts: tuple[Counts, Counts], forgetting_s: float) -> None:
     lanes = [configuration(seed, forgetting_s=forgetting_s).estimator for seed in range(3)]
     assert lanes[0].forgetting_groups > 0
-    assert_lanes_equal([native], configuration(), lanes, *counts)
+    compared([native], configuration(), lanes, *counts)
 
 
 def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
@@ -102,13 +79,13 @@ def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
     config = weak_config_q31(replace(RIG, identifier=settings), 200.0, standard_start(0))
     assert config.design.window == 61
     assert WeakTwinQ31(config).stages_per_tick >= 5
-    twin = assert_lanes_equal([native], config, [config.estimator], *counts_of(RIG, run))
+    twin = compared([native], config, [config.estimator], *counts_of(RIG, run))
     assert twin.estimator.counters["updates"][0] > 0
 
 
 def test_a_zeroed_encoder_equals_the_twin(native: Native, counts: tuple[Counts, Counts]) -> None:
     lanes = [configuration(seed, zero_unknown=False).estimator for seed in range(3)]
-    assert_lanes_equal([native], configuration(zero_unknown=False), lanes, *counts)
+    compared([native], configuration(zero_unknown=False), lanes, *counts)
 
 
 @pytest.mark.parametrize(("gain", "divider"), [(0, 1), (2**28, 1), (2**30, 3)])
@@ -116,7 +93,7 @@ def test_laws_and_divider_equal_the_twin(
     native: Native, counts: tuple[Counts, Counts], gain: int, divider: int
 ) -> None:
     lanes = [replace(configuration(seed).estimator, gain=gain, divider=divider) for seed in range(3)]
-    assert_lanes_equal([native], configuration(), lanes, *(c[:15000] for c in counts))
+    compared([native], configuration(), lanes, *(c[:15000] for c in counts))
 
 
 @pytest.mark.parametrize(
@@ -126,7 +103,7 @@ def test_other_sizes_equal_the_twin(native: Native, counts: tuple[Counts, Counts
     functions = {"test_functions": 4} if "decimation" in sizes else {}
     config = configuration(**{**sizes, **functions})
     # after so many ticks no window is in work, whose solves the core counts before the twin does
-    assert_lanes_equal([native], config, [config.estimator], *(c[:8020] for c in counts))
+    compared([native], config, [config.estimator], *(c[:8020] for c in counts))
 
 
 HOSTILE = (
@@ -194,9 +171,9 @@ def test_hostile_counts_equal_the_twin(native: Native, name: str) -> None:
     config = configuration()
     for tau in (0.0, 5.0):
         lanes = [configuration(seed, forgetting_s=tau).estimator for seed in range(2)]
-        assert_lanes_equal([native], config, lanes, *hostile(name, config))
+        compared([native], config, lanes, *hostile(name, config))
     gated = replace(config, gate=GateConfigQ31(2 << 16, 20))
-    assert_lanes_equal([native], gated, [config.estimator], *hostile(name, config))
+    compared([native], gated, [config.estimator], *hostile(name, config))
 
 
 def test_a_quarter_of_full_scale_in_phase_becomes_rows(native: Native) -> None:
