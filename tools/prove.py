@@ -196,7 +196,7 @@ PROOFS = (
             *("-inline-calls", "is_within", "-eva-domains", "equality", "-eva-slevel-function"),
             "main:50,any_configuration:200,any_tick:200,prepare:100,pvid_strong_init_q31:100,pvid_gate_init_q31:50,"
             "row_is_valid:5,shifts_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,pvid_kapitza_strong_row_q31:30,"
-            "take:4,take_powers:20,pvid_estimator_terms_q31:4,take_row:20,pvid_differentiator_step_q31:5,"
+            "round_entry:4,row_powers:20,pvid_estimator_terms_q31:4,take_row:20,pvid_differentiator_step_q31:5,"
             "pvid_gate_passes_q31:5",
         ),
         taken=(

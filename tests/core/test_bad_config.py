@@ -18,6 +18,7 @@ from configurations import HEADERS, HUGE, IDENTIFIERS, RANGES, RIG, SIZES, SMALL
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pvid.base.errors import PvidError
 from pvid.core.headers import Scalar
 from pvid.core.native import Identifier, Native
 from pvid.settings.enums import Law, Status
@@ -146,6 +147,11 @@ def test_a_field_out_of_its_range_is_refused_by_name(
         assert_finite(subject, *samples[subject.identifier.core])
 
 
+def test_a_refusal_is_an_error_that_names_the_field(native: Native) -> None:
+    with pytest.raises(PvidError, match="refused the configuration: bad length"):
+        native.identifier(replace(weak_config(RIG, 1000.0), l1=math.nan))
+
+
 # ---- tables ----
 
 
@@ -182,12 +188,21 @@ def test_a_table_that_would_overflow_is_refused(empty: dict[str, Subject]) -> No
     assert subject.identifier.initialise() is Status.OK
 
 
+def test_a_weight_that_no_full_scale_fits_is_refused(empty: dict[str, Subject]) -> None:
+    subject = empty["strong q31"]
+    entries = subject.entries["bank.weights"]
+    for place, status in ((0, Status.BAD_FULL_SCALE), (entries - 1, Status.BAD_FULL_SCALE), (entries, Status.OK)):
+        subject.tables["bank.weights"][place] = LEAST
+        assert subject.identifier.initialise() is status, place
+        subject.tables["bank.weights"][place] = 0
+
+
 def test_full_scale_ends_where_a_product_would_overflow(shared: dict[str, Subject]) -> None:
     # the five points' fourth derivative: its outermost products are 48 times four full scales, and fit 32 bits
     subject = shared["strong q31"]
     shifts = {name: 2 for name in subject.fields if name.startswith(("bank.phi_shift", "bank.y_shift"))}
+    limit = (2**31 - 1) // (48 * 4)
     for name in ("bank.phi_max", "bank.y_max"):
-        limit = (2**31 - 1) // (48 * 4)
         assert subject.status_with({**shifts, name: limit}) is Status.OK
         assert subject.status_with({**shifts, name: limit + 1}) is Status.BAD_FULL_SCALE
 

@@ -9,9 +9,11 @@ from dataclasses import asdict
 import numpy as np
 import numpy.typing as npt
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pvid.cli.main import commands
 from pvid.core.native import Native
 from pvid.models.kapitza.physical import linear, physical
 from pvid.models.model import Mechanism, Model
@@ -163,3 +165,11 @@ def test_physical_parameters_are_the_fields_of_the_struct_of_the_core(native: Na
     for core in ("f32", "q31"):
         fields = native.headers.ffi.typeof(f"pvid_{model.name}_{core}").fields
         assert [name for name, _ in fields] == list(model.physical_names)
+
+
+def test_the_command_lists_every_model_with_its_quantities() -> None:
+    listed = CliRunner().invoke(commands, ["models"], standalone_mode=False)
+    assert listed.return_value == 0
+    for model in MODELS.values():
+        for name in (model.name, *model.p_names, *model.physical_names):
+            assert f" {name} " in listed.output

@@ -74,8 +74,8 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     (void)pvid_trust_judge_q31(&trust, &estimator, (pvid_reason)any_i32(PVID_UPDATED, PVID_HELD_FROZEN),
                                any_i64(0, (int64_t)1 << 62), any_bool(), any_i64(-INT64_MAX, INT64_MAX), &candidate);
     /*@ assert -VARIANCE_RATIO_MAX <= trust.long_mean <= VARIANCE_RATIO_MAX; */
-    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> -VARIANCE_RATIO_MAX <= trust.recent[i] <=
-     * VARIANCE_RATIO_MAX; */
+    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] >= -VARIANCE_RATIO_MAX; */
+    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] <= VARIANCE_RATIO_MAX; */
     /*@ assert trust.next < PVID_TRUST_SHORT; */
 }
 

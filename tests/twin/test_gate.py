@@ -1,7 +1,8 @@
-"""The outlier gate: its bits, what it keeps out, what it lets in again, and where it is on."""
+"""The outlier gate of both cores: its bits, its rule, what it keeps out, what it lets in again, and where it is on."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -13,19 +14,24 @@ from linear_rig import LINEAR_RIG
 from strong_lanes import strong_lanes
 
 from pvid.base.errors import PvidError
+from pvid.cases import CASES, case_of
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare import first_difference
-from pvid.settings.enums import Reason, Status
+from pvid.run.compare import compare_run, first_difference
+from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
+from pvid.settings.q31 import GateConfigQ31
 from pvid.setup.f32 import strong_config, weak_config
+from pvid.setup.q31 import gate_config_q31, strong_config_q31, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.twin.f32.gate import Gate
-from pvid.twin.weak import WeakTwin
+from pvid.twin.q31.gate import GateQ31
+from pvid.twin.q31.scaled import Scaled, scaled
 
 RIG = LINEAR_RIG
 OUTLIER = Reason.REJECTED_OUTLIER
+CORES = ("f32", "q31")
 
 
 def rig_with(**identifier: Any) -> RigFile:
@@ -42,7 +48,7 @@ def jolted() -> Run:
     return replace(run, phi=phi)
 
 
-# ---- the rule itself ----
+# ---- the rule in float32 ----
 
 
 def gate(sigmas: float, patience_s: float = 0.0, memory: float = 10.0, floor: float = 1.0) -> Gate:
@@ -107,25 +113,80 @@ def test_gate_scale_stays_finite(squares: list[float], patience: float) -> None:
     assert feed(one, float("inf"), 1) == 1
 
 
+# ---- the rule in fixed point ----
+
+
+def one_lane(value: float) -> Scaled:
+    mantissa, exponent = np.frexp(np.array([value]))
+    return scaled(np.rint(mantissa * 2**30).astype(np.int64), exponent.astype(np.int64) - 30)
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    squares=st.lists(st.floats(-6, 6), min_size=1, max_size=60),
+    patience=st.sampled_from([0.0, 0.5, 10.0]),
+    sigmas=st.sampled_from([2.0, 4.0, 1000.0]),
+)
+def test_scale_follows_that_of_float32(squares: list[float], patience: float, sigmas: float) -> None:
+    config = GateConfig(sigmas, patience)
+    single = Gate(config, np.float32(100.0), np.float32(10.0), np.array([1.0], np.float32))
+    integer = GateQ31(gate_config_q31(config, 100.0), 10, one_lane(1.0))
+    for power in squares:
+        square = np.float32(10.0**power)
+        limit = float(single.limit * single.scale[0])
+        expected = bool(single.passes(np.array([square]))[0])
+        if abs(float(square) / limit - 1) > 1e-4:  # else rounding may decide
+            assert bool(integer.passes(one_lane(float(square)))[0]) == expected
+        elif bool(integer.passes(one_lane(float(square)))[0]) != expected:
+            return
+        scale = float(integer.scale.m[0]) * 2.0 ** float(integer.scale.e[0])
+        assert scale == pytest.approx(float(single.scale[0]), rel=1e-4)  # 60 float32 roundings, and ln 1e4 to 3e-6
+
+
+def test_disabled_gate_accepts_and_keeps_scale() -> None:
+    gate = GateQ31(GateConfigQ31(4 << 16), 1, one_lane(1.0))
+    before = gate.scale
+    assert gate.passes(one_lane(1e9), np.zeros(1, np.bool_)).all()
+    assert gate.judged[0] == 0
+    assert (gate.scale.m == before.m).all() and (gate.scale.e == before.e).all()
+
+
 # ---- in the identifiers ----
 
 
-@pytest.mark.parametrize("patience_s", [0.0, 2.0])
-@pytest.mark.parametrize("correction", [False, True])
-def test_the_weak_form_equals_its_twin(
-    patience_s: float, correction: bool, matrix: dict[str, Native], jolted: Run
+WEAK = {"form": "weak", "outlier_gate": 4.0}
+PATIENT = {**WEAK, "outlier_patience_s": 2.0}
+CORRECTED = {"full_angle": True, "damping": True}
+STRONG = {"form": "strong", "stride": 8, "outlier_gate": 6.0, "forgetting_s": 2.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("core", "identifier"),
+    [
+        *(("f32", {**gate, **other}) for gate in (WEAK, PATIENT) for other in ({}, CORRECTED)),
+        ("q31", {**WEAK, "test_functions": 8}),
+        ("q31", {**PATIENT, "test_functions": 8, "zero": False}),
+        ("q31", STRONG),
+        ("q31", {**STRONG, "outlier_patience_s": 0.5}),
+    ],
+)
+def test_the_core_equals_its_twin(
+    core: str, identifier: dict[str, Any], matrix: dict[str, Native], jolted: Run
 ) -> None:
-    rig = rig_with(outlier_gate=4.0, outlier_patience_s=patience_s, full_angle=correction, damping=correction)
-    config = weak_config(rig, 1000.0)
-    twin = WeakTwin(config)
-    expected = twin.run(jolted.phi, jolted.y)
+    rig, case = rig_with(**identifier), CASES[identifier["form"], core]
+    config, samples = case.settings(rig, 1000.0), case.samples(rig, jolted)
+    if case.form == "strong":
+        samples = samples[0][28_500:31_000], samples[1][28_500:31_000]
+    twin = case.twin(config)
+    expected = twin.run(*samples)
     for native in matrix.values():
-        core = native.identifier(config)
-        record = core.run(jolted.phi, jolted.y, hashes=False)
+        one = native.identifier(config)
+        record = one.run(*samples, hashes=False)
         assert first_difference(record, expected.lane()) is None, native.build
-        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
-        assert core.counters["rejected_outlier"] > 0
-        assert (record.reason == OUTLIER).sum() == core.counters["rejected_outlier"]
+        assert one.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+        assert (record.reason == OUTLIER).sum() == one.counters["rejected_outlier"] > 0
+        assert not one.publishes or one.estimate.tobytes() == twin.trust.estimate[0].tobytes()
 
 
 def test_the_strong_form_equals_its_twin_in_every_lane(matrix: dict[str, Native], jolted: Run) -> None:
@@ -137,36 +198,46 @@ def test_the_strong_form_equals_its_twin_in_every_lane(matrix: dict[str, Native]
         assert counters["rejected_outlier"] == (reason == OUTLIER).sum() > 0
 
 
-def test_disturbed_windows_are_rejected(native: Native, jolted: Run) -> None:
-    errors = {}
+@pytest.mark.parametrize("core", CORES)
+def test_disturbed_windows_are_rejected(core: str, native: Native, jolted: Run) -> None:
+    errors, case = {}, CASES["weak", core]
     for sigmas in (0.0, 4.0):
-        core = native.identifier(weak_config(rig_with(outlier_gate=sigmas), 1000.0))
-        record = core.run(jolted.phi, jolted.y, sums=False)
-        errors[sigmas] = np.abs(record.published[-1, :3] / STANDARD_PENDULUM.linear - 1).max()
+        rig = rig_with(outlier_gate=sigmas)
+        config = case.settings(rig, 1000.0)
+        record = native.identifier(config).run(*case.samples(rig, jolted))
+        errors[sigmas] = np.abs(case.p_of(config, record.published[-1])[:3] / STANDARD_PENDULUM.linear - 1).max()
         refused = np.flatnonzero(record.reason == OUTLIER)
         # each lies in two or three windows of 1.71 s, and nothing else is refused
         assert len(refused) == 0 if sigmas == 0.0 else 4 <= len(refused) <= 6
         assert np.isin(refused // 1000, (25, 26, 27, 30, 31, 32)).all()
+        for tick in refused:  # and it changes nothing but its counter
+            assert np.array_equal(record.p[tick - 300], record.p[tick])
+            assert np.array_equal(record.sums[tick - 300], record.sums[tick])
     assert errors[4.0] < 5e-4 < errors[0.0]
 
 
-def test_a_refused_window_changes_nothing_but_its_counter(native: Native, jolted: Run) -> None:
-    core = native.identifier(weak_config(rig_with(outlier_gate=4.0), 1000.0))
-    record = core.run(jolted.phi, jolted.y)
-    for tick in np.flatnonzero(record.reason == OUTLIER):
-        assert np.array_equal(record.p[tick - 300], record.p[tick])
-        assert np.array_equal(record.sums[tick - 300], record.sums[tick])
+def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
+    """A row beyond its formats is not an outlier, and the gate never sees it."""
+    rig = rig_with(form="strong", stride=8, outlier_gate=2.0)
+    config = strong_config_q31(rig, 1000.0)
+    bank = config.design.bank
+    t = np.arange(1500)
+    y = np.rint(2000 * np.sin(2 * np.pi * 4.0 * t / 1000)).astype(np.int64)
+    phi = np.where(y > 0, bank.phi_max, -bank.phi_max).astype(np.int64)
+    config = replace(config, drive_min=0)
+    assert compare_run(native, config, phi, y).equal
+    core = native.identifier(config)
+    core.run(phi, y, hashes=False)
+    assert core.counters["rejected_saturated"] > 0
 
 
-def test_gate_is_enabled_in_the_stationary_law_and_can_be_disabled(native: Native, jolted: Run) -> None:
-    for form, sigmas in (("weak", 4.0), ("strong", 6.0)):
-        of = weak_config if form == "weak" else strong_config
-        assert of(rig_with(form=form, stride=8), 1000.0).gate == GateConfig(sigmas, 0.0)
-        assert of(rig_with(form=form, stride=8, law="pseudovelocity"), 1000.0).gate == GateConfig(0.0, 0.0)
-        assert of(rig_with(form=form, stride=8, outlier_gate=0.0), 1000.0).gate == GateConfig(0.0, 0.0)
-    assert (native.identifier(weak_config(RIG, 1000.0)).run(jolted.phi, jolted.y).reason == OUTLIER).any()
-    off = native.identifier(weak_config(rig_with(outlier_gate=0.0), 1000.0))
-    assert not (off.run(jolted.phi, jolted.y).reason == OUTLIER).any()
+@pytest.mark.parametrize("core", CORES)
+def test_gate_is_enabled_in_the_stationary_law_and_can_be_disabled(core: str, jolted: Run) -> None:
+    kind, one = (GateConfig, 1) if core == "f32" else (GateConfigQ31, 1 << 16)
+    for form, sigmas in (("weak", 4), ("strong", 6)):
+        for chosen, expected in (({}, sigmas), ({"law": "pseudovelocity"}, 0), ({"outlier_gate": 0.0}, 0)):
+            config = CASES[form, core].settings_for_run(rig_with(form=form, stride=8, **chosen), jolted)
+            assert config.gate == kind(expected * one, 0)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -182,21 +253,33 @@ def test_gate_rejects_nothing_of_a_regular_run(seed: int, native: Native) -> Non
     assert hashes[0] == hashes[1]
 
 
+# ---- settings ----
+
+
+def test_a_rig_file_s_gate_reaches_the_core_and_the_board(jolted: Run) -> None:
+    settings = {"outlier_gate": 4.5, "outlier_patience_s": 60.0}
+    weak = weak_config_q31(rig_with(**settings), 1000.0)
+    windows = 60.0 * 1000.0 / (weak.design.decimation * weak.hop)
+    assert weak.gate == GateConfigQ31(round(4.5 * 2**16), round(windows))
+    strong = strong_config_q31(rig_with(form="strong", stride=8, **settings), 1000.0)
+    assert strong.gate == GateConfigQ31(round(4.5 * 2**16), 60_000)
+    for config, groups in ((strong, 60_000), (weak, round(windows))):
+        header = " ".join(case_of(config).header(config, RIG.l1, config.form, "a test").split())
+        assert f".gate = {{ .sigmas = 294912u, .patience_groups = {groups}u, }}," in header
+
+
+def test_a_patience_that_cannot_be_counted_is_refused() -> None:
+    assert gate_config_q31(GateConfig(4.0, 1e-9), 1000.0).patience_groups == 1
+    assert gate_config_q31(GateConfig(4.0, 2.0**20), 1024.0).patience_groups == 2**30
+    with pytest.raises(PvidError, match=r"outlier_patience_s = 2e\+06 is too long for core q31"):
+        strong_config_q31(rig_with(form="strong", stride=8, outlier_gate=4.0, outlier_patience_s=2e6), 1000.0)
+
+
 @pytest.mark.parametrize("form", ["weak", "strong"])
-@pytest.mark.parametrize(
-    ("gate_config", "status"),
-    [
-        (GateConfig(1.9), Status.BAD_GATE_SIGMAS),
-        (GateConfig(-1.0), Status.BAD_GATE_SIGMAS),
-        (GateConfig(1.1e3), Status.BAD_GATE_SIGMAS),
-        (GateConfig(float("nan")), Status.BAD_GATE_SIGMAS),
-        (GateConfig(4.0, -1.0), Status.BAD_GATE_PATIENCE),
-        (GateConfig(4.0, float("inf")), Status.BAD_GATE_PATIENCE),
-    ],
-)
-def test_invalid_gate_is_refused(form: str, gate_config: GateConfig, status: Status, native: Native) -> None:
-    with pytest.raises(PvidError, match=status.name.lower().replace("_", " ")):
-        if form == "weak":
-            native.identifier(replace(weak_config(RIG, 1000.0), gate=gate_config))
-        else:
-            native.identifier(replace(strong_config(rig_with(form="strong", stride=8), 1000.0), gate=gate_config))
+@pytest.mark.parametrize(("forgetting_s", "sentence"), [(1e-9, "1e-09 is too short"), (1e9, "1e+09 is too long")])
+def test_a_forgetting_that_cannot_be_counted_is_refused_before_the_patience_that_follows_it(
+    form: str, forgetting_s: float, sentence: str
+) -> None:
+    config = {"weak": weak_config_q31, "strong": strong_config_q31}[form]
+    with pytest.raises(PvidError, match=re.escape(f"forgetting_s = {sentence} for core q31")):
+        config(rig_with(form=form, forgetting_s=forgetting_s), 1000.0)

@@ -1,4 +1,4 @@
-"""The strong form's verdict on itself: its bits, when it speaks and when it does not, and who hears of it."""
+"""The strong form's verdict on itself in both cores: its bits, when it raises the alarm, and what identify prints."""
 
 from __future__ import annotations
 
@@ -6,61 +6,102 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from strong_lanes import strong_lanes
 
+from pvid.cases import CASES
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
+from pvid.run.compare import first_difference
 from pvid.run.identify import identify
 from pvid.settings.enums import Reason
-from pvid.setup.f32 import strong_config
-from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
+from pvid.setup.f32 import nominal_start, strong_config
+from pvid.setup.q31 import counts_of, strong_config_q31
+from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
+from pvid.twin.kapitza import strong_q31 as kapitza_strong_q31
+from pvid.twin.q31.estimator import EstimatorQ31
+from pvid.twin.strong_q31 import StrongTwinQ31
 
-RATE_HZ = 1000.0
-CHANGE = 9_000  # tick
+SLOW_HZ = 125.0  # the default filter with one sample in eight: 31 points
+CHANGE = 9 * 125  # tick
+FINE_BITS = 22
+DOUBTED = (Reason.MISFIT, Reason.REJECTED_OUTLIER)
+both_cores = pytest.mark.parametrize("core", ("f32", "q31"))
 
 
-def rig_of(lsb: float, **identifier: Any) -> RigFile:
+def rig_of(bits: int, core: Any = "q31", **identifier: Any) -> RigFile:
     rig = RigFile.standard()
-    settings = replace(rig.identifier, form="strong", **identifier)
-    sensor = replace(rig.sensor, phi_lsb=lsb, y_lsb=rig.sensor.y_lsb if lsb > 0.0 else 0.0)
-    return replace(rig, identifier=settings, sensor=sensor)
+    settings = replace(rig.identifier, form="strong", core=core, **identifier)
+    return replace(rig, identifier=settings, sensor=replace(rig.sensor, phi_lsb=standard_sensors(bits).phi_lsb))
+
+
+def reasons_of(native: Native, rig: RigFile, run: Run) -> npt.NDArray[np.uint8]:
+    case = CASES["strong", rig.identifier.core]
+    core = native.identifier(case.settings(rig, run.sample_rate))
+    return core.run(*case.samples(rig, run), sums=False).reason
 
 
 @pytest.fixture(scope="module")
 def changed() -> Run:
-    """30 s with exact sensors; after 9 s w is larger by 20 %."""
+    """30 s at 125 Hz with a fine encoder; after 9 s w is larger by 20 %."""
+    sensors = replace(standard_sensors(FINE_BITS), random_offset=False)
     before, after = (
-        simulate(replace(STANDARD_PENDULUM, g=g), sensors=Sensors(), truth="linear", duration=30.0, seed=1).run
+        simulate(
+            replace(STANDARD_PENDULUM, g=g), sensors=sensors, truth="linear", sample_rate=SLOW_HZ, duration=30.0, seed=1
+        ).run
         for g in (STANDARD_PENDULUM.g, 1.2 * STANDARD_PENDULUM.g)
     )
     return replace(before, phi=np.where(np.arange(len(before.phi)) < CHANGE, before.phi, after.phi))
 
 
 @pytest.mark.parametrize("law", ["stationary", "pseudovelocity"])
-def test_the_core_equals_its_twin_under_the_alarm(law: str, matrix: dict[str, Native], changed: Run) -> None:
-    phi, y = changed.phi[:14_000], changed.y[:14_000]
-    config = strong_config(rig_of(0.0, stride=8, law=law), RATE_HZ)
+def test_float32_equals_its_twin_under_the_alarm(law: str, matrix: dict[str, Native], changed: Run) -> None:
+    phi, y = changed.phi[:2000], changed.y[:2000]
+    config = strong_config(rig_of(FINE_BITS, law=law), SLOW_HZ)
     lanes = [replace(config.estimator, forgetting_s=tau, feedback_hz=f) for tau in (0.0, 1.0) for f in (0.0, 10.0)]
     counters, _ = strong_lanes(config, lanes, phi, y, matrix)[0]
     assert counters["misfits"] > 0
 
 
-def test_change_that_sums_cannot_follow_raises_the_alarm(native: Native, changed: Run) -> None:
-    core = native.identifier(strong_config(rig_of(0.0, stride=8), RATE_HZ))
-    reason = core.run(changed.phi, changed.y, sums=False).reason
+@pytest.mark.parametrize(
+    "identifier",
+    [{}, {"forgetting_s": 1.0, "outlier_gate": 0.0}, {"feedback_hz": 0.0, "divider": 3}, {"law": "pseudovelocity"}],
+)
+def test_fixed_point_equals_its_twin_under_the_alarm(
+    identifier: dict[str, Any], matrix: dict[str, Native], changed: Run
+) -> None:
+    rig = rig_of(FINE_BITS, **identifier)
+    phi, y = (counts[:2000] for counts in counts_of(rig, changed))
+    config = strong_config_q31(rig, SLOW_HZ)
+    twin = StrongTwinQ31(config)
+    expected = twin.run(phi, y)
+    assert twin.estimator.counters["misfits"][0] > 0
+    for native in matrix.values():
+        core = native.identifier(config)
+        assert first_difference(core.run(phi, y, hashes=False), expected.lane()) is None, native.build
+        assert core.counters == {name: int(of[0]) for name, of in twin.estimator.counters.items()}
+
+
+@both_cores
+def test_change_that_sums_cannot_follow_raises_the_alarm(core: str, native: Native, changed: Run) -> None:
+    reason = reasons_of(native, rig_of(FINE_BITS, core), changed)
     assert not (reason[:CHANGE] == Reason.MISFIT).any()
-    assert np.isin(reason[CHANGE + 4_000 :], (Reason.MISFIT, Reason.REJECTED_OUTLIER)).all()
-    assert (reason[-8_000:] == Reason.MISFIT).any()
+    assert np.isin(reason[CHANGE + 500 :], DOUBTED).all()
+    assert (reason[-1000:] == Reason.MISFIT).any()
 
 
-def test_alarm_of_a_followed_change_ends_with_its_block(native: Native, changed: Run) -> None:
-    core = native.identifier(strong_config(rig_of(0.0, stride=8, forgetting_s=0.5), RATE_HZ))
-    reason = core.run(changed.phi, changed.y, sums=False).reason
+@both_cores
+def test_alarm_of_a_followed_change_ends_with_its_block(core: str, native: Native, changed: Run) -> None:
+    rig, case = rig_of(FINE_BITS, core, forgetting_s=0.5), CASES["strong", core]
+    config = case.settings(rig, SLOW_HZ)
+    identifier = native.identifier(config)
+    reason = identifier.run(*case.samples(rig, changed), sums=False).reason
     assert (reason == Reason.MISFIT).any()
-    assert (reason[-8_000:] == Reason.UPDATED).all()
-    assert core.assess()["p"][0] == pytest.approx(1.2 * STANDARD_PENDULUM.linear[0], rel=2e-3)
+    assert (reason[-1000:] == Reason.UPDATED).all()
+    w = case.p_of(config, identifier.assess()["p"][:3])[0]
+    assert w == pytest.approx(1.2 * STANDARD_PENDULUM.linear[0], rel=2e-3)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -68,27 +109,59 @@ def test_alarm_of_a_followed_change_ends_with_its_block(native: Native, changed:
 def test_too_coarse_encoder_is_reported(bits: int, alarm: bool, seed: int, native: Native) -> None:
     # 18 bits: w 0.3 % off at a standard error of 0.26 %; 16 bits: 6.2 % at 1.0 %
     run = simulate(sensors=standard_sensors(bits), truth="linear", duration=40.0, seed=seed).run
-    core = native.identifier(strong_config(rig_of(2 * np.pi / 2**bits), RATE_HZ))
-    reasons = core.run(run.phi, run.y, sums=False).reason[8_500:]  # the second block is the first that is judged
-    misfits = np.isin(reasons, (Reason.MISFIT, Reason.REJECTED_OUTLIER))
-    assert misfits.all() if alarm else not (reasons == Reason.MISFIT).any()
+    for core in ("f32", "q31"):
+        reasons = reasons_of(native, rig_of(bits, core), run)[8_500:]  # the second block is the first that is judged
+        assert np.isin(reasons, DOUBTED).all() if alarm else not (reasons == Reason.MISFIT).any()
 
 
-def test_other_drives_are_no_misfit(native: Native) -> None:
+def test_standard_rig_raises_no_alarm_from_any_start(native: Native, standard_20_bits: Simulation) -> None:
+    rig = rig_of(20)
+    counts = [c[:14_000] for c in counts_of(rig, standard_20_bits.run)]
+    for seed in range(20):
+        core = native.identifier(strong_config_q31(rig, 1000.0, standard_start(seed)))
+        assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any(), seed
+    core = native.identifier(strong_config_q31(rig_of(20, law="pseudovelocity"), 1000.0))
+    assert not np.isin(core.run(*counts, sums=False).reason, DOUBTED).any()
+
+
+@both_cores
+def test_other_drives_are_no_misfit(core: str, native: Native) -> None:
     # the same motion and drive, smaller and larger by turns: residuals go with them, and their part stays
-    run = simulate(sensors=Sensors(), truth="linear", duration=14.0, seed=1).run
+    sensors = replace(standard_sensors(24), random_offset=False)
+    run = simulate(sensors=sensors, truth="linear", sample_rate=SLOW_HZ, duration=14.0, seed=1).run
     phi = np.concatenate([run.phi, 0.3 * run.phi, run.phi])
-    core = native.identifier(strong_config(rig_of(0.0, stride=8), RATE_HZ))
-    record = core.run(phi, np.concatenate([run.y, run.y, run.y]), sums=False)
-    settled = np.concatenate([np.arange(4_500, 14_000), np.arange(26_000, 28_000), np.arange(40_000, 42_000)])
-    assert not (record.reason[settled] == Reason.MISFIT).any()
+    whole = replace(run, t=np.arange(len(phi)) / SLOW_HZ, phi=phi, y=np.concatenate([run.y, run.y, run.y]))
+    reason = reasons_of(native, rig_of(24, core), whole)
+    settled = np.concatenate([np.arange(563, 1750), np.arange(3250, 3500), np.arange(5000, 5250)])
+    assert not (reason[settled] == Reason.MISFIT).any()
 
 
-def test_identify_prints_the_finding(native: Native) -> None:
+def test_sensitivity_of_a_row_is_w_times_the_gradient_in_w(changed: Run) -> None:
+    rig = rig_of(FINE_BITS)
+    config = strong_config_q31(rig, SLOW_HZ)
+    n, y, row_reason = StrongTwinQ31(config).rows(*counts_of(rig, changed))
+    rows = np.flatnonzero(row_reason == Reason.ACCUMULATED)[::50]
+
+    def predicted(w_factor: float) -> npt.NDArray[np.float64]:
+        w, d1, d2 = nominal_start(rig)
+        start = strong_config_q31(rig, SLOW_HZ, (w * w_factor, d1, d2)).estimator
+        terms = EstimatorQ31([start], kapitza_strong_q31.STRONG).terms(n[rows].T, y[rows])[0]
+        return np.asarray(terms.sum(axis=0), np.float64)
+
+    terms = EstimatorQ31([config.estimator], kapitza_strong_q31.STRONG).terms(n[rows].T, y[rows])[0]
+    sensitivity = kapitza_strong_q31.sensitivity(terms)
+    slope = (predicted(1.001) - predicted(0.999)) / 0.002
+    # of third order in 0.001, and terms rounded to 1
+    assert np.abs(sensitivity - slope).max() < 1e-4 * np.abs(sensitivity).max() + 11 / 0.002
+
+
+@both_cores
+def test_identify_prints_the_finding(core: str, native: Native) -> None:
     for bits, doubted in ((20, False), (14, True)):
         run = simulate(sensors=standard_sensors(bits), truth="linear", duration=20.0, seed=1).run
-        answer = identify(run, rig_of(2 * np.pi / 2**bits), native)
+        answer = identify(run, rig_of(bits, core), native)
         assert answer.identified
         assert answer.alarm is doubted
         assert (answer.warning is not None) == doubted
         assert (answer.status == Reason.MISFIT.text) == doubted
+        assert answer.trusted_s is None

@@ -267,36 +267,6 @@ def test_lanes_with_different_schedules_are_refused() -> None:
         WeakTwin(configuration(), lanes)
 
 
-def test_core_names_its_refusal(native: Native) -> None:
-    config = configuration()
-    for wrong, name in (
-        (replace(config, sample_rate=0.0), "bad sample rate"),
-        (replace(config, l1=float("nan")), "bad length"),
-        (replace(config, drive_min=-1.0), "bad drive min"),
-        (replace(config, iterations=0), "bad iterations"),
-        (replace(config, iterations=11), "bad iterations"),
-        (replace(config, full_angle=True, passes=0), "bad angle"),
-        (replace(config, full_angle=True, passes=9), "bad angle"),
-        (replace(config, friction=True, zero_unknown=False), "bad angle"),
-        (replace(config, angle_limit=-1.0), "bad angle limit"),
-        (replace(config, pivot_noise=float("nan")), "bad pivot noise"),
-        (replace(config, trust=TrustConfig(se_max=0.0)), "bad se max"),
-        (replace(config, estimator=replace(config.estimator, noise_margin=-1.0)), "bad noise margin"),
-    ):
-        with pytest.raises(PvidError, match=name):
-            native.identifier(wrong)
-    tables = design(L1, 1000.0, NOMINAL).f32
-    chi = tables.chi.copy()
-    chi[7, 1, 3] = np.nan
-    for wrong_tables, name in (
-        (replace(tables, chi=chi), "bad design"),
-        (replace(tables, taps=70), "bad taps"),
-        (replace(tables, overlap=0.5), "bad overlap"),
-    ):
-        with pytest.raises(PvidError, match=name):
-            native.identifier(replace(config, design=wrong_tables))
-
-
 def test_a_window_too_short_for_its_work_is_refused(native: Native) -> None:
     # a hop of 4 ticks: 8 stages for each function, 17 for each step and some 30 others, of which a tick takes 32
     config = configuration(sizes=Sizes(decimation=1, taps=31, functions=4, window_s=0.008))

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.run.compare import first_difference
@@ -227,23 +226,3 @@ def test_a_run_in_pieces_is_the_same_run(native: Native, counts: tuple[Counts, C
     for part in np.array_split(np.arange(len(counts[0])), 7):
         pieces.run(counts[0][part], counts[1][part])
     assert pieces.running_hash == whole.running_hash
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("row_sd", 0),
-        ("forgetting_groups", 3),
-        ("gain", 2**30 + 1),
-        ("correlation", 1),
-        ("row_weight", 0),
-        ("step_limit", 0),
-        ("kappa_min", -1),
-        ("divider", 0),
-    ],
-)
-def test_out_of_range_value_is_refused_by_name(native: Native, field: str, value: int) -> None:
-    config = configuration()
-    bad = replace(config, estimator=replace(config.estimator, **{field: value}))  # type: ignore[arg-type]
-    with pytest.raises(PvidError, match="refused"):
-        native.identifier(bad)

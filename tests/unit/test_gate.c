@@ -102,34 +102,6 @@ static void uninformative_count_is_reset(void **state)
     assert_true(gate.memory == 1.0f);
 }
 
-static void settings_end_at_their_bounds(void **state)
-{
-    (void)state;
-    const struct {
-        float sigmas;
-        float patience_s;
-        pvid_status status;
-    } cases[] = {
-        {0.0f, 0.0f, PVID_OK},
-        {2.0f, 0.0f, PVID_OK},
-        {1.0e3f, 1.0e12f, PVID_OK},
-        {1.9999999f, 0.0f, PVID_BAD_GATE_SIGMAS},
-        {1000.0001f, 0.0f, PVID_BAD_GATE_SIGMAS},
-        {-1.0e-45f, 0.0f, PVID_BAD_GATE_SIGMAS},
-        {1.0e-45f, 0.0f, PVID_BAD_GATE_SIGMAS},
-        {NAN, 0.0f, PVID_BAD_GATE_SIGMAS},
-        {INFINITY, 0.0f, PVID_BAD_GATE_SIGMAS},
-        {0.0f, -1.0e-45f, PVID_BAD_GATE_PATIENCE},
-        {0.0f, 1.0001e12f, PVID_BAD_GATE_PATIENCE},
-        {0.0f, NAN, PVID_BAD_GATE_PATIENCE},
-        {0.0f, INFINITY, PVID_BAD_GATE_PATIENCE},
-    };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        const pvid_gate_config_f32 config = {.sigmas = cases[i].sigmas, .patience_s = cases[i].patience_s};
-        assert_int_equal(pvid_gate_init_f32(&gate, &config, 100.0f, 4.0f, FLOOR), cases[i].status);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -138,7 +110,6 @@ int main(void)
         cmocka_unit_test(gate_passes_nan),
         cmocka_unit_test(the_scale_stays_between_its_floor_and_its_ceiling),
         cmocka_unit_test(uninformative_count_is_reset),
-        cmocka_unit_test(settings_end_at_their_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

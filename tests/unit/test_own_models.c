@@ -179,14 +179,14 @@ static void own_functions_are_all_or_none(void **state)
     const pvid_model_f32 *strong = &pvid_kapitza_strong_f32;
     ACCEPTED_F32(model = *strong);
     ASSERT_INIT(init_f32, (model = *strong, config.row_weight = 0.5f), PVID_BAD_ROW_WEIGHT); /* it accumulates itself */
-    ACCEPTED_F32((model = *strong, model.step = NULL));
+    ACCEPTED_F32((model = *strong, model.take_row = NULL));
     REFUSED_F32((model = *strong, model.accumulate = NULL));
     REFUSED_F32((model = *strong, model.project = NULL));
     REFUSED_F32((model = *strong, model.innovate = NULL));
     REFUSED_F32((model = *strong, model.n_theta = PVID_MAX_THETA + 1));
     ACCEPTED_F32((model = *strong, model.n_moments = PVID_MAX_MOMENTS));
     REFUSED_F32((model = *strong, model.n_moments = PVID_MAX_MOMENTS + 1));
-    REFUSED_F32(model.step = strong->step);
+    REFUSED_F32(model.take_row = strong->take_row);
     REFUSED_F32(model.innovate = strong->innovate);
 }
 

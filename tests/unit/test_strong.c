@@ -118,27 +118,6 @@ static void gap_does_what_a_bad_sample_does_without_counting_one(void **state)
     assert_int_equal(with_nan.estimator.counters.rejected_not_finite, 1);
 }
 
-static void every_bad_field_has_its_own_status(void **state)
-{
-    (void)state;
-    const float bad[5] = {0.0f, -1.0f, INFINITE, INFINITE - INFINITE, 1.0e30f};
-    static pvid_strong_f32 identifier;
-    for (int k = 0; k < 5; k++) {
-        pvid_strong_config_f32 config = good_config();
-        config.l1 = bad[k];
-        assert_int_equal(pvid_strong_init_f32(&identifier, &config), PVID_BAD_LENGTH);
-        config = good_config();
-        config.sample_rate_hz = bad[k];
-        assert_int_equal(pvid_strong_init_f32(&identifier, &config), PVID_BAD_SAMPLE_RATE);
-        config = good_config();
-        config.estimator.row_sd = bad[k];
-        assert_int_equal(pvid_strong_init_f32(&identifier, &config), PVID_BAD_ROW_SD);
-    }
-    pvid_strong_config_f32 config = good_config();
-    config.bank.half = 0;
-    assert_int_equal(pvid_strong_init_f32(&identifier, &config), PVID_BAD_HALF);
-}
-
 static void absurd_samples_never_make_the_state_infinite(void **state)
 {
     (void)state;
@@ -174,7 +153,6 @@ int main(void)
         cmocka_unit_test(warming_up_lasts_one_window),
         cmocka_unit_test(bad_sample_empties_the_windows_and_keeps_the_sums),
         cmocka_unit_test(gap_does_what_a_bad_sample_does_without_counting_one),
-        cmocka_unit_test(every_bad_field_has_its_own_status),
         cmocka_unit_test(absurd_samples_never_make_the_state_infinite),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -276,39 +276,6 @@ static void a_restored_run_continues_bit_for_bit(void **state)
     assert_memory_equal(&restored, &self, sizeof self);
 }
 
-static void out_of_range_value_is_refused_by_name(void **state)
-{
-    (void)state;
-    static pvid_strong_q31 self;
-    pvid_strong_config_q31 bad = settings();
-    bad.row.n_phi0[4] = 63;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_SHIFT);
-    bad = settings();
-    bad.row.n_phi2[3] = 63;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_SHIFT);
-    bad = settings();
-    bad.row.y = 63;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_SHIFT);
-    bad = settings();
-    bad.u_multiplier = 0;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_U_MULTIPLIER);
-    bad = settings();
-    bad.u_shift = 63;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_SHIFT);
-    bad = settings();
-    bad.drive_min = -1;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_DRIVE_MIN);
-    bad = settings();
-    bad.drive_ticks = 0;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_DRIVE_TICKS);
-    bad = settings();
-    bad.bank.half = 1;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_HALF);
-    bad = settings();
-    bad.estimator.gain = -1;
-    assert_int_equal(pvid_strong_init_q31(&self, &bad), PVID_BAD_FEEDBACK);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -320,7 +287,6 @@ int main(void)
         cmocka_unit_test(a_still_pivot_is_no_drive),
         cmocka_unit_test(frozen_form_accepts_no_row),
         cmocka_unit_test(a_restored_run_continues_bit_for_bit),
-        cmocka_unit_test(out_of_range_value_is_refused_by_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

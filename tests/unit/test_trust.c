@@ -290,32 +290,6 @@ static void sums_without_digits_fade(void **state)
     assert_int_equal(groups_of_fading(&left), 4);
 }
 
-#define REFUSED(field, value, status)                                                                                  \
-    do {                                                                                                               \
-        pvid_trust_config_f32 config = pvid_trust_defaults_f32;                                                        \
-        config.field = (value);                                                                                        \
-        assert_int_equal(pvid_trust_init_f32(&trust, &config, &estimator), (status));                                  \
-    } while (0)
-
-static void init_names_what_it_refuses(void **state)
-{
-    (void)state;
-    const float wrong[] = {NAN, INFINITY, -INFINITY, -1.0f};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        REFUSED(kappa_min, wrong[i], PVID_BAD_PUBLISH_KAPPA);
-        REFUSED(se_max, wrong[i], PVID_BAD_SE_MAX);
-        REFUSED(misfit_max, wrong[i], PVID_BAD_MISFIT_MAX);
-    }
-    REFUSED(kappa_min, 1.0f, PVID_BAD_PUBLISH_KAPPA);
-    REFUSED(se_max, 0.0f, PVID_BAD_SE_MAX);
-    REFUSED(misfit_max, 0.5f, PVID_BAD_MISFIT_MAX);
-    REFUSED(misfit_max, 0.0f, PVID_OK);
-    REFUSED(renewal, 0.0f, PVID_OK);
-    REFUSED(renewal, 0.009f, PVID_BAD_RENEWAL);
-    REFUSED(renewal, NAN, PVID_BAD_RENEWAL);
-    REFUSED(renewal, 1.1e3f, PVID_BAD_RENEWAL);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -333,7 +307,6 @@ int main(void)
         cmocka_unit_test_setup(the_alarms_means_begin_anew_with_a_renewal, start_again),
         cmocka_unit_test_setup(sums_without_digits_fade, start_again),
         cmocka_unit_test_setup(the_alarm_can_be_switched_off, start_again),
-        cmocka_unit_test_setup(init_names_what_it_refuses, start_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

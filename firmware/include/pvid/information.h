@@ -18,7 +18,8 @@
 extern "C" {
 #endif
 
-/* Layout of the sums: n_moments of M, n_theta of B, yy, weight. */
+/* Layout of the sums: n_moments of M, n_theta of B, yy, weight. For a model without its own `project` b and rr take the
+ * places of B and yy (estimator.h). */
 #define PVID_MAX_SUMS (PVID_MAX_MOMENTS + PVID_MAX_THETA + 2)
 
 /* Limit of the root of a row's sum of squares: 2^32 such rows fit into float32. */

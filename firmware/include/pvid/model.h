@@ -9,8 +9,8 @@
  *       .c_row = row, .c_column = column, .theta = my_theta, .jacobian = my_jacobian };
  *
  * Optional functions: `accumulate` if entries of M repeat (fewer sums than n_theta (n_theta + 1) / 2); `project`
- * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set; `step` may be
- * added to them. `noise` enables the noise check (noise_margin of estimator.h).
+ * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set; `take_row` may
+ * be added to them. `noise` enables the noise check (noise_margin of estimator.h).
  */
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
@@ -59,8 +59,8 @@ struct pvid_model_f32 {
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
     /* pvid_estimator_step_f32 in one call, or pvid_estimator_add_f32 for a row that does not end a group, with the same
-     * bits, given innovate's results at p (needed while g < 1): saves storing and reloading sums and S where a solve
-     * follows every row. NULL: one after the other. */
+     * bits; e and gradient are innovate's results at p while g < 1. It saves storing and reloading sums and S where a
+     * solve follows every row. NULL: the estimator adds and solves one after the other. */
     pvid_reason (*take_row)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[],
                             bool ends_group);
 };

@@ -10,7 +10,6 @@
  *   - step in the main loop, read in an interrupt: the read succeeds at the first attempt, even in the middle of a
  *     put;
  *   - threads, several cores: neither blocks the other. With gcc and clang every access to a word is atomic, with
- *     the
  *     memory fences for other cores; there is no data race in the sense of C11.
  *
  * The weak form contains a publication (pvid_weak_read_f32). The strong form computes an estimate only on request:

@@ -16,7 +16,8 @@ enum { REMAINDER_Y = 0, REMAINDER_C1 = 1, REMAINDER_C2 = 2 };
 /* Below this L2 = (l2 / rho2)^2 is implausible, and 1 / L1 too large. */
 #define L2_MIN 0.05f
 
-/* The correction waits for these many windows, steps and errors smaller than these; it ends beyond the last. */
+/* The correction begins after this many windows, with steps and errors below these; it ends at errors above the last.
+ */
 #define SETTLED_GROUPS 4u
 #define SETTLED_STEP 0.02f
 #define SETTLED_ERROR 0.05f

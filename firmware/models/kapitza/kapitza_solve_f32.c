@@ -57,17 +57,25 @@ static pvid_reason move_three(pvid_estimator_f32 *self, float gain, float s[][PV
     return PVID_UPDATED;
 }
 
-pvid_reason pvid_kapitza_solve_f32(pvid_estimator_f32 *self, const float n[], float y)
+/* With a dead zone: by the sums, written out. */
+pvid_reason pvid_kapitza_solve_in_zone_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     pvid_information_f32 *information = &self->information;
     float s[PVID_MAX_P][PVID_MAX_P];
     float force[PVID_MAX_P];
+    float sums[PVID_MAX_SUMS];
+    pvid_kapitza_accumulate_f32(n, y, information->high, information->low, sums);
+    const float energy = pvid_kapitza_project_f32(self->p, sums, &sums[PVID_KAPITZA_STRONG_MOMENTS], s, force);
+    return pvid_direct_move_f32(self, self->gain, sums, energy, s, force);
+}
+
+pvid_reason pvid_kapitza_solve_f32(pvid_estimator_f32 *self, const float n[], float y)
+{
     if (self->dead_zone > 0.0f) {
-        float sums[PVID_MAX_SUMS];
-        pvid_kapitza_accumulate_f32(n, y, information->high, information->low, sums);
-        const float energy = pvid_kapitza_project_f32(self->p, sums, &sums[PVID_KAPITZA_STRONG_MOMENTS], s, force);
-        return pvid_direct_move_f32(self, self->gain, sums, energy, s, force);
+        return pvid_kapitza_solve_in_zone_f32(self, n, y);
     }
-    pvid_kapitza_absorb_f32(self->p, n, y, information->high, information->low, s, force);
+    float s[PVID_MAX_P][PVID_MAX_P];
+    float force[PVID_MAX_P];
+    pvid_kapitza_absorb_f32(self->p, n, y, self->information.high, self->information.low, s, force);
     return move_three(self, self->gain, s, force);
 }

@@ -4,7 +4,10 @@
 
 #include "pvid/kapitza.h"
 
-/* Adds an accepted row to the sums and takes the step that they ask for. */
+/* Adds an accepted row to the sums and takes one step of p. */
 pvid_reason pvid_kapitza_solve_f32(pvid_estimator_f32 *self, const float n[], float y);
+
+/* The same with a dead zone: a function of its own, whose sums need stack. */
+pvid_reason pvid_kapitza_solve_in_zone_f32(pvid_estimator_f32 *self, const float n[], float y);
 
 #endif

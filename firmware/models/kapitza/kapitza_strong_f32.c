@@ -110,8 +110,7 @@ pvid_reason pvid_kapitza_take_row_f32(pvid_estimator_f32 *self, const float n[],
     if (ends_group && pvid_estimator_is_due_f32(self)) {
         reason = pvid_kapitza_solve_f32(self, n, y);
     } else {
-        float sums[PVID_MAX_SUMS];
-        pvid_kapitza_accumulate_f32(n, y, self->information.high, self->information.low, sums);
+        pvid_kapitza_add_f32(n, y, self->information.high, self->information.low);
     }
     if (ends_group) {
         pvid_information_end_group_f32(&self->information);

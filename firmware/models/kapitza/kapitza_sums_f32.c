@@ -139,6 +139,12 @@ void pvid_kapitza_accumulate_f32(const float n[], float y, const float high[], f
     sums[WEIGHT] = high[WEIGHT] + low[WEIGHT];
 }
 
+void pvid_kapitza_add_f32(const float n[], float y, const float high[], float low[])
+{
+    float sums[PVID_MAX_SUMS];
+    pvid_kapitza_accumulate_f32(n, y, high, low, sums);
+}
+
 /* What C^T M C and C^T (b - M theta) are made of, with X_k for -G^k phi'' or -G^k phi. */
 typedef struct {
     float aa;

@@ -6,9 +6,9 @@
 
 #include "number/finite_f32.h"
 
-#define GROWTH 9.21034f   /* ln 1e4: of the scale within the time of patience */
-#define WIDEST 1.0e3f     /* the scale grows no faster than this */
-#define SCALE_MAX 1.0e30f /* of squares: far beyond any accepted row */
+#define GROWTH 9.21034f   /* ln 1e4: consecutive outliers multiply the scale by 1e4 within patience_s */
+#define WIDEST 1.0e3f     /* largest relative growth of the scale by one outlier */
+#define SCALE_MAX 1.0e30f /* largest scale [square of a residual]: far beyond any accepted row */
 
 pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *config, float rate_hz, float memory,
                                float floor)

@@ -22,24 +22,24 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .renewal = 0.2f,
 };
 
-/* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
+/* p has arrived if its last step, relative, is at most this part of the largest relative standard error, or 1e-4. */
 #define ARRIVED 0.3f
 #define SMALL_STEP 1.0e-4f
 
-/* p has settled when its last step is smaller than this. */
+/* p has settled if its last step, relative, is smaller than this. */
 #define SETTLED_STEP 0.02f
 
-/* It is near where it goes when it has settled with standard errors, relative, below this. */
-#define NEAR 0.1f
+/* Relative standard errors up to this are small: p has converged if it has settled and they are small. */
+#define SMALL_ERROR 0.1f
 
-/* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
+/* A renewal multiplies the sums by FADE before each of the next FADE_GROUPS groups: 0.8 % of them remains. */
 #define FADE 0.3f
 #define FADE_GROUPS 4u
 
-/* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
+/* Most groups in the alarm's long mean; with forgetting it is as long as the memory of the sums. */
 #define LONG_MEMORY 4096.0f
 
-/* One group that the model cannot explain at all must not outweigh thousands. */
+/* Limit of a group's variance ratio: a single group must not outweigh thousands. */
 #define VARIANCE_RATIO_MAX 1.0e6f
 
 static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
@@ -109,7 +109,7 @@ const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self)
 
 /* ---- the alarm ---- */
 
-/* Returns whether the windows alone raise it. */
+/* Adds a group's variance ratio to the short and the long mean. Returns whether one of them exceeds its limit. */
 static bool add_variance_ratio(pvid_trust_f32 *self, float variance_ratio)
 {
     const float x =
@@ -138,7 +138,7 @@ static void restart_alarm(pvid_trust_f32 *self)
     memset(self->recent, 0, sizeof self->recent);
 }
 
-/* Whether the residual variance of all rows is within the limit and its statistical spread. */
+/* Returns whether the residual variance of all rows is within misfit_max, with three standard deviations of chance. */
 static bool all_rows_agree(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
                            const pvid_estimate_f32 *candidate)
 {
@@ -177,7 +177,7 @@ float pvid_trust_fade_factor_f32(pvid_trust_f32 *self)
     return FADE;
 }
 
-/* Whether p has moved by `renewal` from its value at the rows. */
+/* Returns whether a positive parameter differs from the anchor by more than `renewal`, relative. */
 static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
     bool moved = false;
@@ -190,8 +190,8 @@ static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *esti
     return moved;
 }
 
-/* At a converged p: renews the sums if they are stale. Rows that agree with p are as good as rows at p; a p with
- * large errors has not converged. */
+/* For a settled p: renews the sums if they are stale. If the rows agree with p, p becomes the anchor. If the standard
+ * errors are large, p has not converged. */
 static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool errors_small, bool agrees)
 {
     const bool stale = errors_small && !agrees && has_moved(self, estimator);
@@ -200,16 +200,16 @@ static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estim
     } else if (errors_small && agrees) {
         memcpy(self->anchor, estimator->p, sizeof self->anchor);
     } else {
-        /* p is on its way yet, or about where it was */
+        /* p has not converged, or has not moved far */
     }
 }
 
-/* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
+/* Sets the alarm and renews the sums if they are stale. `settled`: the last step was small. */
 static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled, float variance_ratio,
                         const pvid_estimate_f32 *candidate)
 {
     const bool agrees = all_rows_agree(self, estimator, candidate);
-    const bool errors_small = pvid_trust_largest_error_f32(estimator, candidate) <= NEAR;
+    const bool errors_small = pvid_trust_largest_error_f32(estimator, candidate) <= SMALL_ERROR;
     const bool renewing = self->groups_to_fade > 0u;
     self->errors_small = errors_small;
     bool short_exceeds = false;

@@ -8,16 +8,16 @@
 #include "judge/publication.h"
 #include "judge/verdict.h"
 
-/* p has arrived when its last step is this part of the widest standard error, or a ten-thousandth. */
+/* p has arrived if its last step, relative, is at most this part of the largest relative standard error, or 1e-4. */
 #define ARRIVED 19661 /* 0.3, Q16 */
 #define SMALL_STEP (((int64_t)1 << PVID_SIZE_BITS) / 10000)
 
-/* p has settled when its last step is smaller than 2 %, and is near where it goes when it has with standard errors
- * below a tenth. */
+/* p has settled if its last step, relative, is smaller than 2 %. It has converged if its relative standard errors are
+ * at most 10 % as well. */
 #define SETTLED_STEP (((int64_t)1 << PVID_SIZE_BITS) / 50)
-#define NEAR (((int64_t)1 << ERROR_BITS) / 10)
+#define SMALL_ERROR (((int64_t)1 << ERROR_BITS) / 10)
 
-/* What is renewed is multiplied by this before so many groups: less than a hundredth is left of it. */
+/* A renewal multiplies the sums by FADE before each of the next FADE_GROUPS groups: 0.8 % of them remains. */
 #define FADE 644245094 /* 0.3, Q31 */
 #define FADE_GROUPS 4u
 
@@ -26,10 +26,10 @@
 #define RENEWAL_MIN 655u /* 0.01, Q16 */
 #define RENEWAL_MAX ((uint32_t)1000 << 16)
 
-/* The alarm's long mean never forgets faster than the sums do, nor ever stalls. */
+/* Most groups in the alarm's long mean; with forgetting it is as long as the memory of the sums. */
 #define LONG_MEMORY 4096u
 
-/* One group that the model cannot explain at all must not outweigh thousands. */
+/* Limit of a group's variance ratio: a single group must not outweigh thousands. */
 #define VARIANCE_RATIO_MAX ((int64_t)1000000 << PVID_VARIANCE_RATIO_BITS)
 
 #define ERROR_BITS 24 /* of se_max */
@@ -92,7 +92,7 @@ const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self)
 
 /* ---- the alarm ---- */
 
-/* Returns whether the windows alone raise it. */
+/* Adds a group's variance ratio to the short and the long mean. Returns whether one of them exceeds its limit. */
 static bool add_variance_ratio(pvid_trust_q31 *self, int64_t variance_ratio)
 {
     const int64_t x = pvid_clamp_q31(variance_ratio, VARIANCE_RATIO_MAX);
@@ -122,7 +122,7 @@ static void restart_alarm(pvid_trust_q31 *self)
     memset(self->recent, 0, sizeof self->recent);
 }
 
-/* Whether the residual variance of all rows is within the limit and its statistical spread. */
+/* Returns whether the residual variance of all rows is within misfit_max, with three standard deviations of chance. */
 static bool all_rows_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
                            const pvid_estimate_q31 *candidate)
 {
@@ -160,7 +160,7 @@ int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self)
     return FADE;
 }
 
-/* Whether p has moved by `renewal` from its value at the rows. */
+/* Returns whether a positive parameter differs from the anchor by more than `renewal`, relative. */
 static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
 {
     bool moved = false;
@@ -173,8 +173,8 @@ static bool has_moved(const pvid_trust_q31 *self, const pvid_estimator_q31 *esti
     return moved;
 }
 
-/* At a converged p: renews the sums if they are stale. Rows that agree with p are as good as rows at p; a p with
- * large errors has not converged. */
+/* For a settled p: renews the sums if they are stale. If the rows agree with p, p becomes the anchor. If the standard
+ * errors are large, p has not converged. */
 static void renew_if_stale(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool agrees)
 {
     if (!agrees && has_moved(self, estimator)) {
@@ -187,12 +187,12 @@ static void renew_if_stale(pvid_trust_q31 *self, const pvid_estimator_q31 *estim
     }
 }
 
-/* The alarm, and the renewal that may follow from it; `settled`: the last step was small. */
+/* Sets the alarm and renews the sums if they are stale. `settled`: the last step was small. */
 static void raise_alarm(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool settled, int64_t variance_ratio,
                         const pvid_estimate_q31 *candidate)
 {
     const bool agrees = all_rows_agree(self, estimator, candidate);
-    const bool errors_small = largest_error(estimator, candidate) <= NEAR;
+    const bool errors_small = largest_error(estimator, candidate) <= SMALL_ERROR;
     const bool renewing = self->groups_to_fade > 0u;
     self->errors_small = errors_small;
     bool short_exceeds = false;

@@ -7,7 +7,8 @@
 #include "number/count.h"
 #include "pvid/status.h"
 
-/* Counts consecutive uninformative groups; 0 after a step, or after p reverted to the published estimate. */
+/* Counts consecutive uninformative groups: groups without a step. 0 after a step, or after p reverted to the published
+ * estimate (is_back). */
 static inline void pvid_trust_count_uninformative(uint16_t *uninformative, pvid_reason reason, bool is_back)
 {
     if ((reason == PVID_UPDATED) || is_back) {
@@ -17,7 +18,8 @@ static inline void pvid_trust_count_uninformative(uint16_t *uninformative, pvid_
     }
 }
 
-/* Counts a verdict and returns the reason to report; `reason` is that of the solve. */
+/* Counts the verdict of trust on a group and returns the reason that the tick reports. `reason` is that of the solve;
+ * the solve has counted it if it is not PVID_UPDATED. */
 static inline pvid_reason pvid_trust_report(pvid_counters *counters, pvid_reason verdict, pvid_reason reason,
                                             bool misfit)
 {

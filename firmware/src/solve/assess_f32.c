@@ -81,7 +81,7 @@ void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s
     if (!pvid_cholesky_factor_f32(&factor, n, s)) {
         return;
     }
-    /* the factor holds 1 / U_jj: diagonal over pivot is D S D_jj / U_jj^2 */
+    /* the factor contains 1 / U_jj; diagonal over pivot is (D S D)_jj / U_jj^2 */
     float most = 1.0f;
     for (size_t j = 0; j < n; j++) {
         const float scaled = factor.u[j][j] * factor.scale[j];

@@ -1,13 +1,13 @@
-/* How far p can be trusted, from S and the residuals: pure functions, for both engines. Private to the core. */
+/* Accuracy of p from S and the residuals, for both engines. Private to the core. */
 #ifndef PVID_ASSESS_F32_H
 #define PVID_ASSESS_F32_H
 
 #include "solve/cholesky_f32.h"
 #include "solve/state_f32.h"
 
-/* Whether S - margin Sn is positive definite, Sn the information of noise of the given variance alone: S contains
- * more information than noise. True if the model has no `noise`. s: upper triangle of C^T M C [n_p][n_p]. Cost: a
- * factorisation. */
+/* Returns whether S contains more information than noise: S - noise_margin Sn is positive definite, where Sn is the
+ * information of noise of the given variance alone. True if the model has no `noise`. s: upper triangle of C^T M C
+ * [n_p][n_p]. Cost: a factorisation. */
 bool pvid_estimator_is_above_noise_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
                                        float weight);
 
@@ -16,11 +16,12 @@ bool pvid_estimator_is_above_noise_f32(const pvid_estimator_f32 *self, const flo
 bool pvid_estimator_is_in_dead_zone_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
                                         const float force[], float variance);
 
-/* Where p is absurd a residual sum overflows or is no number; so far up no standard error made of it does. */
+/* Upper limit of a residual sum, which may overflow far from the solution: standard errors from it are finite. */
 #define PVID_RESIDUAL_MAX 1.0e30f
 
-/* s^2 of a row: the residual sum of squares, yy + energy but no less than `floor`, over degrees of freedom; row_sd^2
- * while there are none. */
+/* s^2 of a row: the residual sum of squares, at least `floor`, over the degrees of freedom; row_sd^2 if there are none.
+ * The residual sum of squares is yy + energy, with energy = theta^T M theta - 2 theta^T B from `project` (model.h), or
+ * rr with energy 0. */
 float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy, float floor);
 
 /* Degrees of freedom of the residuals in these sums. */
@@ -29,27 +30,27 @@ static inline float pvid_estimator_freedom_f32(const pvid_estimator_f32 *self, c
     return sums[self->model->n_moments + self->model->n_theta + 1u] - (float)self->model->n_p;
 }
 
-/* Sets the variance that the sensors' noise gives the rows of the current group; call it when the group is
- * complete, before its solve begins. For models without their own project, as the next two. */
+/* Sets the variance of the current group's rows by the sensors' noise. Call it when the group is complete, before its
+ * solve begins. This function and the next two are for models without their own `project`. */
 void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance);
 
 /* Residual variance of all rows in these sums over its expectation; 0 without degrees of freedom, or if rounding
  * dominates the residuals. */
 float pvid_estimator_misfit_f32(const pvid_estimator_f32 *self, const float sums[]);
 
-/* Whether rounding may dominate the residual sum because p has moved far with these sums. */
+/* Returns whether rounding may dominate rr, because p has moved far since the rows were added. */
 bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self);
 
 /* estimate->kappa and least_pivot from S, the upper triangle s. */
 void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],
                                    pvid_estimate_f32 *estimate);
 
-/* Factors S / wide + 1 / start_sd^2, times wide; s is used up. Returns whether it could be done. */
+/* Factors S + wide / start_sd^2, where wide = correlation s^2; overwrites s. Returns false if this is not possible. */
 bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PVID_MAX_P], float wide,
                                     pvid_cholesky_f32 *factor);
 
-/* Multiplies estimate->covariance, the inverse of that factor, by `wide` and takes its roots; the start's standard
- * deviations if `known` is false or the result is not finite. */
+/* Multiplies estimate->covariance, the inverse of the factored matrix, by `wide` and writes the standard errors. If
+ * `known` is false or a result is not finite, writes the start's standard deviations. */
 void pvid_estimator_scale_f32(const pvid_estimator_f32 *self, float wide, bool known, pvid_estimate_f32 *estimate);
 
 #endif

@@ -10,8 +10,7 @@
 #include "number/finite_f32.h"
 #include "pvid/estimator.h"
 
-/* A pivot below this part of its diagonal entry is rounding, not data: n eps, with a margin for
- * the rounding of S itself. */
+/* A pivot below this part of its diagonal entry is rounding, not data: n eps, with a margin for the rounding of S. */
 #define PVID_PIVOT_MIN 1.0e-6f
 
 /* Factors the n x n matrix with the upper triangle s. Fails (returns false, first_pivot = 0) iff a diagonal entry

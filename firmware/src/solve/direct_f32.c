@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-/* The engine of models that project their sums by themselves: B = sum N Y as it is, a solve in one go. */
+/* The engine for models with their own `project`: the sums are B = sum N Y and yy, and a solve is one call. */
 #include "solve/direct_f32.h"
 
 #include <math.h>

@@ -12,16 +12,16 @@ pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], 
 /* pvid_estimator_assess_f32. */
 void pvid_direct_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate);
 
-/* A solve of the sums as they are: at the end of a group, or once more. */
+/* A solve of the present sums: at the end of a group, or a further Gauss-Newton step. */
 pvid_reason pvid_direct_solve_f32(pvid_estimator_f32 *self, bool ends_group);
 
-/* One step of p from S and F = force, which `project` made of these sums with this energy; s is used up. */
+/* One step of p from S, F = force and energy, the results of `project` (model.h) on these sums; overwrites s. */
 pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, const float sums[], float energy,
                                  float s[][PVID_MAX_P], const float force[]);
 
 /* ---- inlined ---- */
 
-/* Counts and returns why p is held. */
+/* Counts and returns the reason why p is held. */
 static inline pvid_reason pvid_direct_hold_f32(uint32_t *counter, pvid_reason reason)
 {
     pvid_count_up(counter);

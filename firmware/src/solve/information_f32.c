@@ -17,8 +17,8 @@ static float decay(float x)
     return 1.0f / sum;
 }
 
-/* Rows between folds: long enough to be cheap, short enough for `low` to keep 17 bits of a term and
- * for forgetting to be smooth (a sixteenth of its time constant). */
+/* Most groups of rows between folds. Long enough to be cheap; short enough that `low` keeps 17 bits of a group's
+ * terms and that forgetting is smooth (a sixteenth of its time constant). */
 #define BLOCK_MAX 64u
 
 void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model, float forgetting_groups)
@@ -66,7 +66,7 @@ static inline void accumulate_any(size_t n_theta, const float *restrict n, float
 
 #define EIGHT 8u
 
-/* The same for the weak form's number of entries, a constant: the compiler writes the loops out. */
+/* The same for the weak form's 8 entries of N: the compiler unrolls loops of constant length. */
 static inline void accumulate_eight(const float *restrict n, float y, float row_weight, float *restrict low)
 {
     PVID_UNROLL

@@ -1,5 +1,5 @@
-/* C^T M C and its relatives for a C known by its non-zeros and an M kept as its packed upper
- * triangle by rows. Private to the core; every function is a few loops of fixed length. */
+/* Products with C and M: C is given by its non-zeros (model.h), M as its packed upper triangle by rows. Private to the
+ * core; every function is a few loops of fixed length. */
 #ifndef PVID_PATTERN_F32_H
 #define PVID_PATTERN_F32_H
 
@@ -16,7 +16,7 @@ size_t pvid_pattern_start_f32(const pvid_model_f32 *model, size_t a);
 /* One past the last non-zero of the column that starts at `start`. */
 size_t pvid_pattern_end_f32(const pvid_model_f32 *model, size_t start);
 
-/* t[n_theta] += M times the non-zeros first..last-1 of a column of C: M c_a once they are all in. */
+/* t[n_theta] += M times the non-zeros first..last-1 of a column c_a of C; t = M c_a when all of them are added. */
 void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t last,
                                   const float m[], float t[]);
 

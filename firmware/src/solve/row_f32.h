@@ -1,4 +1,4 @@
-/* What both engines do with a row before it is added to the sums. Private to the core, inlined. */
+/* Check and innovation of a row before it is added to the sums, for both engines. Private to the core, inlined. */
 #ifndef PVID_ROW_F32_H
 #define PVID_ROW_F32_H
 
@@ -16,8 +16,8 @@ static inline float pvid_row_squares_f32(size_t n_theta, const float n[], float 
     return squares;
 }
 
-/* Counts a row that is refused. Its sum of squares is within the limit only if every entry is a number of reasonable
- * size: one comparison for all of them. The entry that breaks the rule is sought only afterwards. */
+/* Accepts a row or counts it as rejected. One comparison of the sum of squares checks all entries; the reason is sought
+ * only after a rejection. */
 static inline pvid_reason pvid_row_accept_f32(pvid_estimator_f32 *self, const float n[], float y, float squares)
 {
     if (squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {

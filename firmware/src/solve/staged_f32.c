@@ -1,7 +1,7 @@
 #include "number/uncontracted.h"
 
-/* The engine of models that are known by theta, C and the pattern of C: rows relative to p, the solve and the
- * assessment in stages. */
+/* The engine for models without their own `project`: it needs theta, C and the pattern of C. A row is added as (e, N)
+ * with e = Y - N^T theta, so that the sums are b = B - M theta and rr = sum e^2. Solve and assessment run in stages. */
 #include "solve/staged_f32.h"
 
 #include <math.h>
@@ -18,19 +18,19 @@
 
 enum {
     STAGE_READ,        /* the sums and C */
-    STAGE_PROJECT,     /* n_p times: M c_a, a few non-zeros of c_a at a time, then row a of S and F */
-    STAGE_ABOVE_NOISE, /* is there more in S than noise puts there? */
-    STAGE_FACTOR,
-    STAGE_STEP,   /* dp, and where p and theta go with it */
-    STAGE_MOVE_B, /* a few rows of M dtheta at a time */
-    STAGE_COMMIT,
-    STAGE_FOLD,
+    STAGE_PROJECT,     /* for each column c_a of C: M c_a, a few non-zeros at a time, then row a of S and F */
+    STAGE_ABOVE_NOISE, /* whether S contains more information than noise alone */
+    STAGE_FACTOR,      /* Cholesky factor of S + H0; whether p[0] is excited */
+    STAGE_STEP,        /* dp; p and theta after the step */
+    STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
+    STAGE_COMMIT,      /* writes p, theta, b and rr */
+    STAGE_FOLD,        /* ends the group: information.h */
     STAGE_DONE,
-    STAGE_DIRECT, /* all of a solve, by the direct engine */
-    STAGE_KAPPA,  /* of an assessment, after STAGE_ABOVE_NOISE */
-    STAGE_WIDEN,
-    STAGE_INVERT, /* n_p times: a column */
-    STAGE_SCALE
+    STAGE_DIRECT, /* the whole solve by direct_f32.c */
+    STAGE_KAPPA,  /* in an assessment after STAGE_ABOVE_NOISE: kappa, residual, misfit */
+    STAGE_WIDEN,  /* Cholesky factor of S + prior, for the covariance */
+    STAGE_INVERT, /* n_p times: a column of its inverse */
+    STAGE_SCALE   /* covariance and standard errors */
 };
 
 /* Rounding error of rr per step, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
@@ -93,7 +93,8 @@ static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 
     self->model->jacobian(self->p, solve->c);
 }
 
-/* A part of M c_a, or, once it is complete, row a of S and F; returns whether anything is left. */
+/* Adds a part of M c_a; when M c_a is complete, computes row a of S and F. Returns whether the stage is to be repeated.
+ */
 static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
@@ -122,8 +123,8 @@ static float variance_of(const pvid_estimator_f32 *self, const float sums[])
     return pvid_estimator_variance_f32(self, sums, 0.0f, self->expected * pvid_estimator_freedom_f32(self, sums));
 }
 
-/* Variance of the noise: the configured one for a solve, because a distant p adds residuals of its own; the
- * measured one for an assessment. */
+/* The noise has row_sd^2 in a solve, because the residuals are larger while p is far from the solution, and the
+ * variance of the residuals in an assessment. */
 static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const float weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
@@ -194,7 +195,7 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
     solve->scale = 0.0f;
 }
 
-/* Rows first.. of M dtheta, and of the fall of rr by dtheta^T (b_old + b_new); returns the next row. */
+/* A few rows of M dtheta, and their part of the decrease of rr, dtheta^T (b_old + b_new). Returns the next row. */
 static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, size_t first)
 {
     const size_t n = self->model->n_theta;
@@ -209,7 +210,8 @@ static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
     return last;
 }
 
-/* Moves p, theta, b and rr together: b -= M dtheta. A sum that would overflow shows in `fall`. */
+/* Writes p, theta, b -= M dtheta and rr -= fall together. If a sum would overflow, `fall` is not finite, and p is held.
+ */
 static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const bool steps = solve->reason == PVID_UPDATED;
@@ -237,7 +239,7 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     }
 }
 
-/* What follows once a stage that is not repeated is over. */
+/* The stage after a stage that is not to be repeated. */
 static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
 {
     switch (solve->stage) {
@@ -282,7 +284,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
         solve->gain = self->gain;
         solve->stage = (uint8_t)(pvid_estimator_is_due_f32(self) ? STAGE_READ : STAGE_FOLD);
     } else if (self->gain < 1.0f) {
-        solve->stage = STAGE_DONE; /* the law of g < 1 is a rate, not an iteration */
+        solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
     }
 }
 
@@ -395,7 +397,7 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
     return finish_stage(solve, repeat);
 }
 
-/* READ and PROJECT. */
+/* Number of stages of READ and PROJECT. */
 static size_t projection_stages(const pvid_model_f32 *model)
 {
     size_t stages = 1u;

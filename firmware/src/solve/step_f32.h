@@ -1,6 +1,5 @@
-/* A step of p, from the solution of S dp = F: its size, its limits, whether it may be taken. Private to the core,
- * inlined.
- */
+/* A step of p from the solution of (S + H0) dp = rhs: its size, its limits, and whether it is allowed. Private to the
+ * core, inlined. */
 #ifndef PVID_STEP_F32_H
 #define PVID_STEP_F32_H
 
@@ -8,15 +7,15 @@
 #include "number/finite_f32.h"
 #include "solve/state_f32.h"
 
-/* Relative size of a step in parameter a: over p if it is positive, else over start_sd. Returned as bits: those of
- * |x| are ordered like |x|, infinity and NaN last. */
+/* Relative size of a step in parameter a: relative to p if it is a positive parameter, else to start_sd. Returns the
+ * bits of the float: the bits of |x| are ordered like |x|, infinity and NaN last. */
 static inline uint32_t pvid_estimator_relative_step_f32(const pvid_estimator_f32 *self, size_t a, float step)
 {
     const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
     return pvid_bits_f32(step / reference[a]) & 0x7FFFFFFFu;
 }
 
-/* The farthest of all parameters; not finite if dp is not. */
+/* The largest relative step of all parameters; not finite if dp is not. */
 static inline float pvid_estimator_step_size_f32(const pvid_estimator_f32 *self, const float dp[])
 {
     uint32_t largest = 0;
@@ -27,7 +26,7 @@ static inline float pvid_estimator_step_size_f32(const pvid_estimator_f32 *self,
     return pvid_from_bits_f32(largest);
 }
 
-/* Where a step leads in parameter a, within its bounds. */
+/* Parameter a after a step, within its bounds. */
 static inline float pvid_estimator_bounded_f32(const pvid_estimator_f32 *self, size_t a, float step, bool *bounded)
 {
     float x = self->p[a] + step;
@@ -42,7 +41,7 @@ static inline float pvid_estimator_bounded_f32(const pvid_estimator_f32 *self, s
     return x;
 }
 
-/* Part of a step of this size that is taken. */
+/* Factor that shortens a step of this relative size to the step limit. */
 static inline float pvid_estimator_step_factor_f32(pvid_estimator_f32 *self, float size)
 {
     if (size > self->step_limit) {
@@ -52,7 +51,7 @@ static inline float pvid_estimator_step_factor_f32(pvid_estimator_f32 *self, flo
     return 1.0f;
 }
 
-/* p[n_p] = where the step dp leads: shortened to the step limit, within the bounds. */
+/* p[n_p] = the estimator's p after the step dp, shortened to the step limit, within the bounds. */
 static inline void pvid_estimator_apply_step_f32(pvid_estimator_f32 *self, const float dp[], float size, float p[])
 {
     const float part = pvid_estimator_step_factor_f32(self, size);
@@ -73,7 +72,7 @@ static inline bool pvid_estimator_is_excited_f32(const pvid_estimator_f32 *self,
     return (kappa >= self->kappa_min) && (own || !(self->kappa_min > 0.0f));
 }
 
-/* Counts a group; whether a solve is due. */
+/* Counts a group. Returns whether a solve is due. */
 static inline bool pvid_estimator_is_due_f32(pvid_estimator_f32 *self)
 {
     self->phase++;

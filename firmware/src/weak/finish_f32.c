@@ -17,21 +17,21 @@
 #include "weak/window_f32.h"
 
 enum {
-    STAGE_COMBINE,   /* K times: a row of the Gram matrix at p, the columns of a function */
-    STAGE_REMAINDER, /* remainder of the linear rows, if enabled: its own stages */
-    STAGE_FACTOR,    /* K times: a row of its Cholesky factor */
-    STAGE_TRACE,     /* 4 K times: a row of its inverse, then its noise in three sums */
-    STAGE_WHITEN,    /* K times: a row of L^-1 (Y, N, a, b) */
-    STAGE_DIRECTION_A,
-    STAGE_ALONG_A,  /* a few functions at a time */
-    STAGE_REMOVE_A, /* a few functions at a time */
-    STAGE_DIRECTION_B,
+    STAGE_COMBINE,     /* K times: a row of R0 at p; sums of a function to the columns (Y, N, a, b) of its row */
+    STAGE_REMAINDER,   /* correction for large angles, if enabled: its own stages (full_angle_f32.h) */
+    STAGE_FACTOR,      /* K times: a row of L, R0 = L L^T */
+    STAGE_TRACE,       /* 4 K times: a row of L^-1, then its part of the three noise traces */
+    STAGE_WHITEN,      /* K times: a row of L^-1 (Y, N, a, b) */
+    STAGE_DIRECTION_A, /* column a over the functions as a unit vector */
+    STAGE_ALONG_A,     /* components of all columns along it, a few functions at a time */
+    STAGE_REMOVE_A,    /* subtracts them, a few functions at a time */
+    STAGE_DIRECTION_B, /* the same with column b */
     STAGE_ALONG_B,
     STAGE_REMOVE_B,
     STAGE_FIT,    /* residuals of the rows for the gate, a few functions at a time */
-    STAGE_ADD,    /* K times: a row to the estimator */
-    STAGE_SOLVE,  /* `iterations` solves of several stages each */
-    STAGE_ASSESS, /* several stages; the last one publishes or not */
+    STAGE_ADD,    /* K times: a row to the estimator; before the first one the gate accepts or rejects the window */
+    STAGE_SOLVE,  /* `iterations` solves (steps of p), several stages each: estimator.h */
+    STAGE_ASSESS, /* several stages: standard errors, then trust.h publishes the estimate or holds it */
     STAGE_IDLE
 };
 
@@ -50,7 +50,7 @@ bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self)
     return self->stage != STAGE_IDLE;
 }
 
-/* (N1..N8, Y, a, b, 0, 0) from the terms of a function, in their place. */
+/* (N1..N8, Y, a, b, 0, 0) of theory.md, (10) and (11), in place of a function's sums. N1..N3 are where they belong. */
 static void assemble(float sum[PVID_WEAK_TERMS])
 {
     const float u = sum[PVID_TERM_U];
@@ -78,8 +78,8 @@ static inline void subtract(float a, const float *restrict y, float *restrict x)
     }
 }
 
-/* The direction of a column over the functions; 0 if its squared length is not a positive normal number (no drive:
- * nothing to remove). */
+/* The unit vector of a column over the functions; 0 if its squared length is not a positive normal number (without a
+ * drive there is nothing to remove). */
 static void find_direction(pvid_weak_finish_f32 *self, size_t functions, size_t column,
                            const float sums[][PVID_WEAK_TERMS])
 {
@@ -135,7 +135,7 @@ void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator
     self->stage = STAGE_COMBINE;
 }
 
-/* What a window's rows leave unexplained, a few functions at a time. */
+/* energy += e^2 of the rows first..last-1 at the present p. */
 static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator, size_t first, size_t last,
                           const float columns[][PVID_WEAK_TERMS])
 {
@@ -153,8 +153,8 @@ static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *
     }
 }
 
-/* Before the rows: sets their noise (if the window keeps the whitening of its design, the last known one) and
- * fades the sums during a renewal. */
+/* Before the rows are added: sets the noise traces of the rows (those of the last window if R0 could not be factored)
+ * and fades the sums during a renewal (trust.h). */
 static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimator, pvid_trust_f32 *trust)
 {
     if (self->whiten.whitened) {
@@ -163,7 +163,7 @@ static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *est
     pvid_information_fade_f32(&estimator->information, pvid_trust_fade_factor_f32(trust));
 }
 
-/* Adds a row to the estimator; *reason is set if it is refused. */
+/* Adds a row to the estimator; sets *reason if the estimator rejects it. */
 static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
 {
     float n[PVID_MAX_THETA];
@@ -183,7 +183,7 @@ static void begin_solves(pvid_weak_finish_f32 *self, pvid_estimator_f32 *estimat
     self->solve.fallback = pvid_trust_fallback_f32(trust);
 }
 
-/* A stage of a solve; true once the last one of the window is complete. */
+/* A stage of a solve. Returns true when the last solve of the window is complete. */
 static bool advance_solve(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_estimator_f32 *estimator)
 {
     if (!pvid_estimator_advance_f32(estimator, &self->solve)) {
@@ -192,7 +192,7 @@ static bool advance_solve(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_e
     self->iteration++;
     self->reason = self->solve.reason;
     self->size = self->solve.size;
-    /* not due: by the divider this window only accumulates */
+    /* ACCUMULATED: the divider allows no solve after this window */
     if ((self->iteration >= iterations) || (self->reason == PVID_ACCUMULATED)) {
         return true;
     }
@@ -200,7 +200,8 @@ static bool advance_solve(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_e
     return false;
 }
 
-/* A stage of the assessment; true once the estimate is judged. */
+/* A stage of the assessment. Returns true when the estimate has been judged. self->solve.energy is still that of the
+ * window's first solve. */
 static bool advance_assessment(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design,
                                pvid_estimator_f32 *estimator, pvid_trust_f32 *trust)
 {
@@ -215,7 +216,7 @@ static bool advance_assessment(pvid_weak_finish_f32 *self, const pvid_weak_desig
     if (pvid_angle_correction_enabled_f32(self->angle) && stepped) {
         const float worst = pvid_trust_largest_error_f32(estimator, &self->candidate);
         if (pvid_weak_angle_switch_f32(self->angle, estimator->p, worst, trust->groups)) {
-            pvid_trust_renew_f32(trust, estimator); /* the uncorrected rows, and where they have led p */
+            pvid_trust_renew_f32(trust, estimator); /* the sums contain rows without the correction */
         }
     }
     return true;
@@ -229,8 +230,8 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
     const float (*fixed)[PVID_WEAK_TERMS] = (const float (*)[PVID_WEAK_TERMS])sums;
     const size_t row = self->index;
     const size_t few = ((row + FUNCTIONS_PER_STAGE) < functions) ? (row + FUNCTIONS_PER_STAGE) : functions;
-    size_t done = row + 1u; /* functions, after this stage */
-    size_t all = functions; /* of them end it */
+    size_t done = row + 1u; /* calls or functions of this stage that are done after this call */
+    size_t all = functions; /* the stage ends when so many are done */
     switch (self->stage) {
     case STAGE_COMBINE:
         pvid_weak_whiten_combine_f32(&self->whiten, design, row);

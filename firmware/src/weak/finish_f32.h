@@ -1,4 +1,5 @@
-/* A complete window of the weak form: from sums to rows to steps, one stage a call. Private to the core. */
+/* A complete window of the weak form: from sums to rows, to steps of p, to the published estimate. One stage per call;
+ * finish_f32.c lists the stages. Private to the core. */
 #ifndef PVID_WEAK_FINISH_F32_H
 #define PVID_WEAK_FINISH_F32_H
 
@@ -10,15 +11,16 @@
 /* No work. */
 void pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self);
 
-/* Starts on the window with the sums of self->buffer, at the estimator's present p; `expected`: variance of a row
- * by noise; angle: NULL for linear rows. */
+/* Begins a window, whose sums are in self->buffer, at the estimator's present p. expected: variance of a row by the
+ * sensors' noise; angle: NULL for linear rows. */
 void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator,
                                 pvid_weak_angle_f32 *angle, float expected);
 
-/* Whether a window is in work. */
+/* Returns whether a window is being processed. */
 bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self);
 
-/* One stage; sums are those of self->buffer. Sets *reason if a row was refused or the window is complete. */
+/* Runs one stage; `sums` are those of self->buffer, which become the columns of the rows. Sets *reason if a row is
+ * rejected, if the gate rejects the window, or at its last stage. */
 void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design, uint8_t iterations,
                                float sums[][PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_trust_f32 *trust,
                                pvid_reason *reason);

@@ -12,14 +12,14 @@
 #include "number/scaled_q31.h"
 #include "weak/window_q31.h"
 
-/* Columns of a row once it is assembled, in place of its terms. */
+/* Columns of a row. They replace the sums of its function in place. */
 enum { COLUMN_N = 0, COLUMN_Y = 8, COLUMN_A = 9, COLUMN_B = 10, COLUMN_SPARE = 11 };
 
 enum {
-    STAGE_COMBINE,  /* K times: a row of the Gram matrix at p */
+    STAGE_COMBINE,  /* K times: a row of R0 at p, a combination of the Gram tables */
     STAGE_ASSEMBLE, /* the columns of a few functions at a time */
-    STAGE_FACTOR,   /* K times, long rows in parts: a row of its Cholesky factor */
-    STAGE_TRACE,    /* K times: a row of its inverse and its noise */
+    STAGE_FACTOR,   /* K times, long rows in parts: a row of L, R0 = L L^T */
+    STAGE_TRACE,    /* K times: a row of L^-1 and its part of the three noise traces */
     STAGE_WHITEN,   /* K times: a row of L^-1 (Y, N, a, b) */
     STAGE_SQUARE_A, /* the length of a */
     STAGE_DIRECTION_A,
@@ -31,11 +31,11 @@ enum {
     STAGE_REMOVE_B,
     STAGE_FIT,    /* residuals of the rows for the gate, a few functions at a time */
     STAGE_NOISE,  /* the gate, and the noise of the rows */
-    STAGE_FADE,   /* in two parts: the past, while it is to be aged */
+    STAGE_FADE,   /* in two parts: multiplies the sums by the factor of a renewal (trust_q31.h) */
     STAGE_ADD,    /* K times: a row to the estimator */
     STAGE_SOLVE,  /* `iterations` solves of several stages each */
     STAGE_ASSESS, /* several stages */
-    STAGE_JUDGE,  /* is the estimate to be published? */
+    STAGE_JUDGE,  /* publishes the estimate or holds it */
     STAGE_IDLE
 };
 
@@ -159,7 +159,7 @@ static void combine_row(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *
     }
 }
 
-/* (N1..N8, Y, a, b, 0) from the terms of a function, in their place. */
+/* (N1..N8, Y, a, b, 0) of theory.md, (10) and (11), in place of a function's sums. */
 static void assemble(const pvid_weak_design_q31 *design, int32_t sum[PVID_WEAK_TERMS_Q31])
 {
     int32_t share[PVID_WEAK_TERMS_Q31];
@@ -330,7 +330,7 @@ static void trace_part(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *d
     }
 }
 
-/* x held within COLUMN_LIMIT, and noted if it was not. */
+/* x within COLUMN_LIMIT; sets `saturated` if it was beyond. */
 static int32_t clamped(pvid_weak_finish_q31 *self, int64_t x)
 {
     self->saturated = self->saturated || (x >= COLUMN_LIMIT) || (x <= -COLUMN_LIMIT);
@@ -433,7 +433,7 @@ static pvid_scaled_q31 variance_ratio_of(const pvid_weak_finish_q31 *self, const
     return pvid_scaled_over_q31(pvid_scaled_of_q31(self->energy, 0), pvid_scaled_times_q31(freedom, self->expected));
 }
 
-/* Whether the window's rows are used. Rows that do not fit are refused without the gate. */
+/* Returns whether the gate accepts the window. Saturated rows pass; the estimator rejects them. */
 static bool passes(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
 {
     return (self->gate.limit.m == 0) || self->saturated ||
@@ -460,7 +460,7 @@ static void set_noise(const pvid_weak_finish_q31 *self, const pvid_weak_design_q
     }
 }
 
-/* Adds a row to the estimator; *reason is set if it is refused. */
+/* Adds a row to the estimator; sets *reason if the estimator rejects it. */
 static void add_row(const pvid_weak_finish_q31 *self, const int32_t column[PVID_WEAK_TERMS_Q31],
                     pvid_estimator_q31 *estimator, pvid_reason *reason)
 {
@@ -483,7 +483,7 @@ static void begin_solves(pvid_weak_finish_q31 *self, pvid_estimator_q31 *estimat
     }
 }
 
-/* A stage of a solve; true once the last one of the window is complete. */
+/* A stage of a solve. Returns true when the last solve of the window is complete. */
 static bool advance_solve(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_estimator_q31 *estimator)
 {
     if (!pvid_estimator_advance_q31(estimator, &self->solve)) {
@@ -492,7 +492,7 @@ static bool advance_solve(pvid_weak_finish_q31 *self, uint8_t iterations, pvid_e
     self->iteration++;
     self->reason = self->solve.reason;
     self->size = self->solve.size;
-    /* not due: by the divider this window only accumulates */
+    /* ACCUMULATED: the divider allows no solve after this window */
     if ((self->iteration >= iterations) || (self->reason == PVID_ACCUMULATED)) {
         return true;
     }
@@ -574,7 +574,7 @@ static size_t prepare(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *de
     return next;
 }
 
-/* What a stage has to find when it starts. */
+/* Prepares the next stage. */
 static void begin_stage(pvid_weak_finish_q31 *self, pvid_estimator_q31 *estimator, const pvid_trust_q31 *trust)
 {
     if (self->stage == STAGE_SOLVE) {

@@ -30,7 +30,7 @@ static void begin_sums(pvid_weak_front_f32 *self)
     self->sum[Y] = 0.0f;
 }
 
-/* A slice of pairs, outwards from the centre, in runs that do not cross the ring's ends. */
+/* The pairs of this tick, outwards from the centre, in runs that are contiguous in the ring. */
 static inline void continue_job(pvid_weak_front_f32 *self)
 {
     pvid_weak_job *job = &self->job;

@@ -11,9 +11,9 @@ void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_
 
 void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self);
 
-/* Takes one finite sample in and does a slice of the present block's FIR job. Returns whether the job
- * is complete with it, and then writes phi [rad] and u = y_A''/l1 [1/s^2] at the block's centre: once
- * in `decimation` samples, in the first half of these. */
+/* Stores one finite sample and runs a part of the block's FIR job. Returns true if this completes the job, and then
+ * writes phi [rad] and u = y_A''/l1 [1/s^2] at the block's centre: once per `decimation` samples, in the first half of
+ * a block. */
 bool pvid_weak_front_step_f32(pvid_weak_front_f32 *self, float phi, float y, float *smooth_phi, float *u);
 
 #endif

@@ -25,8 +25,8 @@ static void begin_sums(pvid_weak_front_q31 *self)
     self->sum[Y] = 0;
 }
 
-/* A slice of pairs, outwards from the centre, in runs that do not cross the ring's ends. A weight times the sum of two
- * differences fits 32 bits by design. */
+/* The pairs of this tick, outwards from the centre, in runs that are contiguous in the ring. A weight times the sum of
+ * two differences fits 32 bits by design. */
 static void continue_job(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design)
 {
     pvid_weak_job *job = &self->job;

@@ -10,8 +10,8 @@ void pvid_weak_front_init_q31(pvid_weak_front_q31 *self, const pvid_weak_design_
 
 void pvid_weak_front_reset_q31(pvid_weak_front_q31 *self);
 
-/* Takes one sample within full scale in and does a slice of the present block's FIR job. Returns whether the job is
- * complete with it, and then writes F and U at the block's centre. */
+/* Stores one sample within full scale and runs a part of the block's FIR job. Returns true if this completes the job,
+ * and then writes F and U at the block's centre. */
 bool pvid_weak_front_step_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design, int32_t phi, int32_t y,
                               int32_t *f, int64_t *u);
 

@@ -1,7 +1,7 @@
 /* The schedule of the weak form: the work of a tick by its place in a block, for both cores. Private to the core.
  *
- * Of the D ticks of a block the first half runs the front end's FIR job, the second half adds its result to the
- * two windows; the stages of a complete window run in the ticks that add nothing.
+ * A block has D ticks. Its first half runs the front end's FIR job; its second half adds the result to the two
+ * windows. The stages of a complete window run in the ticks that add nothing.
  */
 #ifndef PVID_WEAK_SCHEDULE_H
 #define PVID_WEAK_SCHEDULE_H
@@ -14,9 +14,8 @@
 #include "pvid/status.h"
 #include "pvid/detail/weak_job.h"
 
-/* Most stages of a complete window that a tick may take. One is the rule; more only where a hop has fewer free ticks
- * than a window has stages: short windows, low decimation, the correction's sweeps. The longest tick grows with them.
- */
+/* Largest number of stages per tick. One is the rule. More are needed only if a hop has fewer free ticks than a window
+ * has stages: short windows, low decimation, the correction for large angles. The longest tick grows with them. */
 #define PVID_STAGES_PER_TICK_MAX 32u
 
 static inline bool pvid_is_odd_within(uint16_t n, uint16_t low, uint16_t high)
@@ -49,8 +48,8 @@ static inline uint16_t pvid_weak_hop(uint16_t window)
     return (uint16_t)((window - 1u) / 2u);
 }
 
-/* Functions of a window that a tick adds the present sample to: the second half of a block is shared by two windows.
- * At D = 2 one tick has to do for both, at D = 1 that of the front end. */
+/* Functions of a window to which a tick adds the present decimated sample. Two windows share the second half of a
+ * block. At D = 2 one tick adds to both windows; at D = 1 the tick of the front end does. */
 static inline uint8_t pvid_weak_functions_per_tick(uint32_t decimation, uint32_t functions)
 {
     const uint32_t second_half = decimation - (decimation / 2u);
@@ -68,7 +67,8 @@ static inline uint32_t pvid_weak_free_ticks(uint32_t decimation, uint32_t functi
     return decimation - (2u * ((functions + (functions_per_tick - 1u)) / functions_per_tick));
 }
 
-/* Stages a tick that work a window off before the next one is complete; 0: more than are allowed. */
+/* Fewest stages per tick that finish a window before the next one is complete; 0: more than PVID_STAGES_PER_TICK_MAX.
+ */
 static inline uint8_t pvid_weak_stages_per_tick(uint32_t stages, uint16_t window, uint32_t decimation,
                                                 uint32_t functions)
 {
@@ -105,8 +105,8 @@ static inline uint16_t pvid_weak_job_ticks(const pvid_weak_job *self)
     return (uint16_t)((self->half + (self->pairs_per_tick - 1u)) / self->pairs_per_tick);
 }
 
-/* Counts the sample that was put in the place `head`. Returns whether it completes a block: then a job begins, and
- * `newer` and `older` are the place of the block's centre. */
+/* Counts the sample at place `head` of the ring. Returns true if it completes a block: then a job begins, and `newer`
+ * and `older` are the place of the block's centre. */
 static inline bool pvid_weak_job_begins(pvid_weak_job *self)
 {
     self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
@@ -125,19 +125,19 @@ static inline bool pvid_weak_job_begins(pvid_weak_job *self)
     return true;
 }
 
-/* One past the last pair of this tick's slice. */
+/* One past the last pair of this tick. */
 static inline size_t pvid_weak_job_end(const pvid_weak_job *self)
 {
     const size_t left = (size_t)self->half - self->pair;
     return self->pair + ((left < self->pairs_per_tick) ? left : self->pairs_per_tick);
 }
 
-/* Most stretches of a job between which a place crosses an end of the ring: the ring is longer than the two halves of a
- * block together, so that one of its places at most crosses an end, and that once. */
+/* Most contiguous runs of a tick's pairs. The ring is longer than both halves of the filter together: at most one of
+ * `newer` and `older` crosses an end of the ring, and only once. */
 #define PVID_WEAK_JOB_RUNS 2u
 
-/* Moves to the next pair outwards; returns how many of the `left` pairs from it on lie ahead without crossing the
- * ring's ends. */
+/* Moves to the next pair outwards. Returns the number of pairs from there on, at most `left`, that are contiguous in
+ * the ring. */
 static inline size_t pvid_weak_job_outwards(const pvid_weak_job *self, size_t left, size_t *newer, size_t *older)
 {
     const size_t length = self->length;

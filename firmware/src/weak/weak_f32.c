@@ -77,10 +77,10 @@ static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f3
     return pvid_estimator_init_f32(&self->estimator, &estimator);
 }
 
-/* Windows in the average of the gate's scale, which is relative to the sensors' noise and never below it. */
+/* Windows in the average of the gate's scale. The scale is relative to the sensors' noise and at least 1. */
 #define GATE_MEMORY 4.0f
 
-/* Whether init has accepted a configuration. */
+/* Returns whether init has accepted a configuration. */
 static inline bool is_ready(const pvid_weak_f32 *self)
 {
     const bool ready = (self != NULL) && (self->design != NULL);
@@ -99,8 +99,8 @@ static void restart_window(pvid_weak_window_f32 *window, uint16_t index)
     }
 }
 
-/* The first window begins with the next decimated sample. The second is then in its middle: its sums until its own
- * start, half a window later, are discarded. */
+/* Window 0 begins with the next decimated sample. Window 1 begins half a window later; until then it discards its
+ * sums (`whole` is false). */
 static void restart(pvid_weak_f32 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);
@@ -223,7 +223,7 @@ static void next_curvature(pvid_weak_curvature_f32 *self, uint8_t lag, float phi
     self->before[0] = phi;
 }
 
-/* An encoder's zero may be anywhere: before the first row c goes to the mean of phi. */
+/* The encoder's offset may be large: before the first row c is set to the mean of phi. */
 static void place_offset(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
 {
     float p[PVID_MAX_P];
@@ -233,7 +233,7 @@ static void place_offset(pvid_weak_f32 *self, const pvid_weak_window_f32 *window
     pvid_trust_place_f32(&self->trust, &self->estimator);
 }
 
-/* Why a window that is complete cannot be used; PVID_ACCUMULATED if it can. */
+/* The reason why a complete window is dropped; PVID_ACCUMULATED if it is used. */
 static pvid_reason drop_reason(pvid_weak_f32 *self, const pvid_weak_window_f32 *window)
 {
     if (self->frozen) {
@@ -243,20 +243,21 @@ static pvid_reason drop_reason(pvid_weak_f32 *self, const pvid_weak_window_f32 *
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
-    const bool zeroed = self->estimator.model->n_p <= (uint8_t)PVID_KAPITZA_C;
-    if (!zeroed && (self->estimator.counters.rows == 0u)) {
+    const bool offset_known = self->estimator.model->n_p <= (uint8_t)PVID_KAPITZA_C;
+    if (!offset_known && (self->estimator.counters.rows == 0u)) {
         place_offset(self, window);
     }
-    const float zero = zeroed ? 0.0f : self->estimator.p[PVID_KAPITZA_C];
-    if ((self->angle_limit > 0.0f) && (pvid_weak_window_max_deviation_f32(window, zero) > self->angle_limit)) {
+    const float offset = offset_known ? 0.0f : self->estimator.p[PVID_KAPITZA_C];
+    if ((self->angle_limit > 0.0f) && (pvid_weak_window_max_deviation_f32(window, offset) > self->angle_limit)) {
         pvid_count_up(&self->estimator.counters.held_out_of_range);
         return PVID_HELD_OUT_OF_RANGE;
     }
     return PVID_ACCUMULATED;
 }
 
-/* A complete window hands its sums over and continues in the free buffer. Its last sample, which has no weight, is
- * the first one of the next window. A dropped window keeps its sums, which are then cleared. */
+/* Exchanges the buffers of a complete window and of `finish`, which then processes the window's sums. A dropped window
+ * keeps its buffer. The window's last sample, where chi is 0, is the first sample of the next one, which clears the
+ * sums. */
 static pvid_reason hand_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
 {
     const pvid_reason reason = drop_reason(self, window);
@@ -272,7 +273,8 @@ static pvid_reason hand_over(pvid_weak_f32 *self, pvid_weak_window_f32 *window)
     return PVID_ACCUMULATED;
 }
 
-/* Returns why a window that this sample completes is dropped, if it is. */
+/* Begins a decimated sample in both windows. If it completes a window that is dropped, returns the reason; else
+ * PVID_ACCUMULATED. */
 static pvid_reason next_sample(pvid_weak_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
@@ -325,6 +327,9 @@ static void advance_finish(pvid_weak_f32 *self, pvid_reason *reason)
     }
 }
 
+/* Every tick runs the front end. If this completes a decimated sample, the sample begins in both windows and may
+ * complete one of them. In the second half of a block the tick adds the decimated sample to some functions of a window.
+ * All other ticks run stages of a complete window (schedule.h). */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, float phi, float y)
 {
     if (!is_ready(self)) {

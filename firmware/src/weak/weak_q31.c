@@ -19,7 +19,7 @@
 #define TERM_LIMIT ((int64_t)1 << 20)                                        /* of the factors of a test function */
 #define MOST_FUNCTIONS ((PVID_MAX_FUNCTIONS < 32) ? PVID_MAX_FUNCTIONS : 32) /* form_of in weak/finish_q31.c */
 
-/* Windows in the average of the gate's scale, which is relative to the sensors' noise and never below it. */
+/* Windows in the average of the gate's scale. The scale is relative to the sensors' noise and at least 1. */
 #define GATE_MEMORY 4u
 
 static bool is_count(int32_t x, int32_t limit)
@@ -112,7 +112,7 @@ static bool pivot_noise_is_valid(pvid_scaled_q31 noise)
     return (noise.m >= 0) && (noise.m <= PVID_ONE_Q30) && (noise.e >= -EXPONENT_LIMIT) && (noise.e <= EXPONENT_LIMIT);
 }
 
-/* Whether init has accepted a configuration. */
+/* Returns whether init has accepted a configuration. */
 static inline bool is_ready(const pvid_weak_q31 *self)
 {
     const bool ready = (self != NULL) && (self->design != NULL);
@@ -143,8 +143,8 @@ static void restart_window(pvid_weak_window_q31 *window, uint16_t index)
     window->curvatures = 0;
 }
 
-/* The first window begins with the next decimated sample. The second is then in its middle: its sums until its own
- * start, half a window later, are discarded, but must not be added to its earlier sums. */
+/* Window 0 begins with the next decimated sample. Window 1 begins half a window later; until then it discards its sums
+ * (`whole` is false), which must not be added to its earlier sums. */
 static void restart(pvid_weak_q31 *self)
 {
     const uint16_t hop = pvid_weak_hop(self->design->window);
@@ -244,7 +244,7 @@ void pvid_weak_gap_q31(pvid_weak_q31 *self)
     }
 }
 
-/* The first window's mean angle is a better start of c than none: the pendulum swings about its rest. */
+/* The encoder's offset may be large: before the first row c is set to the mean angle of the window. */
 static void place_offset(pvid_weak_q31 *self, const pvid_weak_window_q31 *window)
 {
     if (!self->zero_unknown || (self->estimator.counters.rows > 0u)) {
@@ -263,9 +263,9 @@ void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen)
     }
 }
 
-/* A complete window hands its sums over and continues in the free buffer. Its last sample, which has no weight, is
- * the first one of the next window. Returns PVID_ACCUMULATED, or why the window is dropped; its sums are then
- * cleared in place. */
+/* Exchanges the buffers of a complete window and of `finish`, which then processes the window's sums. The window's last
+ * sample, where chi is 0, is the first sample of the next one, which clears the sums. Returns PVID_ACCUMULATED, or the
+ * reason why the window is dropped; it then keeps its buffer. */
 static pvid_reason hand_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
 {
     self->warm = true;
@@ -285,7 +285,8 @@ static pvid_reason hand_over(pvid_weak_q31 *self, pvid_weak_window_q31 *window)
     return PVID_ACCUMULATED;
 }
 
-/* Returns why a window that this sample completes is dropped, if it is. */
+/* Begins a decimated sample in both windows. If it completes a window that is dropped, returns the reason; else
+ * PVID_ACCUMULATED. */
 static pvid_reason next_sample(pvid_weak_q31 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;

@@ -18,13 +18,14 @@ static size_t row_start(size_t row)
 
 void pvid_weak_whiten_begin_f32(pvid_weak_whiten_f32 *self, const float p[])
 {
-    const float two = p[PVID_KAPITZA_D1] * p[PVID_KAPITZA_W];
-    const float zero = (p[PVID_KAPITZA_D2] * p[PVID_KAPITZA_W]) * p[PVID_KAPITZA_W];
-    self->combination[0] = two;
-    self->combination[1] = zero;
-    self->combination[2] = two * two;
-    self->combination[3] = two * zero;
-    self->combination[4] = zero * zero;
+    /* factors of chi'' and of chi in the filter */
+    const float factor2 = p[PVID_KAPITZA_D1] * p[PVID_KAPITZA_W];
+    const float factor0 = (p[PVID_KAPITZA_D2] * p[PVID_KAPITZA_W]) * p[PVID_KAPITZA_W];
+    self->combination[0] = factor2;
+    self->combination[1] = factor0;
+    self->combination[2] = factor2 * factor2;
+    self->combination[3] = factor2 * factor0;
+    self->combination[4] = factor0 * factor0;
     self->whitened = true;
 }
 

@@ -8,7 +8,7 @@
 
 enum { UF = 0, F = 1, U = 2 }; /* integrands */
 
-/* What is known of the window as a whole: drive, zero, range, curvature. */
+/* Statistics of the window: drive, offset, range, curvature. */
 static inline void observe(pvid_weak_window_f32 *self, float phi, float u, const pvid_weak_curvature_f32 *curvature)
 {
     const bool first = self->index == 0u;
@@ -22,7 +22,7 @@ static inline void observe(pvid_weak_window_f32 *self, float phi, float u, const
     self->curvatures = (uint16_t)((first ? 0u : self->curvatures) + (curvature->due ? 1u : 0u));
 }
 
-/* The double integral of integrand i up to now, less the trapezoid rule's error. */
+/* The double integral of integrand i up to now, minus the trapezoid rule's error. */
 static inline float integrate(pvid_weak_window_f32 *self, size_t i, float now, float half_dt, float correction)
 {
     const bool first = self->index == 0u;
@@ -44,7 +44,7 @@ void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, fl
     const float i2_f = integrate(self, F, phi, half_dt, correction);
     const float i2_u = integrate(self, U, u, half_dt, correction);
     observe(self, phi, u, curvature);
-    if (self->index == 0u) { /* no weight, and 0 times infinity would not be 0 */
+    if (self->index == 0u) { /* chi is 0, but 0 times infinity would not be 0 */
         memset(term, 0, PVID_WEAK_SAMPLE_TERMS * sizeof term[0]);
         return;
     }
@@ -61,7 +61,7 @@ void pvid_weak_window_terms_f32(pvid_weak_window_f32 *self, uint16_t samples, fl
     term[PVID_TERM_UT] = u * t;
 }
 
-/* The last sample counts for the next window. */
+/* Without the window's last sample, which is the first of the next window. */
 float pvid_weak_window_drive_f32(const pvid_weak_window_f32 *self, uint16_t samples)
 {
     const float n = (float)(samples - 1u);
@@ -74,10 +74,10 @@ float pvid_weak_window_mean_f32(const pvid_weak_window_f32 *self, uint16_t sampl
     return self->phi_sum / (float)(samples - 1u);
 }
 
-float pvid_weak_window_max_deviation_f32(const pvid_weak_window_f32 *self, float zero)
+float pvid_weak_window_max_deviation_f32(const pvid_weak_window_f32 *self, float offset)
 {
-    const float up = self->highest - zero;
-    const float down = zero - self->lowest;
+    const float up = self->highest - offset;
+    const float down = offset - self->lowest;
     return (up > down) ? up : down;
 }
 
@@ -123,7 +123,7 @@ void pvid_weak_window_add_f32(const pvid_weak_window_f32 *self, const pvid_weak_
                               const float term[2][PVID_WEAK_SAMPLE_TERMS], size_t first, size_t last,
                               float sums[][PVID_WEAK_TERMS])
 {
-    static const float no_weight[3 * PVID_MAX_FUNCTIONS]; /* of the window's first sample */
+    static const float no_weight[3 * PVID_MAX_FUNCTIONS]; /* chi of the window's first sample: 0 */
     const size_t functions = design->functions;
     const size_t index = self->index;
     if (index == 0u) {

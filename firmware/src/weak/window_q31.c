@@ -13,7 +13,7 @@ enum { UF = 0, F = 1, U = 2 }; /* integrands */
 #define ON_CHI2 8u
 #define ON_CHI0 4u
 
-/* The double integrals in dt^2/12: exact, for they are whole numbers of it. */
+/* The double integrals in units of dt^2/12, in which they are exact integers. */
 static void integrate(pvid_weak_window_q31 *self, const int64_t now[], const uint8_t shift[], int64_t integral[])
 {
     const bool first = self->index == 0u;
@@ -27,7 +27,7 @@ static void integrate(pvid_weak_window_q31 *self, const int64_t now[], const uin
     }
 }
 
-/* What pvid_round_shift_q31 takes off x: half of 2^shift at most. */
+/* x - 2^shift pvid_round_shift_q31(x, shift): at most half of 2^shift. */
 static int64_t rest_of(int64_t x, uint8_t shift)
 {
     const int64_t half = ((int64_t)1 << shift) / 2;
@@ -75,7 +75,7 @@ void pvid_weak_window_terms_q31(pvid_weak_window_q31 *self, const pvid_weak_desi
     term[PVID_TERM_Y_Q31] = f;
 }
 
-/* The last sample counts for the next window. */
+/* Without the window's last sample, which is the first of the next window. */
 int64_t pvid_weak_window_drive_q31(const pvid_weak_window_q31 *self, uint16_t samples)
 {
     return ((int64_t)(samples - 1u) * self->u_square_sum) - (self->u_sum * self->u_sum);

@@ -6,7 +6,7 @@
 
 #include "pvid/weak_q31.h"
 
-/* What a decimated sample adds, by the factor of the table: places among the terms. Integrals in dt^2/12. */
+/* Places among the sums of a function, as in window_f32.h. Integrals in dt^2/12. */
 enum {
     PVID_TERM_UIUF_HIGH_Q31 = 0, /* chi'' (-U I2(U F)): high part, without a shift */
     PVID_TERM_UIF_HIGH_Q31 = 1,  /* chi'' (-U I2(F)): high part */
@@ -32,10 +32,10 @@ enum {
 void pvid_weak_window_terms_q31(pvid_weak_window_q31 *self, const pvid_weak_design_q31 *design, int32_t f, int32_t u,
                                 const pvid_weak_curvature_q31 *curvature, int32_t term[PVID_WEAK_TERMS_Q31]);
 
-/* (W - 1)^2 times the variance of U over the samples so far; call it where the window is complete. */
+/* (W - 1)^2 times the variance of U; valid once the window is complete. */
 int64_t pvid_weak_window_drive_q31(const pvid_weak_window_q31 *self, uint16_t samples);
 
-/* Mean square of the second differences of F that fell into the window, 0 if none did. */
+/* Mean square of the second differences of F; 0 if there are none. */
 pvid_scaled_q31 pvid_weak_window_curvature_q31(const pvid_weak_window_q31 *self);
 
 /* Adds the terms to the sums of functions first..last-1, or clears them at the window's first sample. */

@@ -1,8 +1,7 @@
-"""The four identifiers behind one face: CASES[form, core] knows what belongs to a form and a core.
+"""One interface to the four identifiers: CASES[form, core], or `case_of` for settings or a rig file.
 
-From a rig to the settings, from a run to the samples, from the core's numbers to SI, and to the frames of the link, the
-twin and the C headers of the same settings. The rest of the package asks the case, which everything that has a form and
-a core leads to (`case_of`).
+A case converts a rig file to settings, a run to samples and the core's numbers to SI. It makes the frames of the link,
+the twin and the C header of the same settings. Code that depends on form or core belongs here.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
 
 
 class HasCase(Protocol):
-    """Settings of an identifier, or what a rig file says of it."""
+    """Settings of an identifier, or the `[identifier]` section of a rig file."""
 
     @property
     def form(self) -> Form: ...
@@ -51,7 +50,7 @@ class HasCase(Protocol):
 
 
 class Case(ABC):
-    """What depends on the core: methods of the two subclasses; on the form: what they are made with.
+    """A form and a core. The two subclasses are the cores; the form is an argument of their constructor.
 
     Parameters
     ----------
@@ -76,7 +75,7 @@ class Case(ABC):
 
     @property
     def publishes(self) -> bool:
-        """Whether it publishes the estimates that it trusts, and no others."""
+        """Whether it publishes trusted estimates only (pvid/trust.h)."""
         return FORMS[self.form].publishes
 
     @property
@@ -88,11 +87,11 @@ class Case(ABC):
 
     @abstractmethod
     def settings(self, rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> Settings:
-        """For samples at `sample_rate` [Hz]; `start` overrides the rig's nominal p = (w, d1, d2)."""
+        """Settings for samples at `sample_rate` [Hz]; `start` overrides the rig's nominal p = (w, d1, d2)."""
 
     @abstractmethod
     def settings_for_run(self, rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> Settings:
-        """For a run, whose samples they take in."""
+        """Settings for a run; in fixed point with ranges that contain its samples."""
 
     def twin(self, config: Settings, estimators: Sequence[Any] | None = None) -> Twin:
         """The numpy twin; one lane for each of `estimators`, by default the settings' own."""
@@ -104,9 +103,9 @@ class Case(ABC):
         """A C header that defines the settings as `name`, with their tables, for a rod of l1 [m]."""
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
-        """Macros of pvid/config.h without which the settings would not fit, or take more room than they need.
+        """Macros of pvid/config.h that the settings need.
 
-        exact: no more room than they need in the weak form either, for a board of little memory.
+        exact: the smallest sizes that suffice, for a board with little memory.
         """
         if self.form == "strong":
             return {"PVID_MAX_WINDOW": str(max(config.bank.window, 5))}
@@ -118,8 +117,8 @@ class Case(ABC):
         return {macro: str(value) for macro, value in bounds.items()}
 
     def alike_from(self, config: Any, ticks: int) -> int:
-        """First of `ticks` from which on the mean cost of a tick is taken: whole periods of the weak form's windows,
-        all of them with a solve in work; in the strong form what follows the first 500."""
+        """First tick of `ticks` that counts in the mean cost of a tick. From there on the weak form has whole periods
+        of its windows, each with a solve, and the strong form has full windows (after 500 ticks)."""
         if self.form == "strong":  # windows are full and the drive is noticed
             return min(500, ticks // 2)
         period = config.hop * config.design.decimation
@@ -134,10 +133,10 @@ class Case(ABC):
 
     @abstractmethod
     def from_counts(self, counts: npt.NDArray[np.integer], lsb: tuple[float, float]) -> tuple[Samples, Samples]:
-        """The same from what a board's sensors count [n, 2], a count being worth `lsb` [rad], [m]."""
+        """The same from counts of a board's sensors [n, 2]; `lsb`: one count [rad], [m]."""
 
     def with_ranges(self, rig: RigFile, run: Run) -> RigFile:
-        """The rig file with the ranges that the core needs for a run, where it needs any."""
+        """The rig file with the ranges of the fixed-point core for a run; other cores have none."""
         return rig
 
     # ---- estimates
@@ -163,11 +162,11 @@ class Case(ABC):
         """kappa of estimates."""
 
     def beyond(self, config: Any, phi: Samples, y: Samples, rejected: int) -> Beyond | None:
-        """Which samples lay beyond the core's ranges; None in a core without ranges. `rejected` of them in all."""
+        """Samples beyond the core's ranges; None in a core without ranges. rejected: count of rejected samples."""
         return None
 
     def zero_shift(self, rig: RigFile, run: Run, phi: Samples) -> float:
-        """What the run's angles lie above the samples that the core took, on average [rad]."""
+        """Mean of the run's angles minus the samples of the core [rad]."""
         return 0.0
 
     # ---- frames
@@ -181,7 +180,7 @@ class Case(ABC):
         return made
 
     def configured(self, config: Any, frame: frames.Configuration) -> Settings:
-        """The settings with what a Configure frame says."""
+        """The settings with the values of a Configure frame."""
         if not isinstance(frame, self.configure_frame):
             raise PvidError("the board's image contains another core than the rig file sets")
         n_p = len(config.estimator.start)
@@ -190,7 +189,7 @@ class Case(ABC):
         return self._with(config, {**given, **places}, {name: getattr(frame, name) for name in self._offsets(config)})
 
     def shared(self, config: Any) -> Settings:
-        """The settings without what a Configure frame brings: those of an image."""
+        """The settings of an image: neutral values for the fields of a Configure frame."""
         ones = self._array((1,) * len(config.estimator.start))
         neutral = {"divider": 1, "row_sd": 1, **dict.fromkeys(_PER_PARAMETER, ones), **self._neutral}
         return self._with(config, neutral, dict.fromkeys(self._offsets(config), 0))
@@ -332,7 +331,7 @@ class _Fixed(Case):
 
 
 def _places(values: npt.ArrayLike) -> tuple[Any, ...]:
-    """Filled up with zeros to the places of a frame."""
+    """The values, padded with zeros to the length of a frame's field."""
     given = np.asarray(values).tolist()
     return tuple([*given, *[type(given[0])(0)] * (frames.MAX_P - len(given))])
 
@@ -349,12 +348,12 @@ CASES: dict[tuple[str, str], Case] = {
 
 
 def case_of(what: HasCase) -> Case:
-    """The case of an identifier's settings, or of those that a rig file asks for.
+    """The case of an identifier's settings, or of a rig file.
 
     Raises
     ------
     PvidError
-        For core f64, which is no case: only this machine has it.
+        For core f64, which exists in Python only.
     """
     case = CASES.get((what.form, what.core))
     if case is None:

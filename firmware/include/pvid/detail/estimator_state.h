@@ -4,7 +4,8 @@
 
 #include "pvid/estimator.h"
 
-/* How rows are kept and p is solved for: in stages, by the pattern of C, or directly, by the model's own functions. */
+/* How p is solved: in stages by the pattern of C (src/solve/staged_f32.c), or at once by the model's own functions
+ * (src/solve/direct_f32.c). */
 enum { PVID_ENGINE_STAGED = 1, PVID_ENGINE_DIRECT = 2 };
 
 /* Only the functions of estimator.h write to it. */
@@ -24,20 +25,20 @@ struct pvid_estimator_f32 {
     float step_limit;
     float kappa_min;
     float noise_margin;
-    float dead_zone;                /* squared */
-    float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; written by the module that makes the rows */
+    float dead_zone;                /* square of the configured one */
+    float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; the weak form writes it */
     float energy;                   /* sum of e^2 of the rows of the current group, each at the p of its tick */
     float group_weight; /* their weight; energy and group_weight only for models without their own project */
     float expected;     /* mean over the rows in the sums of their variance by the sensors' noise [units of Y^2]: lower
                            limit of the residual variance. 0: unknown */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
-    uint8_t engine; /* by the model: set by init */
+    uint8_t engine; /* PVID_ENGINE_; set by init */
     pvid_counters counters;
 };
 
-/* D S D = U U^T with D a diagonal of powers of two and U upper triangular: elimination runs from
- * the last index to the first, so that the last pivot is that of p[0]. */
+/* D S D = U U^T with D a diagonal of powers of two and U upper triangular. Elimination runs from the last index to the
+ * first: the last pivot is that of p[0]. */
 typedef struct {
     uint8_t n;
     float scale[PVID_MAX_P];         /* D: diagonal entries of D S D lie in [1, 4) */
@@ -45,35 +46,35 @@ typedef struct {
     float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
 } pvid_cholesky_f32;
 
-/* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be
- * read when it is complete, fallback may be set after begin. */
+/* A solve or an assessment in progress; the caller owns it. Read reason, size, energy and above_noise when it is
+ * complete. The caller may set fallback after begin. */
 struct pvid_estimator_solve_f32 {
     pvid_reason reason;
-    const float *fallback;       /* [n_p] where p goes if it may not step; NULL: it stays */
+    const float *fallback;       /* [n_p] value of p if no step is allowed; NULL: p is unchanged */
     pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
-    float size;                  /* largest |dp/p| of the step before its limit; 0 while p is held */
+    float size;                  /* largest |dp/p| of the step before step_limit; 0 if p is held */
     float energy;                /* sum of e^2 of the group's rows, each at the p of its tick */
-    float variance;              /* of a row's noise */
+    float variance;              /* of a row: row_sd^2 in a solve, s^2 of the residuals in an assessment */
     bool above_noise;            /* S contains more information than noise alone */
-    bool solvable;
+    bool solvable;               /* of an assessment: S could be factored */
     uint8_t stage;
-    uint8_t index; /* of the row within the stage */
-    uint8_t start; /* of the column of C in work among its non-zeros */
-    uint8_t next;  /* non-zero to be multiplied next */
+    uint8_t index; /* of the row or column within the stage */
+    uint8_t start; /* first non-zero of the present column of C */
+    uint8_t next;  /* next non-zero of this column */
     bool ends_group;
     bool in_dead_zone; /* within the dead zone: no step is taken */
-    float gain;
-    float fall;  /* of rr */
-    float scale; /* sum of M_ii dtheta_i^2: the size of the terms that cancel to it */
+    float gain;        /* g of this solve */
+    float fall;        /* decrease of rr by the step */
+    float scale;       /* sum of M_ii dtheta_i^2: size of the terms that cancel in `fall` */
     float sums[PVID_MAX_SUMS];
     float c[PVID_MAX_THETA * PVID_MAX_P];
-    float column[PVID_MAX_THETA]; /* M times a column of C */
-    float s[PVID_MAX_P][PVID_MAX_P];
-    float force[PVID_MAX_P];
-    float p[PVID_MAX_P]; /* where p, theta and b = B - M theta go: b -= moved */
+    float column[PVID_MAX_THETA];    /* M times a column of C */
+    float s[PVID_MAX_P][PVID_MAX_P]; /* S, then S + H0; upper triangle */
+    float force[PVID_MAX_P];         /* F */
+    float p[PVID_MAX_P];             /* p and theta after the step */
     float theta[PVID_MAX_THETA];
-    float theta_step[PVID_MAX_THETA];
-    float moved[PVID_MAX_THETA];
+    float theta_step[PVID_MAX_THETA]; /* dtheta */
+    float moved[PVID_MAX_THETA];      /* M dtheta: b -= moved */
     pvid_cholesky_f32 factor;
 };
 

@@ -14,7 +14,7 @@ typedef struct {
     int32_t e;
 } pvid_root_q31;
 
-/* What is known of the noise inside the rows, beside that of Y: PVID_NOISE_TRACES numbers of model.h. */
+/* Noise in the regressors N, beside that of Y: PVID_NOISE_TRACES numbers of model.h. */
 #define PVID_NOISE_TRACES_Q31 3
 
 /* The sums M, b, rr and weight. */
@@ -22,7 +22,7 @@ typedef struct {
     uint8_t n_theta;
     uint8_t exponent; /* M, b and rr are divided by 4^exponent */
     uint16_t n_sums;
-    uint16_t block;    /* groups of rows between acts of forgetting */
+    uint16_t block;    /* groups of rows between two forgettings */
     uint16_t age;      /* groups since the last one */
     int32_t retention; /* factor on the past, Q31; 2^31 - 1: everything is kept */
     uint32_t row_weight;
@@ -53,7 +53,7 @@ struct pvid_estimator_q31 {
     int32_t kappa_min;
     uint32_t noise_margin;
     uint32_t dead_zone;
-    pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; written by the module that makes the rows */
+    pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; the weak form writes it */
     int64_t energy; /* sum of e^2 of the rows of the current group, each at the p of its tick, at most PVID_WIDE */
     int64_t group_weight;     /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them
@@ -80,22 +80,22 @@ typedef struct {
     int64_t pivot[PVID_MAX_P];               /* Q60 */
 } pvid_cholesky_q31;
 
-/* A solve or an assessment in progress, kept by the caller; reason, size, energy and informed are to be read when it is
- * complete, fallback may be set after begin. */
+/* A solve or an assessment in progress; the caller owns it. Read reason, size, energy and above_noise when it is
+ * complete. The caller may set fallback after begin. */
 struct pvid_estimator_solve_q31 {
     pvid_reason reason;
     uint8_t stage;
     uint8_t index; /* of the row within the stage */
-    uint8_t start; /* of the column of C in work among its non-zeros */
+    uint8_t start; /* first non-zero of the present column of C */
     bool ends_group;
     bool judging;     /* an assessment */
     bool above_noise; /* S contains more information than noise alone */
     bool has_fallback;
     bool in_dead_zone;                      /* within the dead zone: no step is taken */
-    int32_t fallback[PVID_MAX_P];           /* where p goes if it may not step */
-    int64_t size;                           /* largest |dp/p| of the step before its limit, Q22; 0 while p is held */
+    int32_t fallback[PVID_MAX_P];           /* value of p if no step is allowed */
+    int64_t size;                           /* largest |dp/p| of the step before step_limit, Q22; 0 if p is held */
     int64_t energy;                         /* sum of e^2 of the group's rows, each at the p of its tick */
-    pvid_scaled_q31 variance;               /* of a row's noise, divided by 4^exponent as the sums are */
+    pvid_scaled_q31 variance;               /* of a row, divided by 4^exponent as the sums are */
     pvid_root_q31 wide;                     /* root of the variance that standard errors are made of */
     int32_t column[PVID_MAX_P][PVID_MAX_P]; /* of an inverted factor, and */
     pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
@@ -112,7 +112,7 @@ struct pvid_estimator_solve_q31 {
     int32_t q[PVID_MAX_P][PVID_MAX_P]; /* s_ab 2^-(g_a + g_b), which is factored */
     pvid_cholesky_q31 factor;
     int64_t dp[PVID_MAX_P];
-    int32_t p[PVID_MAX_P]; /* where p, theta and b go: b -= moved */
+    int32_t p[PVID_MAX_P]; /* p after the step; likewise theta and b: b -= moved */
     int64_t theta[PVID_MAX_THETA_Q31];
     int32_t theta_step[PVID_MAX_THETA_Q31]; /* theta_step_j 2^(step_exponent - h_j) in units of Y per N */
     int32_t step_exponent;

@@ -7,7 +7,7 @@
 /* Only the functions of gate.h write to it. */
 struct pvid_gate_f32 {
     float limit;    /* sigmas^2; 0: no gate */
-    float memory;   /* residuals that the scale remembers */
+    float memory;   /* residuals over which the scale averages */
     float floor;    /* least scale */
     float widening; /* factor on the scale at an outlier */
     float judged;   /* accepted residuals; stops at memory */

@@ -11,8 +11,8 @@ struct pvid_information_f32 {
     uint16_t age;     /* groups since the last fold, 0..block-1 */
     float retention;  /* factor on the past at a fold, in (0, 1]; 1 keeps everything */
     float row_weight; /* weight of a row; 1 for a model with its own accumulate */
-    float rounding; /* bound of the rounding error of yy where it is relative to a moving estimate; fades with the sums
-                       [units of yy] */
+    float rounding;   /* bound of the rounding error of rr, which every step of p changes (estimator.h); fades with the
+                         sums [units of yy] */
     float high[PVID_MAX_SUMS];
     float low[PVID_MAX_SUMS];
 };

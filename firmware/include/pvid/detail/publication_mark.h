@@ -1,4 +1,4 @@
-/* pvid/detail/publication_mark.h - which of two copies of an estimate is whole; see publication.h. Not API. */
+/* pvid/detail/publication_mark.h - version of a published estimate's two copies; see publication.h. Not API. */
 #ifndef PVID_DETAIL_PUBLICATION_MARK_H
 #define PVID_DETAIL_PUBLICATION_MARK_H
 

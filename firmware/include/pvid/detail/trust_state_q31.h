@@ -9,16 +9,16 @@ struct pvid_trust_q31 {
     pvid_trust_config_q31 config;
     uint16_t groups;        /* groups judged; saturates */
     uint16_t uninformative; /* consecutive uninformative groups */
-    uint16_t judged;        /* residuals in long_mean; stops at long_memory; none before p is near */
+    uint16_t judged;        /* groups in long_mean; stops at long_memory; 0 until p has converged */
     uint16_t long_memory;
-    uint8_t next;           /* place of the next residual in recent */
-    uint8_t groups_to_fade; /* groups before which the past is still to fade */
-    bool errors_small;      /* the present standard errors are small; otherwise nothing fades */
-    bool converged;         /* whether p has settled with small standard errors yet */
-    bool published;         /* whether an estimate has been trusted yet */
+    uint8_t next;           /* place of the next group in `recent` */
+    uint8_t groups_to_fade; /* remaining groups of a renewal: before each the sums are multiplied by a factor */
+    bool errors_small;      /* the present standard errors are small; otherwise a renewal waits */
+    bool converged;         /* p has once settled with small standard errors */
+    bool published;         /* an estimate has been published */
     bool misfit;
-    int32_t anchor[PVID_MAX_P]; /* p at the rows in the sums, or when they last agreed with p */
-    int64_t long_mean;          /* of residual variances over their expectation, PVID_VARIANCE_RATIO_BITS */
+    int32_t anchor[PVID_MAX_P]; /* p at which the rows in the sums last agreed with p, or at the last renewal */
+    int64_t long_mean;          /* of the variance ratios of the groups, PVID_VARIANCE_RATIO_BITS */
     int64_t recent[PVID_TRUST_SHORT];
     pvid_publication_mark mark;
     pvid_estimate_q31 estimate; /* the published one, for the context that calls step */

@@ -10,9 +10,9 @@
 
 typedef struct {
     uint16_t half;   /* pairs of taps */
-    uint16_t length; /* places of the ring in use: taps + decimation - 1, for a job may last a block */
+    uint16_t length; /* places of the ring in use, taps + decimation - 1: a job may last a whole block */
     uint16_t decimation;
-    uint16_t pairs_per_tick; /* pairs a tick: a job lasts half a block */
+    uint16_t pairs_per_tick; /* pairs per tick, such that a job lasts half a block */
     uint16_t head;           /* place of the next sample */
     uint16_t wait;           /* samples until the next block is complete */
     uint16_t pair;           /* pairs done; half: the job is done */

@@ -19,29 +19,29 @@ typedef struct {
 typedef struct {
     uint16_t index;                          /* of the present decimated sample in the window, 0..W-2 */
     bool whole;                              /* the window has been filling from its first sample */
-    uint8_t buffer;                          /* which of the three it fills */
+    uint8_t buffer;                          /* index in pvid_weak_q31.sums of the sums that the window fills */
     int64_t before[PVID_WEAK_INTEGRALS_Q31]; /* the integrands at the last sample */
     int64_t once[PVID_WEAK_INTEGRALS_Q31];   /* twice their integrals */
     int64_t twice[PVID_WEAK_INTEGRALS_Q31];  /* four times the integrals of these */
     int64_t f_sum;
     int64_t u_sum;
     int64_t u_square_sum;
-    int64_t curvature_square_sum; /* of the second differences of F that fell into the window */
-    uint16_t curvatures;          /* how many did */
+    int64_t curvature_square_sum; /* sum of the squared second differences of F */
+    uint16_t curvatures;          /* number of second differences in this sum */
 } pvid_weak_window_q31;
 
 /* Second differences F(t) - 2 F(t - lag) + F(t - 2 lag), one every `lag` decimated samples. */
 typedef struct {
-    uint8_t wait;      /* samples until the next */
+    uint8_t wait;      /* decimated samples until the next second difference */
     uint8_t known;     /* samples in `before`, 0..2 */
-    bool due;          /* the present sample ends one */
+    bool due;          /* the present sample completes a second difference */
     int32_t before[2]; /* F one lag and two lags ago */
-    int64_t square;    /* of the one that is due */
+    int64_t square;    /* the squared second difference; valid if due */
 } pvid_weak_curvature_q31;
 
 #define PVID_WEAK_FACTOR_Q31 ((PVID_MAX_FUNCTIONS * (PVID_MAX_FUNCTIONS + 1)) / 2)
 
-/* The complete window that is being turned into rows and steps. */
+/* Processing of a complete window: rows, then steps of p, then the assessment. */
 typedef struct {
     uint8_t stage;
     uint8_t index; /* of the function within the stage */
@@ -56,18 +56,19 @@ typedef struct {
     int32_t factor[PVID_WEAK_FACTOR_Q31];            /* R0, then its Cholesky factor, Q30 */
     int32_t inverted[PVID_MAX_FUNCTIONS];            /* a row of the factor's inverse, Q15, then a block of it */
     int16_t inverted_exponent;
-    pvid_scaled_q31 trace[PVID_NOISE_TRACES_Q31]; /* noise in the columns, a row of unit noise variance */
+    pvid_scaled_q31 trace[PVID_NOISE_TRACES_Q31]; /* argument of the model's `noise`: see src/weak/whiten_f32.h */
     pvid_reciprocal_q31 length;                   /* of the column that is being projected out */
-    int32_t direction[PVID_MAX_FUNCTIONS];        /* of it, Q30; length 1 or 0 */
-    int64_t along[PVID_WEAK_COLUMNS_Q31];         /* the columns' components along it, Q30 */
+    int32_t direction[PVID_MAX_FUNCTIONS];        /* unit vector of this column, Q30; or 0 */
+    int64_t along[PVID_WEAK_COLUMNS_Q31];         /* components of the columns along it, Q30 */
     pvid_reason reason;                           /* of the last solve, then of the window */
     int64_t size;                                 /* of the last step, relative, Q22 */
-    int64_t energy; /* of the window's rows: before they are added where the gate looks at it, then since */
+    int64_t
+        energy; /* sum of e^2 of the window's rows: before they are added (only if the gate is enabled), then since */
     pvid_gate_q31 gate;
-    pvid_scaled_q31 expected; /* variance of a row's noise */
-    int32_t fade_factor;      /* factor on the past before this window's rows, Q31; 0: none */
+    pvid_scaled_q31 expected; /* variance of a row by the sensors' noise */
+    int32_t fade_factor;      /* factor on the sums before this window's rows, Q31; 0: none */
     pvid_estimator_solve_q31 solve;
-    pvid_estimate_q31 candidate; /* for publication */
+    pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_weak_finish_q31;
 
 /* Only the functions of weak_q31.h write to it. */
@@ -79,12 +80,12 @@ struct pvid_weak_q31 {
     int8_t zero_bits;  /* format of c */
     bool zero_unknown;
     uint8_t iterations;
-    uint8_t functions_per_tick; /* functions a tick */
-    uint8_t stages_per_tick;    /* stages of a complete window a tick */
-    uint8_t active;             /* the window that takes the present decimated sample in; 2: both have */
-    uint8_t function;           /* functions of that window that have, 0..K-1 */
+    uint8_t functions_per_tick; /* functions of a window to which a tick adds the present decimated sample */
+    uint8_t stages_per_tick;    /* stages of a complete window per tick */
+    uint8_t active;             /* window to which the present decimated sample is being added; 2: both are done */
+    uint8_t function;           /* functions of that window that are done, 0..K-1 */
     bool warm;                  /* a window has been completed since the restart */
-    bool frozen;                /* windows are gathered and dropped */
+    bool frozen;                /* complete windows are dropped */
     int32_t f;                  /* the present decimated sample */
     int32_t u;
     pvid_scaled_q31 pivot_noise;

@@ -26,7 +26,7 @@ Int32 = npt.NDArray[np.int32]
 
 
 class _Arithmetic(NamedTuple):
-    """What differs between the cores. `sample`, `sums`: numpy's types of samples and p, and of the sums."""
+    """Properties of a core. sample, sums: numpy types of samples and p, and of the sums."""
 
     sample: type[np.generic]
     sums: type[np.generic]
@@ -91,12 +91,12 @@ class Native:
         return Identifier(self, config)
 
     def estimator(self, config: EstimatorConfig, update_rate: float) -> Stepper:
-        """An initialised float estimator of the strong form that is fed rows."""
+        """An initialised float estimator of the strong form; its input are rows."""
         model = self.headers.ffi.addressof(self.library, f"pvid_{DEFAULT}_strong_f32")
         return Stepper(self, "estimator", "f32", config, replay="rows", model=model, update_rate_hz=update_rate)
 
     def estimator_q31(self, config: EstimatorConfigQ31) -> Stepper:
-        """An initialised fixed-point estimator on one of the core's models that is fed rows, a group each."""
+        """An initialised fixed-point estimator on one of the core's models; its input are rows, one per group."""
         name = _MODELS_Q31[len(config.p_bits), len(config.n_bits)]
         model = self.headers.ffi.addressof(self.library, name)
         return Stepper(self, "estimator", "q31", config, replay="rows", model=model)
@@ -171,7 +171,7 @@ class Stepper:
     replay
         pvid_replay_<replay>_<core> steps it.
     given
-        Fields of the C configuration that the settings do not hold.
+        Fields of the C configuration that the settings do not have.
     """
 
     def __init__(self, native: Native, name: str, core: Core, config: Any, *, replay: str, **given: Any) -> None:
@@ -197,7 +197,7 @@ class Stepper:
         return getattr(self.native.library, f"pvid_{self._name}_{verb}_{self.core}")(self.state, *arguments)
 
     def initialise(self) -> Status:
-        """Runs init on the configuration as it stands."""
+        """Runs init on the present configuration."""
         return Status(self._call("init", self.config_pointer))
 
     @property
@@ -227,7 +227,7 @@ class Stepper:
 
     @property
     def publishes(self) -> bool:
-        """Whether it publishes estimates that it trusts."""
+        """Whether it publishes trusted estimates only."""
         return False
 
     @property
@@ -314,7 +314,7 @@ class Identifier(Stepper):
 
     @property
     def publishes(self) -> bool:
-        """Whether it publishes estimates that it trusts."""
+        """Whether it publishes trusted estimates only."""
         return FORMS[self.form].publishes
 
     @property
@@ -324,7 +324,7 @@ class Identifier(Stepper):
 
     @property
     def estimate(self) -> npt.NDArray[np.void]:
-        """The published estimate, the start until there is one; of a form without trust, the present state's."""
+        """The published estimate (before the first one the start); in the strong form the present estimate."""
         return self.native.headers.viewed(self.state.trust.estimate) if self.publishes else self.assess()
 
     @property
@@ -334,11 +334,11 @@ class Identifier(Stepper):
 
     @property
     def misfit(self) -> float:
-        """Variance of the residuals behind the estimate over what the sensors' noise explains; NaN: not judged."""
+        """Residual variance of the estimate's rows over its expectation from the sensors' noise; NaN: not judged."""
         return float(self.estimate["misfit"]) * self._arithmetic.misfit_unit or math.nan
 
     def freeze(self, frozen: bool) -> None:
-        """Takes nothing in, or goes on."""
+        """Freezes (True) or resumes (False) the identifier: pvid_weak_freeze_f32."""
         self._call("freeze", frozen)
 
     def gap(self) -> None:

@@ -84,7 +84,7 @@ def reason_words(reason: str) -> str:
 
 
 def kappa_words(kappa: float) -> str:
-    """Identifiability of w, d1 and d2 from the data, in words."""
+    """Identifiability of the parameters from the data, in words."""
     if not kappa >= KAPPA_MIN:
         return "parameters not identifiable"
     if kappa < KAPPA_WEAK:

@@ -1,7 +1,7 @@
 """A mechanism as the rest of the package sees it: names, units and words of its channels, constants and parameters,
 and the map from the parameters p that are identified to the physical ones.
 
-Each fact is written once, in the folder of the mechanism (pvid.models.kapitza); registry.MODELS holds them by name.
+A mechanism is defined in its own folder (pvid.models.kapitza); registry.MODELS contains them by name.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Channel(Quantity):
     ----------
     short : in one word
     shown_in : a unit for pages and terminals, and how many of it are one of SI; ("", 1): that of SI
-    usual_names : regular expression of the names of columns that are likely to hold it
+    usual_names : regular expression of likely column names of this signal
     """
 
     short: str = ""
@@ -99,7 +99,7 @@ class Parameter(Quantity):
 
 @dataclass(frozen=True)
 class Scale:
-    """A scale whose error no residual shows, so that it is added to the standard errors.
+    """A scale, such as a sensor's gain, whose error changes no residual; it is added to the standard errors.
 
     Attributes
     ----------
@@ -125,15 +125,14 @@ class Model:
     ----------
     name, title : in rig files; in a few words
     channels, constants : what is recorded, and what the user knows
-    parameters : p in the order of the core: mapped, then offset, then nuisance; the first is the one that kappa refers
-        to
-    physical : what the mapped parameters give with the constants
+    parameters : p in the order of the core: mapped, then offset, then nuisance; kappa refers to the first one
+    physical : parameters that follow from the mapped ones and the constants
     physical_of : (mapped p [..., n_mapped], constants) -> [..., n_physical]; NaN outside the physical region
     gradient_of : likewise, d physical / d p [..., n_physical, n_mapped]
     mapped_of : (physical [n_physical], constants) -> mapped p, the inverse
     is_plausible : whether p, at least the mapped ones, can be that of a rig
     modes_hz : of p, at least the mapped ones: natural frequencies [Hz], the slowest first; () where there are none
-    scales : whose errors enter the standard errors
+    scales : scales whose errors are part of the standard errors
     """
 
     name: str

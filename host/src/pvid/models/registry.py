@@ -1,4 +1,4 @@
-"""The mechanisms that are there: every folder of pvid.models that defines MODEL."""
+"""The available mechanisms: every folder of pvid.models that defines MODEL."""
 
 from __future__ import annotations
 

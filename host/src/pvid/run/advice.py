@@ -1,9 +1,8 @@
-"""What is likely to be wrong with a run that gives no answer, or a doubtful one, and what to type about it.
+"""Finds likely mistakes in a run that is not identified, or identified with a warning, and options that correct them.
 
-Mistakes of units are seen in magnitudes; the others in trials: the run is identified again with the suspected mistake
-put right, which takes some hundredths of a second, and the trial that answers, or leaves much less unexplained,
-is believed. What is found is put right before the search goes on, so that two mistakes give two sentences, and one
-mistake one.
+Magnitudes show mistakes of units. For other mistakes the run is identified again with the suspected mistake corrected,
+which takes some hundredths of a second; a trial counts if it identifies the run, or if its chi^2 is much smaller. A
+mistake is corrected before the search continues: two mistakes give two sentences, one mistake gives one.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from pvid.setup.ranges_q31 import pivot_acceleration, reach
 
 GRAVITY = 9.81  # m/s^2
 _MOST_GRAVITY = 1.02 * 9.83  # nowhere on Earth is more
-_TILTED = 0.5  # of gravity, and of the rig file's: a plane that is tilted by 60 degrees is rare
+_TILTED = 0.5  # least g*, relative to gravity and to the rig file's: a plane tilted by more than 60 degrees is rare
 
 _LOWEST_RATE = 25.0  # Hz
 _LIKELY_RATES = (50.0, 20_000.0)
@@ -38,9 +37,9 @@ _LONGEST_ROD = 3.0  # m
 _LIKELY_RODS = (0.03, 2.0)  # m
 _MOST_ACCELERATION = 3.0  # of the pivot [gravity], rms
 _LIKELY_ACCELERATION = (0.005, 2.0)
-_WIDE_SWING = 1.0  # rad: a swing of a few degrees looks like it when it is read as radians
-_SMALL_ANGLE = 0.05  # rad: below, what sines leave is within a 14-bit encoder's noise
-_USUAL_SWING = 0.75 * VALID_ANGLE  # small angles do not show the counts of a turn: it is taken for one of these
+_WIDE_SWING = 1.0  # rad: a larger swing may be degrees that are read as radians
+_SMALL_ANGLE = 0.05  # rad: below it phi - sin phi is within a 14-bit encoder's noise
+_USUAL_SWING = 0.75 * VALID_ANGLE  # largest swing that is assumed in order to guess the counts per turn
 _FULL_TURN = 2 * math.pi
 _FAR_REST = 1.5  # rad
 _LSB_OFF = 0.3
@@ -49,18 +48,18 @@ _WHOLE_BITS = 0.01  # a turn of 2 pi is off by 0.16
 
 _FADING = 2.5  # rms of the swing in the first fifth of a run, over that in the last
 
-_LINEAR_TOLD = 0.005  # error of fixed point's linear rows, relative
+_LINEAR_TOLD = 0.005  # relative error of fixed point's linear rows from which on a sentence reports it
 
 _MOST_SAMPLES = 200_000  # of a run, for trials
-_BETTER = 0.5  # chi^2 of a trial that is believed, over that without it
-_EXPLAINED = 3.0  # chi^2 at which nothing in the equations is looked for
+_BETTER = 0.5  # largest chi^2 of a trial that counts, relative to that without it
+_EXPLAINED = 3.0  # below this chi^2 no mistake in the equations is sought
 _MOST_ROUNDS = 4
-_CLOCK_OFF = 0.3  # less does not keep a run from being answered
+_CLOCK_OFF = 0.3  # least relative error of the clock that is sought: smaller errors do not prevent an estimate
 
 
 @dataclass(frozen=True)
 class Case:
-    """A run and its rig, as given or with mistakes put right."""
+    """A run and its rig, as given or with mistakes corrected."""
 
     run: Run
     rig: RigFile
@@ -68,15 +67,15 @@ class Case:
 
 @dataclass(frozen=True)
 class Cure:
-    """A mistake, in a sentence with what to type, and the case without it."""
+    """A sentence that names a mistake and the option that corrects it, and the case without the mistake."""
 
     sentence: str
     case: Case
 
 
 def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tuple[str, ...]:
-    """Sentences on what is likely to be wrong; () for a run that has been answered without a warning and whose sensors
-    and scales are plausible.
+    """Sentences that name likely mistakes; () for a run that is identified without a warning and whose sensors and
+    scales are plausible.
 
     Parameters
     ----------
@@ -101,7 +100,7 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
         degrees = _angle_in_degrees(case, native)
         if degrees:
             return (degrees[0].sentence,)
-        # the answer's own start and design serve the trials
+        # the trials use the start and design of this result
         found, case, now = _put_right(Case(case.run, _settled(case)), native, units=False)
     else:
         found, case, now = _put_right(case, native)
@@ -116,18 +115,17 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
 
 
 def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]:
-    """Sentences on a run whose rig file's settings were refused."""
+    """Sentences for a run whose settings were refused."""
     return tuple(_put_right(Case(_shortened(run), rig), native)[0])
 
 
 def behind(advices: tuple[str, ...], error: PvidError) -> PvidError:
-    """A refusal behind the mistakes that it follows from."""
+    """An error message with the mistakes before the refusal that they cause."""
     return PvidError(f"{'; '.join(advices)} (as it is: {error})" if advices else str(error))
 
 
 def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str], Case, Identification | None]:
-    """What is found, the case without it, and what this gives; without `units` only sensors and equations are looked
-    at."""
+    """The mistakes found, the case without them, its identification; units: whether mistakes of units are sought."""
     found: list[str] = []
     for _ in range(_MOST_ROUNDS if units else 0):
         cure = _unit_mistake(case, native)
@@ -157,8 +155,8 @@ def _shortened(run: Run) -> Run:
 
 
 def _trial(case: Case, native: Native) -> Identification | None:
-    """The case in the weak form and float32, its residuals held against the sensors' noise alone; None where the
-    settings are refused."""
+    """The case identified in the weak form and float32, with residuals relative to the sensors' noise alone; None if
+    the settings are refused."""
     identifier = case.rig.identifier
     float32 = identifier.in_weak_form(core="f32", law="stationary")
     try:
@@ -168,7 +166,7 @@ def _trial(case: Case, native: Native) -> Identification | None:
 
 
 def _settled(case: Case) -> RigFile:
-    """The rig with what the run's survey finds, but for the disturbance that explains the rest."""
+    """The rig with the result of the run's survey, but without its disturbance."""
     rig = fitted(case.rig, case.run)
     return replace(rig, identifier=replace(rig.identifier, disturbance=case.rig.identifier.disturbance))
 
@@ -182,12 +180,12 @@ def _is_explained(result: Identification | None) -> bool:
 
 
 def _answers(trial: Identification | None) -> bool:
-    """With parameters that some mechanism has."""
+    """Whether a trial is identified with physical parameters."""
     return trial is not None and trial.identified and all(name in trial.value for name in trial.model.physical_names)
 
 
 def _is_better(trial: Identification | None, now: Identification | None) -> bool:
-    """Whether a trial answers where there was no answer, or leaves much less unexplained."""
+    """Whether a trial identifies the run and `now` does not, or has a much smaller chi^2."""
     if trial is None or not _answers(trial):
         return False
     if now is None or not now.identified:
@@ -201,7 +199,7 @@ def _is_better(trial: Identification | None, now: Identification | None) -> bool
 
 
 def _unit_mistake(case: Case, native: Native) -> Cure | None:
-    """The first mistake of a unit that magnitudes show; of several units the one that answers."""
+    """The first mistake of a unit that magnitudes show; of several units the first that identifies the run."""
     for cures in (
         _time_unit(case),
         _angle_in_counts(case),
@@ -236,7 +234,7 @@ def _time_unit(case: Case) -> list[Cure]:
 
 
 def _swing(run: Run) -> tuple[float, float]:
-    """Where phi rests, about, and how far it goes from there [rad]."""
+    """Median of phi and the largest distance from it [rad]."""
     phi = run.phi[np.isfinite(run.phi)]
     rest = float(np.median(phi)) if len(phi) else 0.0
     return rest, float(np.abs(phi - rest).max(initial=0.0))
@@ -260,7 +258,7 @@ def _angle_in_counts(case: Case) -> list[Cure]:
 
 
 def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
-    """By its swing, where that is a whole turn or a trial in degrees is answered better; or by the encoder's step."""
+    """Detected by the swing, if it is a whole turn or a trial in degrees is better; or by the encoder's step."""
     run = case.run
     _, swing = _swing(run)
     step = resolution_of(run.phi)
@@ -279,8 +277,7 @@ def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
 
 
 def _is_step_in_degrees(step: float, lsb: float) -> bool:
-    """Whether an encoder's step is what the rig file gives, in degrees; or, where it does not give it, a turn of 360
-    over a power of two."""
+    """Whether an encoder's step equals the rig file's phi_lsb in degrees; without one, 360 over a power of two."""
     if not isinstance(lsb, Unset):
         return lsb > 0 and abs(math.degrees(lsb) / step - 1) < 0.1
     bits = math.log2(360.0 / step)
@@ -344,7 +341,7 @@ def _height_units(case: Case) -> list[Cure]:
 
 
 def _exchanged(case: Case, now: Identification | None, native: Native) -> Cure | None:
-    """phi and y in one another's place, where the run is answered only with both in their own."""
+    """phi and y exchanged: the run is identified only after exchanging them back."""
     if now is not None and now.identified:
         return None
     sensor = case.rig.sensor
@@ -368,7 +365,7 @@ def _step_of(case: Case, now: Identification | None, native: Native) -> Cure | N
 
 
 def _steps(case: Case) -> list[Cure]:
-    """Resolutions that the rig file gives otherwise than the run shows them."""
+    """Resolutions of the rig file that differ from those of the run."""
     sensor, cures = case.rig.sensor, []
     for name, values, given, unit in (
         ("phi_lsb", case.run.phi, sensor.phi_lsb, "rad"),
@@ -392,7 +389,7 @@ def _steps(case: Case) -> list[Cure]:
 
 
 def _equation_mistake(case: Case, now: Identification | None, native: Native) -> Cure | None:
-    """The one that a trial confirms best."""
+    """The mistake whose trial is the best."""
     best: tuple[Cure, Identification] | None = None
     for cure in _suspected(case, now):
         trial = _trial(cure.case, native)
@@ -434,7 +431,7 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
 
 
 def _first_answered(case: Case, now: Identification | None, native: Native) -> Cure | None:
-    """Another clock with which a run is answered that was not."""
+    """A clock with which a run is identified that is not identified with its own."""
     return None if now is not None and now.identified else _clock(case, native)
 
 
@@ -444,8 +441,8 @@ def _at_rate(case: Case, factor: float) -> Case:
 
 
 def _clock(case: Case, native: Native) -> Cure | None:
-    """A clock that runs too slow or too fast. Any explains a run, with another gravity: one is tried that brings what
-    phi does most to the nominal slow mode, and gravity tells which is right."""
+    """A clock that runs too slow or too fast. Any clock fits a run, with another gravity: the first trial moves the
+    dominant frequency of phi to the nominal slow mode; from its gravity follows the right clock."""
     modes = case.rig.mechanism.model.modes_hz(nominal_start(case.rig))
     slow = (modes or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
     tried = slow / _dominant_hz(case.run)
@@ -467,19 +464,19 @@ def _clock(case: Case, native: Native) -> Cure | None:
 
 
 def _dominant_hz(run: Run) -> float:
-    """Where phi's spectrum is largest [Hz]; at least two periods a run."""
+    """Frequency of the largest value of phi's spectrum [Hz]; at least two periods per run."""
     phi = np.where(np.isfinite(run.phi), run.phi, np.nanmedian(run.phi))
     power = np.abs(np.fft.rfft((phi - phi.mean()) * np.hanning(len(phi)))) ** 2
     return float(max(2, int(np.argmax(power[2:])) + 2)) * run.sample_rate / len(phi)
 
 
 def _size(ratio: float) -> str:
-    """Of what is `ratio` times what it should be."""
+    """Words for a quantity that is `ratio` times its right value."""
     return f"{ratio:.3g} times too large" if ratio > 1 else f"{1 / ratio:.3g} times too small"
 
 
 def _clock_of(result: Identification, rig: RigFile) -> tuple[str, ...]:
-    """Of an answer whose gravity is more than the Earth's, or much less than that and the rig file's."""
+    """Sentence for an estimate with a gravity above the Earth's, or much below that and the rig file's."""
     g, error = result.value.get("g", GRAVITY), 3 * result.se.get("g", 0.0)
     if g - error > _MOST_GRAVITY:
         unless = ""
@@ -507,7 +504,7 @@ def _wider_ranges(result: Identification) -> str:
 
 
 def _remaining(case: Case, result: Identification, now: Identification | None) -> Iterator[str]:
-    """Of a run in which no mistake was found; `now` is what the weak form in float32 makes of it."""
+    """Sentences for a run in which no mistake was found; now: its identification in the weak form and float32."""
     if _is_good(result):
         return
     if result.form == "strong" and _is_good(now):

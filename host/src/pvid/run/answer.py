@@ -1,4 +1,4 @@
-"""The answer of `pvid identify`: its JSON object, and what a person reads."""
+"""Output of `pvid identify`: JSON object, table and lines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pvid.run.identify import Identification
 
 
 def as_json(result: Identification) -> dict[str, Any]:
-    """The object of `identify --json` (host/docs/index.md): null where nothing is identified or judged."""
+    """The object of `identify --json` (host/docs/index.md); null: not identified, or not judged."""
     parameters = {one.name: _parameter(result, one) for one in result.model.answers}
     beyond = result.beyond
     return {
@@ -49,7 +49,7 @@ def as_json(result: Identification) -> dict[str, Any]:
 
 
 def _parameter(result: Identification, of: Quantity) -> dict[str, Any]:
-    """Value, standard error and what this is made of; nulls for what is not identified."""
+    """Value, standard error and its parts; null if the parameter is not identified."""
     name, known = of.name, result.identified and of.name in result.value
     parts = result.parts.get(name) if known else None
     return {
@@ -62,7 +62,7 @@ def _parameter(result: Identification, of: Quantity) -> dict[str, Any]:
 
 
 def table(result: Identification, truths: dict[str, float] | None = None) -> Table | None:
-    """The parameters, rounded to their errors; None where nothing is identified: a guess is no estimate."""
+    """The parameters, rounded to their errors; None if the run is not identified."""
     if not result.identified:
         return None
     out = Table(title=f"{result.form} form, {result.law} law, core {result.core} on {result.on}")
@@ -86,7 +86,7 @@ def table(result: Identification, truths: dict[str, float] | None = None) -> Tab
 
 
 def one_line(result: Identification) -> str:
-    """The parameters, or why there are none, in a line."""
+    """The parameters in one line, or the reason why there are none."""
     if not result.identified:
         return f"nothing: {result.verdict}"
     pairs = [(name, with_error(result.value[name], result.se[name])) for name in result.value]
@@ -94,7 +94,7 @@ def one_line(result: Identification) -> str:
 
 
 def status_line(result: Identification) -> str:
-    """What the core reported besides the parameters."""
+    """The core's report without the parameters."""
     chi2 = "" if result.chi2 is None else f" chi2 {result.chi2:.2g};"
     since = f" since the estimate of {result.trusted_s:.1f} s" if result.is_old else ""
     return (
@@ -104,7 +104,7 @@ def status_line(result: Identification) -> str:
 
 
 def error_line(result: Identification, rig: RigFile) -> str | None:
-    """What the standard errors of the physical parameters are made of; None where nothing is identified."""
+    """Parts of the standard errors of the physical parameters; None if the run is not identified."""
     if not result.identified:
         return None
     model, scale_sd = result.model, rig.scale_sd

@@ -39,7 +39,7 @@ def sum_name(index: int, n_sums: int) -> str:
 
 @dataclass(frozen=True)
 class Difference:
-    """The first bit that differs: tick, variable and both words, of floats 32 bits."""
+    """The first difference: tick, variable and both words (of floats their 32 bits)."""
 
     tick: int
     variable: str
@@ -69,8 +69,7 @@ class Comparison:
 
 
 def first_difference(core: Record, twin: Record) -> Difference | None:
-    """The first difference between a replay of the core and a lane of its twin: p, sums, status, then what is
-    published."""
+    """The first difference between a replay of the core and a lane of its twin: p, sums, status, published p."""
     names: dict[str, Callable[[int], str]] = {
         "p": P_NAMES.__getitem__,
         "sums": lambda place: sum_name(place, core.sums.shape[1]),
@@ -121,6 +120,6 @@ def compare_rig(
     start: npt.ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Comparison:
-    """The same with the form, core and settings that a rig file asks for on a run."""
+    """compare_run with the form, core and settings of a rig file for a run."""
     case = case_of(rig.identifier)
     return compare_run(native, case.settings_for_run(rig, run, start), *case.samples(rig, run), progress=progress)

@@ -16,7 +16,7 @@ Float = npt.NDArray[np.float64]
 
 # A drive below these is weak: 15 s with u at 5 % of w fix w to some 5 % with a 12-bit encoder.
 _WEAK_PART = 0.05
-_NOISY = 10.0  # the core takes a window for driven from so many times the noise on
+_NOISY = 10.0  # least drive of a window in the core, times the noise
 # Motion below this many steps of the encoder (rms) shows too little of how it swings.
 _STILL_STEPS = 1.5
 _BAND = 4.0  # fast modes

@@ -1,9 +1,9 @@
-"""How well settings of the weak form predict what they have not seen: alternate blocks of a run, half from half.
+"""Cross-validation of settings of the weak form: one half of a run's blocks predicts the other half.
 
     settings -> rows of the even blocks -> p -> residuals of the reference rows in the odd blocks, and vice versa
 
-The reference rows are the same for all settings: one design, whitened at one p. With the full-angle correction or
-friction in the settings the reference rows have them, too, since these belong to the model that predicts.
+The reference rows are the same for all settings: one design, whitened at one p. If the settings have the correction for
+large angles or friction, the reference rows have them too.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from pvid.setup.f32 import nominal_start, weak_design_of
 Float = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
-# A block holds this many windows' lengths where the run is long enough for more than two.
+# Length of a block in windows, if the run is long enough for more than two blocks.
 _WINDOWS_A_BLOCK = 4
-# Reference windows held back, and windows that p comes from, in each half: fewer judge nothing.
+# Fewest reference windows and fewest windows for p in each half.
 _LEAST_WINDOWS = 2
-# Where the angle hardly ever stays small, all windows are taken.
+# If fewer windows than this have small angles, all windows are used.
 _FEWEST = 8
 # Pass band of the reference: as wide as its decimation lets it be.
 _WIDEST_HZ = 1e6
@@ -41,12 +41,12 @@ _OVERLAP = 2.0
 
 @dataclass(frozen=True)
 class Equations:
-    """The equations that a rig file asks for, with p of the whole run and the moments of the reference rows there.
+    """The equations of a rig file (large angles, friction), with p of the whole run and moments of the reference rows.
 
     Attributes
     ----------
     p : w, d1, d2, c and, with friction, its two coefficients
-    moments : of each reference window [windows, n, n]
+    moments : of (Y, N) of each reference window [windows, n, n]
     """
 
     full_angle: bool
@@ -88,12 +88,12 @@ class HeldBack:
         self.kept = residuals <= JOLT * np.median(residuals)
 
     def equations_of(self, rig: RigFile) -> Equations:
-        """The equations that a rig file asks for, fitted to all reference rows.
+        """The equations of a rig file, fitted to all reference rows.
 
         Raises
         ------
         PvidError
-            When they lead to no plausible parameters.
+            When the fit has no plausible parameters.
         """
         asked = (rig.identifier.full_angle, rig.identifier.damping)
         if asked not in self.equations:
@@ -117,12 +117,12 @@ class HeldBack:
         Raises
         ------
         PvidError
-            When a half holds too few windows of these settings, or leads to no plausible parameters.
+            When a half has too few windows with these settings, or no plausible parameters.
         """
         model = self.equations_of(rig)
         design = weak_design_of(rig, self.run.sample_rate)
         rows = RunRows.of(rig, self.run, design)
-        if model.full_angle:  # the core leaves out what it cannot correct
+        if model.full_angle:  # the core drops windows that it cannot correct
             rows = rows.within(model.p[3], VALID_ANGLE, _FEWEST)
         if model.full_angle or rig.identifier.damping:
             rows = rows.corrected(model.p, model.full_angle)
@@ -142,7 +142,7 @@ class HeldBack:
         return predicted[self.kept & (self.halves >= 0)]
 
     def innovations(self, rig: RigFile, forgetting_s: float) -> Float:
-        """Energy of each reference window but the first quarter, predicted from those before it [windows].
+        """Energy of each reference window after the first quarter, predicted from the windows before it [windows].
 
         Parameters
         ----------
@@ -163,18 +163,18 @@ class HeldBack:
         return np.array(out)
 
     def _halves(self, rows: RunRows) -> npt.NDArray[np.int64]:
-        """0 or 1 by the parity of the block that a window lies in; -1 where it lies in two."""
+        """Parity (0 or 1) of the block that contains a window; -1 if it lies in two blocks."""
         blocks = np.floor(rows.spans / self.block_s).astype(np.int64)
         return np.where(blocks[:, 0] == blocks[:, 1], blocks[:, 0] % 2, -1)
 
 
 def _moments_of(white: Float) -> Float:
-    """Of each window's rows [windows, n, n]."""
+    """Moments of each window's rows [windows, n, n]."""
     return np.asarray(white @ white.transpose(0, 2, 1))
 
 
 def sigmas(energies: Float, reference: Float) -> float:
-    """By how many standard errors energies of the same windows sum to more than the reference's; negative: to less."""
+    """Difference of two sums of energies of the same windows [standard errors]; negative: the first is smaller."""
     gain = energies - reference
     spread = float(np.std(gain)) * math.sqrt(_OVERLAP * len(gain))
     return float(np.sum(gain)) / spread if spread > 0 else 0.0

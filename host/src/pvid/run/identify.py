@@ -1,4 +1,7 @@
-"""One run through one core: the answer that `pvid identify` prints."""
+"""Identifies a run with one core; `pvid identify` prints the result.
+
+run -> survey (start, design) -> settings -> C core, every tick -> verdict of all windows -> Identification
+"""
 
 from __future__ import annotations
 
@@ -29,35 +32,33 @@ from pvid.setup.ranges_q31 import Beyond
 
 Float = npt.NDArray[np.float64]
 
-# With the first parameter known no better than this, relative, nothing is identified.
+# Largest relative standard error of the first parameter of an identified run, in the strong form.
 WORST_SE = 0.1
-# The fixed-point core's linear rows err by more at angles at which nothing is identified; as the core's own se_max.
+# Largest relative error by the fixed-point core's linear rows of an identified run; the same as the core's se_max.
 WORST_LINEAR = 0.05
 
-# What the strong form says of an estimate that is one.
+# Last reasons of the strong form with which a run is identified.
 _GOOD = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
 
-_FADING = 4  # windows after the correction's switch (weak_oracle)
+_FADING = 4  # windows during which the sums fade after the correction is enabled (pvid.oracle.weak)
 
-# Windows that the float64 core's alarm wants to have seen.
+# Fewest windows in the float64 core's alarm, as PVID_TRUST_LONG.
 MISFIT_WINDOWS = 16
 
-# Status of a run that gave nothing because samples lay beyond the fixed-point core's ranges.
+# Status of a run that is not identified because too many samples are beyond the fixed-point core's ranges.
 SATURATED = "saturated"
-# Of a run that is driven and moves, and in which the core sees no drive: its equations do not explain it.
+# Status of a run with drive and motion in which the core reports no excitation: the equations do not fit it.
 UNEXPLAINED = "held not explained"
 
-# Samples beyond the fixed-point core's ranges: of an answer, from this share on they are worth a warning.
+# Share of the samples beyond the fixed-point core's ranges that gives a warning beside an estimate.
 _BEYOND_WARNED = 0.01
-# Each of them costs a window: with so many, one or two a second at 1 kHz, nothing else needs to be wrong.
+# Each of them costs a window: one or two per second at 1 kHz suffice for the status SATURATED.
 _BEYOND_FATAL = 1e-3
 
-
-# An answer that fewer windows published than this share, and the last ones not, is doubtful.
+# An old estimate gives a warning if fewer windows than this share published.
 _RARELY = 0.1
 
-
-# Share of the motion from which on a warning tells what is left unexplained.
+# A warning contains the unexplained share of the motion from this share on.
 _UNEXPLAINED_TOLD = 1e-3
 
 
@@ -78,7 +79,7 @@ class Trajectory:
 @dataclass(frozen=True)
 class Publications:
     """Every estimate that was published during a run: t [n] in s, the mapped parameters p and their standard errors
-    [n, n_mapped], and whether the alarm stood beside it [n]."""
+    [n, n_mapped], and whether the misfit alarm was raised [n]."""
 
     t: Float
     p: Float
@@ -94,8 +95,8 @@ class Publications:
 
 @dataclass(frozen=True)
 class ErrorParts:
-    """What a standard error is made of, in the parameter's unit: the larger of the core's own and of the scatter of the
-    run's windows; those of the model's scales by name."""
+    """Parts of a standard error, in the parameter's unit: `noise`, the larger of the core's standard error and that of
+    the run's windows (pvid.run.verdict); `scales`, those of the model's scales by name."""
 
     noise: float
     scales: Mapping[str, float]
@@ -108,54 +109,54 @@ class ErrorParts:
 
 @dataclass(frozen=True)
 class Identification:
-    """What a run gave.
+    """Result of a run.
 
     model
-        of the mechanism: names and units of what is estimated
+        of the mechanism: names and units of the parameters
     value, se
         the mapped parameters, the offset where it is estimated and, inside the physical region, the physical
-        parameters, with their standard errors. Where `identified` is false they are the start, not an estimate.
+        parameters, with their standard errors. If `identified` is false they are the start, not an estimate.
     parts
-        of the standard errors, where something is identified
+        of the standard errors; empty if the run is not identified
     friction
         the nuisance parameters, where they are estimated; else ()
     kappa
-        part of the first parameter's information that the others cannot imitate
+        share of the information on the first parameter that the other parameters cannot explain
     trusted_s, first_publication_s
-        when the core published last and first [s]; None: never. In the strong form, which publishes whatever it has,
-        trusted_s is None
+        times of the core's last and first publication [s]; None: never. trusted_s is None in the strong form, which
+        publishes every estimate
     chi2
-        variance of the residuals over what the sensors' noise explains; None: not judged yet, or the strong form
+        residual variance over its expectation from the sensors' noise; None: not judged yet, or the strong form
     unexplained
-        share of the motion that the equations leave unexplained, rms; None in the strong form
+        rms of the residuals beyond the encoder's noise, relative to the rms of the rows; None in the strong form
     skew
-        how much later y seems to be sampled than phi [s]; 0 where that explains nothing
+        estimated delay of y after phi [s]; 0 if a delay does not reduce the residuals
     judged
-        whether the run had enough windows to compare the estimate with; True where no verdict is asked for
+        whether the run has enough windows to compare with the estimate; True without a verdict
     linear_error
-        what the fixed-point core's linear rows put into the standard errors, the largest of the mapped parameters,
-        relative; 0 in other cores
+        largest relative error of the mapped parameters by the fixed-point core's linear rows, which is contained in
+        the standard errors; 0 in other cores
     parts_disagree
-        the run's windows, corrected for large angles, want another estimate than the one published, or scatter, by
-        much more than the core's standard errors say
+        the least squares of the run's windows, corrected for large angles, differ from the published estimate, or
+        scatter, by much more than the core's standard errors
     alarm
-        whether chi2 is too much. The strong form's is its own (pvid/misfit.h); float64 has none
+        whether chi2 is too large. The strong form has its own alarm (pvid/misfit.h); its float64 core has none
     status
-        the last tick's reason in words; of a run that the fixed-point core could not take in, that
+        the last tick's reason in words, or SATURATED or UNEXPLAINED
     ticks, updates, lost
         samples; steps of the estimate; samples that were rejected
     reasons
-        how often each reason came, in ticks (core f64: in windows or rows)
+        count of each reason, in ticks (core f64: in windows or rows)
     largest_angle
         of phi from its rest [rad]
     beyond
-        samples beyond the ranges of the fixed-point core, and `beyond_words`, a clause on them; None in other cores
+        samples beyond the ranges of the fixed-point core, and a clause about them; None in other cores
     notes
-        on how the run was read
+        from reading the run
     advice
-        sentences on what is likely to be wrong, and its cure (pvid.run.advice)
+        sentences with a likely fault and its remedy (pvid.run.advice)
     publications
-        of the weak form's C cores; their standard errors contain those of the scales, too
+        of the weak form's C cores; their standard errors contain those of the scales
     hash
         None where the core has none (f64)
     """
@@ -195,21 +196,21 @@ class Identification:
 
     @property
     def identified(self) -> bool:
-        """Whether this is an answer: one that was trusted; in the strong form, whose last word is no refusal and whose
-        first parameter is known."""
+        """Whether the run is identified: an estimate was published; in the strong form, the last reason is no refusal
+        and the first parameter is accurate enough."""
         first = self.model.p_names[0]
         return _is_answer(self.form, self.trusted_s, self.updates, self.status, self.se[first], self.value[first])
 
     @property
     def modes_hz(self) -> tuple[float, ...]:
-        """Natural frequencies of the estimate [Hz], the slowest first; () where nothing is identified."""
+        """Natural frequencies of the estimate [Hz], the slowest first; () if the run is not identified."""
         if not self.identified:
             return ()
         return self.model.modes_hz(np.array([self.value[name] for name in self.model.mapped_names]))
 
     @property
     def warning(self) -> str | None:
-        """What makes the answer doubtful, in words; None if nothing does."""
+        """Reasons to doubt the estimate, in words; None if there are none."""
         words = []
         if self.alarm and self.chi2 is not None:
             words.append(
@@ -249,14 +250,14 @@ class Identification:
 
     @property
     def _share_published(self) -> float:
-        """Of the windows of a moving pivot, those that published."""
+        """Share of the windows with a moving pivot that published."""
         published = sum(self.reasons.get(one.text, 0) for one in (Reason.UPDATED, Reason.MISFIT))
         doubted = sum(self.reasons.get(one.text, 0) for one in (Reason.HELD_UNCERTAIN, Reason.HELD_OUT_OF_RANGE))
         return published / max(published + doubted, 1)
 
     @property
     def verdict(self) -> str:
-        """Why nothing was identified, in words."""
+        """The reason why the run is not identified, in words."""
         if not FORMS[self.form].publishes and self.updates and self.status in _GOOD:
             first = self.model.p_names[0]
             return f"the standard error of {first} is {100 * self.se[first] / abs(self.value[first]):.0f} % of it"
@@ -281,7 +282,7 @@ def identify(
     native
         The C core, used by cores "f32" and "q31".
     start
-        p = (w, d1, d2) to start from; by default what the run's survey finds (pvid.run.survey).
+        p = (w, d1, d2) to start from; by default the result of the run's survey (pvid.run.survey).
     points
         Number of points of the trajectory.
 
@@ -305,7 +306,7 @@ def identify(
 
 
 def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, native: Native) -> Identification:
-    """By the C core of the rig file's form and arithmetic."""
+    """Identifies a run with the C core of the rig file's form and arithmetic."""
     case = case_of(rig.identifier)
     rig = case.with_ranges(rig, run)
     config, samples = case.settings_for_run(rig, run, start), case.samples(rig, run)
@@ -371,8 +372,8 @@ def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, na
 
 
 def _with_linear_error(covariance: Float, p: Float, linear: Float | None) -> Float:
-    """Covariance [..., n_p, n_p] at p [..., n_p] with the error that linear rows make, relative of the mapped
-    parameters [n_mapped]."""
+    """Adds the error by linear rows, relative of the mapped parameters [n_mapped], to a covariance [..., n_p, n_p] at
+    p [..., n_p]."""
     if linear is None:
         return covariance
     error, n = np.zeros_like(p), len(linear)
@@ -438,7 +439,7 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
 
 
 def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> Identification:
-    """The trajectory has one point a window."""
+    """Identifies a run with the weak form in float64; the trajectory has one point per window."""
     if config.estimator.law is not Law.STATIONARY or config.estimator.divider != 1:
         raise PvidError("core f64 has the weak form's stationary law with a solve at every window only: use f32")
     settings = config.estimator
@@ -464,7 +465,7 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> 
             renewal=config.trust.renewal,
         ),
     )
-    # the gate and the alarm of pvid/trust.h, without the question how much of the information noise makes
+    # conditions of publication and alarm of pvid/trust.h, without the noise check
     trust = config.trust
     relative = (result.se[:, :n] / result.p[:, :n]).max(axis=1)
     arrived = np.arange(len(result.t)) + 1 >= trust.groups_min
@@ -478,7 +479,7 @@ def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> 
         status, chi2, alarm = Reason.HELD_NOT_EXCITED, None, False
     else:
         p, covariance = result.p[trusted[-1], :n_p], result.covariance[trusted[-1], :n_p, :n_p]
-        # rows that are corrected later than the first publication are judged once the uncorrected past has faded
+        # judged after the first publication, and after the rows without correction have faded
         judged = result.misfit[
             max(trusted[0], _FADING * int(result.corrected.any()) + int(np.argmax(result.corrected))) :
         ]
@@ -516,7 +517,7 @@ _IN_FLOAT64: dict[str, Callable[[Run, RigFile, Any, int], Identification]] = {
 
 
 def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
-    """The answer to a run without a drive: the start, with the start's own standard deviations."""
+    """The result of a run without a drive: the start with its standard deviations."""
     p = config.estimator.start.astype(np.float64)
     covariance = np.diag(config.estimator.start_sd.astype(np.float64) ** 2)
     return _identification(
@@ -539,7 +540,7 @@ def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
 
 
 def _trajectory(t: Float, p: Float, covariance: Float, rig: RigFile, kappa: Float) -> Trajectory:
-    """Of p [n, n_p] and its covariance [n, n_p, n_p]."""
+    """The trajectory of p [n, n_p] with its covariance [n, n_p, n_p]."""
     mechanism = rig.mechanism
     n = mechanism.model.n_mapped
     p, covariance = p[:, :n], covariance[:, :n, :n]
@@ -560,8 +561,8 @@ _REJECTED = (Reason.REJECTED_NOT_FINITE, Reason.REJECTED_SATURATED)
 
 
 def _final_status(reasons: npt.NDArray[np.uint8]) -> str:
-    """The last reason in words; with a divider, the last one that followed a solve. Windows that fill again after a
-    rejected sample are warming up for that reason."""
+    """The last reason in words, without ticks that only accumulate; if the windows fill again after a rejected sample,
+    the reason of the rejection."""
     solved = reasons[reasons != Reason.ACCUMULATED]
     if len(solved) == 0:
         return Reason.ACCUMULATED.text
@@ -572,13 +573,13 @@ def _final_status(reasons: npt.NDArray[np.uint8]) -> str:
 
 
 def _counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:
-    """How often each reason came."""
+    """Count of each reason."""
     counts = np.bincount(reasons)
     return {Reason(int(one)).text: int(counts[one]) for one in np.flatnonzero(counts)}
 
 
 def _windows_counted(updated: npt.NDArray[np.bool_], good: npt.NDArray[np.bool_]) -> dict[str, int]:
-    """Of the float64 core's windows: `updated` moved p [n], `good` were published, too [n]."""
+    """Count of each reason in the float64 core's windows: `updated` moved p [n], `good` published [n]."""
     counts = {
         Reason.UPDATED.text: int(good.sum()),
         Reason.HELD_UNCERTAIN.text: int((updated & ~good).sum()),
@@ -593,7 +594,7 @@ def _judged(misfit: float) -> float | None:
 
 
 def largest_angle(run: Run, rest: float | None) -> float:
-    """Of phi from its rest [rad]; where that is not known, from the median."""
+    """Largest |phi - rest| of a run [rad]; None: from the median."""
     phi = run.phi[np.isfinite(run.phi)]
     if not len(phi):
         return 0.0
@@ -624,8 +625,10 @@ def _identification(
     beyond_words: str | None = None,
     linear: Float | None = None,
 ) -> Identification:
-    """`linear`: relative errors of the mapped parameters [n_mapped] that linear rows make; they are in the
-    covariance."""
+    """Compares an estimate with all windows of the run, and adds the errors of the scales.
+
+    linear: relative errors of the mapped parameters [n_mapped] by linear rows; the covariance contains them.
+    """
     mechanism = rig.mechanism
     model, n = mechanism.model, mechanism.model.n_mapped
     names = model.p_names[: len(p)]
@@ -633,7 +636,7 @@ def _identification(
     unexplained, parts_disagree, skew, judged = None, False, 0.0, True
     if rig.identifier.form_traits.publishes and trusted_s is not None:
         unbiased = np.append(p, friction)
-        if linear is not None:  # the verdict's rows are corrected
+        if linear is not None:  # the verdict's rows are corrected for large angles
             unbiased[:n] /= 1 + linear
         over_run = verdict(rig, run, unbiased)
         own = np.sqrt(np.diag(covariance))
@@ -641,7 +644,7 @@ def _identification(
         covariance = covariance * np.outer(wider, wider)
         unexplained, parts_disagree = over_run.unexplained, bool(wider[:n].max() > DISAGREES)
         skew, judged = over_run.skew, over_run.judged
-        if publications is not None:  # windows that scatter by more than the core expects did so from the first one on
+        if publications is not None:  # the scatter of the windows applies to all publications
             scatter = np.maximum(over_run.scatter[:n] / own[:n], 1.0)
             publications = replace(publications, se=publications.se * scatter)
     noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
@@ -697,14 +700,14 @@ def _identification(
 
 
 def _widened(published: Publications, rig: RigFile) -> Publications:
-    """With the scales' errors in the standard errors."""
+    """Publications with the errors of the scales in their standard errors."""
     scales = rig.mechanism.scale_errors(published.p, rig.scale_sd).values()
     se = np.sqrt(sum((one.p**2 for one in scales), published.se**2))
     return Publications(published.t, published.p, se, published.alarm)
 
 
 def _parts(noise: Mapping[str, float], p: Float, rig: RigFile) -> dict[str, ErrorParts]:
-    """Of the standard errors of every parameter whose own is in `noise`."""
+    """Parts of the standard error of every parameter in `noise`."""
     model, scales = rig.mechanism.model, rig.mechanism.scale_errors(p, rig.scale_sd)
     order = (*model.mapped_names, *model.physical_names)
     sizes = {

@@ -1,4 +1,4 @@
-"""What a run's rows leave unexplained at given parameters, in float64, and how it hangs together in time."""
+"""Residuals of a run's rows at given parameters, in float64, and their autocorrelation."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _MOST_ROWS = 200_000  # of the strong form, from the run's end: one a sample
 
 @dataclass(frozen=True)
 class Residuals:
-    """Y - N^T theta at one p, over the noise that the encoder makes of it.
+    """Y - N^T theta at one p, relative to the encoder's noise in it.
 
-    t : when a group of rows was complete, on the run's clock [groups, s];  e : [groups, rows of a group]
+    t : time at which a group of rows is complete, on the run's clock [groups, s];  e : [groups, rows of a group]
     free : degrees of freedom of a group, at most its rows;  step_s : time between groups [s]
-    expected : whether 1 is what the encoder's noise gives; else e is over its own standard deviation
-    shared : groups that share samples with one before them
+    expected : whether e is relative to the encoder's noise; else to its own standard deviation
+    shared : number of earlier groups that share samples with a group
     """
 
     t: Float
@@ -40,30 +40,30 @@ class Residuals:
 
     @property
     def rms(self) -> Float:
-        """Of each group [groups]."""
+        """RMS of each group [groups]."""
         return np.asarray(np.sqrt((self.e**2).sum(axis=1) / self.free))
 
     def autocorrelation(self, lags: int) -> Float:
-        """Of groups 0 to `lags` apart, over that of 0 [lags + 1]; less where there are fewer groups."""
+        """Autocorrelation at 0 to `lags` groups, 1 at lag 0 [lags + 1]; shorter if there are fewer groups."""
         power = float((self.e**2).sum()) or 1.0  # of residuals that are all 0, too
         n = len(self.e)
         return np.array([float((self.e[lag:] * self.e[: n - lag]).sum()) / power for lag in range(min(lags + 1, n))])
 
     @property
     def chance(self) -> float:
-        """What of an autocorrelation is chance alone: two standard deviations if the rows were independent."""
+        """Two standard deviations of the autocorrelation of independent rows."""
         return 2.0 / float(np.sqrt(len(self.e) * self.free))
 
 
 def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
-    """Of a run in the rig file's form.
+    """Residuals of a run in the rig file's form.
 
-    In the weak form with the tables of the rig file: those that identify takes for a run are those of `survey.fitted`.
+    The weak form uses the tables of this rig file; identify uses those of the rig file from `survey.fitted`.
 
     Parameters
     ----------
     p
-        w, d1, d2, then c where the zero is unknown, then both frictions where they are estimated.
+        w, d1, d2, then c if the offset is unknown, then both frictions if they are estimated.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def _strong(run: Run, rig: RigFile, p: Float) -> Residuals:
     if not driven.any():
         raise PvidError("the pivot rests: there are no rows")
     n, y = oracle.strong_rows(d_phi[driven], u[driven])
-    e = (y - n @ oracle.theta(p[:3]))[-_MOST_ROWS:]
+    e = (y - n @ oracle.theta(p[: oracle.N_P]))[-_MOST_ROWS:]
     t = run.t[2 * bank.delay :][driven][-_MOST_ROWS:]
     scaled = (e / e.std())[:, np.newaxis]
     return Residuals(t, scaled, 1, 1 / run.sample_rate, expected=False, shared=2 * bank.delay)

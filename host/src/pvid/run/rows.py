@@ -2,8 +2,8 @@
 
     samples -> RunRows (columns of every driven window) -> corrected for large angles at p -> whitened at p -> Fit
 
-Source: theory, 4 (constrained least squares) and 5 (weak form); the same rows as `weak_oracle`, which takes them window
-by window as the core does.
+Source: theory, 4 (constrained least squares) and 5 (weak form); the same rows as pvid.oracle.weak, which processes them
+window by window as the core does.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.design.weak import WeakDesign, disturbance_gram
+from pvid.models.kapitza import MODEL
 from pvid.oracle.self_consistent import self_consistent
 from pvid.oracle.weak import A, N, columns, frames, front_end, jacobian, noise_gram, packed_to_square, theta
 from pvid.rig.file import RigFile
@@ -24,15 +25,15 @@ from pvid.setup.f32 import row_sd_of, weak_drive_threshold
 
 Float = npt.NDArray[np.float64]
 
-# Windows with this many times the median residual energy hold a jolt or a lost sample, not the mechanism.
+# Windows with more than this many times the median residual energy contain a jolt or a lost sample and are left out.
 JOLT = 25.0
 _WHITENINGS = 3
 _STEPS = 40
 _LONGEST_STEP = 0.5  # of log w, log d1, log d2
 _DONE = 1e-8
-# Fewer windows say nothing.
+# Fewer windows are not evaluated.
 FEWEST = 4
-_CORE = 4  # w, d1, d2, c; friction adds two
+_MAPPED, _CORE = MODEL.n_mapped, len(MODEL.published)  # without the offset, with it; friction adds two
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Fit:
     Attributes
     ----------
     p : the estimate
-    chi2 : variance of the rows over what the encoder's noise, and the disturbance where there is one, explain
+    chi2 : residual variance of the rows over that of the encoder's noise and of the disturbance, if there is one
     information : S = C^T M C [n_p, n_p]
     scores : C^T N e of each window [windows, n_p]; they sum to 0 at the least squares
     energy, signal : sums of squares of e and of Y over each window's rows [windows]
@@ -59,10 +60,10 @@ class Fit:
 
     @property
     def clustered_se(self) -> Float:
-        """Standard errors of p [n_p] from the scatter of the windows' scores, whatever makes it.
+        """Standard errors of p [n_p] from the scatter of the windows' scores g, without a model of the noise.
 
-        S^-1 (sum g g^T) S^-1 with the products of neighbours, which share samples, counted; never less than without
-        them, and inflated for the few windows of a short run.
+        S^-1 (sum g g^T) S^-1, with the products of neighbours, which share samples, if this is larger; increased for
+        a short run with few windows.
         """
         windows = len(self.scores)
         inverse = np.linalg.pinv(self.information, hermitian=True)
@@ -90,7 +91,7 @@ class RunRows:
 
     @classmethod
     def of(cls, rig: RigFile, run: Run, design: WeakDesign) -> RunRows:
-        """Of the windows that are driven and lack no sample.
+        """Rows of the windows that are driven and lack no sample.
 
         Raises
         ------
@@ -141,8 +142,8 @@ class RunRows:
         return self.only(inside) if int(inside.sum()) >= fewest else self
 
     def corrected(self, p: Float, full_angle: bool = True) -> RunRows:
-        """With what the linear rows lack at large angles taken off Y, at p; with the columns of friction where p has
-        its two coefficients. `sound` tells the windows in which the lack was found; the others stay linear."""
+        """Rows with the remainder of large angles at p subtracted from Y, and with the columns of friction if p has its
+        two coefficients. `sound`: windows in which the remainder was found; the others remain linear."""
         friction = len(p) > _CORE
         damping = p[_CORE:] if friction else np.zeros(2)
         y = np.zeros((len(self.phi), self.design.functions))
@@ -162,17 +163,18 @@ class RunRows:
         return self if self.sound is None else self.only(self.sound)
 
     def covariance(self, p: Float) -> Float:
-        """Of a window's rows at p for noise of 1 of the decimated angle [K, K]."""
+        """Covariance of a window's rows at p for a decimated angle with noise of unit variance [K, K]."""
         return noise_gram(self.design, p)
 
     def covariance_of_disturbance(self, p: Float) -> Float:
-        """Of a window's rows at p for a disturbance of 1 [K, K]."""
+        """Covariance of a window's rows at p for a unit disturbance [K, K]."""
         return packed_to_square(disturbance_gram(self.design.gram, p))
 
     def whitened(self, p: Float, disturbance: float = 0.0) -> Float:
-        """Rows (Y, N) [windows, 9 or 11, K] whose noise is white at p, without what a and b, their last, explain.
+        """Rows (Y, N) [windows, 9 or 11, K] whose noise is white at p; the columns a and b, the last two, are projected
+        out.
 
-        `disturbance` is that of `weak_design.design`.
+        disturbance: as in pvid.design.weak.design.
         """
         gram = self.covariance(p)
         if disturbance > 0:
@@ -197,7 +199,7 @@ class RunRows:
         return self.judged(p, disturbance, kept)
 
     def judged(self, p: Float, disturbance: float = 0.0, kept: npt.NDArray[np.bool_] | None = None) -> Fit:
-        """What the rows say of a p that may come from elsewhere."""
+        """Residuals, scores and information of the rows at a given p."""
         white = self.whitened(p, disturbance)
         if kept is not None:
             white = white[kept]
@@ -250,7 +252,7 @@ def least_squares(moments: Float, p: Float) -> Float:
     damping, energy = 1e-3, float(energy_at(moments, p))
     units = np.ones(len(p))
     for _ in range(_STEPS):
-        units[:3] = p[:3]
+        units[:_MAPPED] = p[:_MAPPED]
         c = _jacobian(p) * units
         information, force = c.T @ m @ c, c.T @ (b - m @ _theta(p))
         scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -258,15 +260,15 @@ def least_squares(moments: Float, p: Float) -> Float:
         step, there, better = np.zeros(len(p)), p, False
         while not better and damping < 1e12:
             step = scale * np.linalg.solve(normal + damping * np.eye(len(p)), scale * force)
-            step[:3] = np.clip(step[:3], -_LONGEST_STEP, _LONGEST_STEP)
-            there = np.append(p[:3] * np.exp(step[:3]), p[3:] + step[3:])
+            step[:_MAPPED] = np.clip(step[:_MAPPED], -_LONGEST_STEP, _LONGEST_STEP)
+            there = np.append(p[:_MAPPED] * np.exp(step[:_MAPPED]), p[_MAPPED:] + step[_MAPPED:])
             now = float(energy_at(moments, there))
             better = math.isfinite(now) and now <= energy
             damping *= 1 / 8 if better else 4
         if not better:
             break
         p, energy = there, float(energy_at(moments, there))
-        if np.abs(step[:3]).max() < _DONE:
+        if np.abs(step[:_MAPPED]).max() < _DONE:
             break
     return p
 

@@ -7,7 +7,7 @@ Of the minima found the one with the smallest chi^2 is taken. There the rows are
 friction, where the rig file asks for it, and what still exceeds the encoder's noise becomes a white disturbance of the
 joints: rows are weighted by both from then on.
 
-`fitted` returns the rig file with the outcome as its nominal: what a board would be given after a first run.
+`fitted` returns the rig file with the outcome as its nominal, for example for a board after a first run.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ _RENEWALS = 4
 # Corrections for large angles at p, until it moves by less than this; they are kept where chi^2 falls.
 _CORRECTIONS = 4
 _SETTLED = 0.002
-# Windows that are enough for them.
+# Most windows in a correction.
 _WINDOWS = 300
-# Below this chi^2 the encoder explains the residuals; above, a disturbance is found that brings it to 1.
+# Up to this chi^2 the encoder's noise explains the residuals; above it a disturbance is fitted that makes it 1.
 _UNEXPLAINED = 1.3
 _HALVINGS = 16
-_DISTURBANCES = (1e-4, 1e4)  # of what gives the rows as much as the encoder does
+_DISTURBANCES = (1e-4, 1e4)  # range of the fit, relative to a disturbance with the effect of the encoder's noise
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Survey:
     Attributes
     ----------
     p : (w [1/s^2], d1, d2, c [rad])
-    chi2 : variance of the rows over what the encoder's noise explains
-    disturbance : of the joints' accelerations that explains the rest [rad/s^2/sqrt(Hz)]
-    agreeing : starts that led there
+    chi2 : residual variance of the rows over that of the encoder's noise
+    disturbance : white noise of the joints' accelerations that explains the rest [rad/s^2/sqrt(Hz)]
+    agreeing : starts with this result
     tried : starts tried
     """
 

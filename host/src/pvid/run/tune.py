@@ -47,8 +47,8 @@ _EQUATIONS = 4
 # Steps of `tune`, at most: survey and the rig file's own settings, sizes from the modes, the groups, forgetting.
 STEPS = 3 + _EQUATIONS + len(_WINDOWS) + len(_FUNCTIONS) + len(_PASS_BANDS) + len(_DECIMATIONS) + 1
 
-# What is held back is predicted better from this many standard errors on, if this share of its residuals goes; as well
-# up to so many standard errors more.
+# Settings predict the windows held back better if their energy is lower by this many standard errors and by this share;
+# they predict equally well if it is higher by at most so many standard errors.
 _SIGMAS = 3.0
 _GAIN = 0.1
 _AS_WELL = 1.0
@@ -56,21 +56,21 @@ _AS_WELL = 1.0
 _SMALLER = 0.7
 # Linear equations bias w by this times the square of the largest angle (theory; the standard rig).
 _LINEAR_BIAS = 0.36
-# The rig file is written with so many digits; with more, at last all, where the answer would be another with these.
+# Digits of the numbers in the written rig file; the second, or all digits, if the estimate changes with the first.
 _DIGITS = (4, 7)
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Settings and what the run says of them.
+    """Settings and their result on the run.
 
     Attributes
     ----------
-    what : how they differ from those before them
-    rig : the rig file with them
-    answer : what the core makes of the run; None where it refuses the settings
-    refusal : why
-    residuals : energy of the windows held back; None where nothing could be held back
+    what : their difference from the settings before, in words
+    rig : the rig file with these settings
+    answer : the identification; None if the core refuses the settings
+    refusal : the reason of a refusal
+    residuals : energy of the windows held back; None if no window could be held back
     """
 
     what: str
@@ -87,7 +87,7 @@ class Judged:
     @property
     def error(self) -> float:
         """Expected relative error, RMS over the mapped parameters: standard errors, and the bias of linear equations;
-        infinite where nothing is identified."""
+        infinite if the run is not identified."""
         if self.answer is None or not self.answer.identified:
             return math.inf
         relative = [self.answer.se[name] / self.answer.value[name] for name in self.answer.model.mapped_names]
@@ -95,7 +95,7 @@ class Judged:
         return math.hypot(math.sqrt(sum(one**2 for one in relative) / len(relative)), bias)
 
     def agrees_with(self, other: Judged) -> bool:
-        """Whether both answers are the same but for rounding: within a standard error, and as good."""
+        """Whether both estimates agree within a standard error, and both or none have a warning."""
         if self.answer is None or other.answer is None or self.identified != other.identified:
             return False
         names = self.answer.model.mapped_names
@@ -104,11 +104,11 @@ class Judged:
 
     @property
     def warned(self) -> bool:
-        """Whether the answer is given with a warning."""
+        """Whether the estimate has a warning."""
         return self.answer is not None and self.answer.warning is not None
 
     def residual_over(self, other: Judged) -> float:
-        """Energy of what is held back over that with other settings; NaN where one is not known."""
+        """Energy of the windows held back over that with other settings; NaN if one of them is unknown."""
         if self.residuals is None or other.residuals is None:
             return math.nan
         return float(np.sum(self.residuals) / np.sum(other.residuals))
@@ -305,13 +305,13 @@ class _Bench:
         return default
 
     def from_modes(self, rig: RigFile) -> Iterator[tuple[str, RigFile]]:
-        """Surveyed, with sizes that follow from the modes; that the rig file as it is has, unless it says otherwise."""
+        """The surveyed rig file with sizes that follow from the modes (the default of a rig file)."""
         yield "sizes from the modes", sized_for(_with(self.surveyed, **_FROM_MODES), self.run)
 
     def equations(self, rig: RigFile) -> Iterator[tuple[str, RigFile]]:
         """With and without sines and friction, each with its own survey.
 
-        With an angle beyond what the correction is good for, linear equations are no alternative.
+        Linear equations are tried only if the angles are small enough for the correction.
         """
         if not rig.identifier.core_traits.corrects_angles:
             return
@@ -327,7 +327,7 @@ class _Bench:
                 yield what, _with(with_them, disturbance=found.identifier.disturbance, **asked)
 
     def judged(self, what: str, rig: RigFile) -> Judged:
-        """What the core makes of settings, and how well they predict what is held back."""
+        """The identification with these settings, and their prediction of the windows held back."""
         residuals = None
         try:
             if self.held_back is not None:
@@ -340,7 +340,7 @@ class _Bench:
             return Judged(what, rig, None, str(error), residuals)
 
     def best_of(self, candidates: Iterator[tuple[str, RigFile]], best: Judged) -> Judged:
-        """The best of a group and of what was best before."""
+        """The best of `candidates` and `best`."""
         for what, candidate in candidates:
             self.advance()
             try:

@@ -1,1 +1,1 @@
-"""Settings of the identifiers, and what a run through one leaves; apart from the C core and from its twin."""
+"""Settings of the identifiers and the record of a run, for the C core and its twin."""

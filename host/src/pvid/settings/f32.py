@@ -37,7 +37,7 @@ class EstimatorConfig:
 
 @dataclass(frozen=True)
 class GateConfig:
-    """Which rows or windows are kept out, as in gate.h; sigmas 0: none."""
+    """Settings of the outlier gate, as in gate.h; sigmas 0: no gate."""
 
     sigmas: float = 0.0
     patience_s: float = 0.0
@@ -104,7 +104,7 @@ class WeakTables(Protocol):
 
 @dataclass(frozen=True)
 class TrustConfig:
-    """Which estimates are published, as in trust.h."""
+    """Conditions of publication, as in trust.h."""
 
     kappa_min: float = 3e-5
     se_max: float = 0.05
@@ -118,9 +118,8 @@ class TrustConfig:
 class WeakConfig:
     """Settings of the weak-form identifier, as in weak.h.
 
-    The estimator's start, start_sd and bounds have four entries when the encoder's zero is unknown, else three, and two
-    more with friction;
-    its row_weight and correlation come from the design.
+    The estimator's start, start_sd and bounds have four entries if the encoder's offset is unknown, else three, and two
+    more with friction. Its row_weight and correlation follow from the design.
     """
 
     sample_rate: float
@@ -153,10 +152,10 @@ class WeakConfig:
 
     @property
     def delay(self) -> int:
-        """Ticks between a sample and the smoothed value that refers to its instant."""
+        """Ticks from a sample to the end of the smoothing filter that is centred on it."""
         return (self.design.taps - 1) // 2
 
     @property
     def ticks_needed(self) -> int:
-        """Samples up to the first estimate: one window, and as many again as its rows and steps may take."""
+        """Samples up to the first estimate: one window, and the hop in which it is processed."""
         return self.design.taps + self.design.decimation * (self.design.window + self.hop)

@@ -1,4 +1,4 @@
-"""What depends on the form of the model alone, or on the core alone; pvid.cases has what depends on both."""
+"""Properties of a form alone, and of a core alone; pvid.cases has those that depend on both."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ AnyCore = Literal["f32", "q31", "f64"]  # f64: the oracle on this machine
 
 @dataclass(frozen=True)
 class FormTraits:
-    """Of a form.
+    """Properties of a form.
 
     gate
-        What its outlier gate keeps out by default [times the usual]: windows are alike, rows follow the motion.
+        Default limit of the outlier gate [times the usual residual]. It is lower in the weak form, whose windows have
+        similar residuals.
     patience
-        Until the gate believes in a change [time constants of forgetting]: windows of a changed mechanism pass no
-        sooner; of its rows enough do wherever their residuals cross zero.
+        Default time until the gate accepts a changed mechanism [time constants of forgetting].
     uses_windows
-        Whether window_s is the length of windows of rows that are solved together, and not of a differentiator.
+        Whether window_s is the length of a window of rows; else of the differentiator.
     publishes
-        Whether it publishes the estimates that it trusts, and says nothing else.
+        Whether it publishes trusted estimates only (pvid/trust.h).
     estimates_zero
-        Whether it can estimate the encoder's zero, and friction; else angles are measured from 0.
+        Whether it can estimate the encoder's offset, and friction; else the offset is 0.
     """
 
     gate: float
@@ -36,14 +36,14 @@ class FormTraits:
 
 @dataclass(frozen=True)
 class CoreTraits:
-    """Of a core.
+    """Properties of a core.
 
     in_c
-        The core in C that stands for it.
+        The C core for it: the core itself; for f64, which is in Python only, f32.
     corrects_angles
         Whether its weak form can correct its rows for large angles.
     takes_gaps
-        Whether it takes runs with missing samples.
+        Whether it accepts runs with missing samples.
     """
 
     in_c: Literal["f32", "q31"]

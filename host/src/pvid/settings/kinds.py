@@ -1,4 +1,4 @@
-"""The settings of any identifier."""
+"""Type of the settings of any identifier."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run through an identifier leaves, of the C core or of a lane of its twin."""
+"""Record of a run, by the C core or by a lane of its twin."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _integers(values: Array) -> Array:
 
 @dataclass
 class Record:
-    """One entry a tick along the first axis; float32, or integers in fixed point.
+    """One entry per tick along the first axis; float32, or integers in fixed point.
 
     p
         The estimator's parameters [ticks, n_p].
@@ -37,11 +37,12 @@ class Record:
     exponent
         Of the sums [ticks] in fixed point; else empty.
     published, published_se
-        What the weak form publishes and its standard errors [ticks, n_p]; else empty.
+        The weak form's published p and its standard errors [ticks, n_p]; else empty.
     hash
-        Running hash after each tick, uint32 [ticks]; empty where it was not asked for.
+        Running hash after each tick, uint32 [ticks]; empty if it was not requested.
     estimate
-        Every so many ticks an estimate, structured. In fixed point it is the published one in the weak form.
+        An assessed estimate every `estimate_every` ticks, structured. In the weak form in fixed point it is the
+        published one.
     """
 
     p: Array
@@ -59,7 +60,7 @@ class Record:
         return self.p.dtype.kind != "f"
 
     def words(self) -> dict[str, Array]:
-        """What is compared, as integers [ticks, n]: floats as their 32 bits. In the order in which it is compared."""
+        """The compared quantities as integers [ticks, n], floats as their 32 bits, in the order of the comparison."""
         parts = {"p": self.p, "sums": self.sums, "exponent": self.exponent[:, None], "status": self.reason[:, None]}
         if len(self.published):
             parts["published"] = self.published

@@ -1,4 +1,4 @@
-"""From a rig file to the settings of the core: the one place where defaults meet a rig."""
+"""Settings of the float32 core from a rig file. All defaults that depend on the rig are here."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from pvid.settings.bounds import MAX_WINDOW
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, StrongConfig, TrustConfig, WeakConfig
 
-# The start may be wrong by half (the rig file asks for a rough guess); bounds leave it a factor of 20.
+# The start is a rough guess with an error of up to 50 %; the bounds are a factor of 20 away.
 START_RELATIVE_SD = 0.5
 BOUND_FACTOR = 20.0
 
-# Rough size of Y - N^T theta relative to w^4 [rad/s^8]: only the first ticks feel it, through H0.
+# Rough size of Y - N^T theta relative to w^4 [rad/s^8]; through H0 it affects only the first ticks.
 ROW_SD_OF_W4 = 0.1
 
 LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
@@ -34,7 +34,7 @@ def nominal_start(rig: RigFile) -> npt.NDArray[np.float64]:
 
 
 def bank_of(rig: RigFile, sample_rate: float) -> FirBank:
-    """The FIR bank a rig file asks for at `sample_rate` [Hz]."""
+    """The FIR bank of a rig file at `sample_rate` [Hz]."""
     settings = rig.identifier
     if settings.differentiator == "finite-difference":
         bank = finite_difference(settings.stride)
@@ -71,7 +71,7 @@ def estimator_config(rig: RigFile, bank: FirBank, start: npt.ArrayLike | None = 
 
 
 def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
-    """Rms of u [1/s^2] below which the pivot counts as still: ten times the noise the bank makes of a still sensor.
+    """Rms of u [1/s^2] below which the pivot counts as still: ten times the noise of u with a still sensor.
 
     The sensor's noise is taken as half an LSB (rounding, 0.29 LSB, and somewhat more of its own); without a
     resolution in the rig file, a thousandth of w.
@@ -83,7 +83,7 @@ def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
 
 
 def gate_config(rig: RigFile) -> GateConfig:
-    """What the rig file says of outliers."""
+    """The outlier gate of a rig file."""
     return GateConfig(rig.identifier.gate, rig.identifier.patience_s)
 
 
@@ -101,24 +101,25 @@ def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
     )
 
 
-# The unknown encoder zero c [rad]: where it may lie, and how far from 0 it is expected; steps are limited to
-# 0.3 of the latter, which must not hold back a zero of 0.1 rad.
+# Bounds and start_sd of the encoder's offset c [rad]. Steps are limited to 0.3 start_sd, which must be larger than an
+# offset of 0.1 rad.
 ZERO_BOUND = 3.0
 ZERO_SD = 0.5
 
-# Friction over the mass of body 2 [m^2/s]: a rig's is some 1e-4; a tenth would stop the pendulum within a second.
+# start_sd and bounds of friction over the mass of body 2 [m^2/s]. A rig has about 1e-4; 0.1 would stop the pendulum
+# within a second.
 FRICTION_SD = 1e-3
 FRICTION_BOUND = 0.1
 
 # Noise of a sensor in LSB: rounding, and half an LSB of its own.
 NOISE_LSB = float(np.sqrt(1 / 12 + 1 / 4))
 
-# Below this kappa rounding alone speaks of w: without a drive float32 leaves up to 6e-7.
+# Below this kappa the information on w is rounding: without a drive float32 gives up to 6e-7.
 WEAK_KAPPA_MIN = 5e-6
 
 
 def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
-    """The tables a rig file asks for at `sample_rate` [Hz], whitened at its nominal p."""
+    """The tables of a rig file at `sample_rate` [Hz], whitened at its nominal p."""
     settings = rig.identifier
     sizes = Sizes(
         window_s=settings.window_s or None,
@@ -136,15 +137,15 @@ def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
 
 
 def row_sd_of(rig: RigFile, decimation: int) -> float:
-    """Noise of a decimated angle [rad]: the rows listen where the filters pass, at the density of the samples' noise.
+    """Noise of a decimated angle [rad]: white noise of the samples, whose variance decimation divides by its factor.
 
-    An exact sensor has float32's noise.
+    An exact sensor has the noise of float32.
     """
     return max(rig.sensor.phi_lsb * NOISE_LSB, 1e-8) / math.sqrt(decimation)
 
 
-# A window counts as driven when the rms of u exceeds the noise of a still pivot's so many times: in all, and in the
-# rows' band, where noise passes for drive and draws the estimate towards less of it (a hundredth of its variance).
+# A window counts as driven if the rms of u exceeds that of a still pivot so many times: in total, and in the band of
+# the rows, where noise of u would bias the estimate.
 _STILL = 1.3
 _STILL_IN_BAND = 10.0
 
@@ -161,7 +162,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
     tables = weak_design_of(rig, sample_rate)
     p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
     zero = 1 if settings.zero else 0
-    # the zero c [rad], then the frictions c1 and c2 [m^2/s]: what they may be, and how far they are expected
+    # the offset c [rad], then the frictions c1 and c2 [m^2/s]: start_sd and bounds
     extra_sd = [ZERO_SD] * zero + [FRICTION_SD] * (2 * settings.damping)
     extra_bound = [ZERO_BOUND] * zero + [FRICTION_BOUND] * (2 * settings.damping)
     extra = np.array([rig.sensor.phi_zero] * zero + [0.0] * (2 * settings.damping))
@@ -196,7 +197,7 @@ def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = 
 
 
 def config_of(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig | WeakConfig:
-    """Settings of the form the rig file asks for."""
+    """Settings of the rig file's form."""
     if rig.identifier.form == "weak":
         return weak_config(rig, sample_rate, start)
     return strong_config(rig, sample_rate, start)

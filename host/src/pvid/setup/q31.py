@@ -42,7 +42,7 @@ def format_of(largest: float) -> int:
 
 
 def _counting(rig: RigFile) -> Sensor:
-    """The sensors of a rig, which must count in something, with a range each."""
+    """The sensors of a rig with all ranges; their resolutions must be given."""
     sensor = with_default_ranges(rig)
     for name, lsb in (("phi_lsb", sensor.phi_lsb), ("y_lsb", sensor.y_lsb)):
         if not lsb > 0:
@@ -53,7 +53,7 @@ def _counting(rig: RigFile) -> Sensor:
 
 
 def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
-    """The tables a rig file asks for."""
+    """The tables of a rig file."""
     sensor = _counting(rig)
     return weak_tables_q31(
         weak_design_of(rig, sample_rate),
@@ -66,7 +66,7 @@ def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
 
 
 def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
-    """The strong form's formats that a rig file asks for."""
+    """The strong form's formats of a rig file."""
     sensor = _counting(rig)
     w, d1, d2 = nominal_start(rig)
     mode = math.sqrt(w * (d1 + math.sqrt(max(d1**2 - 4 * d2, 0.0))) / 2)  # the faster one of the nominal mechanism
@@ -86,21 +86,21 @@ def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
 
 
 def counts_of(rig: RigFile, run: Run) -> tuple[Int64, Int64]:
-    """What the sensors of a rig count in a run: phi and y, both [ticks]."""
+    """Counts of a rig's sensors in a run: phi and y, both [ticks]."""
     return counts_of_samples(run.phi, rig.sensor.phi_lsb), counts_of_samples(run.y, rig.sensor.y_lsb)
 
 
 def counts_of_samples(values: npt.NDArray[np.float64], lsb: float) -> Int64:
-    """As a 32-bit register holds them; what is not a number is as far beyond full scale as can be."""
+    """Counts as in a 32-bit register; NaN becomes the least count, which is beyond full scale."""
     counts = np.rint(np.nan_to_num(values / lsb, nan=-(2.0**31), posinf=2.0**31, neginf=-(2.0**31)))
     return np.clip(counts, -(2.0**31), 2.0**31 - 1).astype(np.int64)
 
 
 def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> ConfigQ31:
-    """Settings of the form the rig file asks for, with ranges that hold the run where the file leaves them open.
+    """Settings of the rig file's form; ranges that are missing in the file contain the run.
 
-    A run that does not fit about 0 is counted about the middle of its travel; the strong form takes the encoder's zero
-    for the equilibrium, and of the pivot only what changes counts.
+    A run that does not fit about 0 is counted about the middle of its travel. In the strong form the encoder's zero is
+    the equilibrium, so only y has an offset.
     """
     if rig.identifier.form_traits.estimates_zero and rig.identifier.damping:
         raise PvidError("core q31 has no damping: use --core f32")
@@ -113,8 +113,8 @@ def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -
 
 
 def _offset(counts: Int64, limit: int, given: int = 0) -> int:
-    """Where a sensor's travel has its middle, or its median where the travel is longer than the full scale `limit`; the
-    one that is given where that is within half of the full scale and the whole travel fits about it [counts]."""
+    """Offset of a sensor [counts]: `given`, if the median is within half of the full scale `limit` and the whole
+    travel fits; else the middle of the travel, the median or `given`, that with most samples in range."""
     ordinary = counts[np.abs(counts) < 2**31 - 1]
     middle, median = round(middle_of_travel(ordinary)), round(float(np.median(ordinary))) if len(ordinary) else 0
     if abs(median - given) <= limit // 2 and reach(ordinary.astype(np.float64), float(given)) <= limit:
@@ -123,7 +123,7 @@ def _offset(counts: Int64, limit: int, given: int = 0) -> int:
 
 
 def beyond_range(config: ConfigQ31, phi: Int64, y: Int64, rejected: int) -> Beyond:
-    """Which of the counts phi, y [n] a core of this configuration could not take in; `rejected` of them in all."""
+    """Counts phi, y [n] beyond the ranges of this configuration; rejected: number of rejected samples."""
     limited = rejected if config.limits_acceleration else 0
     return beyond_ranges(phi - config.phi_offset, y - config.y_offset, *config.full_scale, limited)
 
@@ -284,7 +284,7 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
 
 
 def config_of_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> ConfigQ31:
-    """Settings of the form the rig file asks for."""
+    """Settings of the rig file's form."""
     make = weak_config_q31 if rig.identifier.form == "weak" else strong_config_q31
     return make(rig, sample_rate, start)
 
@@ -320,7 +320,7 @@ LENGTH_BITS = 24  # of pvid_kapitza_q31
 
 
 def scale_of(config: ConfigQ31, l1: float) -> ScaleQ31:
-    """What turns the estimates of a configuration into metres for a rod of l1 [m]."""
+    """Scale factors from the estimates of a configuration to metres, for a rod of l1 [m]."""
     if not 2.0**-LENGTH_BITS <= l1 < 2.0 ** (31 - LENGTH_BITS):
         raise PvidError(f"l1 = {l1:g} m does not fit the fixed-point core's lengths, which end at 127 m")
     mantissa, exponent = math.frexp(units_of(config)[0] * l1 * 2.0**LENGTH_BITS)

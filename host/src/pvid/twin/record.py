@@ -1,4 +1,4 @@
-"""What all four twins have in common: they step through a run and record the state after every tick."""
+"""Common part of the four twins: they step through a run and record the state after every tick."""
 
 from __future__ import annotations
 
@@ -39,8 +39,7 @@ class TwinRecord:
 
 
 class Recorder:
-    """Records an estimator's state, and what `trust` publishes, after every tick: float32, or in fixed point int32 and
-    int64."""
+    """Records an estimator's state and the published p after every tick: float32, or in fixed point int32 and int64."""
 
     def __init__(
         self, estimator: Any, ticks: int, sums: bool = True, progress: Progress | None = None, trust: Any = None
@@ -88,9 +87,9 @@ class Twin(ABC):
 
     @abstractmethod
     def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
-        """Like `run`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+        """Like `run` without a record: calls `after` after every tick.
 
-        Returns what every tick told, [ticks, lanes].
+        Returns the reason of every tick [ticks, lanes].
         """
 
     def run(

@@ -39,9 +39,9 @@ def run_rows(
 
 
 def follow_rows(estimator: Any, step: Step, n: Array, y: Array, row_reason: Reasons | None, after: After) -> Reasons:
-    """Like `run_rows`, keeping nothing: `after` is called after every tick, when the state is that tick's.
+    """Like `run_rows` without a record: calls `after` after every tick.
 
-    Returns what every tick told, [ticks, lanes].
+    Returns the reason of every tick [ticks, lanes].
     """
     ticks, lanes = len(y), estimator.p.shape[1]
     reason = np.empty((ticks, lanes), np.uint8)

@@ -42,7 +42,7 @@ class StrongTwin(Twin):
         self.misfit = Misfit(rate, np.array([one.forgetting_s for one in settings], np.float32))
 
     def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, Reasons]:
-        """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
+        """N [ticks, 11], Y [ticks] and the reason of each tick: ACCUMULATED if it has a row."""
         phi32 = np.asarray(phi, np.float32)
         y32 = np.asarray(y, np.float32)
         finite = np.isfinite(phi32) & np.isfinite(y32)
@@ -60,7 +60,7 @@ class StrongTwin(Twin):
         return n, row_y, row_reason
 
     def _driven(self, u: Float32, ready: Mask) -> Mask:
-        """Where the mean square of u [ticks] over about a second reaches its threshold."""
+        """Whether the mean square of u over about a second reaches its threshold [ticks]."""
         rate = np.float32(self.config.sample_rate)
         forgetting = np.float32(1) / rate if rate > 1 else np.float32(1)
         threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)

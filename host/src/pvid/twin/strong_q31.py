@@ -35,7 +35,7 @@ class StrongTwinQ31(Twin):
         self.misfit = MisfitQ31(config.drive_ticks, forgetting)
 
     def rows(self, phi: Int, y: Int) -> tuple[Int, Int, Reasons]:
-        """N [ticks, 11], Y [ticks] and the fate of each tick: ACCUMULATED where there is a row to take in."""
+        """N [ticks, 11], Y [ticks] and the reason of each tick: ACCUMULATED if it has a row."""
         config, design = self.config, self.config.design
         phi = phi - config.phi_offset
         y = y - config.y_offset
@@ -57,7 +57,7 @@ class StrongTwinQ31(Twin):
         return n, row_y, row_reason
 
     def _driven(self, u: Int, usable: Mask) -> Mask:
-        """Where the mean square of u [ticks] over about a second reaches its threshold."""
+        """Whether the mean square of u over about a second reaches its threshold [ticks]."""
         threshold = self.config.drive_min**2
         forgetting = integers((2**31 - 1) // self.config.drive_ticks)
         mean_square = integers(0)
@@ -84,7 +84,7 @@ class StrongTwinQ31(Twin):
 def step(
     estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None = None, misfit: MisfitQ31 | None = None
 ) -> Reasons:
-    """A row and the solve it may lead to; all lanes must let the same rows in."""
+    """Adds a row and solves if a solve is due; the gate must accept the same rows in all lanes."""
     terms, e, fits = estimator.terms(n, y)
     held = np.where(fits, e, 0)
     if misfit is not None and fits.all():

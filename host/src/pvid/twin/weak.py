@@ -66,9 +66,9 @@ class WeakTwin(Twin):
         return ~((threshold > 0) & (variance < threshold))
 
     def windows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[dict[int, Window], Mask, Mask]:
-        """Every whole window, by the tick of its handing over.
+        """Every complete window, by the tick that completes it.
 
-        Also which samples were finite, and which ticks are free for the stages of a window, both [ticks].
+        Also which samples are finite, and which ticks are free for the stages of a window, both [ticks].
         """
         config, design = self.config, self.config.design
         phi32 = np.asarray(phi, np.float32)
@@ -99,7 +99,7 @@ class WeakTwin(Twin):
         return complete, finite, free
 
     def _drop_reason(self, window: Window) -> Reasons | None:
-        """Why a window is dropped [lanes], None if it is not; all lanes must agree."""
+        """The reason why a window is dropped [lanes], None if it is used; all lanes must agree."""
         estimator = self.estimator
         lanes = estimator.p.shape[1]
         if window.frozen:
@@ -107,13 +107,13 @@ class WeakTwin(Twin):
         if not window.driven:
             estimator.counters["held_not_excited"] += 1
             return np.full(lanes, Reason.HELD_NOT_EXCITED, np.uint8)
-        zeroed = len(estimator.p) <= 3
-        if not zeroed and not estimator.counters["rows"].any():
+        offset_known = len(estimator.p) <= 3
+        if not offset_known and not estimator.counters["rows"].any():
             estimator.place(np.concatenate([estimator.p[:3], np.full((1, lanes), window.mean), estimator.p[4:]]))
             self.trust.place()
         limit = np.float32(self.config.angle_limit)
-        zero = np.zeros(lanes, np.float32) if zeroed else estimator.p[3]
-        up, down = window.highest - zero, zero - window.lowest
+        offset = np.zeros(lanes, np.float32) if offset_known else estimator.p[3]
+        up, down = window.highest - offset, offset - window.lowest
         beyond = (limit > 0) & (np.where(up > down, up, down) > limit)
         if beyond.any():
             if not beyond.all():
@@ -123,7 +123,7 @@ class WeakTwin(Twin):
         return None
 
     def _take(self, window: Window) -> Reasons | Work:
-        """Why a window is dropped, or its stages."""
+        """The reason why a window is dropped, or its stages."""
         drop_reason = self._drop_reason(window)
         if drop_reason is not None:
             return drop_reason

@@ -41,7 +41,7 @@ class WeakTwinQ31(Twin):
         )
 
     def window_sums(self, phi: Int, y: Int) -> tuple[dict[int, Window | Reason], Mask, Mask]:
-        """Every whole window, or why it is dropped, by the tick of its handing over.
+        """Every complete window, or the reason why it is dropped, by the tick that completes it.
 
         Also which samples were within full scale, and which ticks are free for the stages of a window.
         """
@@ -68,7 +68,7 @@ class WeakTwinQ31(Twin):
         free: Mask,
         threshold: int,
     ) -> int:
-        """Windows from tick `first` on, up to `last` or the first U beyond its full scale; returns where to go on."""
+        """Windows from tick `first` on, up to `last` or the first U beyond its full scale; returns the next tick."""
         design = self.config.design
         f, u = weak_front_q31.decimate(phi[first:last], y[first:last], design)
         beyond = np.flatnonzero(np.abs(u) > design.u_max)
@@ -101,7 +101,7 @@ class WeakTwinQ31(Twin):
         self.trust.place()
 
     def _take(self, window: Window | Reason) -> Reasons | Work:
-        """Why a window is dropped, or its stages."""
+        """The reason why a window is dropped, or its stages."""
         if isinstance(window, Reason):
             self.estimator.counters["held_not_excited"] += window is Reason.HELD_NOT_EXCITED
             return np.full(self.estimator.lanes, window, np.uint8)

@@ -1,4 +1,4 @@
-"""Twin of weak/schedule.h: at which tick the weak form does what, whatever its arithmetic."""
+"""Twin of weak/schedule.h: the work of each tick of the weak form, for both cores."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WindowT = TypeVar("WindowT")
 
 
 class Sizes(Protocol):
-    """What the schedule depends on."""
+    """Sizes that determine the schedule."""
 
     @property
     def taps(self) -> int: ...
@@ -34,7 +34,7 @@ class Sizes(Protocol):
 
 @dataclass(frozen=True)
 class Schedule:
-    """The ticks of a design; those of a stretch count from its first sample."""
+    """Ticks of a design. A stretch is a part of a run without missing samples; its ticks count from its start."""
 
     taps: int
     decimation: int
@@ -63,7 +63,7 @@ class Schedule:
         return max(0, (samples - self.taps - self.job_ticks + 1) // self.decimation + 1)
 
     def centres(self, samples: int) -> npt.NDArray[np.int64]:
-        """Ticks of the stretch that the decimated samples speak of."""
+        """Ticks of the stretch to whose instants the decimated samples refer."""
         return (self.taps - 1) // 2 + self.decimation * np.arange(self.outputs(samples))
 
     def tick_of(self, index: int) -> int:
@@ -76,7 +76,7 @@ class Schedule:
 
     @property
     def window_ticks(self) -> int:
-        """Ticks in which the windows take a decimated sample in, after the one at which it comes out."""
+        """Ticks that add a decimated sample to the windows, after the tick that completes it."""
         if self.decimation <= 2:
             return self.decimation - 1
         second_half = self.decimation - self.decimation // 2
@@ -95,7 +95,7 @@ class Schedule:
             free[start : min(start + self.window_ticks, last)] = False
 
     def stages_per_tick(self, stages: int) -> int:
-        """Stages a tick that work a window off before the next one is complete."""
+        """Fewest stages per tick that finish a window before the next one is complete."""
         free_ticks = 1 if self.decimation <= 2 else self.decimation - self.window_ticks
         return -(-stages // (self.hop * free_ticks))
 
@@ -111,22 +111,22 @@ def play(
     take: Callable[[WindowT], Reasons | Work],
     record: Callable[[int, Reasons], None],
 ) -> Reasons:
-    """Steps through a run and returns what every tick told, [ticks, lanes].
+    """Steps through a run and returns the reason of every tick [ticks, lanes].
 
     Parameters
     ----------
     usable, free
-        Which samples are taken in, and which ticks are free for the stages of a window, [ticks].
+        Usable samples, and ticks that are free for the stages of a window, both [ticks].
     complete
         Every whole window, by the tick of its handing over.
-    together
-        Stages a tick.
+    stages_per_tick
+        Stages of a window per tick.
     reject
-        Counts an unusable sample, and names what it was.
+        Counts an unusable sample and returns its reason.
     take
-        Takes a window in: returns why it is dropped, or its stages.
+        Begins a window: returns the reason why it is dropped, or its stages.
     record
-        Called after every tick, with what it told [lanes].
+        Called after every tick with its reason [lanes].
     """
     reason = np.empty((len(usable), lanes), np.uint8)
     warm = False

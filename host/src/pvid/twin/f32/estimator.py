@@ -1,7 +1,7 @@
 """Twin of estimator_f32.c: one tick of every lane at a time.
 
-`Estimator` is that of the strong form, whose model projects its sums by itself; `RelativeEstimator` is that of a
-model known by its pattern, which keeps B relative to the estimate and solves in stages.
+`Estimator` is the twin of direct_f32.c, the engine of the strong form. `RelativeEstimator` is the twin of staged_f32.c,
+the engine of the weak form, with b = B - M theta and rr.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _COUNTERS = (
 
 
 def _capped(residual: Float32) -> Float32:
-    """No more than RESIDUAL_MAX, which stands for what is no number as well."""
+    """At most RESIDUAL_MAX; NaN becomes RESIDUAL_MAX."""
     return np.where(residual <= RESIDUAL_MAX, residual, RESIDUAL_MAX)
 
 
@@ -141,9 +141,9 @@ class Estimator:
             self.counters["rejected_saturated"] += saturated
         if not taken.any():
             return reason
-        listening = taken & (self.gain < 1)
-        if listening.any():
-            self.innovation = np.where(listening, self.innovation + gradient * e, self.innovation)
+        is_rate = taken & (self.gain < 1)
+        if is_rate.any():
+            self.innovation = np.where(is_rate, self.innovation + gradient * e, self.innovation)
         self.sums = self.information.add(model.terms(n, y), taken)
         self.counters["rows"] += taken
         self.phase += taken
@@ -165,11 +165,11 @@ class Estimator:
         return reason
 
     def _reference(self) -> Float32:
-        """What the size of a step is measured by [n_p, lanes]."""
+        """Reference of the relative size of a step [n_p, lanes]."""
         return self.p
 
     def _kappa(self, s: Float32, whole: cholesky.Factor) -> cholesky.Factor:
-        """The factor of the leading parameters that the gates look at; `whole` is that of all."""
+        """The factor for the leading parameters that are checked for excitation; whole: that for all parameters."""
         return whole
 
     def _step_from(
@@ -180,8 +180,8 @@ class Estimator:
         due: npt.NDArray[np.bool_],
         above_noise: npt.NDArray[np.bool_],
     ) -> tuple[Float32, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
-        """Where p goes from S and F, whether it may (UPDATED or why it is held), and whether it rests in its dead zone,
-        in every lane."""
+        """p after a step from S and F, the reason (UPDATED, or why p is held), and whether p is within its dead zone
+        [lanes]."""
         for a in range(len(self.p)):
             s[a, a] = s[a, a] + self.prior[a]
         rhs = gain * force + (np.float32(1) - gain) * self.innovation
@@ -243,7 +243,7 @@ class Estimator:
             return self._assess(sums, s, self._variance(sums, residual))
 
     def misfit(self, sums: Float32) -> Float32:
-        """Residual variance over what the sensors explain; nobody has told what that is [lanes]."""
+        """Residual variance over its expectation [lanes]; 0: the strong form has no expectation."""
         return np.zeros(sums.shape[1], np.float32)
 
     def _variance(self, sums: Float32, residual: Float32) -> Float32:
@@ -258,8 +258,8 @@ class Estimator:
         most = np.ones(len(weight), np.float32)
         for j in range(len(kappa.u)):
             scaled = kappa.u[j, j] * kappa.scale[j]
-            imitated = (scaled * scaled) * s[j, j]
-            most = np.where(imitated > most, imitated, most)
+            inflation = (scaled * scaled) * s[j, j]
+            most = np.where(inflation > most, inflation, most)
         wide = variance * self.correlation
         for a in range(n_p):
             s[a, a] = s[a, a] + wide / (self.start_sd[a] * self.start_sd[a])
@@ -343,7 +343,7 @@ class RelativeEstimator(Estimator):
     ) -> Iterator[npt.NDArray[np.uint8] | None]:
         """The stages of a solve: None while it is in progress, the reasons [lanes] at the last one.
 
-        refuge: in which lanes p goes elsewhere if it may not step, and where.
+        fallback: lanes in which p reverts if no step is allowed, and the p to revert to.
         """
         reason = np.full(len(self.phase), Reason.ACCUMULATED, np.uint8)
         self.was_due = True
@@ -386,7 +386,7 @@ class RelativeEstimator(Estimator):
         return self._projection_stages + 4 + self.model.n_p
 
     def judged(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
-        """The assessment, and where the data say more than noise of the variance found would [lanes]."""
+        """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
         sums = self.information.read()
         s, residual = self._assessed(sums)
         variance = self._variance(sums, residual)
@@ -451,7 +451,7 @@ class RelativeEstimator(Estimator):
         return reason
 
     def place(self, p: Float32) -> None:
-        """Sets p [n_p, lanes] before the first row, within its bounds; what is no number leaves its entry."""
+        """Sets p [n_p, lanes] before the first row, within its bounds; an entry that is not finite is ignored."""
         x = np.where(p < self.lower, self.lower, p)
         self.p = np.where(np.isfinite(p), np.where(x > self.upper, self.upper, x), self.p)
         with np.errstate(all="ignore"):

@@ -17,13 +17,13 @@ Mask = npt.NDArray[np.bool_]
 
 _SHORT, _LONG, _LONG_MEMORY = 8, 16, np.float32(4096)
 _ARRIVED, _SMALL_STEP, _VARIANCE_RATIO_MAX = np.float32(0.3), np.float32(1e-4), np.float32(1e6)
-_SETTLED_STEP, _NEAR = np.float32(0.02), np.float32(0.1)
+_SETTLED_STEP, _SMALL_ERROR = np.float32(0.02), np.float32(0.1)
 _FADE, _FADE_GROUPS = np.float32(0.3), 4
 _COUNT_MAX = 0xFFFF
 
 
 def uninformative_groups(uninformative: npt.NDArray[np.int64], stepped: Mask, is_back: Mask) -> npt.NDArray[np.int64]:
-    """Groups in a row that said too little for a step [lanes]; of verdict.h, as `tell`."""
+    """Consecutive groups without a step [lanes]: pvid_trust_count_uninformative of verdict.h."""
     return np.where(stepped | is_back, 0, np.minimum(uninformative + 1, _COUNT_MAX))
 
 
@@ -34,7 +34,7 @@ def report(
     sure: Mask,
     misfit: Mask,
 ) -> npt.NDArray[np.uint8]:
-    """Counts the verdicts on what solves with these reasons left, and says what is told of them [lanes]."""
+    """pvid_trust_report of verdict.h: counts the verdicts and returns the reasons to report [lanes]."""
     stepped = reason == Reason.UPDATED
     reported = reason.copy()
     reported[stepped & ~excited] = Reason.HELD_NOT_EXCITED
@@ -82,12 +82,12 @@ class Trust:
 
     @property
     def fallback(self) -> tuple[Mask, Float32]:
-        """In which lanes p has one, and where [n_p, lanes]."""
+        """Lanes in which p may revert, and the p to revert to [n_p, lanes]."""
         some = (self.config.revert_after > 0) & (self.uninformative >= self.config.revert_after)
         return some, np.ascontiguousarray(self.estimate["p"][:, : len(self.estimator.p)].T)
 
     def _add_variance_ratio(self, lanes: Mask, variance_ratio: Float32) -> Mask:
-        """Where the windows alone raise the alarm, of the given lanes."""
+        """Lanes in which the short or the long mean exceeds its limit."""
         x = np.where(variance_ratio <= _VARIANCE_RATIO_MAX, variance_ratio, _VARIANCE_RATIO_MAX)
         self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
         with np.errstate(all="ignore"):
@@ -152,7 +152,7 @@ class Trust:
     def _raise_alarm(
         self, settled: Mask, errors_small: Mask, variance_ratio: Float32, candidate: npt.NDArray[np.void]
     ) -> None:
-        """The alarm, and the renewal that may follow from it; where p has settled, and where it is known well."""
+        """Sets the alarm and renews the sums if they are stale; settled: the last step was small [lanes]."""
         agrees = self._all_agree(candidate)
         renewing = self.groups_to_fade > 0
         self.errors_small = errors_small
@@ -181,7 +181,7 @@ class Trust:
             error = self.largest_error(candidate)
             part = _ARRIVED * error
             arrived = size <= np.where(part > _SMALL_STEP, part, _SMALL_STEP)
-            self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _NEAR, variance_ratio, candidate)
+            self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _SMALL_ERROR, variance_ratio, candidate)
         enough_kappa = np.float32(self.config.kappa_min)
         excited = above_noise & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         enough = self.groups >= self.config.groups_min

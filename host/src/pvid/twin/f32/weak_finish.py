@@ -53,7 +53,7 @@ def rows(
 ) -> tuple[Float32, Float32, npt.NDArray[np.bool_]]:
     """Whitened, projected columns [13, K, lanes] of a window at the estimator's p.
 
-    Also the noise traces [3, lanes] and where they hold [lanes].
+    Also the noise traces [3, lanes] and whether they are valid [lanes].
     """
     p = estimator.p
     with np.errstate(all="ignore"):
@@ -79,7 +79,7 @@ def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEst
 
 
 def _passes(gate: Gate, x: Float32, design: WeakTables, estimator: RelativeEstimator, expected: Float32) -> bool:
-    """Whether the gate lets the rows in; all lanes must agree."""
+    """Whether the gate accepts the window; all lanes must agree."""
     with np.errstate(all="ignore"):
         energy = np.zeros(x.shape[2], np.float32)
         for k in range(design.functions):
@@ -103,11 +103,11 @@ def stages(
     expected: Float32,
     gate: Gate,
 ) -> Iterator[Reasons | None]:
-    """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None."""
+    """Processes a window, one stage per step; yields the reason to report [lanes], or None."""
     x, noise, whitened = rows(window, design, estimator, angle)
     for _ in range(_stages_of_rows(design) + (1 if angle is None else angle.stages) - 1):
         yield None
-    # the last of these stages asks the gate, and makes the sums ready for the rows
+    # the last of these stages runs the gate and prepares the sums for the rows
     if gate.is_on and not _passes(gate, x, design, estimator, expected):
         estimator.counters["rejected_outlier"] += 1
         yield np.full(estimator.p.shape[1], Reason.REJECTED_OUTLIER, np.uint8)

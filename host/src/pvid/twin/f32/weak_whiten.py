@@ -1,4 +1,4 @@
-"""Twin of weak/whiten_f32.c: the noise covariance of a window's rows at p, its factor, and what noise is in it."""
+"""Twin of weak/whiten_f32.c: the noise covariance of a window's rows at p, its Cholesky factor, the noise traces."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ Float32 = npt.NDArray[np.float32]
 
 def gram(design: WeakTables, p: Float32) -> Float32:
     """R0 at p [n_p, lanes]: packed lower triangle by rows [K (K + 1) / 2, lanes]."""
-    two = p[1] * p[0]
-    zero = (p[2] * p[0]) * p[0]
+    factor2 = p[1] * p[0]
+    factor0 = (p[2] * p[0]) * p[0]
+    factors = (factor2, factor0, factor2 * factor2, factor2 * factor0, factor0 * factor0)
     tables = np.asarray(design.gram, np.float32)[:, :, None]
     total = np.broadcast_to(tables[0], (tables.shape[1], p.shape[1]))
-    for table, factor in zip(tables[1:], (two, zero, two * two, two * zero, zero * zero), strict=True):
-        total = total + factor * table
+    for table, one in zip(tables[1:], factors, strict=True):
+        total = total + one * table
     return total
 
 
 def factor(packed: Float32, functions: int) -> tuple[Float32, npt.NDArray[np.bool_]]:
-    """The Cholesky factor [K, K, lanes] with inverted diagonal, and where there is one [lanes]."""
+    """The Cholesky factor [K, K, lanes] with inverted diagonal, and whether it exists [lanes]."""
     lanes = packed.shape[1]
     low = np.zeros((functions, functions, lanes), np.float32)
     rows, columns = np.tril_indices(functions)

@@ -19,7 +19,7 @@ _TERM_TABLE = ((_CHI2, 1), (_CHI0, 0), (_CHI4, 2))  # terms, and which table of 
 
 
 def window_count(decimated: int, hop: int) -> int:
-    """Windows handed over by the time that `decimated` samples have come out."""
+    """Complete windows in `decimated` samples."""
     return max(0, (decimated - 1) // hop - 1)
 
 
@@ -35,9 +35,11 @@ def curvature_squares(phi: Float32, lag: int) -> tuple[Float32, Float32]:
 
 @dataclass(frozen=True)
 class Observed:
-    """Of every window of one stretch, over all but its last sample [windows].
+    """Statistics of every window of one stretch, over all but its last sample [windows].
 
-    drive : variance of u [1/s^4];  mean, lowest, highest : of phi [rad];  bend : mean square of its second differences
+    drive : variance of u [1/s^4]
+    mean, lowest, highest : of phi [rad]
+    curvature : mean square of the second differences of phi [rad^2]
     """
 
     drive: Float32
@@ -48,7 +50,7 @@ class Observed:
 
 
 def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
-    """What is known of each window as a whole."""
+    """Statistics of each window."""
     hop = (design.window - 1) // 2
     starts = hop * np.arange(window_count(len(u), hop))
     zero = np.zeros(len(starts), np.float32)
@@ -73,8 +75,8 @@ def observe(phi: Float32, u: Float32, design: WeakTables) -> Observed:
 
 @dataclass(frozen=True)
 class Window:
-    """A whole window at its handing over: sums [K, 13], samples phi [rad] and u [1/s^2] [W], whether it is driven,
-    whether it comes while the identifier is frozen, and what `observe` says of it."""
+    """A complete window: sums [K, 13], samples phi [rad] and u [1/s^2] [W], whether it is driven, whether the
+    identifier is frozen, and its statistics from `observe`."""
 
     sums: Float32
     phi: Float32

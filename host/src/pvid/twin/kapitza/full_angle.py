@@ -1,4 +1,4 @@
-"""Twin of models/kapitza/full_angle_f32.c: what the linear rows of a window lack, in every lane."""
+"""Twin of models/kapitza/full_angle_f32.c: the remainder of a window's linear rows, in every lane."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ class Angle:
         return self.config.passes * (fit + 1 + sweep) + 1
 
     def correct(self, x: Float32, p: Float32, theta: Float32, phi: Float32, u: Float32) -> Float32:
-        """Columns x [13, K, lanes] with the remainder of a window's samples phi, u [W] taken off Y and the columns of
-        friction; p [n_p, lanes], theta [n_theta, lanes]."""
+        """Columns x [13, K, lanes] with the remainder subtracted from Y and the columns of friction filled in, from a
+        window's samples phi, u [W]; p [n_p, lanes], theta [n_theta, lanes]."""
         functions, lanes = x.shape[1:]
         self.p = p[:3].copy()
         zero = p[3] if len(p) > 3 else np.zeros(lanes, np.float32)
@@ -160,7 +160,7 @@ class Angle:
         return out
 
     def switch(self, lanes: Mask, p: Float32, worst: Float32, groups: int) -> Mask:
-        """pvid_weak_angle_switch_f32 in the given lanes; where it was switched on."""
+        """pvid_weak_angle_switch_f32 in the given lanes; returns the lanes in which it was enabled."""
         moved = np.zeros(p.shape[1], np.float32)
         for i in range(3):
             step = (p[i] / self.p[i]) - f(1)

@@ -1,4 +1,4 @@
-"""Twin of kapitza_weak_f32.c: theta and its Jacobian in the weak form, with and without the encoder's zero."""
+"""Twin of kapitza_weak_f32.c: theta and its Jacobian in the weak form, with and without the encoder's offset."""
 
 from __future__ import annotations
 

@@ -175,13 +175,13 @@ class EstimatorQ31:
         return scale(values, h), h
 
     def place(self, index: int, value: int) -> None:
-        """A better start of p[index], within its bounds."""
+        """Sets p[index] before the first row, within its bounds."""
         self.p = self.p.copy()
         self.p[index] = np.clip(value, self.lower[index], self.upper[index])
         self.theta = self.model.theta(self.p)
 
     def innovation(self, n: Int, y: Int) -> tuple[Int, Mask]:
-        """e = Y - N^T theta of a row [lanes], and where the row fits; shapes as in `add`."""
+        """e = Y - N^T theta of a row [lanes], and whether the row fits; shapes as in `add`."""
         return self.terms(n, y)[1:]
 
     def terms(self, n: Int, y: Int) -> tuple[Int, Int, Mask]:
@@ -201,7 +201,7 @@ class EstimatorQ31:
         return self.take_row(n, *self.innovation(n, y))
 
     def take_row(self, n: Int, innovation: Int, fits: Mask) -> Reasons:
-        """The same, its innovation known and where it fits."""
+        """As `add`, given the results of `innovation`."""
         e = np.where(fits, innovation, 0)
         self.energy = clamp(self.energy + e * e, WIDE)
         e = round_shift(e, self.exponent)
@@ -255,11 +255,11 @@ class EstimatorQ31:
 
     @property
     def assessment_stages(self) -> int:
-        """Stages of an assessment: those that look, residual, two factors, kappa, columns and errors."""
+        """Stages of an assessment: projection, residual, two factors, kappa, columns and errors."""
         return self._shared_stages() + 2 + 2 * self._factor_parts() + 2 * self.model.n_p
 
     def _stages_before_commit(self) -> int:
-        """Those that look, factor, force, solve, step, rows of M dtheta."""
+        """Stages of projection, factor, force, solve, step, rows of M dtheta."""
         follow = -(-self.model.n_theta // self._ROWS_PER_STAGE)
         return self._shared_stages() + self._factor_parts() + follow + 3
 
@@ -284,13 +284,13 @@ class EstimatorQ31:
     # ---- information ----
 
     def _forget(self, places: slice) -> None:
-        """Lets some of the sums fade if it is time to."""
+        """Multiplies some of the sums by the retention at the end of a block."""
         due = (self.age + 1 >= self.block) & (self.retention < 2**31 - 1)
         if due.any():
             self.sums[places] = np.where(due, times_q31(self.sums[places], self.retention), self.sums[places])
 
     def fade(self, factor: Int) -> Iterator[None]:
-        """Multiplies all that was gathered by factor [lanes], Q31, in stages; 0: not at all."""
+        """Multiplies the sums by factor [lanes], Q31, in stages; 0: no change."""
         half = self.model.n_sums // 2
         for places in (slice(0, half), slice(half, None)):
             faded = times_q31(self.sums[places], np.maximum(factor, 1))
@@ -354,7 +354,7 @@ class EstimatorQ31:
         return clamp(scale(s, g[:, None] + g[None]), ONE), g
 
     def _above_noise(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
-        """Whether S less what noise of this variance puts there, so many times over, is still positive."""
+        """Whether S minus noise_margin times the information of noise of this variance is positive definite."""
         model = self.model
         if model.noisy is None:
             return np.ones(self.lanes, np.bool_)
@@ -413,7 +413,7 @@ class EstimatorQ31:
         return rhs, *cholesky.solve(factor, rhs)
 
     def _at_rest(self, factor: cholesky.Factor, c: Int, b: Int, g: Int) -> Mask:
-        """Where p is within the dead zone; b scaled as the rows of C."""
+        """Whether p is within the dead zone; b scaled as the rows of C."""
         if not (self.dead_zone > 0).any():
             return np.zeros(self.lanes, np.bool_)
         force, down = cholesky.to_block(b, 30)
@@ -434,7 +434,7 @@ class EstimatorQ31:
         return np.where(self.gain == 0, self.fresh, both)
 
     def _limited(self, dp: Int, moving: Mask) -> Int:
-        """Where the step leads: shortened to the step limit, within the bounds; p where nothing moves."""
+        """p after the step, shortened to the step limit, within the bounds; p in lanes without a step."""
         size = np.zeros(self.lanes, np.int64)
         for a in range(self.model.n_p):
             reference = self.p[a] if self.model.positive[a] else self.start_sd[a]
@@ -505,7 +505,7 @@ class EstimatorQ31:
         self.expected = pick(counted, self.expected.plus(share.times(variance.minus(self.expected))), self.expected)
 
     def _misfit(self) -> Int:
-        """Residual variance over what the sensors explain of it, Q16; 0 where that is not known [lanes]."""
+        """Residual variance over its expectation, Q16; 0: unknown [lanes]."""
         known = (self._freedom() >= (1 << 16)) & (self.expected.m > 0)
         explained = self._explained_variance()
         one = scaled(np.ones(self.lanes, np.int64), 0)
@@ -517,7 +517,7 @@ class EstimatorQ31:
         return self.judged()[0]
 
     def judged(self) -> tuple[npt.NDArray[np.void], Mask]:
-        """The assessment, and where the data say more than noise of the variance found would [lanes]."""
+        """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
         n_p = self.model.n_p
         out = np.zeros(self.lanes, estimates.Q31)
         out["p"][:, :n_p] = self.p.T

@@ -1,4 +1,4 @@
-"""Twin of gate_q31.c: which residuals are let in, in several lanes."""
+"""Twin of gate_q31.c: which residuals are accepted, in several lanes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Twin of misfit_q31.c: when the strong form leaves more unexplained than it should, in several lanes."""
+"""Twin of misfit_q31.c: the misfit alarm of the strong form, in several lanes."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _VARIANCE_RATIO_MAX = 1_000_000 << VARIANCE_RATIO_BITS
 _ERROR_BITS = 24
 _COUNT_MAX = 0xFFFF
 _SETTLED_STEP = (1 << SIZE_BITS) // 50
-_NEAR = (1 << _ERROR_BITS) // 10
+_SMALL_ERROR = (1 << _ERROR_BITS) // 10
 _FADE, _FADE_GROUPS = 644245094, 4  # 0.3 in Q31
 
 
@@ -59,12 +59,12 @@ class TrustQ31:
 
     @property
     def fallback(self) -> tuple[Mask, Int]:
-        """In which lanes p has one, and where [n_p, lanes]."""
+        """Lanes in which p may revert, and the p to revert to [n_p, lanes]."""
         some = (self.config.revert_after > 0) & (self.uninformative >= self.config.revert_after)
         return some, self.estimate["p"][:, : len(self.estimator.p)].T.astype(np.int64)
 
     def _add_variance_ratio(self, lanes: Mask, variance_ratio: Int) -> Mask:
-        """Where the windows alone raise the alarm, of the given lanes."""
+        """Lanes in which the short or the long mean exceeds its limit."""
         x = clamp(variance_ratio, _VARIANCE_RATIO_MAX)
         self.judged = np.where(lanes & (self.judged < self.long_memory), self.judged + 1, self.judged)
         change = x - self.long_mean
@@ -110,7 +110,7 @@ class TrustQ31:
     def _raise_alarm(
         self, settled: Mask, errors_small: Mask, variance_ratio: Int, candidate: npt.NDArray[np.void]
     ) -> None:
-        """The alarm, and the renewal that may follow from it; where p has settled, and where it is known well."""
+        """Sets the alarm and renews the sums if they are stale; settled: the last step was small [lanes]."""
         agrees = self._all_agree(candidate)
         renewing = self.groups_to_fade > 0
         self.errors_small = errors_small
@@ -139,7 +139,7 @@ class TrustQ31:
         stepped = reason == Reason.UPDATED
         self.uninformative = uninformative_groups(self.uninformative, stepped, self.fallback[0])
         error = self._largest_error(candidate)
-        self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _NEAR, variance_ratio, candidate)
+        self._raise_alarm(stepped & (size <= _SETTLED_STEP), error <= _SMALL_ERROR, variance_ratio, candidate)
         converged = round_shift(clamp(error, 1 << 44) * _ARRIVED, 16 + (_ERROR_BITS - SIZE_BITS))
         arrived = size <= np.maximum(converged, _SMALL_STEP)
         enough_kappa = self.config.kappa_min

@@ -81,7 +81,7 @@ def gram(design: WeakTablesQ31, estimator: EstimatorQ31) -> tuple[Int, Int]:
 
 
 def factor(packed: Int, functions: int) -> tuple[Int, Int, Int, Int, Mask]:
-    """L [K, K, lanes] in Q30, its inverse diagonal (m, k) and row exponents [K, lanes], and where there is one."""
+    """L [K, K, lanes] in Q30, its inverse diagonal (m, k) and row exponents [K, lanes], and whether it exists."""
     lanes = packed.shape[1]
     low = np.zeros((functions, functions, lanes), np.int64)
     rows, columns = np.tril_indices(functions)
@@ -106,7 +106,7 @@ def factor(packed: Int, functions: int) -> tuple[Int, Int, Int, Int, Mask]:
 
 
 class Held:
-    """Holds numbers within COLUMN_LIMIT and remembers, by lane, where they were not."""
+    """Clamps numbers to COLUMN_LIMIT; `saturated`: lanes in which one was beyond."""
 
     def __init__(self, lanes: int) -> None:
         self.saturated = np.zeros(lanes, np.bool_)
@@ -173,7 +173,7 @@ def traces(design: WeakTablesQ31, by: Whitening) -> list[Scaled]:
 
 
 def noise_of(design: WeakTablesQ31, by: Whitening, estimator: EstimatorQ31) -> list[Scaled]:
-    """What `EstimatorQ31.noise` is to be: by the traces where the window is whitened, else as it was."""
+    """The new `EstimatorQ31.noise`: from the traces if the window is whitened, else unchanged."""
     noise = []
     assert estimator.model.noisy is not None
     first, second = estimator.model.noisy
@@ -195,7 +195,7 @@ def remove(x: Int, column: int, held: Held) -> Int:
 
 
 def rows(sums: Int, by: Whitening, design: WeakTablesQ31) -> tuple[Int, Mask]:
-    """Whitened, projected columns [12, K, lanes] of a window with sums [K, 15], and where they did not fit."""
+    """Whitened, projected columns [12, K, lanes] of a window with sums [K, 15], and whether they are saturated."""
     lanes = len(by.whitened)
     x = np.repeat(assemble(sums, design)[:, :, None], lanes, axis=2)
     held = Held(lanes)
@@ -226,14 +226,14 @@ def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: Estimato
 
 
 def _variance_ratio(energy: Int, design: WeakTablesQ31, expected: Scaled) -> Scaled:
-    """Variance of a window's residuals over what is expected of it [lanes]."""
+    """Residual variance of a window over its expectation [lanes]."""
     return scaled(energy, 0).over(scaled(design.functions - 2, 0).times(expected))
 
 
 def _passes(
     gate: GateQ31, x: Int, saturated: Mask, design: WeakTablesQ31, estimator: EstimatorQ31, expected: Scaled
 ) -> bool:
-    """Whether the gate lets the rows in; all lanes must agree."""
+    """Whether the gate accepts the window; all lanes must agree."""
     energy = np.zeros(estimator.lanes, np.int64)
     for k in range(design.functions):
         e = clamp(estimator.innovation(x[: estimator.model.n_theta, k], x[_Y, k])[0], COLUMN_LIMIT)
@@ -253,7 +253,7 @@ def stages(
     pivot: Scaled,
     gate: GateQ31,
 ) -> Work:
-    """Works a window off: one stage a step, yielding what there is to tell of it [lanes], else None.
+    """Processes a window, one stage per step; yields the reason to report [lanes], or None.
 
     pivot: what the noise of the pivot's sensor adds to the variance of a row for each mean square of a second
     difference of F.
@@ -263,7 +263,7 @@ def stages(
     x, saturated = rows(window.sums, by, design)
     for _ in range(_stages_before_add(design) - 1):
         yield None
-    # the last of these stages asks the gate, and tells what noise there is in the rows
+    # the last of these stages runs the gate and sets the noise of the rows
     if gate.is_on and not _passes(gate, x, saturated, design, estimator, expected):
         estimator.counters["rejected_outlier"] += 1
         yield np.full(estimator.lanes, Reason.REJECTED_OUTLIER, np.uint8)

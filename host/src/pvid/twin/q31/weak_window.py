@@ -32,7 +32,7 @@ def angle_sums(f: Int, design: WeakTablesQ31) -> Int:
 
 
 def curvatures(f: Int, design: WeakTablesQ31) -> Scaled:
-    """Mean square of the second differences of F that fell into each window [windows]."""
+    """Mean square of the second differences of F in each window [windows]."""
     hop = (design.window - 1) // 2
     squares, due = np.zeros(len(f), np.int64), np.zeros(len(f), np.int64)
     ends = np.arange(2 * design.lag, len(f), design.lag)

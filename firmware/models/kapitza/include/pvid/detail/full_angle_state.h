@@ -11,17 +11,18 @@ typedef struct {
     float twice;
 } pvid_weak_integral_f32;
 
-/* What the rows lack: the remainder of Y, and the columns of c1 and c2. */
+/* The remainder of Y, and the columns of c1 and c2. */
 #define PVID_WEAK_REMAINDERS 3
 
-/* The samples and the remainder of the window in work. Only the identifier writes to it. */
+/* Samples of the last windows, and the remainder of the window that is being processed. Only the identifier writes to
+ * it. */
 struct pvid_weak_angle_f32 {
     uint16_t length; /* places of the ring in use: a window and a hop */
     uint16_t window; /* W */
     uint16_t head;   /* place of the next decimated sample */
     uint16_t first;  /* place of the window's first sample */
-    uint16_t place;  /* of the sample in work */
-    uint16_t index;  /* of it in the window, or of the function in work */
+    uint16_t place;  /* place of the present sample */
+    uint16_t index;  /* index of the present sample in the window, or of the present function */
     uint8_t stage;
     uint8_t pass;
     uint8_t passes;
@@ -34,15 +35,15 @@ struct pvid_weak_angle_f32 {
     float p[PVID_KAPITZA_P];
     float zero;        /* c */
     float friction[2]; /* c1, c2 */
-    float l1;          /* L1 and L2 of p */
+    float l1;          /* L1 and L2 of p (theory.md 1), not lengths */
     float l2;
-    float a; /* of the window */
+    float a; /* unknowns of the window: q = a + b t - ... */
     float b;
     float normal[5]; /* A^T A, A^T B, B^T B, A^T e, B^T e */
     pvid_weak_integral_f32 motion;
     pvid_weak_integral_f32 remainder_integral[PVID_WEAK_REMAINDERS];
-    float remainder[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];              /* by the last pass */
-    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];                   /* by this one */
+    float remainder[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];              /* of the last pass */
+    float next[PVID_MAX_FUNCTIONS][PVID_WEAK_REMAINDERS];                   /* of this pass */
     float ring[PVID_MAX_WEAK_WINDOW + ((PVID_MAX_WEAK_WINDOW + 1) / 2)][2]; /* phi [rad], u [1/s^2] */
 };
 
