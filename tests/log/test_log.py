@@ -152,7 +152,7 @@ def test_joining_and_leaving_amidst_a_frame_is_no_loss(tmp_path: Path, sent: lis
 def test_garbage_alone_is_no_log_and_a_loss_beside_frames(tmp_path: Path, sent: list[bytes]) -> None:
     noise = tmp_path / "noise"
     noise.write_bytes(np.random.default_rng(1).bytes(100_000))
-    with pytest.raises(PvidError, match="is no log of pvid: not one frame in 100000 bytes"):
+    with pytest.raises(PvidError, match="is not a log of pvid: not one frame in 100000 bytes"):
         list(LogReader(noise))
     with pytest.raises(PvidError, match="cannot read"):
         list(LogReader(tmp_path / "nothing"))
@@ -601,7 +601,7 @@ def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -
     with pytest.raises(PvidError, match="run.csv is not a log of pvid: nothing is appended"):
         refuse_to_append(tmp_path / "run.csv", rig)
     arguments = ["log", "nowhere", str(tmp_path / "run.csv"), "--append"]
-    with pytest.raises(PvidError, match="is no log of pvid"):
+    with pytest.raises(PvidError, match="is not a log of pvid"):
         CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
 
 

@@ -412,4 +412,4 @@ class LogReader:
         if stream.is_log and not stream.account.begun and not stream.account.frames:
             raise PvidError(f"{self.path} is empty: the recording ended before the link was up")
         if not stream.account.frames and not stream.account.begun:
-            raise PvidError(f"{self.path} is no log of pvid: not one frame in {stream.account.bytes} bytes")
+            raise PvidError(f"{self.path} is not a log of pvid: not one frame in {stream.account.bytes} bytes")
