@@ -60,6 +60,7 @@ def play_hostile(library: Path, *arguments: str) -> subprocess.CompletedProcess[
         PLAYER,
         *arguments,
         PVID_NATIVE_LIBRARY=str(library),
+        PYTHONPATH=os.pathsep.join(filter(None, (str(ROOT / "tests"), os.environ.get("PYTHONPATH")))),
         LD_PRELOAD=runtime,
         ASAN_OPTIONS=f"detect_leaks=0:{NO_SYMBOLIZER}",
     )

@@ -137,7 +137,7 @@ def test_every_command_that_reads_a_run_takes_rig_settings_and_columns(run: Run,
     assert pvid("design", "--run", path, *given, "--set", "sample_rate=1000").return_value == 0
     with pytest.raises(PvidError, match="use --columns t=time_ms:ms,phi=angle_deg:deg,y=h:m"):
         pvid("identify", path, *given[:2])
-    with pytest.raises(PvidError, match="--columns is for the run: name it with --run"):
+    with pytest.raises(PvidError, match="--columns needs --run"):
         pvid("design", *given)
 
 

@@ -186,7 +186,7 @@ def test_the_command_prints_a_table_and_an_object(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (("--tone", "0,1,0"), "nothing of w"),
+        (("--tone", "0,1,0"), "does not identify w"),
         (("--duration", "1"), "one window"),
         (("--duration", "-1"), "-1"),
         (("--tone", "loud"), "loud"),

@@ -170,7 +170,7 @@ def test_mcap_contains_the_fields_required_by_foxglove_and_plotjuggler(tmp_path:
 def test_an_export_that_fails_leaves_nothing(tmp_path: Path, log: Path) -> None:
     (tmp_path / "noise").write_bytes(b"noise")
     for form in FORMATS:
-        with pytest.raises(PvidError, match="is no log of pvid"):
+        with pytest.raises(PvidError, match="is not a log of pvid"):
             export_log(tmp_path / "noise", form, tmp_path / "out", UNKNOWN_RIG)
         with pytest.raises(PvidError, match="cannot write .*nowhere"):
             export_log(log, form, tmp_path / "nowhere" / "out", UNKNOWN_RIG)

@@ -152,7 +152,7 @@ def test_joining_and_leaving_amidst_a_frame_is_no_loss(tmp_path: Path, sent: lis
 def test_garbage_alone_is_no_log_and_a_loss_beside_frames(tmp_path: Path, sent: list[bytes]) -> None:
     noise = tmp_path / "noise"
     noise.write_bytes(np.random.default_rng(1).bytes(100_000))
-    with pytest.raises(PvidError, match="is no log of pvid: not one frame in 100000 bytes"):
+    with pytest.raises(PvidError, match="is not a log of pvid: not one frame in 100000 bytes"):
         list(LogReader(noise))
     with pytest.raises(PvidError, match="cannot read"):
         list(LogReader(tmp_path / "nothing"))
@@ -595,13 +595,13 @@ def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -
     refuse_to_append(tmp_path / "none.pvlog", rig)
     (tmp_path / "empty.pvlog").write_bytes(b"")
     refuse_to_append(tmp_path / "empty.pvlog", rig)
-    with pytest.raises(PvidError, match="a.pvlog was recorded with another rig file: a log has one"):
+    with pytest.raises(PvidError, match="a.pvlog was recorded with another rig file: record to a new log"):
         refuse_to_append(tmp_path / "a.pvlog", replace(rig, l1=0.31))
     (tmp_path / "run.csv").write_text("t,phi,y\n" + 100 * "0,0,0\n")
     with pytest.raises(PvidError, match="run.csv is not a log of pvid: nothing is appended"):
         refuse_to_append(tmp_path / "run.csv", rig)
     arguments = ["log", "nowhere", str(tmp_path / "run.csv"), "--append"]
-    with pytest.raises(PvidError, match="is no log of pvid"):
+    with pytest.raises(PvidError, match="is not a log of pvid"):
         CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
 
 
@@ -686,7 +686,7 @@ def test_unwritable_folder_is_reported(tmp_path: Path, boards: Boards) -> None:
 @pytest.mark.parametrize(
     ("error", "told"),
     [
-        (serial.SerialException("device reports readiness to read but returned no data (...)"), "nothing is at its"),
+        (serial.SerialException("device reports readiness to read but returned no data (...)"), "its other end"),
         (serial.SerialException("socket disconnected"), "its other end was closed"),
         (OSError(5, "Input/output error"), "Input/output error"),
         (serial.SerialException("something else"), "something else"),

@@ -283,7 +283,7 @@ def test_a_flood_is_recorded_and_what_is_not_decoded_is_counted(
     assert account.unread > 500_000 and account.segments[-1].why == "0 s are over"
     assert account_of(tmp_path / "a.pvlog").unread == 0  # nothing is missing in the log
     assert print_account(account, 0.5) == 1
-    assert f"{account.unread} bytes came faster than they could be decoded" in capsys.readouterr().err
+    assert f"{account.unread} bytes arrived too fast to be decoded" in capsys.readouterr().err
 
 
 def test_a_tail_reads_what_was_there_and_skips_what_comes_too_fast(tmp_path: Path) -> None:
@@ -441,7 +441,7 @@ def test_run_of_a_log_contains_samples_only(tmp_path: Path) -> None:
     with pytest.raises(PvidError, match="holds 0 samples in a row"):
         run_of_log(log_of(tmp_path / "b.pvlog", b"".join(nothing)))
     senseless = LyingBoard().honest(board.hello(sample_rate=0.0))
-    with pytest.raises(PvidError, match="sample rate is 0 Hz"):
+    with pytest.raises(PvidError, match="sample rate of 0 Hz"):
         run_of_log(log_of(tmp_path / "c.pvlog", senseless))
 
 

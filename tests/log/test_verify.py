@@ -449,4 +449,4 @@ def test_verify_exit_codes(tmp_path: Path, sent: Sent) -> None:
     assert "1 of 1 stretches DIFFERENT" in different.stdout
     assert pvid(tmp_path, "verify", "none.pvlog").returncode == 3
     noise = pvid(tmp_path, "verify", "noise")
-    assert (noise.returncode, noise.stderr) == (2, "pvid: noise is no log of pvid: not one frame in 5 bytes\n")
+    assert (noise.returncode, noise.stderr) == (2, "pvid: noise is not a log of pvid: not one frame in 5 bytes\n")

@@ -3,7 +3,7 @@
 #include "prove.h"
 
 #include "keep/fingerprint_q31.h"
-#include "pvid/snapshot.h"
+#include "pvid/snapshot_q31.h"
 #include "pvid/strong_q31.h"
 #include "pvid/weak_q31.h"
 

@@ -63,7 +63,7 @@ def test_the_window_is_the_forms_own_unless_given() -> None:
         ("l1 = inf", "^l1 must be from .* not inf"),
         ("l1 = [0.3]", "^l1 must be a number, not \\[0.3\\]"),
         (f"l1 = {10**400}", "^l1 must be from .* not 1000000000"),
-        ("l1 = 0.3\nl3 = 1", "^'l3' is not a key of a rig file; here are known l1"),
+        ("l1 = 0.3\nl3 = 1", "^'l3' is not a key of a rig file; known keys: l1"),
         ("l1 = 0.3\n[sensors]", "^'sensors' is not a key"),
         ("l1 = 0.3\nsensor = 3", "^sensor must be a table, \\[sensor\\], not 3"),
         ("l1 = 0.3\nsample_rate = 0", "^sample_rate must be from 0.001 to 1e\\+06 Hz, not 0"),

@@ -186,3 +186,15 @@ def test_installed_files(prefix: Path) -> None:
     for path in texts:  # nothing may point back to where it was built
         assert str(ROOT) not in path.read_text(encoding="utf-8"), path
         assert "first" not in path.read_text(encoding="utf-8").split("/"), path
+
+
+def test_model_is_chosen_by_its_folder(tmp_path: Path) -> None:
+    """The core compiles with a mechanism of another name, and a name without a folder is refused."""
+    firmware = tmp_path / "firmware"
+    shutil.copytree(ROOT / "firmware", firmware)
+    (firmware / "models" / "kapitza").rename(firmware / "models" / "other")
+    command = ["cmake", "-S", str(firmware), "-B", str(tmp_path / "build"), "-G", "Ninja"]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert refused.returncode != 0 and "PVID_MODEL is kapitza" in refused.stderr
+    call(*command, "-DPVID_MODEL=other", "-DCMAKE_BUILD_TYPE=None")
+    call("ninja", "-C", str(tmp_path / "build"), "pvid")

@@ -8,10 +8,10 @@
 #define SIGMAS_MIN ((uint32_t)2 << 16)
 #define SIGMAS_MAX ((uint32_t)1000 << 16)
 #define PATIENCE_MAX ((uint32_t)1 << 30)
-#define GROWTH 150902 /* ln 1e4 in Q14: of the scale within the time of patience */
+#define GROWTH 150902 /* ln 1e4 in Q14: consecutive outliers multiply the scale by 1e4 within the patience */
 #define GROWTH_BITS 14
 
-/* 2^100: of squares, far beyond any accepted row. */
+/* Largest scale, 2^100 [square of a residual]: far beyond any accepted row. */
 static const pvid_scaled_q31 scale_max = {(int32_t)1 << 29, 71};
 
 pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *config, uint32_t memory,
@@ -52,7 +52,7 @@ static pvid_scaled_q31 clamped(pvid_scaled_q31 scale, pvid_scaled_q31 floor)
     return ((scale.e > (scale_max.e + 1)) || pvid_scaled_exceeds_q31(scale, scale_max)) ? scale_max : scale;
 }
 
-/* Whether a square is at most limit times scale. The mantissas' product is at least 2^58: in most cases the
+/* Returns whether a square is at most limit times scale. The mantissas' product is at least 2^58: in most cases the
  * exponents decide. */
 static bool is_usual(const pvid_gate_q31 *self, pvid_scaled_q31 square)
 {

@@ -7,11 +7,11 @@
 #include "number/finite_f32.h"
 #include "pvid/config.h"
 
-#define UNKNOWN 1.0e35f   /* of the quietest block, while there is none: beyond any */
-#define ROWS_MAX 65535.0f /* of a block */
-#define GROWTH_MAX 2.0f   /* of the quietest ones, a block */
+#define UNKNOWN 1.0e35f   /* least_energy and least_part before the first block: above any block's */
+#define ROWS_MAX 65535.0f /* most rows of a block */
+#define GROWTH_MAX 2.0f   /* largest growth per block */
 
-/* The quietest block is forgotten four times as slowly as the sums. */
+/* least_energy and least_part are forgotten four times as slowly as the sums. */
 #define SLOWER 4.0f
 
 void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting_s)

@@ -1,4 +1,4 @@
-/* How the strong form judges itself by its residuals: see pvid/misfit.h. Private to the core. */
+/* The misfit alarm of the strong form, by its residuals: see pvid/misfit.h. Private to the core. */
 #ifndef PVID_MISFIT_F32_H
 #define PVID_MISFIT_F32_H
 
@@ -10,11 +10,11 @@
  * estimator has checked both. */
 void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting_s);
 
-/* Ends a block: whether it is a misfit. */
+/* Ends a block. Returns whether it is a misfit. */
 bool pvid_misfit_judge_f32(pvid_misfit_f32 *self);
 
-/* Takes a row in: its residual e and p[0] times its gradient in p[0]. Returns whether it was the last of a block, which
- * is then to be judged. */
+/* Adds a row: its residual e and its sensitivity, p[0] times its gradient in p[0]. Returns true at the end of a block,
+ * which must then be judged. */
 static inline bool pvid_misfit_add_f32(pvid_misfit_f32 *self, float e, float sensitivity)
 {
     self->energy += e * e;

@@ -1,4 +1,4 @@
-/* How the fixed-point strong form judges itself by its residuals: see pvid/misfit_q31.h. Private to the core. */
+/* The misfit alarm of the fixed-point strong form, by its residuals: see pvid/misfit_q31.h. Private to the core. */
 #ifndef PVID_PRIVATE_MISFIT_Q31_H
 #define PVID_PRIVATE_MISFIT_Q31_H
 
@@ -18,7 +18,7 @@ void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t 
  * Returns true at the end of a block, which must then be judged. */
 bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity);
 
-/* Ends a block: whether it is a misfit. */
+/* Ends a block. Returns whether it is a misfit. */
 bool pvid_misfit_judge_q31(pvid_misfit_q31 *self);
 
 #endif

@@ -1,4 +1,4 @@
-/* What every snapshot has in common: the copy without its pointers, and the seal. Private to the core. */
+/* Common part of all snapshots: the copy without its pointers, and the seal. Private to the core. */
 #ifndef PVID_SNAPSHOT_SEAL_H
 #define PVID_SNAPSHOT_SEAL_H
 
@@ -15,7 +15,7 @@ typedef enum {
     PVID_SNAPSHOT_KIND_STRONG_Q31 = 4
 } pvid_snapshot_kind;
 
-/* What a snapshot must be of to be restored. */
+/* Identity of a snapshot: only a snapshot with the same identity is restored. */
 typedef struct {
     pvid_snapshot_kind kind;
     uint32_t layout; /* hash of sizes and places */
@@ -39,7 +39,7 @@ size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_iden
 pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity,
                                            uint8_t object[], const pvid_snapshot_shape *shape, void *behind);
 
-/* Whether the pointer at `place` of the object was one when the snapshot was taken, or NULL. */
+/* Returns whether the pointer at `place` of the object was not NULL when the snapshot was taken. */
 bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place);
 
 /* Hash of words that describe the object's layout, and of the machine's byte order. */

@@ -1,4 +1,4 @@
-/* Is a float a number? By its bits: <math.h>'s isfinite may be folded away by fast-math builds. */
+/* Whether a float is finite, by its bits: fast-math builds may remove isfinite of <math.h>. */
 #ifndef PVID_FINITE_F32_H
 #define PVID_FINITE_F32_H
 

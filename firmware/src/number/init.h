@@ -10,7 +10,7 @@
 #include "pvid/config.h"
 #include "pvid/status.h"
 
-/* Whether the object and its configuration are given. */
+/* Returns whether the object and its configuration are given. */
 static inline bool pvid_init_is_given(const void *self, const void *config)
 {
     const bool given = (self != NULL) && (config != NULL);

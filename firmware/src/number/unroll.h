@@ -1,4 +1,4 @@
-/* Loop unrolling, which gcc needs a request for at -O2. Changes no result. */
+/* Loop unrolling, which gcc does at -O2 only on request. Changes no result. */
 #ifndef PVID_UNROLL_H
 #define PVID_UNROLL_H
 

@@ -1,4 +1,4 @@
-/* What is known of p: standard errors, kappa, residual. */
+/* Accuracy of p: standard errors, kappa, residual. */
 #include <string.h>
 
 #include "solve/assess_q31.h"
@@ -26,7 +26,7 @@ static pvid_scaled_q31 found_variance(const pvid_estimator_q31 *self, int64_t fr
     return pvid_scaled_over_q31(pvid_scaled_of_q31(residual, 0), pvid_scaled_of_q31(freedom, -16));
 }
 
-/* What the sensors' noise explains of it. */
+/* Expected residual sum from the sensors' noise. */
 static pvid_scaled_q31 explained_variance(const pvid_estimator_q31 *self)
 {
     return pvid_scaled_shifted_q31(self->expected, -2 * (int32_t)self->information.exponent);

@@ -1,15 +1,15 @@
-/* How far p can be trusted, from S and the residuals, in integers. Private to the core. */
+/* Accuracy of p from S and the residuals, in integers. Private to the core. */
 #ifndef PVID_SOLVE_ASSESS_Q31_H
 #define PVID_SOLVE_ASSESS_Q31_H
 
 #include "solve/state_q31.h"
 
-/* s^2 of a row: residual sum of squares over degrees of freedom, no less than the sensors' noise explains, row_sd^2
- * while there are none; divided by 4^exponent as the sums are. */
+/* s^2 of a row: residual sum of squares over degrees of freedom, at least the variance by the sensors' noise; row_sd^2
+ * if there are none. Divided by 4^exponent as the sums are. */
 pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self);
 
-/* Takes note of the variance >= 0 that the sensors' noise gives the rows taken in since the last group's end [units of
- * Y's integer squared]; call it when all of a group are, and before its solve begins. */
+/* Sets the variance >= 0 of the current group's rows by the sensors' noise [units of Y's integer squared]. Call it when
+ * the group is complete, before its solve begins. */
 void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
 
 /* row_sd^2 as that. */

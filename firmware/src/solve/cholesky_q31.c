@@ -26,7 +26,7 @@ void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n)
     self->first_pivot = 0;
 }
 
-/* A pivot over its diagonal entry, which squares were taken from. */
+/* A pivot over its diagonal entry. */
 static int32_t part_of(int64_t pivot, int32_t diagonal)
 {
     return (int32_t)pvid_clamp_q31(pivot / diagonal, PVID_ONE_Q30);

@@ -76,7 +76,7 @@ static int64_t largest_of(const pvid_information_q31 *self)
     return largest;
 }
 
-/* Lets the sums first..last-1 fade if it is time to. */
+/* Multiplies the sums first..last-1 by the retention if a block is complete. */
 static void forget(pvid_information_q31 *self, size_t first, size_t last)
 {
     if ((self->age < self->block) || (self->retention == KEEP)) {

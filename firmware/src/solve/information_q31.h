@@ -6,7 +6,7 @@
 
 #include "pvid/estimator_q31.h"
 
-/* A sum of squares beyond this makes all sums of squares a quarter. */
+/* If a sum of squares exceeds this, all sums of squares are divided by 4. */
 #define PVID_SUM_LIMIT ((int64_t)1 << 60)
 
 /* Empty sums; forgetting_groups as in pvid_estimator_config_q31. */
@@ -21,7 +21,7 @@ void pvid_information_add_q31(pvid_information_q31 *self, const int32_t n[], int
 #define PVID_INFORMATION_END_PARTS 2u
 void pvid_information_end_group_q31(pvid_information_q31 *self, size_t part, int64_t fresh[]);
 
-/* Multiplies all that was gathered by factor, Q31, rounding each sum; for part = 0, 1 of the work. */
+/* Multiplies all sums by factor, Q31, with rounding; for part = 0, 1 of the work. */
 void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t factor);
 
 /* Place of M_ij, i <= j, among the sums. */

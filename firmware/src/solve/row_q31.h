@@ -1,19 +1,19 @@
-/* A row of the fixed-point estimator, and theta, which rows are multiplied with. Private to the core. */
+/* A row of the fixed-point estimator, its innovation, and theta. Private to the core. */
 #ifndef PVID_SOLVE_ROW_Q31_H
 #define PVID_SOLVE_ROW_Q31_H
 
 #include "solve/state_q31.h"
 
-/* *e = Y - N^T theta of a row; whether N, Y and e fit, that is whether the row may be taken in. |e| < 2^45. */
+/* *e = Y - N^T theta of a row. Returns whether N, Y and e fit, so that the row can be added. |e| < 2^45. */
 bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e);
 
 /* The same, and term[n_theta]: each N_i theta_i, |term| <= 2^40. */
 bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e);
 
-/* Takes a row in that fits, with its innovation e and e^2. */
+/* Adds a row that fits, with its innovation e and e^2. */
 void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
 
-/* Sets theta = f(p), and what rows are multiplied with. */
+/* Sets theta = f(p) and its mantissas and shifts for the innovation of rows. */
 void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
 
 #endif

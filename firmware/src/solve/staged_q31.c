@@ -12,10 +12,10 @@ enum {
     STAGE_JACOBIAN, /* C at p, scaled */
     STAGE_FORCE,
     STAGE_PROJECT,     /* n_p times: a row of S */
-    STAGE_ABOVE_NOISE, /* is there more in S than noise puts there? In parts: less that, then a few pivots at a time */
+    STAGE_ABOVE_NOISE, /* whether S contains more information than noise: subtracts this, then a few pivots per part */
     STAGE_FACTOR,      /* S + H0 and its factor, in the same parts */
     STAGE_SOLVE,       /* dp */
-    STAGE_STEP,        /* where p and theta go with it */
+    STAGE_STEP,        /* p and theta after the step */
     STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
     STAGE_COMMIT,
     STAGE_FOLD, /* in parts */
@@ -47,7 +47,7 @@ static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
     return pvid_system_scale_rows_q31(&self->information, solve->h, row, solve->m);
 }
 
-/* What drives the step, g b + (1 - g) sum N e since the last solve, scaled as the rows of C. */
+/* Right-hand side of the step by rows of C, g b + (1 - g) sum N e since the last solve, scaled as these rows. */
 static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const size_t n = self->model->n_theta;
@@ -237,7 +237,7 @@ static int64_t size_of(const pvid_estimator_q31 *self, const int64_t dp[])
     return size;
 }
 
-/* p[n_p] = where the step leads: shortened to the step limit, within the bounds. */
+/* p[n_p] = the estimator's p after the step, shortened to the step limit, within the bounds. */
 static void take_step(pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int64_t size, int32_t p[])
 {
     const int64_t limit = (int64_t)self->step_limit << (PVID_SIZE_BITS - 16);
@@ -318,7 +318,7 @@ static size_t move_b_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
     return last;
 }
 
-/* dtheta^T (b_old + b_new), by which rr falls. */
+/* Decrease of rr by the step: dtheta^T (b_old + b_new). */
 static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
 {
     const size_t n = self->model->n_theta;
@@ -370,7 +370,7 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     }
 }
 
-/* Counts a group; whether a solve is due. */
+/* Counts a group. Returns whether a solve is due. */
 static bool is_due(pvid_estimator_q31 *self)
 {
     self->phase++;
@@ -408,7 +408,7 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
         solve->gain = self->gain;
         solve->stage = (uint8_t)(is_due(self) ? STAGE_MATRIX : STAGE_FOLD);
     } else if (self->gain < PVID_ONE_Q30) {
-        solve->stage = STAGE_DONE; /* the law of g < 1 is a rate, not an iteration */
+        solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
     }
 }
 
@@ -421,7 +421,7 @@ void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_es
     memcpy(estimate->p, self->p, sizeof estimate->p);
 }
 
-/* What follows once a stage is over. */
+/* The stage after a stage. */
 static uint8_t next_stage(const pvid_estimator_solve_q31 *solve)
 {
     switch (solve->stage) {
@@ -575,7 +575,7 @@ bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_esti
     return finish_stage(solve, index + 1u, all);
 }
 
-/* M, C, S, and whether there is more in it than noise. */
+/* Number of stages of M, C, S and the noise check. */
 static size_t shared_stages(const pvid_model_q31 *model)
 {
     return pvid_system_row_stages_q31(model->n_theta) + 1u + model->n_p + factor_parts(model->n_p);

@@ -7,7 +7,7 @@
 /* (sd 2^exponent / start_sd)^2 = prior 2^-(returned), prior of 31 bits; 0 < sd < 2^31. */
 int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior);
 
-/* s less what noise of solve->variance puts into C^T M C, so many times over as the margin says. */
+/* s minus noise_margin times the information of noise of solve->variance. */
 void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
                                    int64_t rest[][PVID_MAX_P]);
 
@@ -27,7 +27,7 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
 /* H0 = prior 2^-prior_exponent in the unit of s. */
 int64_t pvid_system_prior_q31(int32_t prior, int32_t prior_exponent, int32_t f);
 
-/* q: s with the diagonal that Cholesky wants, q_ab = s_ab 2^-(g_a + g_b). */
+/* q: s equilibrated for the Cholesky factorisation, q_ab = s_ab 2^-(g_a + g_b). */
 void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int16_t g[], int32_t q[][PVID_MAX_P]);
 
 /* Calls of pvid_system_scale_rows_q31 that scale all of M. */

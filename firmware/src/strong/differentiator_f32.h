@@ -10,7 +10,7 @@
 
 #include "pvid/differentiator.h"
 
-/* Takes a sample in; whether the window is full. */
+/* Stores a sample. Returns whether the window is full. */
 static inline bool pvid_fir_push_f32(pvid_differentiator_f32 *self, float sample)
 {
     const size_t head = self->head;
@@ -30,7 +30,7 @@ typedef struct {
     size_t older;
 } pvid_fir_walk;
 
-/* Both at the centre: half * stride after head, the oldest sample. */
+/* Both places at the centre: half * stride after head, the oldest sample. */
 static inline pvid_fir_walk pvid_fir_centre_f32(const pvid_differentiator_f32 *self)
 {
     const size_t length = self->length;

@@ -21,7 +21,7 @@ static bool is_even(size_t order)
     return (order % 2u) == 0u;
 }
 
-/* What a weight of an order is multiplied with at most: q = (x - c) + (x' - c), d = x - x'. */
+/* Largest factor of a weight of each order: q = (x - c) + (x' - c), d = x - x'. */
 static uint64_t derivative_range(size_t order, int32_t full_scale)
 {
     return (uint64_t)full_scale * (is_even(order) ? 4u : 2u);

@@ -14,7 +14,7 @@
 #include "kapitza_strong_f32.h"
 #include "judge/misfit_f32.h"
 
-/* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
+/* The gate's scale averages over about a period of the faster mode, because row_sd is only a guess. */
 #define GATE_MEMORY_S 0.25f
 #define GATE_FLOOR 1.0e-6f
 
@@ -84,8 +84,8 @@ void pvid_strong_gap_f32(pvid_strong_f32 *self)
     }
 }
 
-/* Takes a sample of each channel in and, once the windows are full, writes their derivatives. The windows have the
- * same bank and always the same fill: one walk does for both. */
+/* Stores a sample of each channel and, if the windows are full, writes their derivatives. Both windows have the same
+ * bank and the same fill: one loop serves both. */
 static inline bool differentiate(pvid_strong_f32 *self, float phi, float y, float d_phi[PVID_ORDERS],
                                  float d_y[PVID_ORDERS])
 {

@@ -17,7 +17,7 @@
 #define DRIVE_TICKS_MAX ((uint32_t)1 << 30)
 #define DRIVE_MAX ((int64_t)PVID_DERIVATIVE_LIMIT_Q31 * PVID_DERIVATIVE_LIMIT_Q31) /* a mean of such squares */
 
-/* The gate's scale remembers about a swing of the faster mode; row_sd is but a guess of the innovations. */
+/* The gate's scale averages over about a period of the faster mode, because row_sd is only a guess. */
 #define GATE_MEMORY_PARTS 4u
 #define GATE_FLOOR_BITS 20 /* 1e-6 of its square */
 
@@ -138,7 +138,7 @@ static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int3
     return true;
 }
 
-/* Whether a row with an innovation of this square fits the estimate as well as rows usually do. */
+/* Returns whether the gate accepts a row with an innovation of this square. */
 static bool passes(pvid_strong_q31 *self, int64_t square)
 {
     return (self->gate.limit.m == 0) || pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(square, 0));

@@ -357,5 +357,5 @@ def case_of(what: HasCase) -> Case:
     """
     case = CASES.get((what.form, what.core))
     if case is None:
-        raise PvidError(f"targets hold the cores f32 and q31, and core {what.core} was asked for")
+        raise PvidError(f"targets hold the cores f32 and q31, not {what.core}")
     return case

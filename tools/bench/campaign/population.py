@@ -265,7 +265,7 @@ def parse(text: str) -> Population:
     document = toml_document(text)
     for key in document:
         if key not in ("base", "conditions"):
-            raise PvidError(f"{key!a} is not a key of a population; here are known [base] and [conditions.NAME]")
+            raise PvidError(f"{key!a} is not a key of a population; known keys: [base] and [conditions.NAME]")
     tables = document.get("conditions", {})
     if not isinstance(tables, dict) or not tables:
         raise PvidError("[conditions.NAME] is missing: a population needs at least one condition, with its share")
@@ -307,7 +307,7 @@ def _ranges(table: Any, place: str) -> dict[str, Any]:
         raise PvidError(f"{place} must be a table")
     for key, value in table.items():
         if key not in _KEYS:
-            raise PvidError(f"{place} {key!a} is not a key of a population; here are known {', '.join(_KEYS)}")
+            raise PvidError(f"{place} {key!a} is not a key of a population; known keys: {', '.join(_KEYS)}")
         if key in _RANGES:
             _check_range(key, value, place)
         elif key in _NUMBERS and not (_is_number(value) and value >= 0):

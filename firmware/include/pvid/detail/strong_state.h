@@ -9,7 +9,7 @@ struct pvid_strong_f32 {
     pvid_differentiator_f32 y;
     float inverse_l1;       /* [1/m] */
     float drive;            /* mean square of u over about a second [1/s^4] */
-    float drive_forgetting; /* part of it that a tick replaces */
+    float drive_forgetting; /* share of a tick in this mean */
     float drive_min;        /* mean square of u below which no row is used */
     bool frozen;
     bool alarm; /* the last block of rows was a misfit: see misfit.h */

@@ -14,7 +14,7 @@ struct pvid_strong_q31 {
     int32_t y_offset;
     int64_t drive;            /* mean square of u over about drive_ticks */
     int64_t drive_min;        /* mean square of u below which no row is used */
-    int32_t drive_forgetting; /* part of it that a tick replaces, Q31 */
+    int32_t drive_forgetting; /* share of a tick in this mean, Q31 */
     bool frozen;
     bool alarm; /* the last block of rows was a misfit: see misfit.h */
     pvid_gate_q31 gate;

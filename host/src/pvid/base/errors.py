@@ -2,7 +2,7 @@
 
 
 class PvidError(Exception):
-    """Bad input or usage, told in one clear sentence.
+    """Bad input or usage, explained in one sentence.
 
-    The command line prints the sentence on stderr and exits with code 2; a traceback would tell no more.
+    The command line prints the sentence on stderr and exits with code 2; a traceback would not help.
     """

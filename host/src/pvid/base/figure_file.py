@@ -1,4 +1,4 @@
-"""Figures as files: which format a name asks for, and one sentence where it cannot be written."""
+"""Figure files: the format by the file's suffix, and one sentence if the file cannot be written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FORMATS = ("png", "svg", "pdf")
 
 
 def format_of(path: Path) -> str:
-    """The format that the suffix of a figure's name asks for; png where it has none.
+    """The format by the suffix of a figure's name; png without suffix.
 
     Raises
     ------

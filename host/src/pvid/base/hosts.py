@@ -22,7 +22,7 @@ def addresses(host: str, port: int, kind: socket.SocketKind, otherwise: str) -> 
     Raises
     ------
     PvidError
-        When nobody knows the name, or it is none.
+        When the name is invalid or cannot be resolved.
     """
     try:
         return [(family, address) for family, _, _, _, address in socket.getaddrinfo(host, port, type=kind)]

@@ -1,8 +1,8 @@
-"""Standard output and standard error of a command, where they may be full, closed, or read by nobody.
+"""Standard output and standard error of a command, which may be full, closed or without a reader.
 
 Output that cannot be written is a `PvidError`, so one sentence and exit code 2; a file that the shell opened for it
-(`> FILE`) is emptied again, for half a table is worse than none. When the reader of a pipe has gone, as `head` does,
-the command ends without a word. Messages that cannot be written are dropped: they have no other place to go.
+(`> FILE`) is emptied again, because half a table is worse than none. When the reader of a pipe has ended, as `head`
+does, the command ends silently. Messages that cannot be written are dropped.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from pathlib import Path
 
 def built_under(own: Path) -> Path:
     """`own` where this user may write what is built there, else a folder of the cache: XDG_CACHE_HOME, ~/.cache, or a
-    temporary one that nobody else can have put something into."""
+    private temporary one."""
     given = os.environ.get("XDG_CACHE_HOME", "")
     caches = [*([Path(given)] if given.startswith("/") else []), _home() / ".cache"]
     if _may_write(own / "targets"):

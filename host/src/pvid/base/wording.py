@@ -9,7 +9,7 @@ def shown(text: str, longest: int = 40) -> str:
 
 
 def reason(error: BaseException) -> str:
-    """What an error tells, on one line and without its full stop."""
+    """Message of an error, on one line and without its full stop."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return " ".join(str(text).split()).rstrip(".")
 

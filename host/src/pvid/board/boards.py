@@ -145,7 +145,7 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
 
 
 def one_at_a_time(made: Path) -> FileLock:
-    """A lock for who makes `made`, a file or a tree: tests run in several processes, and users in several terminals."""
+    """A lock for making `made`, a file or a tree: tests run in several processes, and users in several terminals."""
     made.parent.mkdir(parents=True, exist_ok=True)
     return FileLock(made.with_name(f".{made.name}.lock"))
 

@@ -2,7 +2,7 @@
 
     target = open_target("mps2-an386", rig)
     record = collect(target, 5000, begin=rig)          # starts the board over; without begin: joins in
-    phi, y = record.samples(0, 5000)                   # exactly what the identifier got
+    phi, y = record.samples(0, 5000)                   # exactly the identifier's input
 
 link.py describes the frames. The image's settings, the configuration and every sample from the session's first tick on
 are enough to compute every bit again.
@@ -127,7 +127,7 @@ def collect(
     estimate_every: int = 500,
     patience_s: float = 20.0,
 ) -> FieldRecord:
-    """Collects what a board in field mode says, for `ticks` samples from the first that arrives.
+    """Collects the frames of a board in field mode, for `ticks` samples from the first that arrives.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def collect(
     Raises
     ------
     PvidError
-        When the board refuses, says nothing for `patience_s`, or the port is gone.
+        When the board refuses, sends nothing for `patience_s`, or the port is gone.
     """
     record = FieldRecord()
     decoder = Decoder(record.received)

@@ -1,4 +1,4 @@
-"""The run that firmware/apps/replay plays: its header, what the host expects of it, and what the image reports."""
+"""The run of firmware/apps/replay: its header, the expected result on the host, and the report of the image."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def twin_hashes(run: ReplayRun) -> npt.NDArray[np.uint32]:
     return fnv.running_hashes(case_of(run.config).twin(run.config).run(*run.samples).lane())
 
 
-# ---- what the image says
+# ---- report of the image
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The deepest stack an image can need: frames and calls read off its machine code.
 
 Frames of compiled functions come from the compiler (-fstack-usage), those of the compiler's own arithmetic from their
-instructions. A call through a pointer may reach any function whose address stands in a constant of the core.
+instructions. A call through a pointer may reach any function whose address is in a constant of the core.
 """
 
 from __future__ import annotations

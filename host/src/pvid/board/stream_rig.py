@@ -128,7 +128,7 @@ def stream_rig(
         When the settings do not fit the core.
     """
     case = case_of(rig.identifier)
-    standard = standard_sensors()  # a simulated sensor counts in something where the rig file does not say
+    standard = standard_sensors()  # resolution of a simulated sensor, if the rig file has none
     return StreamRig(
         config=case.settings(rig, sample_rate, start) if run is None else case.settings_for_run(rig, run, start),
         sample_rate=sample_rate,

@@ -2,7 +2,7 @@
 
 `open_target` starts an emulator (a name of `boards.BOARDS`), the host's own build ("stream-host") or opens a port
 (/dev/tty..., a pseudo-terminal, socket://host:port); `play` does the rest. Time is bounded: without progress for
-`patience_s` the play ends and the account says how far it came.
+`patience_s` the play ends, and the account contains the progress.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def open_target(name: str, rig: StreamRig, wrap: Callable[[Port], Port] = lambda
 def _start_emulator(board: Board, image: str, wrap: Callable[[Port], Port]) -> Target:
     """QEMU with the board's UART at a socket, the processor held back until we have connected.
 
-    Not at a pseudo-terminal: QEMU drops what a board says to one before it has noticed, by a look a second, that
+    Not at a pseudo-terminal: QEMU drops a board's output to one before it has noticed, by polling once a second, that
     somebody has opened it.
     """
     with socket.create_server(("127.0.0.1", 0)) as listener:
@@ -124,7 +124,7 @@ def _start_emulator(board: Board, image: str, wrap: Callable[[Port], Port]) -> T
 
 
 def _start_host(image: str, wrap: Callable[[Port], Port], patience_s: float = 20.0) -> Target:
-    """The host's build, which says the name of its pseudo-terminal."""
+    """The host's build, which prints the name of its pseudo-terminal."""
     process = child.start([image], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0)
     assert process.stdout is not None
     output = b""
@@ -422,7 +422,7 @@ def play(
     patience_s
         Longest time without any progress [s].
     resend_s
-        Time without an answer after which is asked and sent again [s].
+        Time without an answer after which requests and samples are sent again [s].
     reopen
         Starts the target anew when it has gone; the run then starts over. None: the play ends.
     reconnects
@@ -450,7 +450,7 @@ class Verdict:
 
     @property
     def equal(self) -> bool:
-        """Complete, the running hash after the last tick equal, and no checkpoint that says otherwise."""
+        """Complete, the running hash after the last tick equal, and no unequal checkpoint."""
         return self.playback.complete and self.playback.hash == self.expected and self.first is None
 
     @property
@@ -478,12 +478,12 @@ def judge(playback: Playback, expected: npt.NDArray[np.uint32]) -> Verdict:
 
 
 def targets_of(names: tuple[str, ...]) -> list[str]:
-    """The targets that `--on` asks for; "all": this machine and every emulator that is installed with its compiler.
+    """The targets of `--on`; "all": this machine and every emulator that is installed with its compiler.
 
     Raises
     ------
     PvidError
-        When all are asked for and no emulator is there.
+        For "all", when no emulator is installed.
     """
     if "all" not in names:
         return list(names)

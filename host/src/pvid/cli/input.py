@@ -1,4 +1,4 @@
-"""What commands share that read a run: options for the rig and the columns, and what was done to the run."""
+"""Shared by the commands that read a run: options for the rig and the columns, and the corrections of the run."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Filters and tables of both forms, and what they cost."""
+"""Filters and tables of both forms, and their cost."""

@@ -1,4 +1,4 @@
-"""Rounding to integers whose errors what moves slowly does not see."""
+"""Rounding to integers with errors outside the slow motion (noise shaping)."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ class WeakDesign:
         return scale * math.sqrt(whole), scale * math.sqrt(band)
 
     def _folded_gain(self, band_hz: float) -> float:
-        """Variance of y'' [1/s^4] that noise of 1 on y has after decimation, as its density below band_hz says."""
+        """Variance of y'' [1/s^4] of unit noise of y after decimation, from its density below band_hz."""
         rate = self.sample_rate / self.decimation
         f, response = self._second_response(4096)
         folded = np.abs(f - rate * np.round(f / rate))

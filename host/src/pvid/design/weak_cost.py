@@ -1,8 +1,8 @@
-"""What a weak-form design costs on a device: RAM, delay, and instructions a sample by a fitted formula.
+"""Cost of a weak-form design on a device: RAM, delay, and instructions per sample by a fitted formula.
 
 The instructions are those of x86-64 at -O2, counted by callgrind: a measure to compare designs by, of the size that
-cores with an FPU need too. Their number depends on the design's sizes alone (pvid/weak.h: what a tick does never hangs
-on the data), through the counts of `Schedule`; the coefficients stand in weak_cost.toml, which
+cores with an FPU need too. Their number depends on the design's sizes alone (pvid/weak.h: the work of a tick does not
+depend on the data), through the counts of `Schedule`; the coefficients are in weak_cost.toml, which
 `pvid bench design-cost --update` measures anew and tests/design/test_weak_cost.py holds against the core.
 """
 
@@ -132,7 +132,7 @@ class WeakCost:
     ram_bytes : state of the identifier with the default bounds of pvid/config.h, for a 32-bit device; with that of the
         correction of large angles where it is wanted
     raised : the macros of those bounds that are too small for the design, with what it needs; part of ram_bytes
-    ram_bytes_fitted : with bounds that just hold the design; None, both, where this machine's compiler cannot tell
+    ram_bytes_fitted : with bounds that just hold the design; None, both, if this machine's compiler cannot determine it
     definitions : the macros of these bounds
     instructions : mean per sample (x86-64, gcc -O2, by the formula), without the correction
     longest_tick : instructions of the longest tick (same)
@@ -197,7 +197,7 @@ def fitted_definitions(design: WeakDesign) -> tuple[str, ...]:
 @cache
 def state_bytes_32(definitions: tuple[str, ...] = (), corrected: bool = False) -> int | None:
     """sizeof(pvid_weak_f32) where pointers have 32 bits, with pvid_weak_angle_f32 where rows are corrected: gcc is
-    asked, nothing is linked or run.
+    used, nothing is linked or run.
 
     None without gcc, or on a machine whose gcc has no 32-bit mode.
     """

@@ -47,7 +47,7 @@ class Bounds:
     functions: int = 16
 
 
-# What host/native builds the core with, and a board's image where its rig asks for more than the defaults.
+# Bounds of the host's build, and of a board's image whose rig needs more than the defaults.
 HOST = Bounds(taps=401, decimation=64)
 
 

@@ -13,7 +13,7 @@ every header and firmware/link/schema.h are generated from them (`pvid schema`).
     decoder = Decoder()
     for item in decoder.feed(port.read(...)):
         match item:
-            case Loss(): ...                      # what did not come through, and why
+            case Loss(): ...                      # lost data, and why
             case Frame(message=Estimate() as e): ...
 """
 
@@ -199,7 +199,7 @@ class Source(IntEnum):
 
 
 class Code(IntEnum):
-    """What a board says of itself (Status.code)."""
+    """State of a board (Status.code)."""
 
     WAITING = 0  # not configured
     RUNNING = 1
@@ -212,7 +212,7 @@ class Code(IntEnum):
 
 @dataclass(frozen=True)
 class Hello(Message):
-    """Board to PC: who it is. Sent when it starts, when the PC sends a Credit, and, while the board samples by
+    """Board to PC: its description. Sent when it starts, when the PC sends a Credit, and, while the board samples by
     itself, every few seconds of its time, with Schema, the configuration in force and Status behind it.
 
     What the integers of the fixed-point core are worth stands here, so that a log can be read without its rig file:
@@ -412,7 +412,7 @@ class Estimate(Message):
     FULL_KAPPA: ClassVar[float] = 1.0
 
     def in_si(self, units: Float, zero: float) -> tuple[Float, Float]:
-        """p [MAX_P] and its covariance [MAX_P, MAX_P], whatever the board says of its units."""
+        """p [MAX_P] and its covariance [MAX_P, MAX_P], in the board's units."""
         return np.array(self.p), _symmetric(self.covariance)
 
 
@@ -478,7 +478,7 @@ class Hash(Message):
 
 @dataclass(frozen=True)
 class Credit(Message):
-    """Board to PC: all samples before the header's tick are worked off, `room` more may be sent; PC to board: say
+    """Board to PC: all samples before the header's tick are processed, `room` more may be sent; PC to board: say
     so again, with hello and status."""
 
     TYPE = 9
@@ -657,7 +657,7 @@ def encode_raw(number: int, sequence: int, tick: int, payload: bytes, schema: in
 class Decoder:
     """Bytes in, frames and losses out; never raises and never holds more than one frame.
 
-    `schemas` says what frames of which schema mean, the others are foreign; sequences are followed for each on its
+    `schemas` contains the known schemas, frames of others are foreign; sequences are followed for each on its
     own. With `learns` a foreign Schema frame whose text has the CRC-32 of its own header adds to them, for as long as
     no MAX_LEARNT others have come after it.
     """
@@ -676,7 +676,7 @@ class Decoder:
         return list(self.items(data))
 
     def items(self, data: bytes) -> Iterator[Frame | Loss]:
-        """Like `feed`, each judged only when it is asked for; to be exhausted before the next call."""
+        """Like `feed`, each decoded only when it is requested; to be exhausted before the next call."""
         for piece in self._pieces(data):
             yield from self._judge(*piece)
 

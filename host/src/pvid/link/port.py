@@ -41,7 +41,7 @@ def open_port(name: str) -> Port:
     Raises
     ------
     PvidError
-        When it cannot be opened; the sentence says why.
+        When it cannot be opened; the sentence contains the cause.
     """
     try:
         port: Any = _Socket() if name.startswith("socket://") else serial.serial_for_url(name, do_not_open=True)

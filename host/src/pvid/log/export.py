@@ -183,7 +183,7 @@ class NpzWriter:
 
 
 class McapWriter:
-    """One file: a channel of JSON messages for each table, with a JSON schema that tells the units."""
+    """One file: a channel of JSON messages for each table, with a JSON schema that contains the units."""
 
     def __init__(self, base: Path, files: Mapping[str, Path], tables: Tables) -> None:
         from mcap.writer import Writer as Mcap

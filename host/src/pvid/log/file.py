@@ -1,22 +1,22 @@
-"""The log that `pvid log` writes: what came from the board, byte for byte, and the logger's own frames between.
+"""The log of `pvid log`: all bytes from the board, and the logger's own frames between them.
 
 A log opens with the codec of the link (link.frames) and describes itself. It is a row of frames, each ended by 0x00:
 
-    schema of the logger's frames (type 2, under their own schema number), then for every time that the link came up
+    schema of the logger's frames (type 2, under their own schema number), then for every connection of the link
         Segment     when, from which port, by which pvid
-        Rig ...     the rig file, in pieces, when the logger was given one: what `verify` and `identify` need
-        LinkSchema  the schema of the link as this pvid knows it (a board that has another sends its own)
-        what the board sent, unchanged; between two of its frames, about once a second, a Mark: the time
+        Rig ...     the rig file, in pieces, if the logger has one; `verify` and `identify` need it
+        LinkSchema  the schema of the link in this pvid (a board with another one sends its own)
+        the bytes from the board, unchanged; between two of its frames, about once a second, a Mark: the time
         Close       when and why the segment ended; missing when the logger was killed
     then the next segment, in the same file.
 
-A frame of the logger stands only behind a 0x00, one being added where the board's last frame is cut off, and has a
-schema number of its own: taking these frames out leaves what the board sent. The file is only ever appended to. A
+A frame of the logger always follows a 0x00, which is added if the board's last frame is incomplete, and has its own
+schema number: without these frames the file contains the bytes from the board. The file is only ever appended to. A
 logger that is killed leaves a file whose frames are whole but for the last.
 
 The logger's frames are numbered through the file. Their tick is the file's key, a number drawn when the file is made,
-which no board is ever sent: a frame of the logger's schema with another tick came over the line, and is not the
-logger's. The first frame, in front of all that a board sent, shows the key.
+which is never sent to a board: a frame of the logger's schema with another tick came over the line, not from the
+logger. The first frame, before all bytes from the board, contains the key.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Segment(Message, messages=LOG_MESSAGES):
 
     @property
     def port(self) -> str:
-        """The port's name; empty when it is not told."""
+        """The port's name; empty if unknown."""
         return printable(str(self.description.get("port", "")))
 
 

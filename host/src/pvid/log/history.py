@@ -1,10 +1,10 @@
-"""What a view of a recording remembers, in bounded memory however long it lasts.
+"""History of a recording for a view, in bounded memory for any length.
 
 Of the estimates the whole history, thinned evenly; of the samples the last seconds. Times are seconds since the
 first record, by the PC's clock when a segment began and the board's from there on.
 
-A record is only put aside when it comes. What it means in numbers is computed when somebody looks, and only of what is
-then to be seen: a board that sends ten thousand frames a second costs the view no more than one that sends ten.
+Arriving records are only stored. Their values are computed when the view is drawn, and only for the visible part: ten
+thousand frames per second cost the view no more than ten.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pvid.models.model import Mechanism, Model
 Float = npt.NDArray[np.float64]
 
 _MOST_SAMPLES = 200_000
-_MOST_ASIDE = 5_000  # records that are put aside while nobody looks
+_MOST_ASIDE = 5_000  # records stored while the view is not drawn
 _MOST_PARTS = 1_000  # in which the samples are kept
 
 T = TypeVar("T")
@@ -41,7 +41,7 @@ class Rates:
         self._counts: deque[tuple[float, int, int]] = deque()  # when, samples, bytes
 
     def now(self, account: Account, when: float) -> tuple[float, float]:
-        """At the time `when` (of time.monotonic), which may be asked often."""
+        """At the time `when` (of time.monotonic); cheap to call often."""
         counts = self._counts
         counts.append((when, account.samples, account.bytes))
         while len(counts) > 2 and when - counts[1][0] > self._over_s:

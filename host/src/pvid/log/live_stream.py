@@ -1,4 +1,4 @@
-"""Sends numbers by UDP as they arrive: JSON for PlotJuggler and other receivers, or Teleplot's own lines.
+"""Sends texts by UDP as they arrive: JSON for PlotJuggler and other receivers, or Teleplot's own lines.
 
 JSON as PlotJuggler's "UDP Server" takes it (plotjuggler_plugins/DataStreamUDP and the JSON parser of its repository,
 github.com/facontidavide/PlotJuggler): an object a datagram of less than 2048 bytes; objects within it become paths
@@ -68,7 +68,7 @@ class LiveStream:
         for rows in self._values.rows(record):
             if rows.table in _TABLES:
                 for datagram in _teleplot(rows, self._values.tables) if self._teleplot else _json(rows):
-                    with contextlib.suppress(OSError):  # nobody there: the log has it all
+                    with contextlib.suppress(OSError):  # no listener: the log is complete anyway
                         self._socket.sendto(datagram, self._to)
 
     def idle(self, account: Account) -> None:
@@ -101,12 +101,12 @@ def _teleplot(rows: Rows, tables: Tables) -> Iterator[bytes]:
             for name, value in _numbers(rows, index).items():
                 points.setdefault(name, []).append(f"{when}:{value!r}")
         yield "\n".join(
-            f"{rows.table}.{name}:{';'.join(told)}{_unit(tables[rows.table][name])}" for name, told in points.items()
+            f"{rows.table}.{name}:{';'.join(texts)}{_unit(tables[rows.table][name])}" for name, texts in points.items()
         ).encode()
 
 
 def _milliseconds(ns: int) -> str:
-    """All of its digits: at more than 1000 samples a second whole milliseconds would not tell them apart."""
+    """All of its digits: at more than 1000 samples a second whole milliseconds would be ambiguous."""
     whole, rest = divmod(ns, 1_000_000)
     return f"{whole}.{rest:06d}".rstrip("0") if rest else str(whole)
 

@@ -1,4 +1,4 @@
-"""Records from a log (pvid.log.file), in constant memory: from a file, or from its bytes as they come.
+"""Records from a log (pvid.log.file), in constant memory: from a file, or from its bytes as they arrive.
 
     reader = LogReader(path)                      stream = LogStream()
     for record in reader:                         for record in stream.feed(data): ...
@@ -47,7 +47,7 @@ from pvid.link.tick_count import TickCount
 from pvid.log.file import LOG_MESSAGES, LOG_SCHEMA, MAX_RIG, Close, LinkSchema, Mark, Rig, Segment
 
 _CHUNK = 1 << 16
-_LATEST_NS = 1 << 62  # a log from elsewhere may tell of any time, and sums of two go into 64 bits
+_LATEST_NS = 1 << 62  # a foreign log may contain any time, and sums of two go into 64 bits
 _KEPT_SEGMENTS = 64
 _MOST_KINDS = 64
 OTHER_KINDS = "other"
@@ -110,11 +110,11 @@ class Account:
     """What a log holds and what it lacks; of bounded size, whatever the log holds.
 
     frames : of the board, that came through;  by_kind : of which kind, OTHER_KINDS those beyond the first 64
-    missing : frames that the sequence numbers say were sent;  damaged : pieces that were no frame;  foreign : frames
-    of a schema that nobody described, or of the logger's schema and not its own;  cut : pieces where the link came up
+    missing : frames missing in the sequence numbers;  damaged : pieces that were no frame;  foreign : frames
+    of a schema without description, or of the logger's schema and not its own;  cut : pieces where the link came up
     or went down amidst a frame;  unread : bytes that came faster than they could be decoded, and were not
     samples : that came;  missing_samples : between them;  unheard : that the board took while the link was down, as
-    far as the segments before and after it tell
+    far as the segments before and after it show
     begun : how many segments;  segments : the last 64 of them;  garbled : segments that brought bytes and not one frame
     lasting : the last message of each kind;  obstacle : why the link, being down, is not taken up again, while a logger
     tries to
@@ -138,7 +138,7 @@ class Account:
     garbled: int = 0
     lasting: dict[type[Message], Message] = field(default_factory=dict)
     obstacle: str = ""
-    damaged_since: int = 0  # the last good frame: no sequence number tells of them
+    damaged_since: int = 0  # the last good frame: without sequence numbers
 
     @property
     def lost_share(self) -> float:
@@ -187,7 +187,7 @@ class LogStream:
         self._ticks = TickCount()
         self._next_tick: int | None = None
         self._session = 0  # the last that was named, 0: none was
-        self._anew = False  # it has been told that the board began anew, and no samples have come since
+        self._anew = False  # the board's restart was reported, and no samples have arrived since
         self._configured = (0, 0)  # the session of the last configuration, and its first tick
         self._left: tuple[int, int] | None = None  # session and next tick when the link went down
         self._joined: int | None = None  # first tick since then
@@ -412,4 +412,4 @@ class LogReader:
         if stream.is_log and not stream.account.begun and not stream.account.frames:
             raise PvidError(f"{self.path} is empty: the recording ended before the link was up")
         if not stream.account.frames and not stream.account.begun:
-            raise PvidError(f"{self.path} is no log of pvid: not one frame in {stream.account.bytes} bytes")
+            raise PvidError(f"{self.path} is not a log of pvid: not one frame in {stream.account.bytes} bytes")

@@ -103,7 +103,7 @@ def _identity(info: Any) -> dict[str, Any] | None:
 
 
 def _lasting(device: dict[str, Any] | None, all_devices: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """What of an identity a device keeps when it is plugged in again; None: nothing by which it could be told."""
+    """The part of an identity that a device keeps when it is plugged in again; None: no such part."""
     if device is None:
         return None
     alike = [one for one in all_devices if {**one, "location": ""} == {**device, "location": ""}]
@@ -139,7 +139,7 @@ class Recorder(threading.Thread):
     """Reads a source into a log until `stop` is set; then it takes in what is still under way and ends.
 
     `error` is what ended it before that, if anything did; `obstacle` why the link cannot be taken up again, while it is
-    tried. Whenever the link has come up the board is asked who it is;
+    tried. On every connection the board is asked for its description;
     an emulator only after its first word (Target.coming_up_s), for what it is sent before is lost.
     """
 
@@ -197,7 +197,7 @@ class Recorder(threading.Thread):
         self.writer.end(why)
 
     def _read(self, port: Port, silent_s: float) -> str:
-        """Until the port is gone or the end is asked for; returns which."""
+        """Until the port is gone or the end is requested; returns which."""
         ask_at: float | None = time.monotonic() + silent_s
         try:
             while not self.stop.is_set():
@@ -318,7 +318,7 @@ class Logger:
     append
         Whether `out` may exist.
     duration_s
-        Ends by itself so long after the link first came up; None: when it is asked to.
+        Duration after the first connection [s]; None: until the end is requested.
     samples
         Ends by itself when so many have come; None: likewise.
     begin, restart
@@ -421,6 +421,6 @@ class Logger:
                 self._fail(one, error)
 
     def _fail(self, what: object, error: Exception) -> None:
-        told = f"{type(what).__name__} failed with {type(error).__name__}: {printable(reason(error))}"
+        failure = f"{type(what).__name__} failed with {type(error).__name__}: {printable(reason(error))}"
         if len(self.failures) < _MOST_FAILURES:
-            self.failures.append(f"{told}; the recording went on")
+            self.failures.append(f"{failure}; the recording went on")

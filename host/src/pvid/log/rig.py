@@ -1,4 +1,4 @@
-"""What a log tells of the rig it was recorded on, and the run in it."""
+"""The rig of a log, and the run in it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def run_of_log(path: Path) -> Run:
     Raises
     ------
     PvidError
-        When the log cannot be read, the board has not told its sample rate, or there are too few samples.
+        When the log cannot be read, the board's sample rate is unknown, or there are too few samples.
     """
     hello = hello_of_log(path)
     if hello is None:

@@ -59,8 +59,8 @@ class StatusLine:
             text += f"; waiting for the link ({account.obstacle or account.segments[-1].why})"
         hello, estimate = account.lasting.get(Hello), self._estimate
         if isinstance(hello, Hello) and estimate is not None:
-            told = zip(self._model.parameters[: self._model.n_mapped], in_si(estimate, hello)[0], strict=False)
-            values = ", ".join(f"{one.name} {value:.5g} {one.unit}".rstrip() for one, value in told)
+            numbers = zip(self._model.parameters[: self._model.n_mapped], in_si(estimate, hello)[0], strict=False)
+            values = ", ".join(f"{one.name} {value:.5g} {one.unit}".rstrip() for one, value in numbers)
             reason = Reason(estimate.reason).text if estimate.reason in list(Reason) else str(estimate.reason)
             text += f"; tick {self._tick}: {values}, {reason}"
         return text

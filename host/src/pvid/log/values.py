@@ -145,7 +145,7 @@ class Values:
 
     @property
     def sample_rate(self) -> float:
-        """[Hz], as the board told; NaN before it did, and where it told a number that is no rate."""
+        """[Hz], as reported by the board; NaN before, and for an invalid rate."""
         rate = math.nan if self._hello is None else self._hello.sample_rate
         return rate if is_rate(rate) else math.nan
 
@@ -262,6 +262,6 @@ def in_si(
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """p [MAX_P] and its covariance [MAX_P, MAX_P] in SI; zero where the model has no parameter.
 
-    Of the fixed-point core: NaN before the board has told its units; `phi_offset` [rad] is added to its c.
+    Of the fixed-point core: NaN before the board has reported its units; `phi_offset` [rad] is added to its c.
     """
     return item.in_si(np.full(MAX_P, np.nan) if hello is None else np.array(hello.p_unit), phi_offset)

@@ -44,8 +44,8 @@ from pvid.rig.file import RigFile
 from pvid.run.compare import P_NAMES, Difference
 from pvid.settings.enums import Reason
 from pvid.settings.kinds import Settings
+from pvid.settings.record import HASHED_TYPES
 from pvid.twin import fnv
-from pvid.twin.record import Recorder
 
 Check = Estimate | EstimateQ31 | Hash | Credit
 
@@ -381,9 +381,11 @@ class _Recomputation:
 
     def _state(self, reason: int) -> bytes:
         """The bytes that the hash covers, as in fnv.h."""
-        recorder = Recorder(self.twin.estimator, 1)
-        recorder(0, np.empty(0, np.uint8))
-        return recorder.finished(np.array([[reason]], np.uint8)).lane().hashed().tobytes()
+        estimator, (narrow, wide) = self.twin.estimator, HASHED_TYPES[self.twin.estimator.p.dtype.kind]
+        state: bytes = estimator.p[:, 0].astype(narrow).tobytes() + estimator.sums[:, 0].astype(wide).tobytes()
+        if hasattr(estimator, "exponent"):  # of the sums, in fixed point
+            state += int(estimator.exponent[0]).to_bytes(4, "little")
+        return state + reason.to_bytes(4, "little")
 
     def _compared(self, check: Check, tick: int, reason: int) -> Iterator[tuple[str, int, int]]:
         """Yields variable, word of the log and word of the twin."""

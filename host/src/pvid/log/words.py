@@ -72,8 +72,8 @@ def loss_words(account: Account) -> str:
         (account.damaged, "damaged pieces"),
         (account.foreign, "foreign frames"),
     ]
-    told = ", ".join(f"{count} {what}" for count, what in parts if count)
-    lost = f"{told} ({100 * account.lost_share:.2g} %)" if told else ""
+    losses = ", ".join(f"{count} {what}" for count, what in parts if count)
+    lost = f"{losses} ({100 * account.lost_share:.2g} %)" if losses else ""
     unread = f"{account.unread / 1e6:.1f} MB recorded, but too fast to be decoded" if account.unread else ""
     return "; ".join(filter(None, (lost, unread)))
 

@@ -124,7 +124,7 @@ class Model:
     Attributes
     ----------
     name, title : in rig files; in a few words
-    channels, constants : what is recorded, and what the user knows
+    channels, constants : recorded signals, and known constants
     parameters : p in the order of the core: mapped, then offset, then nuisance; kappa refers to the first one
     physical : parameters that follow from the mapped ones and the constants
     physical_of : (mapped p [..., n_mapped], constants) -> [..., n_physical]; NaN outside the physical region

@@ -1,6 +1,6 @@
-"""The mathematics in float64, straight from theory.md 2 to 4, to be read beside it.
+"""The mathematics in float64, as in theory.md 2 to 4; read both together.
 
-Nothing here is fast or bit-exact; it is what the twin and the C core are measured against.
+Neither fast nor bit-exact: the reference for twin and C core.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def assess(
 ) -> Estimate:
     """Standard errors at p from the sums: (S / s^2 + 1 / start_sd^2)^-1, s^2 = correlation * residual / (weight - 3).
 
-    The second term says that nobody knows less than at the start; it matters only while data are few.
+    The second term is the prior information of the start; it matters only for few data.
     """
     if not weight > N_P:
         raise PvidError(f"{weight:g} rows are too few for the standard errors of {N_P} parameters")

@@ -1,7 +1,6 @@
-"""The weak form in float64, straight from theory.md 5, to be read beside it.
+"""The weak form in float64, as in theory.md 5; read both together.
 
-Nothing here is fast or bit-exact; it is what the twin and the C core are measured against, and where what the
-core does not have yet is tried: the full-angle correction and the two damping regressors.
+Neither fast nor bit-exact: the reference for twin and C core, and the place to try new terms.
 
     samples -> front_end -> frames -> columns -> rows (whitened at p, no a and b) -> WeakOracle -> p, s.e.
 """
@@ -30,20 +29,19 @@ _COLUMNS = 11
 # growing fast (0.3 % at 0.16 rad).
 VALID_ANGLE = 0.2  # rad
 
-# The correction needs an estimate that has settled (from the first window on it diverges): these many
-# windows, a move of p below this a window, and standard errors below this, both relative. It goes off again
-# at four times that.
+# The correction begins after this many windows (at the first one it would diverge), with a step of p and standard
+# errors below these, both relative. It ends at four times the latter.
 _SETTLED_WINDOWS = 4
 _SETTLED_MOVE = 0.02
 _SETTLED_ERROR = 0.05
-# Then what the uncorrected windows said is aged, as is what rows of a poor start said: 0.3^4 = 0.8 % of it is left. It
-# waits while the standard errors are not below this.
+# Then the sums of the windows without correction fade, as those of rows at a poor start do: 0.3^4 = 0.8 % remains.
+# Fading waits until the relative standard errors are at most _NEAR.
 _FADE = 0.3
 _AGEING_WINDOWS = 4
 _NEAR = 0.1
 
 _DAMPING_SD = 1e-3  # m^2/s, prior of the damping coefficients
-_DAMPING_REACH = 1e-2  # m^2/s, what the step limit refers to
+_DAMPING_REACH = 1e-2  # m^2/s, reference of the step limit
 
 
 # ---- from samples to rows
@@ -127,16 +125,16 @@ def columns(phi: Float, u: Float, design: WeakDesign) -> Float:
 
 
 def residual_filters(design: WeakDesign, p: Float) -> Float:
-    """chi'''' + d1 w chi'' + d2 w^2 chi [W, K]: what a row makes of the angle's noise, but for u."""
+    """chi'''' + d1 w chi'' + d2 w^2 chi [W, K]: filter from the angle's noise to a row's residual, without u."""
     w, d1, d2 = p[:3]
     return np.asarray(design.chi[:, 2] + d1 * w * design.chi[:, 1] + d2 * w**2 * design.chi[:, 0])
 
 
 def noise_gram(design: WeakDesign, p: Float) -> Float:
-    """R0(p) [K, K], from the design's Gram tables: covariance of a window's rows for noise of 1."""
+    """R0(p) [K, K], from the design's Gram tables: covariance of a window's rows for noise of unit variance."""
     w, d1, d2 = p[:3]
-    two, zero = d1 * w, d2 * w**2
-    return packed_to_square(np.array([1.0, two, zero, two**2, two * zero, zero**2]) @ design.gram)
+    f2, f0 = d1 * w, d2 * w**2  # factors of chi'' and chi in the filter
+    return packed_to_square(np.array([1.0, f2, f0, f2**2, f2 * f0, f0**2]) @ design.gram)
 
 
 def packed_to_square(packed: Float) -> Float:
@@ -147,7 +145,7 @@ def packed_to_square(packed: Float) -> Float:
 
 @cache
 def _places_in_triangle(n: int) -> npt.NDArray[np.int64]:
-    """Where each entry of a symmetric matrix [n, n] stands in its packed lower triangle."""
+    """Place of each entry of a symmetric matrix [n, n] in its packed lower triangle."""
     places = np.zeros((n, n), np.int64)
     rows, columns = np.tril_indices(n)
     places[rows, columns] = places[columns, rows] = np.arange(len(rows))
@@ -221,20 +219,20 @@ def internal_motion(p: Float, ends: Float, phi: Float, u: Float, design: WeakDes
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the linear rows of a window lack, y [K] and k [2, K]: Y = N^T theta + y + k^T damping."""
+    """Remainder of the linear rows of a window, y [K] and k [2, K]: Y = N^T theta + y + k^T damping."""
 
     y: Float
     k: Float
 
 
-# Below this L2 a mechanism is hardly physical, and nothing is corrected.
+# Below this L2 a mechanism is implausible, and its rows are not corrected.
 L2_MIN = 0.05
 
 
 def remainder_of_motion(
     p: Float, motion: tuple[Float, Float], phi: Float, u: Float, design: WeakDesign, full_angle: bool
 ) -> Remainder:
-    """What the linear rows of one window lack, with q and q' of `internal_motion`.
+    """Remainder of the linear rows of one window, with q and q' of `internal_motion` (theory.md 5, (12)).
 
     With q known, so is the motion: phi1 = q + k phi, k = L2 (1 + L1). The exact equations are
 
@@ -383,9 +381,9 @@ class WeakIdentified:
 
 @dataclass
 class WeakOracle:
-    """The estimator, fed windows. b = B - M theta and rr = sum (Y - N^T theta)^2 are kept relative to p.
+    """The estimator; its input are windows. b = B - M theta and rr = sum (Y - N^T theta)^2 are kept relative to p.
 
-    p holds w, d1, d2, then c where unknown, then the two damping coefficients where estimated.
+    p contains w, d1, d2, then c if unknown, then the two damping coefficients if estimated.
     """
 
     design: WeakDesign
@@ -428,10 +426,10 @@ class WeakOracle:
         return out
 
     def window(self, window_columns: Float, phi: Float, u: Float) -> None:
-        """Takes in one window: its columns [11, K] and its samples phi [rad], u [1/s^2], both [W]."""
+        """Processes one window: its columns [11, K] and its samples phi [rad], u [1/s^2], both [W]."""
         self.updated = False
         self.misfit = math.nan
-        driven = u[:-1]  # the core looks at the window but its last sample
+        driven = u[:-1]  # as the core, without the window's last sample
         if self.settings.drive_min > 0 and float(np.var(driven)) < self.settings.drive_min**2:
             self._previous = None
             return
@@ -452,7 +450,7 @@ class WeakOracle:
             self._switch(before)
 
     def _explained(self, phi: Float) -> float:
-        """Variance that the sensors' noise gives the rows of a window phi [W]."""
+        """Variance of the rows of a window phi [W] by the sensors' noise."""
         lag = self.design.lag
         bend = phi[2 * lag :: lag] - 2 * phi[lag:-lag:lag] + phi[: -2 * lag : lag]
         curvature = float(np.mean(bend**2)) / (lag * self.design.dt) ** 4 if len(bend) else 0.0
@@ -465,17 +463,17 @@ class WeakOracle:
 
     @property
     def chi2(self) -> float:
-        """Variance of the residuals of all rows over what the sensors' noise explains; NaN while there are too few."""
+        """Residual variance of all rows over its expectation from the sensors' noise; NaN with too few rows."""
         return max(self.rr, 0.0) / (self.freedom * self.expected) if self.freedom >= 1 else math.nan
 
     @property
     def agrees(self) -> bool:
-        """Whether that is within what chance makes of the limit."""
+        """Whether chi2 is within misfit_max, with three standard deviations of chance."""
         limit = self.settings.misfit_max * (1 + 3 * math.sqrt(2 / max(self.freedom, 1.0)))
         return not self.chi2 > limit
 
     def _settle(self) -> None:
-        """Ages rows of a poor start once p has settled elsewhere and they do not fit there."""
+        """Begins to fade the rows of a poor start if p has settled elsewhere and they do not fit there."""
         estimate = self.assess()
         self._known = bool((estimate.se[:3] <= _NEAR * self.p[:3]).all())
         settled = self.updated and self.size <= _SETTLED_MOVE and self._known and self._ageing == 0
@@ -497,7 +495,7 @@ class WeakOracle:
         return without_directions(x @ inverse_factor.T, window_columns[[A, B]] @ inverse_factor.T), inverse_factor
 
     def _remainder(self, core: Float, window_columns: Float, phi: Float, u: Float) -> Remainder:
-        """What the rows lack at p: nothing while the correction is off; k has no rows without damping."""
+        """Remainder of the rows at p; 0 while the correction is off; k has no rows without damping."""
         functions, extra = self.design.functions, len(self.p) - self.n_core
         if not self.corrected:
             return Remainder(np.zeros(functions), np.zeros((extra, functions)))
@@ -507,7 +505,7 @@ class WeakOracle:
         return Remainder(neglected.y, neglected.k[:extra])
 
     def add(self, x: Float, inverse_factor: Float) -> None:
-        """Sums of a window's rows, those of the past forgotten or aged first."""
+        """Adds a window's rows to the sums, after forgetting and fading."""
         hop_s = self.design.hop_s
         keep = math.exp(-hop_s / self.settings.forgetting_s) if self.settings.forgetting_s > 0 else 1.0
         if self._ageing > 0 and self._known:
@@ -556,7 +554,7 @@ class WeakOracle:
         return True
 
     def _switch(self, before: Float) -> None:
-        """Turns the correction on once the estimate has settled, off when it is lost."""
+        """Enables the correction if the estimate has settled; disables it if the standard errors become large."""
         worst = float(np.max(self.assess().se[:3] / self.p[:3])) if self.weight > len(self.p) else math.inf
         moved = float(np.max(np.abs(self.p[:3] / before[:3] - 1)))
         if self.corrected:
@@ -566,8 +564,8 @@ class WeakOracle:
             self._ageing = _AGEING_WINDOWS
 
     def assess(self) -> Estimate:
-        """Standard errors by (S / s^2 + 1 / start_sd^2)^-1, s^2 = overlap * rr / (weight - n_p), where rr counts for no
-        less than the sensors' noise explains."""
+        """Standard errors by (S / s^2 + 1 / start_sd^2)^-1, s^2 = overlap * rr / (weight - n_p), where rr is at
+        least its expectation from the sensors' noise."""
         if self.weight <= len(self.p):
             return Estimate(self.p.copy(), self.sd.copy(), np.diag(self.sd**2), 0.0, 0.0)
         variance = max(self.rr / (self.weight - len(self.p)), self.expected)
@@ -586,7 +584,7 @@ class WeakOracle:
         s = self.information()
         inverse = _inverse(s + np.diag(variance / self.sd**2))
         spread = np.diag(inverse @ (s + c.T @ self.q @ c) @ inverse)
-        # Q is an estimate itself: it may not claim that overlapping windows know more than twice as much.
+        # Q is itself an estimate: limit the information of overlapping windows to twice as much.
         return np.sqrt(variance * np.maximum(spread, np.diag(inverse) / 4))
 
 
@@ -653,7 +651,7 @@ _UNDRIVEN_KAPPA = 1e-10
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a design can be expected to make of a run.
+    """Expected result of a design on a run.
 
     Attributes
     ----------
@@ -687,7 +685,7 @@ def row_sd(design: WeakDesign, sensors: Sensors) -> float:
     """Standard deviation of a row's residual [rad]: white noise of the angle sensor, through the front end.
 
     About the samples' own over sqrt(D): the rows look at frequencies that the smoother lets pass, so that
-    `WeakDesign.smoothing_gain`, which averages over all frequencies, says too little.
+    `WeakDesign.smoothing_gain`, which averages over all frequencies, is too small.
     """
     energy = _energy(residual_filters(design, design.nominal), _taps(design.smooth, 1.0), design.decimation)
     return sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb) * math.sqrt(energy / design.functions)
@@ -705,11 +703,11 @@ def predict(
     Raises
     ------
     PvidError
-        When the run does not fill a window, or says nothing of w, or its numbers are beyond those of float64.
+        When the run does not fill a window, or does not excite w, or its numbers are beyond those of float64.
     """
     beyond = "nothing can be predicted: lengths, drive or resolutions are too far apart for numbers of 64 bits"
     try:
-        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # judged by what comes of it
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # the result is checked
             found = _predicted(phi, y, design, p, sensors, forgetting_s)
     except np.linalg.LinAlgError as error:
         raise PvidError(beyond) from error
@@ -724,7 +722,7 @@ def _predicted(
     smooth, u = front_end(phi, y, design)
     phi_frames, u_frames = frames(smooth, design), frames(u, design)
     oracle = WeakOracle(design, WeakSettings(np.asarray(p, np.float64), row_sd=1.0, forgetting_s=forgetting_s))
-    # a row that weighs v has noise that weighs v^2: what has been forgotten twice as fast
+    # a row with weight v has noise with weight v^2: forgotten twice as fast
     noise = WeakOracle(design, replace(oracle.settings, forgetting_s=forgetting_s / 2))
     height_sd = sample_sd(sensors.y_lsb, sensors.y_noise_lsb) * design.sample_rate**2 / design.l1
     angle_sd = sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb)
@@ -737,7 +735,7 @@ def _predicted(
         ends = boundary(oracle.p, window_columns, np.zeros(design.functions))
         motion, _ = internal_motion(oracle.p, ends, phi_frames[k], u_frames[k], design)
         of_angle = residual_filters(design, oracle.p) @ inverse_factor.T
-        # phi'' = (w + u) q: an error of u weighs q
+        # phi'' = (w + u) q: an error of u is multiplied by q
         of_drive = motion[:, None] * (design.chi[:, 1] @ inverse_factor.T)
         variance += angle_sd**2 * _energy(of_angle, smoother, design.decimation)
         variance += height_sd**2 * _energy(of_drive, differentiator, design.decimation)
@@ -751,7 +749,7 @@ def _predicted(
     inverse = _inverse(s)
     alone = inverse @ noise.information() @ inverse
     shared = inverse @ c.T @ noise.q @ c @ inverse
-    # As in `WeakOracle.sandwich`, shared noise may not claim that windows know more than twice as much.
+    # As in `WeakOracle.sandwich`: limit the information of overlapping windows to twice as much.
     share = min(1.0, float(np.min(0.75 * np.diag(alone) / np.maximum(-np.diag(shared), 1e-300))))
     covariance = variance * (alone + share * shared)
     return Prediction(oracle.p, np.sqrt(np.diag(covariance)), covariance, kappa, math.sqrt(variance), windows)
@@ -767,7 +765,7 @@ def predict_rig(
     zero_unknown: bool = True,
     forgetting_s: float = 0.0,
 ) -> Prediction:
-    """`predict` for a simulated run of the linear pendulum: what a rig of these parameters will give."""
+    """`predict` for a simulated run of the linear pendulum with these parameters."""
     run = simulate(pendulum, drive, Sensors(), design.sample_rate, duration, release, "linear").run
     p = np.append(pendulum.linear, [0.0] * zero_unknown)
     return predict(run.phi, run.y, design, p, sensors, forgetting_s)

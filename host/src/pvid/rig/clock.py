@@ -43,7 +43,7 @@ _RATE_LIMIT = 0.05
 _RATE_RANGE_HZ = (1e-3, 1e9)
 _USUAL_RATES = (20.0, 20_000.0)  # Hz
 _LONGEST_S = 1e20  # nanoseconds taken for seconds, since 1970, are 2e18
-# Rows on either side of a gap that their mean tells the number of missing ticks from: jitter averages out.
+# Rows on either side of a gap whose mean gives the number of missing ticks: jitter averages out.
 _ROWS_BESIDE_GAP = 20
 # So few gaps in exact stamps are no rounding.
 _CERTAIN_GAPS = 2
@@ -179,11 +179,11 @@ def _with_jitter(
     # the recorded times are believed: any rate near theirs will do
     rate = promised if promised is not None else _shortest_decimal(1 / fit.period, 1e-3)
     t, phi, y = _interpolated(table, rate, fit.period)
-    told = f"t jitters {size}: phi and y are interpolated at {rate:g} Hz from the recorded times"
+    text = f"t jitters {size}: phi and y are interpolated at {rate:g} Hz from the recorded times"
     long = int(np.count_nonzero(np.diff(table.t) > _GAP_PERIODS * fit.period))
     if long:
-        told += f"; steps longer than {_GAP_PERIODS:g} periods, of late samples or missing ones: {long}"
-    return Uniform(t, phi, y, rate, (*table.notes, told))
+        text += f"; steps longer than {_GAP_PERIODS:g} periods, of late samples or missing ones: {long}"
+    return Uniform(t, phi, y, rate, (*table.notes, text))
 
 
 def _placed(table: Table, ticks: IntArray | None, rate: float, notes: tuple[str, ...]) -> Uniform:
@@ -347,8 +347,8 @@ def _rate(table: Table, measured: float, error: float, promised: float | None) -
     if promised is None:
         low, high = _RATE_RANGE_HZ
         if not low <= measured <= high:
-            told = f"a sample rate of {measured:.6g} Hz is out of range"
-            raise PvidError(f"{table.path}, column {name}: {told}{_unit(name, measured)}.")
+            text = f"a sample rate of {measured:.6g} Hz is out of range"
+            raise PvidError(f"{table.path}, column {name}: {text}{_unit(name, measured)}.")
         return _shortest_decimal(measured, 1e-9 + 3 * error), ()
     off = measured / promised - 1
     # t is trusted only to within the jitter at each end

@@ -1,9 +1,9 @@
 """Text tables as programs and loggers write them, read in blocks: memory for the three signals and a block more.
 
 Separators are commas, semicolons, tabs or spaces; with any but commas the decimal point may be a comma. A byte order
-mark, CRLF, quotes, blank lines and lines that begin with #, % or // are taken; the names may stand in such a line, as
-numpy.savetxt writes them. A table without names has columns 1, 2, 3, ... If a file ends within a line, it was cut off,
-and that line is ignored. Every other fault is reported with its line number.
+mark, CRLF, quotes, blank lines and lines that begin with #, % or // are accepted; such a line may contain the names,
+as written by numpy.savetxt. A table without names has columns 1, 2, 3, ... If a file ends within a line, that line is
+ignored. Every other fault is reported with its line number.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def _data_lines(block: bytes, first: int) -> Iterator[tuple[int, str]]:
 
 
 def _line_of_row(path: Path, body: int, row: int) -> int:
-    """Line of the row counted from 0: looked for only when it is asked for."""
+    """Line of the row counted from 0: searched only on request."""
     first = 1
     for block in _blocks(path):
         for number, _ in _data_lines(block, first):

@@ -1,4 +1,4 @@
-"""The rig file: what a user knows of a rig and wants of the identifier, in TOML.
+"""The rig file: properties of a rig and settings of the identifier, in TOML.
 
     l1 = 0.30                 # m; the only key without a default
     sample_rate = 1000        # Hz
@@ -47,7 +47,7 @@ _LEAST = 1e-12
 
 
 class Unset(float):
-    """A number that stands where the rig file does not say."""
+    """Default of a key that is missing in the rig file."""
 
 
 def _number(default: Any, unit: str, low: float, high: float) -> Any:
@@ -189,7 +189,7 @@ class Identifier:
         return self.form_traits.uses_windows and self.core_traits.corrects_angles
 
     def in_weak_form(self, **changed: Any) -> Identifier:
-        """The same in the weak form; the length of a differentiator's window is none of its windows'."""
+        """The same in the weak form; window_s of a differentiator is dropped."""
         window_s = self.window_s if self.form_traits.uses_windows else 0.0
         return replace(self, form="weak", window_s=window_s, **changed)
 
@@ -200,15 +200,15 @@ class Identifier:
 
     @property
     def gate(self) -> float:
-        """What the gate keeps out [times the usual]: outlier_gate, or 4 (weak form) and 6 (strong form) where the file
-        does not say; none then with equation (5), which is to stay as the paper has it."""
+        """Limit of the gate [multiples of the usual residual]: outlier_gate, or 4 (weak form) and 6 (strong form) if
+        the key is missing; 0 with the paper's law (5)."""
         if self.outlier_gate is not None:
             return self.outlier_gate
         return self.form_traits.gate if self.law == "stationary" else 0.0
 
     @property
     def patience_s(self) -> float:
-        """Until the gate believes in a change [s], 0: never."""
+        """Time until the gate accepts a change [s], 0: never."""
         if self.outlier_patience_s is not None:
             return self.outlier_patience_s
         return min(self.form_traits.patience * self.forgetting_s, 1e12) if self.gate > 0.0 else 0.0
@@ -216,7 +216,7 @@ class Identifier:
 
 @dataclass(frozen=True)
 class ModelTable:
-    """Which mechanism the rig is.
+    """The mechanism of the rig.
 
     Attributes
     ----------
@@ -272,7 +272,7 @@ class RigFile:
 
     @classmethod
     def standard(cls) -> RigFile:
-        """The standard rig of theory.md 6, as written by a user who knows only l1 and the sensors, both exactly: a
+        """The standard rig of theory.md 6, as written by a user with exact l1 and sensors only: a
         simulation has no error of l1 or of the gain of y."""
         sensor = Sensor(y_gain_sd=0.0)
         return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sensor=sensor, sample_rate=1000.0, l1_sd=0.0)
@@ -395,7 +395,7 @@ def _known(owner: type, given: Mapping[str, Any], place: str) -> dict[str, Any]:
     names = [f.name for f in fields(owner)]
     for key in given:
         if key not in names:
-            raise PvidError(f"{place}{key!a} is not a key of a rig file; here are known {', '.join(names)}")
+            raise PvidError(f"{place}{key!a} is not a key of a rig file; known keys: {', '.join(names)}")
     return dict(given)
 
 
@@ -461,7 +461,7 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else text[:40] + "..."
 
 
-# Fields that say nothing by default, and the property that holds what follows from the others.
+# Fields without a default, and the property with the value that follows from the others.
 _DERIVED = {"outlier_gate": "gate", "outlier_patience_s": "patience_s"}
 
 

@@ -1,4 +1,4 @@
-"""What a sensor resolves, seen from what it recorded."""
+"""Resolution of a sensor, from its recorded values."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _refined(levels: Float, guess: float) -> float | None:
     if resultant[best] < _LEAST_RESULTANT:
         return None
     counts = np.rint(from_middle / steps[best])
-    # the whole range tells the step to more digits, as long as the count is not lost
+    # the whole range gives the step to more digits, as long as the count is not lost
     for reach in (30, 300, len(levels)):
         inner = np.abs(counts) <= reach
         if (counts[inner] ** 2).sum() > 0:

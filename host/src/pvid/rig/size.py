@@ -1,4 +1,4 @@
-"""How long a recorded run may be: what this machine's memory holds of it while it is identified."""
+"""Largest length of a run, by this machine's memory during identification."""
 
 from __future__ import annotations
 

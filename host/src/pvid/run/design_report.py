@@ -1,4 +1,4 @@
-"""What a weak-form design promises for a rig: standard errors, kappa, and what it costs on a device."""
+"""Prediction for a weak-form design: standard errors, kappa, and its cost on a device."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def report_for_tones(
     Raises
     ------
     PvidError
-        When the rig file does not suffice, the run does not fill a window or the drive says nothing of w.
+        When the rig file does not suffice, the run does not fill a window or the drive does not excite w.
     """
     _refuse_exact(rig)
     if rig.sample_rate is None:

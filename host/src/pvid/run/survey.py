@@ -4,8 +4,8 @@ The weak form's rows are summed in float64 over all windows of the run, and the 
 from several starts about the guess. Rows depend on p in three ways: by their design (window, test functions, filters
 follow the modes), by their whitening, and by the constraints theta = f(p); the search renews all three until p stays.
 Of the minima found the one with the smallest chi^2 is taken. There the rows are corrected for large angles and
-friction, where the rig file asks for it, and what still exceeds the encoder's noise becomes a white disturbance of the
-joints: rows are weighted by both from then on.
+friction, if the rig file enables it; the residuals above the encoder's noise become a white disturbance of the joints,
+and rows are then weighted by both.
 
 `fitted` returns the rig file with the outcome as its nominal, for example for a board after a first run.
 """
@@ -73,7 +73,7 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     holds often enough.
 
     The encoder's resolution is what the run shows where the rig file does not give it. All else is unchanged where the
-    rig file asks for no survey (`[identifier] survey = false`) or for the strong form. Where the survey finds nothing
+    rig file disables the survey (`[identifier] survey = false`) or sets the strong form. If the survey finds nothing
     plausible the guess stays.
     """
     rig = resolved(rig, run)

@@ -1,14 +1,14 @@
-"""Settings of the weak form for a recorded run: the defaults, unless others predict a part held back better.
+"""Settings of the weak form for a recorded run: the defaults, unless others predict held-out data better.
 
-The yardstick is what `identify` makes of the rig file as it is. Others are tried one group after the other: the
+The reference is the result of `identify` with the given rig file. Candidates are tried group by group: the
 equations (full angles, friction), the window, the test functions, the pass band, the decimation. One replaces another
 only if the core publishes an estimate with it and
 
-    it predicts what is held back (pvid.run.held_back) better, by more than chance explains, or
-    it predicts it as well, its standard errors are clearly smaller, and it does not silence a warning.
+    it predicts the held-out data (pvid.run.held_back) significantly better, or
+    it predicts them equally well, its standard errors are clearly smaller, and it removes no warning.
 
-Forgetting is chosen at last, by how well the estimate so far predicts the next window. What is chosen is written out,
-rounded, and identified once more: the rig file reproduces the answer.
+Forgetting is chosen last, by the prediction of the next window. The chosen settings are rounded, written and identified
+once more: the rig file reproduces the result.
 """
 
 from __future__ import annotations

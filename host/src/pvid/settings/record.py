@@ -11,6 +11,9 @@ import numpy.typing as npt
 Array = npt.NDArray[Any]
 Bytes = npt.NDArray[np.uint8]
 
+# Types of p and of the sums in the bytes that the running hash covers, by numpy's kind of number.
+HASHED_TYPES = {"f": ("<f4", "<f4"), "i": ("<i4", "<i8")}
+
 
 def _none(dtype: npt.DTypeLike) -> Any:
     return field(default_factory=lambda: np.empty(0, dtype))
@@ -66,7 +69,7 @@ class Record:
     def hashed(self) -> Bytes:
         """The bytes of every tick that the running hash covers, uint8 [ticks, n]: p, the sums and the reason as a
         32-bit word, in fixed point the exponent before it; all little-endian."""
-        narrow, wide = ("<i4", "<i8") if self.is_fixed else ("<f4", "<f4")
+        narrow, wide = HASHED_TYPES[self.p.dtype.kind]
         pieces = [self.p.astype(narrow), self.sums.astype(wide), self.reason.astype("<u4")[:, None]]
         if self.is_fixed:
             pieces.insert(2, self.exponent.astype("<u4")[:, None])

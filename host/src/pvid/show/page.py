@@ -30,7 +30,7 @@ _ASSETS = Path(__file__).parent / "web"
 _TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css": "text/css"}
 _NICENESS = 5
 _MOST_CLIENTS = 32
-# Nothing but this server is ever asked; plotly.js sets styles in place and draws its icons from data.
+# Requests go to this server only; plotly.js sets styles in place and draws its icons from data.
 _POLICY = (
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'; "
     "base-uri 'none'; form-action 'none'"
@@ -43,7 +43,7 @@ def listen(at: str) -> tuple[socket.socket, str]:
     Raises
     ------
     PvidError
-        When it is no HOST:PORT, or nobody can listen there.
+        When it is no HOST:PORT, or cannot be listened to.
     """
     match = re.fullmatch(r"(\[[0-9A-Fa-f:.]+\]|[^\[\]:/\s]+):(\d{1,5})", at)
     if match is None or int(match[2]) > 65535:
@@ -82,7 +82,7 @@ def page(at: str, log: Path, title: str) -> Iterator[str]:
     with listening, open(os.devnull, "wb") as nowhere:
         process = subprocess.Popen(
             command,
-            stdin=subprocess.PIPE,  # its end tells that this program is gone, however it went
+            stdin=subprocess.PIPE,  # its end signals the end of this program
             stdout=nowhere,
             stderr=nowhere,
             pass_fds=[listening.fileno()],

@@ -86,7 +86,7 @@ class LiveState(threading.Thread):
                 return  # of another version: the page does without physical parameters
 
     def as_json(self) -> bytes:
-        """The state of now; page.js says what becomes of it."""
+        """The present state; page.js draws it."""
         with self._lock:
             state = self._state()
         return json.dumps(state, allow_nan=False, separators=(",", ":")).encode()

@@ -1,5 +1,4 @@
-"""A recording on one page: measured against simulated angle, how the estimate converged, what it leaves unexplained,
-what excited it, how it moved."""
+"""A recording on one page: measured against simulated angle, convergence, residuals, excitation, motion."""
 
 from __future__ import annotations
 
@@ -61,7 +60,7 @@ _PUBLISHED = (Reason.UPDATED.text, Reason.MISFIT.text)
 class Recording:
     """What is drawn.
 
-    t : of the estimates, `clock` says since when [n, s];  physical, physical_se : [n, n_physical];  kappa [n]
+    t : of the estimates, `clock` is their origin [n, s];  physical, physical_se : [n, n_physical];  kappa [n]
     p : the last estimate, as residuals_of takes it, or the start;  estimate : value and standard error by name; empty
         where nothing is identified
     reasons : how many estimates came with each;  state : the last, with what it means
@@ -114,7 +113,7 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
     reader, values, model = LogReader(path), Values(rig.mechanism), rig.mechanism.model
     columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason")}
     columns |= {name: [] for one in model.answers for name in (one.name, f"{one.name}_se")}
-    # the board's tables are those of its rig file, whatever the run says
+    # the board's tables are those of its rig file, not of the run
     rig = replace(rig, identifier=replace(rig.identifier, survey=False))
     hello, began = None, None
     friction: tuple[float, ...] = ()
@@ -131,9 +130,9 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
                     column.append(rows.columns[name][0])
     if not columns["run"]:
         return None
-    told = {name: np.array(column) for name, column in columns.items()}
-    t = (told["log_time"] - (told["log_time"][0] if began is None else began)) / 1e9
-    counts = zip(*np.unique(told["reason"], return_counts=True), strict=True)
+    series = {name: np.array(column) for name, column in columns.items()}
+    t = (series["log_time"] - (series["log_time"][0] if began is None else began)) / 1e9
+    counts = zip(*np.unique(series["reason"], return_counts=True), strict=True)
     if hello is None:
         title = path.name
     else:
@@ -146,19 +145,19 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         rig=rig,
         run=run_of_log(path),
         t=t,
-        physical=np.stack([told[name] for name in model.physical_names], axis=1),
-        physical_se=np.stack([told[f"{name}_se"] for name in model.physical_names], axis=1),
-        kappa=told["kappa"],
-        p=np.array([*(told[name][-1] for name in model.p_names[: rig.n_core]), *friction]),
+        physical=np.stack([series[name] for name in model.physical_names], axis=1),
+        physical_se=np.stack([series[f"{name}_se"] for name in model.physical_names], axis=1),
+        kappa=series["kappa"],
+        p=np.array([*(series[name][-1] for name in model.p_names[: rig.n_core]), *friction]),
         estimate={
-            name: (float(told[name][-1]), float(told[f"{name}_se"][-1]))
+            name: (float(series[name][-1]), float(series[f"{name}_se"][-1]))
             for name in (*model.physical_names, *model.mapped_names)
-            if np.isin(told["reason"], _PUBLISHED).any() and np.isfinite(told[name][-1])
+            if np.isin(series["reason"], _PUBLISHED).any() and np.isfinite(series[name][-1])
         },
         reasons={str(reason): int(count) for reason, count in counts},
-        state=_with_words(str(told["reason"][-1])),
+        state=_with_words(str(series["reason"][-1])),
         remarks=(),
-        breaks=tuple(t[1:][np.diff(told["run"]) > 0]),
+        breaks=tuple(t[1:][np.diff(series["run"]) > 0]),
         account=reader.account.text,
     )
 
@@ -240,7 +239,7 @@ def _last(recording: Recording) -> list[str]:
     """The last estimate in words, why it is the last, and what is to be said of it."""
     known = recording.estimate
     if not known:
-        told = f"nothing identified: {recording.state}"
+        headline = f"nothing identified: {recording.state}"
     else:
         model = recording.rig.mechanism.model
         physical = all(name in known for name in model.physical_names)
@@ -249,10 +248,10 @@ def _last(recording: Recording) -> list[str]:
             value, error = with_error(*known[one.name])
             parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())
         where = "" if physical else "outside the physical region: "
-        told = f"estimate: {where}{', '.join(parts)}  (± standard error)"
+        headline = f"estimate: {where}{', '.join(parts)}  (± standard error)"
     reasons = ", ".join(f"{count} {reason}" for reason, count in recording.reasons.items())
     return [
-        told,
+        headline,
         *([recording.state] if known else []),
         *([f"estimates: {reasons}"] if reasons else []),
         *recording.remarks,

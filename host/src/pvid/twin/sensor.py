@@ -1,4 +1,4 @@
-"""The simulated sensor of firmware/apps/stream/sensor.c: a rig that a board without one samples in field mode.
+"""The simulated sensor of firmware/apps/stream/sensor.c: the rig of a board without sensors in field mode.
 
 The standard rig's pendulum (theory.md 1, linear) on a pivot that moves in its three tones, integrated in float32
 by steps whose only operations are + - *, so that every machine gets the same counts. A tone and the pendulum are

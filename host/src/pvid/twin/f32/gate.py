@@ -1,4 +1,4 @@
-"""Twin of gate_f32.c: which residuals are let in, in several lanes."""
+"""Twin of gate_f32.c: accepted residuals, in several lanes."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class PatternModel:
         return self.moments + self.n_theta + 2
 
     def terms(self, n: Float32, e: Float32, row_weight: Float32) -> Float32:
-        """What a row N [n_theta, lanes], e [lanes] adds to the sums [n_sums, lanes]."""
+        """Terms that a row N [n_theta, lanes], e [lanes] adds to the sums [n_sums, lanes]."""
         upper, column = np.triu_indices(self.n_theta)
         return np.concatenate([n[upper] * n[column], e * n, (e * e)[None], row_weight[None]])
 

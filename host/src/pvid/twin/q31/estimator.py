@@ -38,7 +38,7 @@ SIZE_BITS = 22  # format of the size of a step
 TERM_MAX = 2**40  # of |N_i theta_i|, far beyond the limit of a row
 HELD_LIMIT = 2 * SUM_LIMIT  # of |b|, rr and what a step may add to them
 UNIT_BITS = cholesky.RHS_BITS - 1
-_REST_BITS = 28  # of F, where a dead zone is asked for
+_REST_BITS = 28  # of F, for a dead zone
 _NOTHING = -200  # exponent of a number that is 0
 _COUNTERS = (
     "rows",

@@ -31,7 +31,7 @@ class GateQ31:
         self.judged = np.zeros(np.shape(floor.m), np.int64)
 
     def passes(self, square: Scaled, asked: Mask | None = None) -> Mask:
-        """Which lanes let a residual of this square in [lanes]; those that are not asked do."""
+        """Lanes that accept a residual of this square [lanes]; those outside `asked` do."""
         if not self.is_on:
             return np.ones(self.judged.shape, np.bool_)
         asking = np.ones(self.judged.shape, np.bool_) if asked is None else asked
