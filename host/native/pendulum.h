@@ -1,4 +1,4 @@
-/* The two-link pendulum of pvid.campaign: full equations of motion with the imperfections of a real rig. */
+/* The two-link pendulum of bench.campaign: full equations of motion with the imperfections of a real rig. */
 #ifndef PVID_PENDULUM_H
 #define PVID_PENDULUM_H
 

@@ -4,7 +4,7 @@
  *
  * the measured angle at every sample. u = y''/l1 comes from a folded smoother of 71 taps, as the weak form's does, but
  * at every sample; the angle waits in a ring for the same instant. The same filter in float64 is
- * pvid.bench.references.kalman, which says how it is tuned.
+ * bench.references.kalman, which says how it is tuned.
  *
  *   ekf_init_f32(&filter, &config);
  *   ekf_sample_f32(&filter, phi, y);      every tick, in s, rad, m

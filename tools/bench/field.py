@@ -67,7 +67,7 @@ def throughput(count: int) -> Throughput:
     """
     ours, theirs = os.openpty()
     tty.setraw(theirs)
-    code = f"from pvid.bench.field import send_frames; send_frames({ours}, {count})"
+    code = f"from bench.field import send_frames; send_frames({ours}, {count})"
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "a.pvlog"
         arguments = ["log", os.ttyname(theirs), str(log), "--samples", str(_SAMPLES_A_FRAME * count)]
