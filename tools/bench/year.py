@@ -211,9 +211,10 @@ def _faults_of_page(log: Path) -> Iterator[str]:
     """Of the live page: a time axis that goes on through the last passage."""
     state = LiveState(log, "a year")
     state.take(log.read_bytes())
-    motion = json.loads(state.as_json())["motion"]["phi"]["t"]
-    if not motion or np.any(np.diff(motion) < 0) or motion[-1] == motion[0]:
-        yield "the page's time axis does not go on"
+    for curve in json.loads(state.as_json())["motion"]:
+        t = curve["t"]
+        if not t or np.any(np.diff(t) < 0) or t[-1] == t[0]:
+            yield f"the page's time axis of {curve['label']} does not go on"
 
 
 def rig_of(core: str, form: str) -> RigFile:
