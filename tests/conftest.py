@@ -12,20 +12,22 @@ from pvid.sim.pendulum import Simulation, simulate, standard_sensors
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# tools/test gives each of its workers a file at a time: those that take a minute and more come first, the longest
-# before the others, so that the workers end together.
-LONGEST = (
-    "targets",
-    "strong_bits_q31",
-    "stream",
-    "bits",
-    "log",
-    "tune",
-    "longevity",
-    "memory",
-    "mutate",
-    "weak_starts",
+# Files that `./tools/test quick` leaves out: images, emulators, builds, tools, many identifications. tools/test gives
+# each of its workers a file at a time, these first and in this order: the longest before the others, so that they
+# end together.
+SLOW = (
+    *("board/targets", "board/stream", "twin/strong_bits_q31", "log/verify", "run/tune", "log/log", "cli/cli"),
+    *("run/advice", "board/memory", "show/report", "cli/run_input", "bench/longevity", "board/port", "design/design"),
+    *("core/strong_q31", "bench/attack", "board/ports", "design/weak_cost", "twin/gate", "bench/liar", "board/field"),
+    *("tools/consumer", "core/core_q31", "twin/bits", "core/dead_zone", "twin/weak_bits_q31", "oracle/weak_accuracy"),
+    *("bench/hard", "twin/misfit", "core/freeze", "core/bad_config", "bench/year", "cli/readme", "bench/campaign_run"),
+    *("bench/cost", "link/link", "twin/compare", "bench/side_by_side", "core/read_while_stepping", "show/view"),
+    *("core/snapshot", "twin/weak_bits", "log/untrusted", "core/arithmetic_options", "twin/trust_q31", "run/survey"),
+    *("twin/weak_starts", "core/full_angle_left_out", "core/sizes_agree", "show/pictures", "show/page", "tools/docs"),
+    *("tools/proofs", "tools/analysis", "tools/loops", "tools/mutate", "tools/core_rooms", "bench/campaign_population"),
 )
+# Of these, the tests that belong to the inner loop all the same.
+QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -52,8 +54,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if not config.getoption("--long"):
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
         items[:] = [item for item in items if not item.get_closest_marker("long")]
-    places = {f"test_{name}.py": place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: places.get(item.path.name, len(places)))
+    places = {name: place for place, name in enumerate(SLOW)}
+    files = {item: f"{item.path.parent.name}/{item.path.stem.removeprefix('test_')}" for item in items}
+    for item in items:
+        if files[item] in places and item.name.partition("[")[0] not in QUICK:
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: places.get(files[item], len(places)))
 
 
 @pytest.fixture(scope="session")

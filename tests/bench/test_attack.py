@@ -21,7 +21,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run, read_run, write_run
 from pvid.sim.pendulum import simulate
 
-SHORT = {"rigs": 50, "runs": 25, "commands": 40}
+SHORT = {"rigs": 30, "runs": 15, "commands": 30}
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -32,10 +32,17 @@ TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s
 Measured = dict[sizes.Configuration, tuple[sizes.Footprint, ReplayReport]]
 
 
+STRONG_ON = ("mps2-an386", "microbit", "virt-rv32imac")  # a processor with an FPU and two without
+
+
 @pytest.fixture(scope="module")
-def measured() -> Measured:
-    """Every configuration of `pvid sizes`, built and run."""
-    return {configuration: sizes.measure(configuration) for configuration in sizes.CONFIGURATIONS}
+def measured(request: pytest.FixtureRequest) -> Measured:
+    """Configurations of `pvid sizes`, built and run: in the long form all, else the strong form on three boards."""
+    return {
+        configuration: sizes.measure(configuration)
+        for configuration in sizes.CONFIGURATIONS
+        if request.config.getoption("--long") or configuration.form == "weak" or configuration.board.name in STRONG_ON
+    }
 
 
 def assert_same_hashes(report: ReplayReport, replay: ReplayRun, native: Native) -> None:
@@ -62,15 +69,17 @@ def test_one_board_of_each_core_computes_the_bits_of_the_host(name: str, core: s
 
 
 @pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)
-@pytest.mark.slow
 def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measured: Measured, native: Native) -> None:
     boards = set()
     for configuration, (_, report) in measured.items():
         if (configuration.form, configuration.core) == (form, core):
             assert_same_hashes(report, standard_run(form, sizes.TICKS, core), native)
             boards.add(configuration.board.name)
-    avrs = {name for name, runs in sizes.ON_AVR.items() if (form, core) in runs}
-    assert boards == {board.name for board in BOARDS.values() if board.toolchain != "avr"} | avrs
+    assert boards == {one.board.name for one in measured if (one.form, one.core) == (form, core)}
+    assert boards >= set(STRONG_ON)
+    if form == "weak":
+        avrs = {name for name, runs in sizes.ON_AVR.items() if (form, core) in runs}
+        assert boards == {board.name for board in BOARDS.values() if board.toolchain != "avr"} | avrs
 
 
 @pytest.mark.long
@@ -82,7 +91,6 @@ def test_long_runs_end_with_the_bits_of_the_host(name: str, form: str, core: str
     assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), replay, native)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("core", ["f32", "q31"])
 def test_missing_samples_have_the_bits_of_the_host(core: str, native: Native, monkeypatch: pytest.MonkeyPatch) -> None:
     # by way of long runs: their samples stand in a file that the assembler takes in
@@ -96,7 +104,6 @@ def test_missing_samples_have_the_bits_of_the_host(core: str, native: Native, mo
     assert_same_hashes(play(BOARDS["mps2-an386"], image, TIMEOUT_S), replay, native)
 
 
-@pytest.mark.slow
 def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> None:
     """A product of the port, not of the core: the figures that benchmarks/cost.md gives for the AVR are from here."""
     replay = standard_run("strong", 1000)
@@ -114,19 +121,16 @@ def mean_of(measured: Measured, board: str, form: str, core: str) -> int:
 
 
 @pytest.mark.parametrize("board", ["microbit", "virt-rv32imac"])
-@pytest.mark.slow
 def test_integers_cost_a_fifth_of_soft_float_at_most(board: str, measured: Measured) -> None:
     assert 5 * mean_of(measured, board, "weak", "q31") <= mean_of(measured, board, "weak", "f32")
 
 
-@pytest.mark.slow
 def test_the_strong_form_in_integers_costs_less_than_soft_float_at_every_row(measured: Measured) -> None:
     for board, ratio in (("microbit", 1.2), ("virt-rv32imac", 2.0)):
         assert ratio * mean_of(measured, board, "strong", "q31") <= mean_of(measured, board, "strong", "f32"), board
 
 
 @pytest.mark.parametrize(("board", "least"), [("microbit", 1.99), ("virt-rv32imac", 3.4)])
-@pytest.mark.slow
 def test_the_strong_form_costs_half_of_soft_float_with_a_solve_at_every_fourth_row(
     board: str, least: float, native: Native
 ) -> None:
@@ -140,14 +144,12 @@ def test_the_strong_form_costs_half_of_soft_float_with_a_solve_at_every_fourth_r
     assert ratio >= least  # 1.999 and 3.5 as measured
 
 
-@pytest.mark.slow
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:
     footprints = {configuration: footprint for configuration, (footprint, _) in measured.items()}
     over = sizes.over_budget(ROOT / "tests" / "budget.toml", footprints)
     assert not over, "accept: ./tools/pvid sizes --budget tests/budget.toml --update host/docs/benchmarks/cost.md"
 
 
-@pytest.mark.slow
 def test_the_readme_shows_what_is_measured(measured: Measured) -> None:
     page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8").splitlines()
     rows = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in page if line.startswith("| ")}
@@ -157,7 +159,6 @@ def test_the_readme_shows_what_is_measured(measured: Measured) -> None:
         assert figures == pytest.approx([int(cell) for cell in row[2:]], rel=0.02), row
 
 
-@pytest.mark.slow
 def test_the_stack_that_is_seen_lies_within_the_bound(measured: Measured) -> None:
     for configuration, (footprint, report) in measured.items():
         assert 0 < footprint.stack_seen <= footprint.stack_bound < report.stack_size, configuration.name
@@ -177,7 +178,6 @@ def test_a_figure_over_its_budget_is_named(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.slow
 def test_an_image_for_an_fpu_reports_the_fault_on_a_core_without_one() -> None:
     board = BOARDS["mps2-an386"]
     image, _ = build_image(board, standard_run("weak", sizes.TICKS))

@@ -731,7 +731,7 @@ def test_a_hundred_thousand_frames_a_minute_take_less_than_a_core() -> None:
     assert seen.late_kb - seen.early_kb < 2000
 
 
-@pytest.mark.parametrize("name", [HOST_TARGET, "mps2-an386"])
+@pytest.mark.parametrize("name", [HOST_TARGET, pytest.param("mps2-an386", marks=pytest.mark.long)])
 def test_a_recording_with_accidents_loses_nothing_that_was_recorded(name: str, tmp_path: Path) -> None:
     """`pvid bench field-log` in short: the board killed twice, its line closed once (a pseudo-terminal, a socket)."""
     account, stretches = field_log(name, 32_000, tmp_path / "a.pvlog")

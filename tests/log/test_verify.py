@@ -25,6 +25,7 @@ from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.rig.file import RigFile
 
 TICKS = 4000
+LONG = pytest.mark.long
 Sent = list[tuple[int, link.Message]]
 
 
@@ -370,15 +371,25 @@ def _wrong_sample(message: link.Message) -> link.Message | None:
     ("target", "identifier", "samples", "change"),
     [
         (HOST_TARGET, {"form": "weak", "core": "f32"}, 3000, _wrong_sample),
-        (HOST_TARGET, {"form": "weak", "core": "f32", "law": "pseudovelocity"}, 3000, _wrong_d1),
-        (HOST_TARGET, {"form": "weak", "core": "f32", "full_angle": True, "damping": True}, 3000, _wrong_hash),
+        pytest.param(
+            HOST_TARGET, {"form": "weak", "core": "f32", "law": "pseudovelocity"}, 3000, _wrong_d1, marks=LONG
+        ),
+        pytest.param(
+            HOST_TARGET,
+            {"form": "weak", "core": "f32", "full_angle": True, "damping": True},
+            3000,
+            _wrong_hash,
+            marks=LONG,
+        ),
         (HOST_TARGET, {"form": "weak", "core": "f32", "outlier_gate": 4.0, "forgetting_s": 10.0}, 3000, _wrong_hash),
         (HOST_TARGET, {"form": "weak", "core": "q31"}, 3000, _wrong_d1),
-        (HOST_TARGET, {"form": "weak", "core": "q31", "outlier_gate": 4.0}, 3000, _wrong_hash),
+        pytest.param(HOST_TARGET, {"form": "weak", "core": "q31", "outlier_gate": 4.0}, 3000, _wrong_hash, marks=LONG),
         (HOST_TARGET, {"form": "strong", "core": "f32"}, 1000, _wrong_d1),
-        (HOST_TARGET, {"form": "strong", "core": "f32", "law": "pseudovelocity"}, 1000, _wrong_hash),
+        pytest.param(
+            HOST_TARGET, {"form": "strong", "core": "f32", "law": "pseudovelocity"}, 1000, _wrong_hash, marks=LONG
+        ),
         (HOST_TARGET, {"form": "strong", "core": "q31"}, 1000, _wrong_sample),
-        ("mps2-an386", {"form": "weak", "core": "f32"}, 8000, _wrong_hash),
+        pytest.param("mps2-an386", {"form": "weak", "core": "f32"}, 8000, _wrong_hash, marks=LONG),
         ("mps2-an386", {"form": "weak", "core": "q31"}, 4000, _wrong_hash),
     ],
     ids=lambda one: "-".join(map(str, one.values())) if isinstance(one, dict) else getattr(one, "__name__", None),
@@ -410,7 +421,7 @@ def test_a_field_log_of_the_firmware_verifies_and_an_altered_bit_is_named(
         assert (found.core_word ^ found.twin_word) == (0x100 if change is _wrong_hash else 1)
 
 
-@pytest.mark.parametrize("core", ["f32", "q31"])
+@pytest.mark.parametrize("core", ["f32", pytest.param("q31", marks=LONG)])
 def test_a_field_log_is_drawn_and_identified_with_its_own_settings(tmp_path: Path, core: str) -> None:
     """The settings that a log is drawn and identified with are those of the rig file in it."""
     rig = RigFile.standard()

@@ -84,6 +84,7 @@ def test_linear_equations_are_no_alternative_at_large_angles(native: Native) -> 
     assert "held out of range" in refused(native, run)
 
 
+@pytest.mark.long
 def test_bad_sizes_are_replaced(native: Native) -> None:
     """A window of half a slow period, where theory.md 5 says that the weak form collapses."""
     bad = with_identifier(STANDARD.rig, window_s=0.6, test_functions=8)
@@ -93,6 +94,7 @@ def test_bad_sizes_are_replaced(native: Native) -> None:
     assert rms(errors(STANDARD, choice.answer)) < 0.5 * rms(errors(STANDARD, identify(run, bad, native)))
 
 
+@pytest.mark.long
 def test_a_drifting_parameter_is_forgotten_and_a_constant_one_is_not() -> None:
     drifting = tuned(DRIFTING)
     assert drifting.rig.identifier.forgetting_s > 0
