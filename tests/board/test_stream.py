@@ -306,15 +306,10 @@ def test_an_image_has_room_for_a_design_beyond_the_default_bounds(native: Native
 
 
 def test_identify_and_compare_on_targets(tmp_path: Path) -> None:
-    assert pvid(tmp_path, "simulate", "run.csv", "--duration", "8", "--truth", "linear").returncode == 0
+    assert pvid(tmp_path, "simulate", "run.csv", "--duration", "6", "--truth", "linear").returncode == 0
     done = pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--on", "mps2-an386", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["on"] == "mps2-an386"
-    fixed = pvid(
-        tmp_path, "identify", "run.csv", "--rig", "run.toml", "--core", "q31", "--on", "virt-rv32imac", "--json"
-    )
-    assert fixed.returncode == 0, fixed.stderr
-    assert json.loads(fixed.stdout)["core"] == "q31"
     both = pvid(
         tmp_path,
         "compare",

@@ -104,6 +104,7 @@ def test_missing_samples_have_the_bits_of_the_host(core: str, native: Native, mo
     assert_same_hashes(play(BOARDS["mps2-an386"], image, TIMEOUT_S), replay, native)
 
 
+@pytest.mark.long
 def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> None:
     """A product of the port, not of the core: the figures that benchmarks/cost.md gives for the AVR are from here."""
     replay = standard_run("strong", 1000)

@@ -734,13 +734,13 @@ def test_a_hundred_thousand_frames_a_minute_take_less_than_a_core() -> None:
 @pytest.mark.parametrize("name", [HOST_TARGET, pytest.param("mps2-an386", marks=pytest.mark.long)])
 def test_a_recording_with_accidents_loses_nothing_that_was_recorded(name: str, tmp_path: Path) -> None:
     """`pvid bench field-log` in short: the board killed twice, its line closed once (a pseudo-terminal, a socket)."""
-    account, stretches = field_log(name, 32_000, tmp_path / "a.pvlog")
+    account, stretches = field_log(name, 20_000, tmp_path / "a.pvlog")
     assert len(account.segments) == 4
     assert [one.why is not None and "gone" in one.why for one in account.segments] == [True, True, True, False]
     assert (account.missing, account.damaged, account.missing_samples) == (0, 0, 0)
     good = [one for one in stretches if one.verified and one.difference is None]
     assert {one.segment for one in good} == {0, 1, 2, 3}
-    assert all(one.checked > 10 for one in good)
+    assert all(one.checked > 5 for one in good)
     others = [one for one in stretches if one not in good]
     # what the board sent of its old session before it started over, its samples meanwhile having been lost
     assert [(one.segment, one.first > 0) for one in others] == [(2, True)]

@@ -47,6 +47,7 @@ def with_identifier(rig: RigFile, **changes: object) -> RigFile:
 # ---- what is chosen
 
 
+@pytest.mark.long
 def test_settings_that_fit_the_rig_are_kept() -> None:
     choice = tuned(STANDARD)
     assert choice.chosen is choice.default
