@@ -219,6 +219,7 @@ def drawn(browser: webdriver.Chrome, plot: str) -> list[dict[str, Any]]:
     """What Plotly holds of a plot: points of each curve, and the length of its path on the screen."""
     script = """
         const div = document.getElementById(arguments[0]);
+        if (!div) { return []; }  // not made yet
         const paths = [...div.querySelectorAll(".scatterlayer .js-line")];
         return (div.data ?? []).map((one, i) => ({
             last: one.y.at(-1), until: one.x.at(-1), points: one.y.filter((y) => y !== null).length,
