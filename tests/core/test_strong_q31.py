@@ -72,7 +72,7 @@ def test_exact_derivatives_stationary_law_reaches_the_truth(
 def test_exact_derivatives_end_within_a_twentieth_of_a_per_cent_of_float64(
     native: Native, exact: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]], law: Law, seed: int
 ) -> None:
-    """Law against law, from the same start; issue 4 asks for 0.05 %."""
+    """Law against law, from the same start; within 0.05 %."""
     rig, config = of_law(law, seed)
     settings = estimator_config(rig, bank_of(rig, 1000.0), standard_start(seed))
     n, y = oracle.strong_rows(*exact)

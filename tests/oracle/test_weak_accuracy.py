@@ -1,4 +1,4 @@
-"""What the weak form promises with a real encoder: the figures of the issue, on the standard rig, in the C core."""
+"""Accuracy of the weak form with a real encoder, on the standard rig, in the C core."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def test_full_angles_are_corrected(standard: WeakDesign) -> None:
         plain = weak.identify_weak(run.phi, run.y, standard, settings(standard, seed)).last
         result = weak.identify_weak(run.phi, run.y, standard, settings(standard, seed, full_angle=True))
         assert abs(plain.p[0] / TRUTH[0] - 1) > 3e-3  # the bias is there
-        assert abs(result.last.p[0] / TRUTH[0] - 1) < 6e-4  # the RMS, 0.04 %, times 1.5
+        assert abs(result.last.p[0] / TRUTH[0] - 1) < 6e-4  # an RMS of 0.04 %, times 1.5
         l2 = physical(result.last.p[:3], 0.3)[1]
         assert abs(l2 / 0.12 - 1) < 3.75e-3
         assert result.valid
@@ -174,7 +174,7 @@ def test_damping_is_estimated(standard: WeakDesign) -> None:
         run = simulate(damped, truth="full", seed=seed).run
         more = settings(standard, seed, full_angle=True, damping=True)
         last = weak.identify_weak(run.phi, run.y, standard, more).last
-        assert abs(last.p[0] / TRUTH[0] - 1) < 6.75e-4  # the RMS, 0.045 %, times 1.5
+        assert abs(last.p[0] / TRUTH[0] - 1) < 6.75e-4  # an RMS of 0.045 %, times 1.5
         assert abs(physical(last.p[:3], 0.3)[1] / 0.12 - 1) < 3.75e-3
         assert last.p[5] == pytest.approx(1e-4, rel=0.2)  # 5 s.e.; that of the pivot is biased (see the docs)
         # with the exact linear truth as well, the damping's columns find nothing where there is none
