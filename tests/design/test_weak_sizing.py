@@ -13,7 +13,16 @@ from conftest import ROOT
 
 from pvid.base.errors import PvidError
 from pvid.design.weak import design
-from pvid.design.weak_sizing import HOST, Bounds, Sizes, raised_bounds, sized, slow_and_fast_hz, window_for_run
+from pvid.design.weak_sizing import (
+    HOST,
+    Bounds,
+    Sizes,
+    bounds_of,
+    raised_bounds,
+    sized,
+    slow_and_fast_hz,
+    window_for_run,
+)
 from pvid.models.kapitza.modes import modes_hz
 from pvid.sim.pendulum import STANDARD_PENDULUM
 
@@ -123,13 +132,7 @@ def test_a_short_run_gets_a_window_that_it_holds_often_enough(slow: float, fast:
 
 def test_the_default_bounds_are_the_cores() -> None:
     text = (ROOT / "firmware" / "include" / "pvid" / "config.h").read_text(encoding="utf-8")
-    default = Bounds()
-    for macro, value in (
-        ("PVID_MAX_TAPS", default.taps),
-        ("PVID_MAX_DECIMATION", default.decimation),
-        ("PVID_MAX_WEAK_WINDOW", default.window),
-        ("PVID_MAX_FUNCTIONS", default.functions),
-    ):
+    for macro, value in bounds_of(Bounds()).items():
         found = re.search(rf"#define {macro} (\d+)", text)
         assert found is not None and int(found.group(1)) == value, macro
 

@@ -16,10 +16,11 @@ from pvid.cli.input import read_input, with_overrides
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.design.weak import to_c_header
-from pvid.design.weak_sizing import SizesOfDesign, raised_bounds
+from pvid.design.weak_sizing import raised_bounds
 from pvid.rig.file import RigFile, load
 from pvid.rig.run import Run
 from pvid.settings.forms import FORMS
+from pvid.settings.tables import WeakSizes
 from pvid.setup.f32 import weak_design_of
 
 _FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1}
@@ -142,7 +143,7 @@ def _print_margins(margins: dict[str, float]) -> None:
     write_stderr(f"bits to spare at full scale: {', '.join(f'{name} {bits:.2f}' for name, bits in margins.items())}")
 
 
-def _print_raised(design: SizesOfDesign) -> None:
+def _print_raised(design: WeakSizes) -> None:
     """Prints the macros of pvid/config.h whose defaults the design exceeds."""
     raised = [f"-D{macro}={value}" for macro, value in raised_bounds(design).items()]
     if raised:

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.core.sources import PUBLIC_INCLUDES
 from pvid.design.weak import WeakDesign
-from pvid.design.weak_sizing import raised_bounds
+from pvid.design.weak_sizing import bounds_of, raised_bounds
 
 COEFFICIENTS_FILE = Path(__file__).with_name("weak_cost.toml")
 
@@ -186,12 +186,7 @@ def coefficients() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
 
 def fitted_definitions(design: WeakDesign) -> tuple[str, ...]:
     """Macros of pvid/config.h that just hold the design."""
-    return (
-        f"PVID_MAX_TAPS={design.taps}",
-        f"PVID_MAX_DECIMATION={design.decimation}",
-        f"PVID_MAX_WEAK_WINDOW={design.window}",
-        f"PVID_MAX_FUNCTIONS={design.functions}",
-    )
+    return tuple(f"{macro}={value}" for macro, value in bounds_of(design).items())
 
 
 @cache

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.design import decimator
 from pvid.design.decimator import Decimator
 from pvid.models.kapitza.modes import modes_hz
+from pvid.settings.tables import WeakSizes
 
 Float = npt.NDArray[np.float64]
 
@@ -142,36 +142,20 @@ def pass_hz_of(p: Float) -> float:
     return PASS * slow_and_fast_hz(p)[1]
 
 
-class SizesOfDesign(Protocol):
-    """What the core's bounds are held against: a design, or its tables in either arithmetic."""
-
-    @property
-    def taps(self) -> int:
-        """Length of the front end's filters [samples]."""
-
-    @property
-    def decimation(self) -> int:
-        """Samples per decimated sample."""
-
-    @property
-    def window(self) -> int:
-        """Length of a window [decimated samples]."""
-
-    @property
-    def functions(self) -> int:
-        """Test functions a window."""
-
-
-def raised_bounds(design: SizesOfDesign) -> dict[str, int]:
-    """Macros of pvid/config.h whose default is too small for a design, with the values that just hold it."""
-    default = Bounds()
-    held = {
-        "PVID_MAX_TAPS": (design.taps, default.taps),
-        "PVID_MAX_DECIMATION": (design.decimation, default.decimation),
-        "PVID_MAX_WEAK_WINDOW": (design.window, default.window),
-        "PVID_MAX_FUNCTIONS": (design.functions, default.functions),
+def bounds_of(design: WeakSizes) -> dict[str, int]:
+    """Macros of pvid/config.h with the values that just hold a design."""
+    return {
+        "PVID_MAX_TAPS": design.taps,
+        "PVID_MAX_DECIMATION": design.decimation,
+        "PVID_MAX_WEAK_WINDOW": design.window,
+        "PVID_MAX_FUNCTIONS": design.functions,
     }
-    return {macro: needed for macro, (needed, most) in held.items() if needed > most}
+
+
+def raised_bounds(design: WeakSizes) -> dict[str, int]:
+    """Those of `bounds_of` that exceed the core's defaults."""
+    default = bounds_of(Bounds())
+    return {macro: needed for macro, needed in bounds_of(design).items() if needed > default[macro]}
 
 
 def window_for_run(p: Float, duration_s: float, bounds: Bounds = HOST) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.enums import Core, Form, Law
-from pvid.settings.tables import Folded
+from pvid.settings.tables import Folded, WeakSizes
 
 Float32 = npt.NDArray[np.float32]
 
@@ -73,21 +73,13 @@ class StrongConfig(Folded):
         return self
 
 
-class WeakTables(Protocol):
+class WeakTables(WeakSizes, Protocol):
     """Tables of a weak-form design, as in weak.h; pvid.design.weak makes them.
 
     smooth, second float32 [(taps - 1) / 2]; chi float32 [window, 3, functions] (orders 0, 2, 4);
     gram float32 [6, functions (functions + 1) / 2].
     """
 
-    @property
-    def taps(self) -> int: ...
-    @property
-    def decimation(self) -> int: ...
-    @property
-    def window(self) -> int: ...
-    @property
-    def functions(self) -> int: ...
     @property
     def smooth(self) -> Float32: ...
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,26 @@ class Folded:
     def delay(self) -> int:
         """Samples from the newest one back to the instant the derivatives refer to."""
         return self.half * self.stride
+
+
+class WeakSizes(Protocol):
+    """Sizes of a weak-form design, or of its tables in either arithmetic."""
+
+    @property
+    def taps(self) -> int:
+        """Length of the front end's filters [samples]."""
+
+    @property
+    def decimation(self) -> int:
+        """Samples per decimated sample."""
+
+    @property
+    def window(self) -> int:
+        """Length of a window [decimated samples]."""
+
+    @property
+    def functions(self) -> int:
+        """Test functions per window."""
 
 
 @dataclass(frozen=True, eq=False)

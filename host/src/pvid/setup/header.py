@@ -7,6 +7,7 @@ from typing import Any
 
 from pvid.core.headers import Headers, default_library
 from pvid.design.c_tables import array, struct_initializer
+from pvid.design.weak_sizing import bounds_of
 from pvid.models.kapitza import MODEL
 from pvid.settings.forms import FORMS
 from pvid.settings.kinds import FixedSettings, Settings
@@ -81,9 +82,7 @@ def _bounds(config: Any) -> dict[str, int]:
     """What pvid/config.h must hold at least."""
     if not FORMS[config.form].uses_windows:
         return {"PVID_MAX_WINDOW": config.bank.window}
-    design = config.design
-    macros = ("PVID_MAX_TAPS", "PVID_MAX_DECIMATION", "PVID_MAX_WEAK_WINDOW", "PVID_MAX_FUNCTIONS")
-    return dict(zip(macros, (design.taps, design.decimation, design.window, design.functions), strict=True))
+    return bounds_of(config.design)
 
 
 def fixed_notes(config: FixedSettings) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.errors import PvidError
 from pvid.settings.record import Array, Record
 
 Mask = npt.NDArray[np.bool_]
@@ -18,6 +19,35 @@ After = Callable[[int, Reasons], None]
 Progress = Callable[[int], None]
 
 _PROGRESS_TICKS = 512
+# Of pvid_counters.
+COUNTERS = (
+    "rows",
+    "updates",
+    "limited",
+    "bounded",
+    "held_not_excited",
+    "held_pivot",
+    "rejected_not_finite",
+    "rejected_saturated",
+    "held_uncertain",
+    "held_out_of_range",
+    "misfits",
+    "rejected_outlier",
+    "at_rest",
+)
+
+
+def of_all_lanes(accepted: Mask) -> bool:
+    """Whether the lanes accept a window [lanes].
+
+    Raises
+    ------
+    PvidError
+        When they differ: lanes of one twin share the schedule.
+    """
+    if accepted.any() != accepted.all():
+        raise PvidError("lanes of one twin must accept the same windows: their estimates differ too much")
+    return bool(accepted.all())
 
 
 @dataclass

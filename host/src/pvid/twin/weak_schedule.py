@@ -4,32 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.enums import Reason
+from pvid.settings.tables import WeakSizes
 from pvid.twin.record import Mask, Reasons
 
 Work = Iterator[Reasons | None]
 WindowT = TypeVar("WindowT")
-
-
-class Sizes(Protocol):
-    """Sizes that determine the schedule."""
-
-    @property
-    def taps(self) -> int: ...
-
-    @property
-    def decimation(self) -> int: ...
-
-    @property
-    def window(self) -> int: ...
-
-    @property
-    def functions(self) -> int: ...
 
 
 @dataclass(frozen=True)
@@ -42,7 +27,7 @@ class Schedule:
     functions: int
 
     @classmethod
-    def of(cls, design: Sizes) -> Schedule:
+    def of(cls, design: WeakSizes) -> Schedule:
         """The schedule of a design's tables."""
         return cls(design.taps, design.decimation, design.window, design.functions)
 

@@ -21,6 +21,7 @@ from pvid.twin.f32.information import Information
 from pvid.twin.f32.misfit import Misfit
 from pvid.twin.f32.pattern import PatternModel
 from pvid.twin.kapitza import strong as model
+from pvid.twin.record import COUNTERS
 
 Float32 = npt.NDArray[np.float32]
 
@@ -28,21 +29,6 @@ ROW_LIMIT = np.float32(1.0e14)
 RESIDUAL_FLOOR = np.float32(4.8e-7)
 RESIDUAL_MAX = np.float32(1e30)
 ROUNDING = np.float32(2.4e-7)  # of a step's terms
-_COUNTERS = (
-    "rows",
-    "updates",
-    "limited",
-    "bounded",
-    "held_not_excited",
-    "held_pivot",
-    "rejected_not_finite",
-    "rejected_saturated",
-    "held_uncertain",
-    "held_out_of_range",
-    "misfits",
-    "rejected_outlier",
-    "at_rest",
-)
 
 
 def _capped(residual: Float32) -> Float32:
@@ -98,7 +84,7 @@ class Estimator:
         self.innovation = np.zeros_like(self.p)
         self.information = Information(n_sums, _lanes([c.forgetting_s for c in configs]) * rate)
         self.sums = self.information.read()
-        self.counters = {name: np.zeros(len(configs), np.int64) for name in _COUNTERS}
+        self.counters = {name: np.zeros(len(configs), np.int64) for name in COUNTERS}
         self.size = np.zeros(len(configs), np.float32)
 
     @staticmethod

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from pvid.base.errors import PvidError
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import WeakTables
 from pvid.twin.f32 import weak_whiten
@@ -16,6 +15,7 @@ from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.trust import Trust
 from pvid.twin.f32.weak_window import Window
 from pvid.twin.kapitza.full_angle import Angle
+from pvid.twin.record import of_all_lanes
 
 Float32 = npt.NDArray[np.float32]
 Reasons = npt.NDArray[np.uint8]
@@ -87,10 +87,7 @@ def _passes(gate: Gate, x: Float32, design: WeakTables, estimator: RelativeEstim
             for i, place in enumerate(_PLACES[: estimator.model.n_theta]):
                 e = e - x[place, k] * estimator.theta[i]
             energy = energy + e * e
-        passes = gate.passes(energy / ((np.float32(design.functions) - np.float32(2)) * expected))
-    if passes.any() != passes.all():
-        raise PvidError("lanes of one twin must accept the same windows: their estimates differ too much")
-    return bool(passes.all())
+        return of_all_lanes(gate.passes(energy / ((np.float32(design.functions) - np.float32(2)) * expected)))
 
 
 def stages(

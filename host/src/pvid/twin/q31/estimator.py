@@ -25,6 +25,7 @@ from pvid.twin.q31.integer import (
     times_q31,
 )
 from pvid.twin.q31.scaled import Scaled, pick, scaled
+from pvid.twin.record import COUNTERS
 
 Mask = npt.NDArray[np.bool_]
 Reasons = npt.NDArray[np.uint8]
@@ -40,21 +41,6 @@ HELD_LIMIT = 2 * SUM_LIMIT  # of |b|, rr and what a step may add to them
 UNIT_BITS = cholesky.RHS_BITS - 1
 _REST_BITS = 28  # of F, for a dead zone
 _NOTHING = -200  # exponent of a number that is 0
-_COUNTERS = (
-    "rows",
-    "updates",
-    "limited",
-    "bounded",
-    "held_not_excited",
-    "held_pivot",
-    "rejected_not_finite",
-    "rejected_saturated",
-    "held_uncertain",
-    "held_out_of_range",
-    "misfits",
-    "rejected_outlier",
-    "at_rest",
-)
 
 
 def length(x: Int) -> Int:
@@ -141,7 +127,7 @@ class EstimatorQ31:
         self.exponent = np.zeros(lanes, np.int64)
         self.sums = np.zeros((model.n_sums, lanes), np.int64)
         self.fresh = np.zeros((model.n_theta, lanes), np.int64)
-        self.counters = {name: np.zeros(lanes, np.int64) for name in _COUNTERS}
+        self.counters = {name: np.zeros(lanes, np.int64) for name in COUNTERS}
         self.was_due = True
         self.prior, self.prior_exponent = self._square_ratio(self.row_sd, integers(-8))
 

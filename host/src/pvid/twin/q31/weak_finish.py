@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pvid.base.errors import PvidError
 from pvid.design.weak_q31 import COLUMN_TERMS
 from pvid.settings.enums import Reason
 from pvid.settings.tables import WeakTablesQ31
@@ -26,7 +25,7 @@ from pvid.twin.q31.integer import (
 from pvid.twin.q31.scaled import Scaled, pick, scaled
 from pvid.twin.q31.trust import VARIANCE_RATIO_BITS, TrustQ31
 from pvid.twin.q31.weak_window import Window
-from pvid.twin.record import Mask
+from pvid.twin.record import Mask, of_all_lanes
 from pvid.twin.weak_schedule import Work
 
 COLUMNS = 12
@@ -238,10 +237,7 @@ def _passes(
     for k in range(design.functions):
         e = clamp(estimator.innovation(x[: estimator.model.n_theta, k], x[_Y, k])[0], COLUMN_LIMIT)
         energy = clamp(energy + e * e, WIDE)
-    passes = gate.passes(_variance_ratio(energy, design, expected), ~saturated)
-    if passes.any() != passes.all():
-        raise PvidError("lanes of one twin must accept the same windows: their estimates differ too much")
-    return bool(passes.all())
+    return of_all_lanes(gate.passes(_variance_ratio(energy, design, expected), ~saturated))
 
 
 def stages(
