@@ -281,7 +281,7 @@ class Subject:
             memory[:] = good
 
     def status_with(self, values: dict[str, Any]) -> Status:
-        """What init says of the good configuration with other values."""
+        """The status of init for the good configuration with other values."""
         self.restore()
         for name, value in values.items():
             self.fields[name].set(value)

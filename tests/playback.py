@@ -33,7 +33,7 @@ from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 Config = WeakConfig | StrongConfig | WeakConfigQ31 | StrongConfigQ31
 Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
-UNIT = Path(__file__).resolve().parents[0] / "unit"
+UNIT = Path(__file__).resolve().parent / "unit"
 RATE = 1000.0
 RIG = LINEAR_RIG
 FINE = replace(RIG, sensor=replace(RIG.sensor, phi_lsb=standard_sensors(20).phi_lsb))

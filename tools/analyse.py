@@ -50,7 +50,7 @@ PACKAGES = {
 
 @dataclass(frozen=True, order=True)
 class Finding:
-    """What a tool says of one line."""
+    """A tool's message about one line."""
 
     tool: str
     rule: str

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
 
+from pvid.cli.page_table import put_table, with_table
 from pvid.link import frames
 from pvid.rig.file import Identifier, ModelTable, Nominal, RigFile, Sensor
 
@@ -92,13 +93,9 @@ def generated_parts(update: bool) -> Iterator[str]:
     """Writes the generated parts, or names those that differ."""
     for name, marker, text_of in GENERATED:
         page = DOCS / name
-        old = page.read_text(encoding="utf-8")
-        opening, closing = f"<!-- {marker} -->\n", f"<!-- /{marker} -->"
-        head, rest = old.split(opening, 1)
-        new = f"{head}{opening}{text_of()}\n{closing}{rest.split(closing, 1)[1]}"
         if update:
-            page.write_text(new, encoding="utf-8")
-        elif new != old:
+            put_table(page, marker, text_of())
+        elif with_table(page, marker, text_of()) != page.read_text(encoding="utf-8"):
             yield f"host/docs/{name}: {marker} is out of date: tools/docs.py --update"
 
 

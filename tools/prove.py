@@ -8,8 +8,8 @@
 A program feeds the functions of one module every input that their header allows. That Eva raises no alarm proves, for
 all of these inputs: no overflow of signed arithmetic, no value lost in a conversion to a smaller signed type, no access
 out of bounds, no division by zero, no bad shift, no uninitialised read, and the assertions of the program. Functions
-of `taken` stand for what tests/proofs/contracts.h says of them, and their conditions are shown to be met; the proof of
-their own module shows that they keep it.
+of `taken` are replaced by their contracts in tests/proofs/contracts.h, and their conditions are shown to be met; the
+proof of their own module shows that they keep the contract.
 
 Where the bound is a relation between several numbers, which intervals do not see, the functions of `deduced` carry
 contracts and loop invariants in their source, and Frama-C's WP proves these, the same absence of faults and that every
@@ -29,6 +29,8 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+
+from pvid.cli.page_table import put_table
 
 ROOT = Path(__file__).resolve().parents[1]
 INCLUDES = " ".join(
@@ -404,18 +406,6 @@ def table(results: list[tuple[Proof, Result]]) -> str:
     return "\n".join(["| program | proved for | statements | alarms left |", "|---|---|---:|---|", *rows])
 
 
-def write_table(results: list[tuple[Proof, Result]]) -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    fresh, places = re.subn(
-        r"(?s)<!-- proofs -->\n.*?<!-- /proofs -->",
-        lambda _: f"<!-- proofs -->\n{table(results)}\n<!-- /proofs -->",
-        text,
-    )
-    if places != 1:
-        raise SystemExit(f"{PAGE} has {places} places for the table of proofs")
-    PAGE.write_text(fresh, encoding="utf-8")
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(proof.name for proof in PROOFS))
@@ -438,7 +428,7 @@ def main() -> int:
         print(f"{proof.name}: {result.text}" if result.proved else f"{proof.name}: NOT PROVED\n{result.text}")
     failed = sum(not result.proved for _, result in results)
     if given.update and not failed:
-        write_table(results)
+        put_table(PAGE, "proofs", table(results))
     print(f"Found {failed} modules not proved" if failed else f"All checks passed! {len(chosen)} modules proved")
     return 1 if failed else 0
 

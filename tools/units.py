@@ -2,7 +2,7 @@
 
 The core, the link and the applications are read for this machine, for a 32-bit Cortex-M and, where they run there, for
 an AVR with its int and size_t of 16 bits; a port for the machine that it is the port of. Applications are compiled for
-a rig: tests/analysis has headers that stand for those which board.stream_image and board.replay_image make.
+a rig: headers of tests/analysis replace those that board.stream_image and board.replay_image make.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-/* Stands for the replay_run.h that pvid.board.replay_image makes of a run: settings and samples that are somewhere
- * else. */
+/* Replaces, for static analysis, the replay_run.h that pvid.board.replay_image makes of a run: declares its settings
+ * and samples. */
 #ifndef REPLAY_RUN_H
 #define REPLAY_RUN_H
 

@@ -1,5 +1,5 @@
-/* Stands for the stream_rig.h that pvid.board.stream_image makes of a rig file, where an application is read and not
- * run: tools/units.py says core and form. */
+/* Replaces, for static analysis, the stream_rig.h that pvid.board.stream_image makes of a rig file. tools/units.py
+ * defines core and form. */
 #ifndef STREAM_RIG_H
 #define STREAM_RIG_H
 

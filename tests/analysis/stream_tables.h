@@ -1,4 +1,4 @@
-/* Stands for the stream_tables.h of an image: settings that are somewhere else. */
+/* Replaces, for static analysis, the stream_tables.h of an image: declares its settings. */
 #ifndef STREAM_TABLES_H
 #define STREAM_TABLES_H
 

@@ -18,9 +18,10 @@ import pytest
 from test_stream import KINDS, Faulty, expected, play_standard, standard_rig
 
 from pvid.board import stream_image, target
-from pvid.board.boards import ROOT, one_at_a_time
+from pvid.board.boards import one_at_a_time
 from pvid.board.target import HOST_TARGET, Verdict, judge, open_target
 from pvid.core.native import Native
+from pvid.core.sources import ROOT
 
 TREE = ROOT / "build" / "native-sanitized"
 PLAYER = Path(__file__).with_name("hostile_runs.py")

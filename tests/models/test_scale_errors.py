@@ -74,7 +74,7 @@ def test_too_long_l1_moves_the_estimate_as_predicted(native: Native, run: Run) -
     for names, shifts in ((LINEAR, told.p), (PHYSICAL, told.physical)):
         for name, shift in zip(names, shifts, strict=True):
             assert wrong[name] - right[name] == pytest.approx(shift, rel=0.02, abs=1e-7 * right[name]), name
-    assert told.physical[0] == pytest.approx(0.0, abs=1e-12)  # g* = w l1 does not hang on l1
+    assert told.physical[0] == pytest.approx(0.0, abs=1e-12)  # g* = w l1 does not depend on l1
 
 
 def test_the_covariance_of_both_scales_is_their_products() -> None:

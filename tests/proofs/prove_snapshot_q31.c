@@ -1,5 +1,5 @@
 /* snapshot_strong_q31, snapshot_weak_q31: any state saved into any room; any bytes of any length restored, whose bytes
- * then are the state's but for its pointers. The hash of the configuration stands for any. */
+ * then are the state's but for its pointers. The hash of the configuration is arbitrary. */
 #include "prove.h"
 
 #include "keep/fingerprint_q31.h"

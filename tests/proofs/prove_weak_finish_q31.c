@@ -1,6 +1,6 @@
-/* weak_finish_q31: every stage of a window, at every index, of designs with 4 and with all functions and any Gram
- * tables within what init asks; on any state that the stages before can have left, window sums as weak_window_q31
- * leaves them. Of the estimator, the gate and the verdict it takes what estimator_contracts.h says of them. */
+/* finish_q31.c: every stage of a window, at every index, for designs with 4 and with all functions and any Gram tables
+ * that init accepts; on any state that earlier stages can leave, with window sums as window_q31.c leaves them. The
+ * estimator, the gate and the verdict are replaced by their contracts (estimator_contracts.h). */
 #include "prove.h"
 
 #include "contracts.h"

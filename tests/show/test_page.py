@@ -48,7 +48,7 @@ def get(address: str, path: str = "", host: str | None = None) -> bytes:
 
 
 def received(address: str) -> str:
-    """What the page says of it; empty while the server is too busy."""
+    """The page's text about it; empty while the server is too busy."""
     try:
         return str(json.loads(get(address, "state"))["received"])
     except urllib.error.URLError:

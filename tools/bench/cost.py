@@ -7,13 +7,12 @@ its cost is the difference between two numbers of ticks, so that start-up falls 
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.spread import PERIOD
+from bench.spread import PERIOD, require_valgrind
 from pvid.base.errors import PvidError
 from pvid.core.sources import INCLUDES, ROOT, sources_of
 
@@ -122,8 +121,7 @@ def stage_costs(binary: Path) -> list[StageCost]:
     PvidError
         When valgrind is missing or the binary fails.
     """
-    if shutil.which("valgrind") is None:
-        raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
+    require_valgrind()
 
     def per_tick(stage: str) -> int:
         ticks = _WEAK_TICKS if stage == "weak" else _TICKS

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pvid.base.errors import PvidError
-from pvid.board.boards import ROOT
-from pvid.core.sources import FIRMWARE, INCLUDES, PUBLIC_INCLUDES, core_sources, source
+from pvid.core.sources import FIRMWARE, INCLUDES, PUBLIC_INCLUDES, ROOT, core_sources, source
 
 LINK = FIRMWARE / "link"
 FUZZ = ROOT / "tests" / "fuzz"

@@ -11,9 +11,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from pvid.base.errors import PvidError
+from pvid.core.sources import ROOT
 
 HEADER = ("room", "claim", "cases", "ticks", "result")
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def long_table(only: tuple[str, ...] = ()) -> list[tuple[str, ...]]:

@@ -21,10 +21,9 @@ import numpy.typing as npt
 
 from bench.longevity_signals import CHUNK, L1, RATE_HZ, Disturbance, Sensing, Signals
 from pvid.base.errors import PvidError
-from pvid.board.boards import ROOT
 from pvid.core.headers import Headers, default_library
 from pvid.core.native import Identifier, Native
-from pvid.core.sources import PUBLIC_FOLDERS
+from pvid.core.sources import PUBLIC_FOLDERS, ROOT
 from pvid.rig.file import RigFile
 from pvid.settings.bounds import SIZES
 from pvid.settings.enums import Reason

@@ -28,9 +28,9 @@ from bench.longevity import (
 )
 from bench.longevity_signals import BEFORE, HELD_OUT, SCENARIOS, Disturbance
 from pvid.base.errors import PvidError
-from pvid.board.boards import ROOT, one_at_a_time
+from pvid.board.boards import one_at_a_time
 from pvid.core.native import Native
-from pvid.core.sources import FOLDERS, core_sources
+from pvid.core.sources import FOLDERS, ROOT, core_sources
 from pvid.settings.enums import Reason
 
 RESULTS = ROOT / "build" / "longevity" / "results.json"

@@ -38,6 +38,12 @@ class Spread:
         return self.longest / self.mean
 
 
+def require_valgrind() -> None:
+    """Raises a PvidError where valgrind is missing."""
+    if shutil.which("valgrind") is None:
+        raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
+
+
 def measure(binary: Path, periods: int = 2, period: int = PERIOD) -> Spread:
     """Steps the weak form of the given tick_cost binary (bench.cost.build) and counts every tick.
 
@@ -48,8 +54,7 @@ def measure(binary: Path, periods: int = 2, period: int = PERIOD) -> Spread:
     PvidError
         When valgrind is missing or the binary fails.
     """
-    if shutil.which("valgrind") is None:
-        raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
+    require_valgrind()
     with TemporaryDirectory() as folder:
         dump = Path(folder) / "ticks"
         command = ["valgrind", "--tool=callgrind", f"--toggle-collect={_STEP}", f"--dump-after={_STEP}"]

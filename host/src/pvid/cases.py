@@ -119,7 +119,7 @@ class Case(ABC):
     def alike_from(self, config: Any, ticks: int) -> int:
         """First tick of `ticks` that counts in the mean cost of a tick. From there on the weak form has whole periods
         of its windows, each with a solve, and the strong form has full windows (after 500 ticks)."""
-        if self.form == "strong":  # windows are full and the drive is noticed
+        if self.form == "strong":
             return min(500, ticks // 2)
         period = config.hop * config.design.decimation
         settled = 3 * period + config.design.taps

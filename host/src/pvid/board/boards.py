@@ -15,8 +15,8 @@ from filelock import FileLock
 
 from pvid.base.errors import PvidError
 from pvid.base.user_cache import built_under
+from pvid.core.sources import ROOT
 
-ROOT = Path(__file__).resolve().parents[4]
 BUILD = built_under(ROOT / "build") / "targets"
 SIMAVR_STDIO = BUILD / "simavr_stdio"
 COMPILED = built_under(ROOT / "build") / "cache" / "ccache"  # objects of all trees

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pvid.base.errors import PvidError
-from pvid.board.boards import BUILD, ROOT, Board, one_at_a_time, prepare_emulator
+from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
 from pvid.board.replay_image import build_image, parse_report, standard_run
+from pvid.core.sources import ROOT
 
 TICKS = 5000
 TIMEOUT_S = 300.0

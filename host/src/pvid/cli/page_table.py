@@ -11,18 +11,29 @@ from pvid.base.console import write_stderr
 from pvid.base.errors import PvidError
 
 
-def put_table(page: Path | None, marker: str, text: str) -> None:
-    """Replaces what stands between <!-- marker --> and <!-- /marker -->, or prints it when no file is given."""
-    if page is None:
-        click.echo(text)
-        return
+def with_table(page: Path, marker: str, text: str) -> str:
+    """The page with this text between <!-- marker --> and <!-- /marker -->.
+
+    Raises
+    ------
+    PvidError
+        When the page has no such lines.
+    """
     old = page.read_text(encoding="utf-8")
     opening, closing = f"<!-- {marker} -->", f"<!-- /{marker} -->"
     if opening not in old or closing not in old:
         raise PvidError(f"{page} does not contain the marker lines {opening} and {closing}")
     head, rest = old.split(opening, 1)
     tail = rest.split(closing, 1)[1]
-    write_whole(page, f"{head}{opening}\n{text}\n{closing}{tail}")
+    return f"{head}{opening}\n{text}\n{closing}{tail}"
+
+
+def put_table(page: Path | None, marker: str, text: str) -> None:
+    """Writes the text into the page, between its marker lines; prints it when no page is given."""
+    if page is None:
+        click.echo(text)
+        return
+    write_whole(page, with_table(page, marker, text))
     write_stderr(f"{page}: table {marker} written")
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from cffi import FFI
 
 from pvid.base.errors import PvidError
+from pvid.core.sources import ROOT
 
 HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the build makes with them
 
@@ -31,7 +32,7 @@ def default_library() -> Path:
 
 
 def _built() -> Path:
-    return Path(__file__).resolve().parents[4] / "build" / "host" / "host" / "native" / "libpvid_native.so"
+    return ROOT / "build" / "host" / "host" / "native" / "libpvid_native.so"
 
 
 @dataclass

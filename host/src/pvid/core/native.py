@@ -141,11 +141,8 @@ class Native:
         one = np.ascontiguousarray(estimate, self.headers.dtype("pvid_estimate_f32"))
         value, se = np.empty(3, np.float32), np.empty(3, np.float32)
         pointer = self.headers.pointer
-        return (
-            (value, se)
-            if self.library.pvid_kapitza_physical_f32(pointer(one), l1, pointer(value), pointer(se))
-            else None
-        )
+        ok = self.library.pvid_kapitza_physical_f32(pointer(one), l1, pointer(value), pointer(se))
+        return (value, se) if ok else None
 
     def physical_q31(self, estimate: npt.NDArray[np.void], scale: ScaleQ31) -> tuple[Int32, Int32] | None:
         """pvid_kapitza_physical_q31: (g, l2, rho2) and standard errors in 2^-24, None outside the physical region."""

@@ -76,11 +76,11 @@ def struct_initializer(headers: Headers, struct: Any, pointers: Mapping[str, str
     Parameters
     ----------
     headers
-        What declares it.
+        The declarations of its type.
     struct
         Its fields are numbers, arrays of them, structs and pointers.
     pointers
-        What stands for each pointer, by its field's name: "replay_weights", "&replay_design"; null without an entry.
+        C expression of each pointer, by its field's name: "replay_weights", "&replay_design"; null without an entry.
     indent
         Of the line where it begins.
     """
