@@ -1,0 +1,175 @@
+"""What the compiler makes of a mechanism; all that oracle, simulator and printers read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import sympy as sp
+
+from pvid.model.signals import Jet
+
+# order -> psi: the sum of D^order[psi] over the entries; psi holds jets of order 0 (of order 1 or more: a smoothed
+# derivative is needed), sgn, Integral and TIME, and no unknown.
+Part = Mapping[int, sp.Expr]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A recorded quantity.
+
+    Attributes
+    ----------
+    jet : its symbol; jet.of is its name
+    unit : as in "rad/s"; "" for a pure number
+    kind : "sensor" has noise; "input" is known exactly
+    resolution : of the sensor, in its unit; 0: no rounding
+    noise : standard deviation of its white noise, in resolutions (in its unit where resolution is 0)
+    reach : largest absolute value
+    hold : "zoh": the value set at t_k holds until t_(k+1); "sampled": the value at t_k
+    driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
+    """
+
+    jet: Jet
+    unit: str
+    kind: Literal["sensor", "input"]
+    resolution: float = 0.0
+    noise: float = 0.5
+    reach: float = 1.0
+    hold: Literal["zoh", "sampled"] = "sampled"
+    driven: bool = False
+
+    @property
+    def name(self) -> str:
+        """As in files."""
+        return self.jet.of
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of one sample [unit]: white noise and rounding."""
+        if self.kind == "input":
+            return 0.0
+        return self.resolution * float((1 / 12 + self.noise**2) ** 0.5) if self.resolution else self.noise
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """An entry of p.
+
+    Attributes
+    ----------
+    symbol : in the equations; its name is that of the parameter
+    unit : as in "kg*m^2"
+    guess : rough value; the start where no other is given
+    positive : identified in its logarithm, never crosses 0
+    low, high : range of the plausible
+    sd : how far off the guess can be [unit]; of positive ones 2 |guess| unless given
+    """
+
+    symbol: sp.Symbol
+    unit: str
+    guess: float
+    positive: bool
+    low: float
+    high: float
+    sd: float
+
+    @property
+    def name(self) -> str:
+        """As in files."""
+        return str(self.symbol)
+
+
+@dataclass(frozen=True)
+class Known:
+    """A constant with a value that the rig file may set."""
+
+    symbol: sp.Symbol
+    unit: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        """As in files."""
+        return str(self.symbol)
+
+
+@dataclass(frozen=True)
+class Output:
+    """A physical parameter that follows from p."""
+
+    name: str
+    unit: str
+    value: sp.Expr
+
+
+@dataclass(frozen=True)
+class Row:
+    """One kind of row: sum_j theta_j(p) N_j = Y, each N_j and Y a Part.
+
+    Attributes
+    ----------
+    name : of the equation
+    theta : expressions in p (and knowns)
+    regressors : N_j, one for each theta
+    known : Y
+    nuisances : columns with a free factor in every window
+    """
+
+    name: str
+    theta: tuple[sp.Expr, ...]
+    regressors: tuple[Part, ...]
+    known: Part
+    nuisances: tuple[Part, ...] = ()
+
+    @property
+    def top(self) -> int:
+        """Highest order of derivative that a test function takes."""
+        return max(order for part in (*self.regressors, self.known, *self.nuisances) for order in part)
+
+
+@dataclass(frozen=True)
+class CompiledModel:
+    """A mechanism ready to identify.
+
+    Attributes
+    ----------
+    name, title : as in commands; in a few words
+    signals, unknowns, knowns, outputs : as described
+    rows : their kinds, in the order of the equations
+    opaque
+        jet of an auxiliary signal -> the expression it stands for, for what the compiler must not differentiate:
+        sgn(th') of a row that was multiplied by an operator. Its jets stand in the rows like those of a signal.
+    equations : expressions = 0 as the user wrote them (in jets of signals and hidden), for the simulator
+    hidden : unmeasured coordinates
+    """
+
+    name: str
+    title: str
+    signals: tuple[Signal, ...]
+    unknowns: tuple[Unknown, ...]
+    knowns: tuple[Known, ...]
+    outputs: tuple[Output, ...]
+    rows: tuple[Row, ...]
+    opaque: Mapping[Jet, sp.Expr] = field(default_factory=dict)
+    equations: tuple[sp.Expr, ...] = ()
+    hidden: tuple[Jet, ...] = ()
+
+    @property
+    def p(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of p."""
+        return tuple(one.symbol for one in self.unknowns)
+
+    @property
+    def p_names(self) -> tuple[str, ...]:
+        """Names of p."""
+        return tuple(one.name for one in self.unknowns)
+
+    def signal(self, name: str) -> Signal:
+        """The one with this name."""
+        return next(one for one in self.signals if one.name == name)
+
+    def with_knowns(self, expression: sp.Expr) -> sp.Expr:
+        """Values in place of the known constants."""
+        return expression.xreplace({one.symbol: sp.Float(one.value) for one in self.knowns})
