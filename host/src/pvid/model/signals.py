@@ -21,6 +21,9 @@ class Jet(sp.Symbol):  # type: ignore[misc]
 
     __slots__ = ("of", "order")
 
+    of: str
+    order: int
+
     def __new__(cls, of: str, order: int = 0) -> Jet:
         if order > MAX_ORDER:
             raise ValueError(f"{of}: derivative {order} is above {MAX_ORDER}")
@@ -47,9 +50,15 @@ class sgn(sp.Function):  # type: ignore[misc] # noqa: N801
 
 
 class Integral(sp.Function):  # type: ignore[misc]
-    """Integral(f, n): the n-fold running integral of a channel f from the start of a window."""
+    """Integral(f, n): the n-fold running integral of a channel f from the start of a window.
+
+    In a definition (`CompiledModel.opaque`) from the start of the run.
+    """
 
     nargs = 2
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"Integral({printer.doprint(self.args[0])}, {self.args[1]})"
 
 
 def jets(expression: Any) -> set[Jet]:
