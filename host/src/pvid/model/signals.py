@@ -51,6 +51,10 @@ class Integral(sp.Function):  # type: ignore[misc]
 
     nargs = 2
 
+    def _sympystr(self, printer: Any) -> str:
+        """Not that of SymPy's class of the same name."""
+        return f"Integral({printer.doprint(self.args[0])}, {self.args[1]})"
+
 
 def jets(expression: Any) -> set[Jet]:
     """All jets in an expression."""
