@@ -1,7 +1,7 @@
 """Signals and their time derivatives as symbols.
 
-A signal z is a family of plain symbols z, z', z'', ... (jets): `z.d(n)` is the nth one, z itself is z.d(0). An expression
-in jets has a total derivative by the chain rule; nothing here knows the time.
+A signal z is a family of plain symbols z, z', z'', ... (jets): `z.d(n)` is the nth one, z itself is z.d(0). An
+expression in jets has a total derivative by the chain rule; nothing here knows the time.
 """
 
 from __future__ import annotations
