@@ -43,7 +43,7 @@ class Signal:
     @property
     def name(self) -> str:
         """As in files."""
-        return self.jet.of
+        return str(self.jet.of)
 
     @property
     def sd(self) -> float:
