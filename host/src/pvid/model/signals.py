@@ -1,7 +1,7 @@
 """Signals and their time derivatives as symbols.
 
 A signal z is a family of plain symbols z, z', z'', ... (jets): `z.d(n)` is the nth one, z itself is z.d(0). An
-expression in jets has a total derivative by the chain rule; nothing here depends on the time.
+expression in jets has a total derivative by the chain rule; nothing here knows the time.
 """
 
 from __future__ import annotations
@@ -50,10 +50,6 @@ class Integral(sp.Function):  # type: ignore[misc]
     """Integral(f, n): the n-fold running integral of a channel f from the start of a window."""
 
     nargs = 2
-
-    def _sympystr(self, printer: Any) -> str:
-        """SymPy prints by the name of the class, and would take it for its own Integral."""
-        return f"Integral({', '.join(printer.doprint(one) for one in self.args)})"
 
 
 def jets(expression: Any) -> set[Jet]:
