@@ -112,6 +112,17 @@ def bench_design_cost(update: bool) -> int:
     return DONE
 
 
+@bench.command(name="cell")
+@click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
+def bench_cell(folder: Path) -> int:
+    """Writes the records of a cell that is no RC circuit (needs PyBaMM)."""
+    from bench import cell
+
+    for path in cell.write(folder):
+        write_stderr(f"{path} written")
+    return DONE
+
+
 @bench.command(name="hard")
 @UPDATE
 def bench_hard(update: Path | None) -> int:
