@@ -8,6 +8,7 @@ from dataclasses import replace
 import sympy as sp
 
 from pvid.model.compiled import Row, Unknown
+from pvid.model.corners import Corners, with_corners
 from pvid.model.eliminate import Equation, Reduced, eliminate
 from pvid.model.factor import factor
 from pvid.model.lower import lower
@@ -38,6 +39,7 @@ def rows_of(
     hidden: Sequence[str],
     unknowns: Sequence[Unknown],
     rates: Mapping[str, sp.Expr],
+    corners: Sequence[Corners] = (),
     by_parts: str = "",
 ) -> list[Row]:
     """Rows in the order of the equations; `rates` contains the derivatives of signals that are integrals of others."""
@@ -46,13 +48,15 @@ def rows_of(
     rows = []
     for one in found:
         try:
-            rows.append(factor(one.name, lowered(_with_rates(one, rates), p, by_parts), p, one.nuisances))
+            parts = lowered(with_rates(one, rates), p, by_parts)
+            rows.append(factor(one.name, with_corners(parts, corners), p, one.nuisances))
         except ModelError as error:
             raise error.at(one.place) from None
     return [opaque.shown(row) for row in with_scales(rows, unknowns)]
 
 
-def _with_rates(one: Reduced, rates: Mapping[str, sp.Expr]) -> Reduced:
+def with_rates(one: Reduced, rates: Mapping[str, sp.Expr]) -> Reduced:
+    """Without derivatives of signals that are integrals of others."""
     if one.expression is None or not rates:
         return one
     orders = [jet for jet in jets(one.expression) if jet.of in rates and jet.order > 0]

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Known, Output, Signal, Unknown
 from pvid.model.compiler import rows_of
+from pvid.model.corners import corners_of
 from pvid.model.eliminate import Equation
+from pvid.model.mechanics import equations_of
 from pvid.model.normal_form import rational
 from pvid.model.refusal import ModelError, place_of_caller
 from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
@@ -37,6 +39,7 @@ class Model:
         self.defined: dict[Jet, sp.Expr] = {}
         self.equations: list[Equation] = []
         self._dimensions: dict[str, Dimension] = {}
+        self._smooth: set[str] = set()  # sensors without corners
 
     # ---- quantities
 
@@ -48,6 +51,7 @@ class Model:
         noise: float | None = None,
         reach: float = 1.0,
         driven: bool = False,
+        corners: bool = True,
     ) -> Jet:
         """A measured signal.
 
@@ -57,6 +61,7 @@ class Model:
         noise : standard deviation of its white noise, in resolutions (0.5); in its unit where there is no resolution
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
+        corners : where a held input is found in its first derivative, the corners that it has are corrected
         """
         if resolution < 0 or not math.isfinite(resolution):
             raise self._refused(f"{name}: resolution must not be negative")
@@ -64,6 +69,8 @@ class Model:
             raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
         level = 0.5 if noise is None else noise
         jet = self._signal(name, unit, reach)
+        if not corners:
+            self._smooth.add(name)
         self.signals.append(Signal(jet, unit, "sensor", float(resolution), float(level), float(reach), driven=driven))
         return jet
 
@@ -166,6 +173,20 @@ class Model:
             momentum = sp.diff(whole, q.d())
             self.equation(total_derivative(momentum) - sp.diff(whole, q) - sp.sympify(force), f"equation of {q}")
 
+    def mechanics(self, method: Any, signals: Mapping[Any, sp.Expr]) -> None:
+        """The equations of a LagrangesMethod, KanesMethod or System of sympy.physics.mechanics.
+
+        Parameters
+        ----------
+        signals : dynamicsymbol or constant -> the signal, unknown or known constant of this model
+        """
+        try:
+            found = equations_of(method, signals)
+        except ModelError as error:
+            raise error.at(place_of_caller()) from None
+        for one in found:
+            self.equation(one)
+
     # ---- result
 
     def compiled(self, name: str = "") -> CompiledModel:
@@ -196,7 +217,9 @@ class Model:
             raise ModelError(f"{self.title}: the model has no unknown")
         integrals = {jet: value for jet, value in self.defined.items() if value.has(Integral)}
         rates = {jet.of: total_derivative(value) for jet, value in integrals.items()}
-        rows = rows_of(self.equations, [jet.of for jet in self.hidden], self.unknowns, rates, by_parts)
+        hidden = [jet.of for jet in self.hidden]
+        corners = corners_of(self.equations, self.signals, hidden, self._smooth)
+        rows = rows_of(self.equations, hidden, self.unknowns, rates, corners, by_parts)
         used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
         for one in self.unknowns:
             if one.symbol not in used:
@@ -212,7 +235,7 @@ class Model:
             tuple(self.knowns),
             tuple(self.outputs),
             tuple(rows),
-            dict(self.defined),
+            {**self.defined, **{one.channel: one.value for one in corners}},
             tuple(simulated),
             (*self.hidden, *integrals),
         )
