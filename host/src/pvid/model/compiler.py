@@ -8,7 +8,6 @@ from dataclasses import replace
 import sympy as sp
 
 from pvid.model.compiled import Row, Unknown
-from pvid.model.corners import Corners, with_corners
 from pvid.model.eliminate import Equation, Reduced, eliminate
 from pvid.model.factor import factor
 from pvid.model.lower import lower
@@ -39,7 +38,6 @@ def rows_of(
     hidden: Sequence[str],
     unknowns: Sequence[Unknown],
     rates: Mapping[str, sp.Expr],
-    corners: Sequence[Corners] = (),
     by_parts: str = "",
 ) -> list[Row]:
     """Rows in the order of the equations; `rates` contains the derivatives of signals that are integrals of others."""
@@ -49,7 +47,7 @@ def rows_of(
     for one in found:
         try:
             parts = lowered(with_rates(one, rates), p, by_parts)
-            rows.append(factor(one.name, with_corners(parts, corners), p, one.nuisances))
+            rows.append(factor(one.name, parts, p, one.nuisances))
         except ModelError as error:
             raise error.at(one.place) from None
     return [opaque.shown(row) for row in with_scales(rows, unknowns)]

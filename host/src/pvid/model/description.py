@@ -11,7 +11,6 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Known, Output, Signal, Unknown
 from pvid.model.compiler import rows_of
-from pvid.model.corners import corners_of
 from pvid.model.eliminate import Equation
 from pvid.model.mechanics import equations_of
 from pvid.model.normal_form import rational
@@ -39,7 +38,6 @@ class Model:
         self.defined: dict[Jet, sp.Expr] = {}
         self.equations: list[Equation] = []
         self._dimensions: dict[str, Dimension] = {}
-        self._smooth: set[str] = set()  # sensors without corners
 
     # ---- quantities
 
@@ -51,7 +49,6 @@ class Model:
         noise: float | None = None,
         reach: float = 1.0,
         driven: bool = False,
-        corners: bool = True,
     ) -> Jet:
         """A measured signal.
 
@@ -61,7 +58,6 @@ class Model:
         noise : standard deviation of its white noise, in resolutions (0.5); in its unit where there is no resolution
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
-        corners : where a held input is found in its first derivative, the corners that it has are corrected
         """
         if resolution < 0 or not math.isfinite(resolution):
             raise self._refused(f"{name}: resolution must not be negative")
@@ -69,8 +65,6 @@ class Model:
             raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
         level = 0.5 if noise is None else noise
         jet = self._signal(name, unit, reach)
-        if not corners:
-            self._smooth.add(name)
         self.signals.append(Signal(jet, unit, "sensor", float(resolution), float(level), float(reach), driven=driven))
         return jet
 
@@ -218,8 +212,7 @@ class Model:
         integrals = {jet: value for jet, value in self.defined.items() if value.has(Integral)}
         rates = {jet.of: total_derivative(value) for jet, value in integrals.items()}
         hidden = [jet.of for jet in self.hidden]
-        corners = corners_of(self.equations, self.signals, hidden, self._smooth)
-        rows = rows_of(self.equations, hidden, self.unknowns, rates, corners, by_parts)
+        rows = rows_of(self.equations, hidden, self.unknowns, rates, by_parts)
         used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
         for one in self.unknowns:
             if one.symbol not in used:
@@ -235,7 +228,7 @@ class Model:
             tuple(self.knowns),
             tuple(self.outputs),
             tuple(rows),
-            {**self.defined, **{one.channel: one.value for one in corners}},
+            dict(self.defined),
             tuple(simulated),
             (*self.hidden, *integrals),
         )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Row
+from pvid.model.corners import slopes
 from pvid.model.identifiability import Identifiability, Shift, Symmetry, identifiable
 from pvid.model.readable import listed, readable, readable_part
 from pvid.model.signals import jets
@@ -89,7 +90,10 @@ def _row(row: Row) -> str:
 
 def _advice(compiled: CompiledModel) -> list[str]:
     """Remarks on what the rows need of the sensors."""
-    lines = []
+    lines = [
+        f"{sensor} has a corner at every step of {name}: rows get a channel for it, with the factor {readable(slope)}."
+        for (sensor, name), slope in slopes(compiled).items()
+    ]
     for row in compiled.rows:
         psis = [psi for part in (*row.regressors, row.known) for psi in part.values()]
         needs = sorted({jet for psi in psis for jet in jets(psi) if jet.order > 0}, key=str)

@@ -68,12 +68,6 @@ class Integral(sp.Function):  # type: ignore[misc]
         return f"Integral({printer.doprint(self.args[0])}, {self.args[1]})"
 
 
-class Corner(sp.Function):  # type: ignore[misc]
-    """Corner(V) = dt/12 (V_k - V_(k-1)) of an input that is held from sample to sample; stands in definitions only."""
-
-    nargs = 1
-
-
 def jets(expression: Any) -> set[Jet]:
     """All jets in an expression."""
     return set(sp.sympify(expression).atoms(Jet))
