@@ -12,7 +12,11 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal, Unknown
 from pvid.model.signals import Jet, sgn
 from pvid.models.drive import Chirp, RandomSteps, Sines, Steps, Sum
+from pvid.models.model import Channel
 from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
+from pvid.rig.columns import Columns
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import read_recording
 from pvid.sim.bound import bound
 from pvid.sim.drives import DRIVES, drive_named
 from pvid.sim.imperfections import Imperfections, with_play
@@ -163,13 +167,15 @@ def test_wrong_requests_are_one_sentence(simulation: RigSimulation) -> None:
 
 def test_run_is_written_with_its_rig_file(simulation: RigSimulation, tmp_path: Path) -> None:
     run = simulation.run(0)
-    settings = write_simulated_run(tmp_path / "shaft.csv", run, simulation.model, simulation.rig)
-    table = np.genfromtxt(tmp_path / "shaft.csv", delimiter=",", names=True)
-    assert table.dtype.names == ("t", "M", "phi", "psi")
-    for name, values in run.items():
-        np.testing.assert_array_equal(table[name], values)
+    settings = write_simulated_run(tmp_path / "shaft.csv", run, simulation)
     assert settings == tmp_path / "shaft.toml"
-    assert 'name = "shaft"' in settings.read_text(encoding="utf-8")
+    rig = MechanismRig.parse(settings.read_text(encoding="utf-8"))
+    assert (rig.model, rig.sample_rate) == ("shaft", 1000.0)
+    channels = tuple(Channel(one.name, one.unit, one.name) for one in simulation.model.signals)
+    again = read_recording(tmp_path / "shaft.csv", rig.sample_rate, Columns(channels=channels))
+    assert list(again.signals) == ["M", "phi", "psi"] and again.notes == ()
+    for name, values in again.signals.items():
+        np.testing.assert_array_equal(values, run[name])
 
 
 # ---- drives

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from pvid.model.signals import Jet
 from pvid.models.simulated_rig import Servo
 from pvid.sim.simulated_run import RigSimulation
 
@@ -25,7 +26,7 @@ def bound(simulation: RigSimulation, window_s: float | None = None) -> Float:
         Length of the windows [s]; the rig's own by default.
     """
     information = information_of(simulation, window_s)
-    size = np.sqrt(np.diag(information))
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
     shown = size > 0
     scaled = information[np.ix_(shown, shown)] / np.outer(size[shown], size[shown])
     out = np.full(len(size), np.inf)
@@ -39,22 +40,22 @@ def information_of(simulation: RigSimulation, window_s: float | None = None) -> 
     truth = simulation.truth
     trajectory = simulation.motion()
     n = round((window_s or rig.window_s) * rig.sample_rate)
-    jets = len(plant.motion.states) - plant.motion.folds
-    span = np.ptp(trajectory.states[:, :jets], axis=0) + 1e-9
+    known = {jet.of for jet in simulation.model.opaque}  # integrals of what is driven, from the start of the run
+    free = [place for place, one in enumerate(plant.motion.states) if isinstance(one, Jet) and one.of not in known]
+    span = np.ptp(trajectory.states, axis=0) + 1e-9
     steps = _NUDGE * np.where(truth != 0.0, np.abs(truth), 1.0)
     total = np.zeros((len(truth), len(truth)))
     for first in range(0, simulation.samples - n + 1, n):
         window = _Window(simulation, first, n)
         start = trajectory.states[first]
         slopes = [_slope(window, truth, start, p=place, step=step) for place, step in enumerate(steps)]
-        slopes += [
-            _slope(window, truth, start, x=place, step=_NUDGE * width) * width for place, width in enumerate(span)
-        ]
+        for place in free:
+            slopes.append(_slope(window, truth, start, x=place, step=_NUDGE * span[place]) * span[place])
         stacked = np.array(slopes)
         whole = stacked @ stacked.T
         q = len(truth)
-        free = np.linalg.pinv(whole[q:, q:], rcond=_DEPENDENT, hermitian=True)
-        total += whole[:q, :q] - whole[:q, q:] @ free @ whole[q:, :q]
+        inverse = np.linalg.pinv(whole[q:, q:], rcond=_DEPENDENT, hermitian=True)
+        total += whole[:q, :q] - whole[:q, q:] @ inverse @ whole[q:, :q]
     return total
 
 

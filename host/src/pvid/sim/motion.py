@@ -33,7 +33,6 @@ class Motion:
     signs : s [ns]
     arguments : of the signs [ns], in x, u and the constants
     slopes : d arguments / d x [ns, nx]
-    folds : of running integrals, how many of the states, the last ones, are such
     """
 
     states: tuple[sp.Symbol, ...]
@@ -46,7 +45,6 @@ class Motion:
     signs: tuple[sp.Symbol, ...]
     arguments: tuple[sp.Expr, ...]
     slopes: sp.Matrix
-    folds: int
 
     def state(self, name: str) -> int:
         """Place of a state in x; PvidError where there is none."""
@@ -99,7 +97,6 @@ def motion_of(model: CompiledModel) -> Motion:
         signs=tuple(marks.values()),
         arguments=arguments,
         slopes=sp.Matrix(len(arguments), len(states), lambda i, j: sp.diff(arguments[i], states[j])),
-        folds=len(folds),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,12 @@ import numpy.typing as npt
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal
-from pvid.models.simulated_rig import Servo, SimulatedRig
-from pvid.rig.csv_table import write_csv
+from pvid.models.mechanisms import compiled_of
+from pvid.models.model import Channel
+from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording, write_recording
+from pvid.sim.drives import drive_named
 from pvid.sim.imperfections import Imperfections, disturbance, eccentric, with_play
 from pvid.sim.plant import Control, Friction, Plant, Trajectory
 from pvid.sim.sensing import sensed
@@ -153,13 +158,48 @@ def _check_names(model: CompiledModel, given: tuple[Mapping[str, float], ...]) -
                 raise PvidError(f"{name} is no signal of {model.name}; signals are {', '.join(sorted(known))}")
 
 
-def write_simulated_run(path: Path, run: Mapping[str, Float], model: CompiledModel, rig: SimulatedRig) -> Path:
-    """Writes the run as CSV and, beside it, its rig file, whose path is returned."""
+@cache
+def simulation_of(name: str) -> RigSimulation:
+    """The shipped rig of a mechanism; PvidError where there is none."""
+    return RigSimulation.of(compiled_of(name), simulated_rig(name))
+
+
+def rig_of_guess(
+    model: CompiledModel, drive: str, low_hz: float, high_hz: float, *, rate: float, duration: float, share: float = 0.5
+) -> SimulatedRig:
+    """A rig whose truth is the model's guess, at rest, with every driven signal on a drive of the list.
+
+    Parameters
+    ----------
+    drive, low_hz, high_hz
+        Name in `DRIVES`, and its band [Hz].
+    rate, duration
+        [Hz] and [s].
+    share
+        Largest value of each drive over the reach of its signal.
+    """
+    driven = [one for one in model.signals if one.driven or one.kind == "input"]
+    return SimulatedRig(
+        model=model.name,
+        truth={one.name: one.guess for one in model.unknowns},
+        drive={
+            one.name: drive_named(drive, share * one.reach, low_hz, high_hz, number)
+            for number, one in enumerate(driven)
+        },
+        sample_rate=rate,
+        duration=duration,
+    )
+
+
+def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSimulation) -> Path:
+    """Writes a run (the suffix gives the format) and beside it its rig file, whose path is returned."""
+    model, rate = simulation.model, simulation.rig.sample_rate
+    signals = {one.name: run[one.name] for one in model.signals}
+    channels = tuple(Channel(one.name, one.unit, one.name) for one in model.signals)
+    write_recording(path, Recording(run["t"], signals, rate), channels)
     settings = path.with_suffix(".toml")
-    text = f'sample_rate = {rig.sample_rate!r}  # Hz\n\n[model]\nname = "{model.name}"\n'
     try:
-        write_whole(path, write_csv(path, {name: values for name, values in run.items()}))
-        write_whole(settings, text)
+        write_whole(settings, MechanismRig(model.name, rate, known=simulation.rig.knowns).text())
     except OSError as error:
-        raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
+        raise PvidError(f"{settings}: cannot be written: {error.strerror}") from error
     return settings

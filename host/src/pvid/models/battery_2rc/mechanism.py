@@ -4,7 +4,7 @@ from pvid.model import Integral, Model
 
 model = Model("battery, 2 RC")
 v = model.sensor("v", "V", resolution=1e-3, reach=5)
-i = model.sensor("i", "A", resolution=5e-3, reach=5, driven=True)
+i = model.sensor("i", "A", resolution=5e-3, reach=12, driven=True)
 z = model.define("z", "A*s", Integral(i, 1))
 h1, h2 = model.unmeasured("h1", "V"), model.unmeasured("h2", "V")
 R0, R1, R2 = model.unknown("R0", "ohm", 0.02), model.unknown("R1", "ohm", 0.015), model.unknown("R2", "ohm", 0.02)

@@ -4,14 +4,14 @@ from pvid.models.drive import Sines
 from pvid.models.simulated_rig import Servo, SimulatedRig
 
 
-def _servo(axis: int, coordinate: str) -> Servo:
-    tones = ((2.0, 0.5 + 0.3 * axis, float(axis)), (1.5, 1.7 + 0.6 * axis, 0.0))
-    return Servo(coordinate, Sines(tones), kp=0.3, kd=0.0)
+def _servo(axis: int) -> Servo:
+    tones = ((0.6, 0.5 + 0.3 * axis, float(axis)), (0.4, 1.7 + 0.6 * axis, 0.0))
+    return Servo(f"w{axis}", Sines(tones), kp=0.3, kd=0.0)
 
 
 RIG = SimulatedRig(
     model="rigid_body",
     truth=dict(Ixx=0.012, Iyy=0.014, Izz=0.022, Ixy=5e-4, Ixz=-3e-4, Iyz=4e-4),
-    drive={f"m{axis}": _servo(place, f"w{axis}") for place, axis in enumerate("xyz")},
+    drive={f"m{axis}": _servo(axis) for axis in range(3)},
     window_s=1.0,
 )

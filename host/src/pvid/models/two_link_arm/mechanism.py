@@ -5,7 +5,7 @@ from math import pi
 from pvid.model import Model, cos, sgn, sin
 
 model = Model("two-link arm")
-t1, t2 = model.input("t1", "N*m", hold="zoh", reach=5), model.input("t2", "N*m", hold="zoh", reach=2)
+t1, t2 = model.input("t1", "N*m", hold="zoh", reach=8), model.input("t2", "N*m", hold="zoh", reach=2)
 q1 = model.sensor("q1", "rad", resolution=2 * pi / 2**14, reach=4)
 q2 = model.sensor("q2", "rad", resolution=2 * pi / 2**14, reach=4)
 l1, m2, g = model.known("l1", "m", 0.3), model.known("m2", "kg", 0.8), model.known("g", "m/s^2", 9.81)
