@@ -13,7 +13,9 @@ from conftest import ROOT
 SOURCE = ROOT / "host" / "src"
 
 # Each imports from itself and from those before it.
-ORDER = "base settings model models core rig sim design oracle setup twin link cases run board log show cli".split()
+ORDER = """
+base settings model models core rig sim design oracle setup twin codegen link cases run board log show cli
+""".split()
 
 # Names of the pendulum's parameters stand in its own rooms only: what shows, stores or sends them asks the model.
 PENDULUMS = ("models/kapitza", "twin/kapitza", "oracle", "sim", "models/two_link_arm")  # the arm has a c1 and a c2

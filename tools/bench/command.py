@@ -112,6 +112,30 @@ def bench_design_cost(update: bool) -> int:
     return DONE
 
 
+@bench.command(name="cell")
+@click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
+def bench_cell(folder: Path) -> int:
+    """Writes the records of a cell that is no RC circuit (needs PyBaMM)."""
+    from bench import cell
+
+    for path in cell.write(folder):
+        write_stderr(f"{path} written")
+    return DONE
+
+
+@bench.command(name="recordings")
+@click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
+@click.option("--into", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
+def bench_recordings(checkouts: Path, folder: Path) -> int:
+    """Cuts two pieces of each recording of real hardware from checkouts of the repositories that hold them."""
+    from bench import recordings
+
+    for source in recordings.SOURCES:
+        for path in recordings.write_source(source, checkouts, folder):
+            write_stderr(f"{path} written")
+    return DONE
+
+
 @bench.command(name="hard")
 @UPDATE
 def bench_hard(update: Path | None) -> int:
