@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import sympy as sp
 
 from pvid.codegen.functions import ModelFunctions, Term
-from pvid.model.signals import Integral
+from pvid.model.compiled import Part
+from pvid.model.refusal import ModelError
+from pvid.model.units import NUMBER, PER_SECOND, Dimension, dimension_of, dimension_of_unit
 
 
 def parameters(functions: ModelFunctions) -> list[str]:
@@ -29,31 +33,60 @@ def channels(functions: ModelFunctions) -> list[str]:
 
 def integrands(functions: ModelFunctions) -> list[str]:
     """What is integrated, and how often."""
-    folds = [one.symbol.args[1] for one in functions.inputs if isinstance(one.symbol, Integral)]
-    labels = zip(functions.integrands.labels, folds, strict=True)
-    return _table([(f"integrand[{k}]", f"{label}, {fold}-fold") for k, (label, fold) in enumerate(labels)])
+    places = [k for k, one in enumerate(functions.inputs) if one.fold]
+    labels = zip(functions.integrands.labels, places, strict=True)
+    return _table([(f"integrand[{k}]", label, f"of in[{place}]") for k, (label, place) in enumerate(labels)])
 
 
 def rows(functions: ModelFunctions) -> list[str]:
     """Each kind of row: its theta with their regressors, and Y."""
     lines = []
-    for number, kind in enumerate(functions.kinds):
+    dimensions = _dimensions(functions)
+    for number, (kind, row) in enumerate(zip(functions.kinds, functions.model.rows, strict=True)):
         lines.append(f"Row {number}, {kind.name}:")
         table = []
-        for offset, place in enumerate(kind.theta):
-            column = kind.columns[offset]
-            table.append(
-                (f"theta[{place}]", functions.theta.labels[place], f"N[{offset}]", regressor(functions, column))
-            )
-        table.append(("", "", "Y", regressor(functions, kind.known)))
+        for offset, (place, theta, part) in enumerate(zip(kind.theta, row.theta, row.regressors, strict=True)):
+            units = _unit_of(theta, dimensions), _unit_of_part(part, dimensions)
+            column = regressor(functions, kind.columns[offset])
+            table.append((f"theta[{place}]", str(theta), units[0], f"N[{offset}]", units[1], column))
+        table.append(("", "", "", "Y", _unit_of_part(row.known, dimensions), regressor(functions, kind.known)))
         for k in range(kind.nuisances):
-            table.append(("", "free in each window", "", regressor(functions, kind.known + 1 + k)))
+            table.append(("", "free in each window", "", "", "", regressor(functions, kind.known + 1 + k)))
         lines += _table(table)
     return lines
 
 
+def _dimensions(functions: ModelFunctions) -> dict[str, Dimension]:
+    """Of signals, parameters, constants and defined signals by name."""
+    model = functions.model
+    named = {one.name: dimension_of_unit(one.unit) for one in model.signals}
+    named |= {one.name: dimension_of_unit(one.unit) for one in model.unknowns}
+    named |= {one.name: dimension_of_unit(one.unit) for one in model.knowns}
+    for jet, value in model.opaque.items():
+        named[jet.of] = dimension_of(value, named) or NUMBER
+    return named
+
+
+def _unit_of(expression: sp.Expr, dimensions: Mapping[str, Dimension]) -> str:
+    """As in [kg*m^2]; nothing where the description's units do not agree."""
+    try:
+        return f"[{dimension_of(expression, dimensions) or NUMBER}]"
+    except ModelError:
+        return ""
+
+
+def _unit_of_part(part: Part, dimensions: Mapping[str, Dimension]) -> str:
+    for order, psi in part.items():
+        try:
+            found = dimension_of(sp.sympify(psi), dimensions) or NUMBER
+        except ModelError:
+            return ""
+        return f"[{found * PER_SECOND.power(sp.Integer(order))}]"
+    return ""
+
+
 def regressor(functions: ModelFunctions, column: int) -> str:
-    """As in D2[phi] - 2 D[channel]; D2 is the second derivative, which acts on the test functions."""
+    """As in D2(phi) - 2 D(channel); D2 is the second derivative, which acts on the test functions."""
     text = ""
     for term in functions.terms:
         if term.column == column:
@@ -67,7 +100,8 @@ def _term(functions: ModelFunctions, term: Term, first: bool) -> str:
     size = abs(term.factor)
     sign = "-" if term.factor < 0 else "+"
     head = ("-" if sign == "-" else "") if first else f" {sign} "
-    return f"{head}{'' if size == 1 else f'{size} '}{operator}[{label}]"
+    factor = str(size) if size.denominator < 1000 else f"{float(size):.9g}"
+    return f"{head}{'' if size == 1 else f'{factor} '}{operator}({label})"
 
 
 def _table(rows: Sequence[tuple[str, ...]]) -> list[str]:

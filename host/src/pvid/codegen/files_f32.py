@@ -33,7 +33,7 @@ def header(functions: ModelFunctions, command: str) -> str:
         "",
         *banner(functions, command),
         "",
-        "Units: SI. D[c] is the time derivative of a channel c, D2[c] the second.",
+        "Units: SI. D(c) is the time derivative of a channel c, D2(c) the second derivative.",
         "",
         "Parameters:",
         *describe.parameters(functions),

@@ -9,7 +9,7 @@ p -> theta, p -> non-zeros of C      of all kinds of rows, one kind after the ot
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -19,7 +19,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.names import identifiers
 from pvid.codegen.operations import Program, exact, program_of
 from pvid.model.compiled import CompiledModel, Part
-from pvid.model.signals import TIME, Integral, Jet, jets, sgn
+from pvid.model.signals import TIME, Integral, Jet, jets, sgn, total_derivative
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,8 @@ class Input:
     unit : "" for a pure number
     reach : largest absolute value, as far as the description tells: of a derivative that of the signal per second^n,
         of an integral and the time that of a window of one second
+    fold : of an integral, how often its integrand is integrated; 0 for others
+    since_start : the integral runs since the start of the run; else since that of the window
     """
 
     symbol: sp.Expr
@@ -41,6 +43,8 @@ class Input:
     meaning: str
     unit: str
     reach: float
+    fold: int = 0
+    since_start: bool = False
 
 
 @dataclass(frozen=True)
@@ -150,12 +154,14 @@ def functions_of(
         Where a parameter is in no theta, or an expression has no C.
     """
     name = identifiers([model.name])[0]
-    bases, terms, kinds = _columns(model)
+    plain = _Plain(model)
+    bases, terms, kinds = _columns(model, plain)
     integrals = sorted({one for base in bases for one in base.atoms(Integral)}, key=sp.default_sort_key)
-    inputs = _inputs(model, bases, integrals, signs_are_inputs)
+    runs = {mark: one for mark, one in plain.runs.items() if any(mark in base.free_symbols for base in bases)}
+    folded = tuple(plain(one.args[0]) for one in (*integrals, *runs.values()))
+    inputs = _inputs(model, [*bases, *folded], integrals, runs, signs_are_inputs)
     symbols, names = [one.symbol for one in inputs], [one.name for one in inputs]
-    folded = tuple(_opaque_gone(model, one.args[0]) for one in integrals)
-    theta = tuple(model.with_knowns(one) for row in model.rows for one in row.theta)
+    theta = tuple(with_values(model, one) for row in model.rows for one in row.theta)
     p_names = identifiers(model.p_names)
     c_row, c_column, c = _jacobian(model, theta)
 
@@ -185,12 +191,46 @@ def functions_of(
     )
 
 
-def _opaque_gone(model: CompiledModel, expression: sp.Expr) -> sp.Expr:
-    """With values for the known constants, and the expressions that auxiliary signals stand for."""
-    return model.with_knowns(expression.xreplace(dict(model.opaque)))
+def with_values(model: CompiledModel, expression: sp.Expr) -> sp.Expr:
+    """The values of known constants in place of their symbols, as the decimal fractions they were written as."""
+    return expression.xreplace({one.symbol: sp.Rational(repr(one.value)) for one in model.knowns})
 
 
-def _columns(model: CompiledModel) -> tuple[tuple[sp.Expr, ...], tuple[Term, ...], tuple[RowKind, ...]]:
+class _Plain:
+    """Replaces the known constants by their values, and defined signals by their definitions.
+
+    runs : symbol -> the integral since the start of the run that it stands for
+    """
+
+    def __init__(self, model: CompiledModel) -> None:
+        self.model = model
+        self.runs: dict[sp.Symbol, sp.Expr] = {}
+        self._definitions: dict[str, sp.Expr] = {}
+        for jet, value in model.opaque.items():
+            marks = {one: self._mark(jet, one, whole=one == value) for one in value.atoms(Integral)}
+            self._definitions[jet.of] = value.xreplace(marks)
+
+    def _mark(self, jet: Jet, integral: sp.Expr, whole: bool) -> sp.Symbol:
+        name = jet.of if whole else f"{jet.of}_integral"
+        number = sum(str(one).startswith(name) for one in self.runs)
+        mark = sp.Symbol(f"{name}_{number}" if number else name, real=True)
+        self.runs[mark] = integral
+        return mark
+
+    def __call__(self, expression: sp.Expr) -> sp.Expr:
+        values = {
+            jet: self._derivative(self._definitions[jet.of], jet.order)
+            for jet in jets(expression)
+            if jet.of in self._definitions
+        }
+        return with_values(self.model, expression.xreplace(values))
+
+    def _derivative(self, definition: sp.Expr, order: int) -> sp.Expr:
+        whole = total_derivative(definition.xreplace(self.runs), order) if order else definition
+        return whole.xreplace({one: mark for mark, one in self.runs.items()})
+
+
+def _columns(model: CompiledModel, plain: _Plain) -> tuple[tuple[sp.Expr, ...], tuple[Term, ...], tuple[RowKind, ...]]:
     """Channels, the terms that make columns of them, and the kinds of rows."""
     channels: dict[sp.Expr, int] = {}
     terms: list[Term] = []
@@ -199,7 +239,7 @@ def _columns(model: CompiledModel) -> tuple[tuple[sp.Expr, ...], tuple[Term, ...
     for kind, row in enumerate(model.rows):
         first = column
         for part in (*row.regressors, row.known, *row.nuisances):
-            for order, base, factor in _split(model, part):
+            for order, base, factor in _split(plain, part):
                 place = channels.setdefault(base, len(channels))
                 terms.append(Term(kind, column, order, place, factor))
             column += 1
@@ -209,11 +249,11 @@ def _columns(model: CompiledModel) -> tuple[tuple[sp.Expr, ...], tuple[Term, ...
     return tuple(channels), tuple(terms), tuple(kinds)
 
 
-def _split(model: CompiledModel, part: Part) -> list[tuple[int, sp.Expr, Fraction]]:
+def _split(plain: _Plain, part: Part) -> list[tuple[int, sp.Expr, Fraction]]:
     """Order, channel and factor of each term of a part."""
     found = []
     for order, psi in sorted(part.items()):
-        whole = sp.expand(_opaque_gone(model, sp.sympify(psi)))
+        whole = sp.expand(plain(sp.sympify(psi)))
         for term in sorted(sp.Add.make_args(whole), key=sp.default_sort_key):
             factor, base = term.as_independent(*term.free_symbols, as_Add=False)
             if factor != 0:
@@ -236,10 +276,13 @@ def _jacobian(
 
 
 def _inputs(
-    model: CompiledModel, channels: Sequence[sp.Expr], integrals: Sequence[sp.Expr], signs_are_inputs: bool
+    model: CompiledModel,
+    seen: Sequence[sp.Expr],
+    integrals: Sequence[sp.Expr],
+    runs: Mapping[sp.Symbol, sp.Expr],
+    signs_are_inputs: bool,
 ) -> tuple[Input, ...]:
     """Signals in the model's order with their derivatives, integrals, the time, signs."""
-    seen: list[sp.Expr] = [*channels, *(_opaque_gone(model, one.args[0]) for one in integrals)]
     outside = [one.xreplace({integral: sp.Integer(0) for integral in integrals}) for one in seen]
     signs: list[sp.Expr] = []
     if signs_are_inputs:
@@ -250,22 +293,27 @@ def _inputs(
     unknown = sorted(jet.of for jet in used if jet.of not in order)
     if unknown:
         raise PvidError(f"{model.name}: {unknown[0]} is no signal of the mechanism, but in a channel")
-    named: list[tuple[sp.Expr, str, str, str, float]] = []  # symbol, name, meaning, unit, reach
+    found: list[Input] = []
     for jet in sorted(used, key=lambda jet: (order.index(jet.of), jet.order)):
         signal = model.signal(jet.of)
-        named.append((jet, str(jet), _meaning(jet), _derived_unit(signal.unit, jet.order), signal.reach))
+        found.append(Input(jet, str(jet), _meaning(jet), _derived_unit(signal.unit, jet.order), signal.reach))
     for k, integral in enumerate(integrals):
-        integrand, fold = integral.args
-        named.append((integral, f"integral_{k}", f"{fold}-fold running integral of {integrand}", "", 1.0))
+        found.append(_integral(integral, integral, f"integral_{k}", since_start=False))
+    for mark, integral in runs.items():
+        found.append(_integral(mark, integral, str(mark), since_start=True))
     if any(TIME in one.free_symbols for one in outside):
-        named.append((TIME, "t", "time since the start of the window", "s", 1.0))
+        found.append(Input(TIME, "t", "time since the start of the window", "s", 1.0))
     for k, sign in enumerate(signs):
-        named.append((sign, f"sign_{k}", f"sign of {sign.args[0]}", "", 1.0))
-    names = identifiers([one[1] for one in named])
-    return tuple(
-        Input(symbol, name, meaning, unit, reach)
-        for (symbol, _, meaning, unit, reach), name in zip(named, names, strict=True)
-    )
+        found.append(Input(sign, f"sign_{k}", f"sign of {sign.args[0]}", "", 1.0))
+    names = identifiers([one.name for one in found])
+    return tuple(replace(one, name=name) for one, name in zip(found, names, strict=True))
+
+
+def _integral(symbol: sp.Expr, integral: sp.Expr, name: str, since_start: bool) -> Input:
+    integrand, fold = integral.args[0], int(integral.args[1])
+    what = f"integral of {integrand}" if fold == 1 else f"{fold}-fold integral of {integrand}"
+    since = "run" if since_start else "window"
+    return Input(symbol, name, f"{what} since the start of the {since}", "", 1.0, fold, since_start)
 
 
 def _meaning(jet: Jet) -> str:

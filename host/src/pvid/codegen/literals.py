@@ -34,5 +34,5 @@ def c_literal(value: Fraction) -> str:
 
 
 def python_literal(value: Fraction) -> str:
-    """As in F(0.25)."""
-    return f"F({float_literal(float32_of(value)).removesuffix('f')})"
+    """As in _F(0.25)."""
+    return f"_F({float_literal(float32_of(value)).removesuffix('f')})"

@@ -18,7 +18,7 @@ _CALLS = {
 
 
 def function(name: str, program: Program, summary: str) -> str:
-    """A definition; x float32 [inputs, ...] gives [results, ...]."""
+    """A definition; of float32 [inputs, ...] it makes [results, ...]."""
     prefix = temporary_prefix(program.arguments)
     names: list[str] = []
     lines: list[str] = []
@@ -27,21 +27,21 @@ def function(name: str, program: Program, summary: str) -> str:
             names.append(python_literal(value.value))
         elif isinstance(value, Argument):
             argument = program.arguments[value.place]
-            lines.append(f"{argument} = x[{value.place}]")
+            lines.append(f"{argument} = _in[{value.place}]")
             names.append(argument)
         else:
             operands = [names[one] for one in value.operands]
             call = _CALLS.get(value.kind, f"{{}} {value.kind} {{}}").format(*operands)
             lines.append(f"{prefix}{place} = {call}")
             names.append(f"{prefix}{place}")
-    lines += [f"out[{k}] = {names[place]}" for k, place in enumerate(program.results)]
+    lines += [f"_out[{k}] = {names[place]}" for k, place in enumerate(program.results)]
     return "\n".join(
         [
-            f"def {name}(x: Float32) -> Float32:",
+            f"def {name}(_in: Float32) -> Float32:",
             f'    """{summary}"""',
-            f"    out = np.empty(({len(program.results)}, *x.shape[1:]), np.float32)",
+            f"    _out = np.empty(({len(program.results)}, *_in.shape[1:]), np.float32)",
             '    with np.errstate(all="ignore"):',
             *(f"        {line}" for line in lines),
-            "    return out",
+            "    return _out",
         ]
     )

@@ -31,7 +31,7 @@ def text(functions: ModelFunctions, command: str) -> str:
         f'"""Twin of {functions.name}_f32.c: {model.title}.\n\n' + "\n".join(banner(functions, command)) + '\n"""',
         "from __future__ import annotations",
         "import numpy as np\nimport numpy.typing as npt\n\nfrom pvid.twin.f32 import elementary",
-        "Float32 = npt.NDArray[np.float32]\nF = np.float32",
+        "Float32 = npt.NDArray[np.float32]\n_F = np.float32",
         "\n".join(
             [
                 f"P = {tuple(model.p_names)!r}",
