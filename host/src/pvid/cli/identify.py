@@ -13,7 +13,6 @@ from pvid.cli.input import FigurePath, form_options, print_notes, read_input, wi
 from pvid.cli.result import identified, print_result, print_warning, write_figure
 from pvid.core.native import Native
 from pvid.log.rig_settings import rig_for
-from pvid.rig.columns import Columns
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.survey import fitted
@@ -32,7 +31,7 @@ def command(
     run_path: Path,
     rig_path: Path | None,
     settings: tuple[str, ...],
-    columns: Columns | None,
+    columns: str | None,
     law: str | None,
     form: str | None,
     core: str | None,

@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
+from pvid.model.corners import with_corners
 from pvid.oracle.fourier.channels import Channels, Record
-from pvid.oracle.fourier.corners import with_corners, with_jumps
+from pvid.oracle.fourier.corners import with_jumps
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.front import grid_of
 from pvid.oracle.fourier.functions import Float
