@@ -113,13 +113,17 @@ def bench_design_cost(update: bool) -> int:
 
 
 @bench.command(name="cell")
-@click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
-def bench_cell(folder: Path) -> int:
-    """Writes the records of a cell that is no RC circuit (needs PyBaMM)."""
+@click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@UPDATE
+def bench_cell(folder: Path | None, update: Path | None) -> int:
+    """RC models on a cell that is no RC circuit; --write makes its records (needs PyBaMM)."""
     from bench import cell
 
-    for path in cell.write(folder):
-        write_stderr(f"{path} written")
+    if folder is not None:
+        for path in cell.write(folder):
+            write_stderr(f"{path} written")
+        return DONE
+    put_table(update, "cell", markdown(cell.HEADER, [one.cells() for one in cell.outcomes()]))
     return DONE
 
 

@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 
 from bench.replay import Replay
 from pvid.base.errors import PvidError
+from pvid.model.signals import Jet
 
 Float = npt.NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def output_error(replay: Replay, p: Float, most: int = 100) -> OutputError:
     reach = np.array([one.sd for one in model.unknowns])
     sd = {one.name: one.sd for one in model.signals}
     begun = replay.start()
-    free = len(begun) - replay.plant.motion.folds  # running integrals start at 0
+    free = sum(isinstance(one, Jet) for one in replay.plant.motion.states)  # running integrals follow and start at 0
     spans = np.maximum(np.abs(begun[:free]), 1e-3)
     count = 0
 
