@@ -64,9 +64,7 @@ class Match:
 class Replay:
     """The plant of a model under the inputs of one recorded run."""
 
-    def __init__(
-        self, model: CompiledModel, run: Recording, *, substeps: int = 4, friction: Friction = SHARP
-    ) -> None:
+    def __init__(self, model: CompiledModel, run: Recording, *, substeps: int = 4, friction: Friction = SHARP) -> None:
         self.model, self.run = model, run
         self.plant = Plant(model)
         self.substeps, self.friction = substeps, friction
