@@ -34,6 +34,23 @@ def bench_demo(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="pages")
+@click.argument("names", nargs=-1)
+@click.option("--docs", type=click.Path(path_type=Path, exists=True), default="host/docs", show_default=True)
+def bench_pages(names: tuple[str, ...], docs: Path) -> int:
+    """Writes the pages of the shipped mechanisms: description, rows, verdict, measured against simulated."""
+    from bench import mechanism_pages
+
+    from pvid.models import mechanisms
+
+    some = names or mechanisms.names()
+    with progress_bar("pages", len(some)) as advance:
+        for done, name in enumerate(some, 1):
+            mechanism_pages.write_page(docs, name)
+            advance(done)
+    return DONE
+
+
 @bench.command(name="laws")
 @UPDATE
 def bench_laws(update: Path | None) -> int:
