@@ -143,8 +143,8 @@ class Headers:
             self._fill(filled, owner[0], settings)
         except OverflowError as error:
             raise PvidError(
-                f"a setting is beyond the fixed-point format ({error}): is a length, a resolution or a guess of the rig "
-                "file far from that of a real rig?"
+                f"a setting is beyond the fixed-point format ({error}): is a length, a resolution or a guess of the "
+                "rig file far from that of a real rig?"
             ) from error
         return filled
 

@@ -46,13 +46,15 @@ def rows_of(
     rows = []
     for one in found:
         try:
-            rows.append(factor(one.name, lowered(_with_rates(one, rates), p, by_parts), p, one.nuisances))
+            parts = lowered(with_rates(one, rates), p, by_parts)
+            rows.append(factor(one.name, parts, p, one.nuisances))
         except ModelError as error:
             raise error.at(one.place) from None
     return [opaque.shown(row) for row in with_scales(rows, unknowns)]
 
 
-def _with_rates(one: Reduced, rates: Mapping[str, sp.Expr]) -> Reduced:
+def with_rates(one: Reduced, rates: Mapping[str, sp.Expr]) -> Reduced:
+    """Without derivatives of signals that are integrals of others."""
     if one.expression is None or not rates:
         return one
     orders = [jet for jet in jets(one.expression) if jet.of in rates and jet.order > 0]

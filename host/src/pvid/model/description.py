@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import sympy as sp
@@ -12,6 +12,7 @@ import sympy as sp
 from pvid.model.compiled import CompiledModel, Known, Output, Signal, Unknown
 from pvid.model.compiler import rows_of
 from pvid.model.eliminate import Equation
+from pvid.model.mechanics import equations_of
 from pvid.model.normal_form import rational
 from pvid.model.refusal import ModelError, place_of_caller
 from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
@@ -166,6 +167,20 @@ class Model:
             momentum = sp.diff(whole, q.d())
             self.equation(total_derivative(momentum) - sp.diff(whole, q) - sp.sympify(force), f"equation of {q}")
 
+    def mechanics(self, method: Any, signals: Mapping[Any, sp.Expr]) -> None:
+        """The equations of a LagrangesMethod, KanesMethod or System of sympy.physics.mechanics.
+
+        Parameters
+        ----------
+        signals : dynamicsymbol or constant -> the signal, unknown or known constant of this model
+        """
+        try:
+            found = equations_of(method, signals)
+        except ModelError as error:
+            raise error.at(place_of_caller()) from None
+        for one in found:
+            self.equation(one)
+
     # ---- result
 
     def compiled(self, name: str = "") -> CompiledModel:
@@ -196,7 +211,8 @@ class Model:
             raise ModelError(f"{self.title}: the model has no unknown")
         integrals = {jet: value for jet, value in self.defined.items() if value.has(Integral)}
         rates = {jet.of: total_derivative(value) for jet, value in integrals.items()}
-        rows = rows_of(self.equations, [jet.of for jet in self.hidden], self.unknowns, rates, by_parts)
+        hidden = [jet.of for jet in self.hidden]
+        rows = rows_of(self.equations, hidden, self.unknowns, rates, by_parts)
         used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
         for one in self.unknowns:
             if one.symbol not in used:

@@ -13,11 +13,20 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from pvid.model.lower import lower
+from pvid.model.readable import listed, readable
 from pvid.model.refusal import ModelError, Place
 from pvid.model.signals import TIME, Integral, Jet, jets, total_derivative
 from pvid.model.terms import ONE, ZERO, added, by_unknowns, merged, terms_of, times, varies
 
 _D = sp.Symbol("D")  # d/dt in the matrix of operators
+
+
+class ChainError(ModelError):
+    """A term stands in the way of the integrator chain."""
+
+    def __init__(self, cause: str, term: sp.Expr) -> None:
+        super().__init__(cause)
+        self.term = term
 
 
 @dataclass(frozen=True)
@@ -27,6 +36,12 @@ class Equation:
     name: str
     expression: sp.Expr
     place: Place = Place()
+    made_of: tuple[str, ...] = ()
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the equations that it was made of."""
+        return self.made_of or (self.name,)
 
 
 @dataclass(frozen=True)
@@ -91,14 +106,15 @@ def _connected(equations: Sequence[Equation], hidden: Sequence[str]) -> tuple[li
 
 
 def _without(group: Sequence[Equation], names: Sequence[str], p: Collection[sp.Symbol]) -> list[Reduced]:
+    any_of = listed(names, "or")
     if len(group) <= len(names):
         raise ModelError(
-            f"{_and(names)} cannot be eliminated: {len(group)} equation{'s' * (len(group) > 1)} for "
+            f"{listed(names)} cannot be eliminated: {len(group)} equation{'s' * (len(group) > 1)} for "
             f"{len(names)} unmeasured coordinate{'s' * (len(names) > 1)} leave nothing to identify from; "
-            f"a sensor for {_or(names)}, or one more equation, would help",
+            f"a sensor for {any_of}, or one more equation, would help",
             group[-1].place,
         )
-    reasons: dict[str, ModelError] = {}
+    causes, aside = [], ""
     for name in names:
         shorter = substituted(group, name)
         if shorter is not None:
@@ -107,25 +123,18 @@ def _without(group: Sequence[Equation], names: Sequence[str], p: Collection[sp.S
     try:
         return by_null_vector(group, names)
     except ModelError as error:
-        reasons["constant"] = error
+        causes.append(error.cause)
     if len(names) == 1:
         try:
             return [by_chain(group, names[0], p)]
         except ModelError as error:
-            reasons["chain"] = error
+            causes.append(error.cause)
+            if isinstance(error, ChainError):
+                aside = f", or leaving {readable(error.term)} out where it is small"
     raise ModelError(
-        f"{_and(names)} cannot be eliminated: {'; '.join(one.cause for one in reasons.values())}; a sensor for "
-        f"{_or(names)} would help, or a known value of what multiplies it",
+        f"{listed(names)} cannot be eliminated: {'; '.join(causes)}; a sensor for {any_of} would help{aside}",
         group[-1].place,
     )
-
-
-def _and(names: Sequence[str]) -> str:
-    return " and ".join(names)
-
-
-def _or(names: Sequence[str]) -> str:
-    return " or ".join(names)
 
 
 def _with_how(one: Reduced, how: str) -> Reduced:
@@ -134,7 +143,11 @@ def _with_how(one: Reduced, how: str) -> Reduced:
 
 
 def _joined(equations: Sequence[Equation]) -> str:
-    return " and ".join(one.name for one in equations)
+    names = list(dict.fromkeys(part for one in equations for part in one.sources))
+    numbers = [name.removeprefix("equation ") for name in names]
+    if len(names) > 1 and all(number.isdecimal() for number in numbers):
+        return f"equations {listed(numbers)}"
+    return listed(names)
 
 
 # ---- substitution
@@ -169,7 +182,9 @@ def substituted(group: Sequence[Equation], name: str) -> list[Equation] | None:
             continue
         bare = sp.expand(one.expression - factors[j] * jet)
         expression = bare - factors[j] * rest / factor if factor.is_Number else bare * factor - factors[j] * rest
-        out.append(Equation(_joined([group[k], one]), sp.expand(expression), one.place))
+        both = [group[k], one]
+        sources = tuple(name for each in both for name in each.sources)
+        out.append(Equation(_joined(both), sp.expand(expression), one.place, sources))
     return out
 
 
@@ -190,11 +205,11 @@ def by_null_vector(group: Sequence[Equation], names: Sequence[str]) -> list[Redu
             chosen = [k for one, k in zip(vector, chosen, strict=True) if one != 0]
             sources = [group[k] for k in chosen]
             used.append(chosen)
-            how = f"{_and(names)} eliminated by operators"
+            how = f"{listed(names)} eliminated by operators"
             out.append(Reduced(_joined(sources), sp.expand(whole), how=how, place=group[extra].place))
             break
     if not out:
-        raise ModelError(f"the equations determine no combination without {_and(names)}")
+        raise ModelError(f"the equations determine no combination without {listed(names)}")
     return out
 
 
@@ -208,9 +223,9 @@ def _operators(group: Sequence[Equation], names: Sequence[str]) -> tuple[sp.Matr
                 jet = Jet(name, order)
                 factor = sp.expand(sp.diff(one.expression, jet))
                 if any(other.of in names for other in jets(factor)):
-                    raise ModelError(f"{_term(one.expression, jet)} is not linear in {name}")
+                    raise ModelError(f"{readable(_term(one.expression, jet))} is not linear in {name}")
                 if varies(factor):
-                    raise ModelError(f"{_term(one.expression, jet)} multiplies {name} by a signal")
+                    raise ModelError(f"{readable(_term(one.expression, jet))} multiplies {name} by a signal")
                 operator += factor * _D**order
                 bare -= factor * jet
             row.append(operator)
@@ -265,14 +280,14 @@ def by_chain(group: Sequence[Equation], name: str, p: Collection[sp.Symbol]) -> 
     for mono, varying in by_unknowns(rest, p).items():
         for m, psi in lower(varying).items():
             if m > top:
-                raise ModelError(f"{name} would follow from a derivative of {psi}")
+                raise ModelError(f"{name} would follow from a derivative of {readable(psi)}")
             value -= mono * (psi if m == top else _running(psi, top - m))
     carrier = next((one for one in group if _orders(one, name) == [0]), None)
     if carrier is None:
         raise ModelError(f"no equation holds {name} without its derivatives")
     gain = sp.expand(sp.diff(carrier.expression, Jet(name)))
     if any(jet.of == name for jet in jets(gain)):
-        raise ModelError(f"{_term(carrier.expression, Jet(name))} is not linear in {name}")
+        raise ModelError(f"{readable(_term(carrier.expression, Jet(name)))} is not linear in {name}")
     inserted = sp.expand(carrier.expression.xreplace({Jet(name): value}))
     parts = merged(*(times(_tested(psi, top), mono) for mono, psi in by_unknowns(inserted, p).items()))
     columns = []
@@ -359,4 +374,4 @@ def _pure(group: Sequence[Equation], name: str) -> tuple[sp.Expr, sp.Expr, int]:
             return whole, factor, top
     jet = Jet(name, max(order for one in group for order in _orders(one, name) if order < top or top == 0))
     culprit = next(_term(one.expression, jet) for one in group if one.expression.has(jet))
-    raise ModelError(f"no combination of the equations is free of {culprit} while {name} has a derivative left")
+    raise ChainError(f"no combination of the equations is free of {readable(culprit)}", culprit)

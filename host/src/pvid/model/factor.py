@@ -14,7 +14,7 @@ from sympy.polys.matrices import DomainMatrix
 
 from pvid.model.compiled import Part, Row
 from pvid.model.refusal import ModelError
-from pvid.model.signals import total_derivative
+from pvid.model.signals import Jet, sgn, total_derivative
 from pvid.model.terms import ONE, ZERO, merged, split, terms_of, times
 from pvid.model.zero import dependent
 
@@ -26,8 +26,9 @@ class _Channel:
 
     @property
     def rate(self) -> sp.Expr:
-        """D^order[base] in jets."""
-        return total_derivative(self.base, self.order)
+        """D^order[base] in jets; sgn(..) and |..| stand as signals of their own."""
+        atoms = {one: Jet(f"_{one}") for one in self.base.atoms(sgn, sp.Abs)}
+        return total_derivative(self.base.xreplace(atoms), self.order)
 
 
 _Table = dict[_Channel, dict[sp.Expr, sp.Expr]]
@@ -45,7 +46,7 @@ def factor(name: str, parts: Part, p: Sequence[sp.Symbol], nuisances: Sequence[P
     table = _independent(table, [_Channel(m, base) for part in nuisances for m, base in part.items()])
     monos = _monos(table, p)
     if not monos:
-        raise ModelError(f"{name} contains no unknown: there is nothing to identify in it")
+        raise ModelError(f"{name} contains no unknown, so that nothing can be identified from it: leave it out")
     known = merged(*({one.order: -cells[ONE] * one.base} for one, cells in table.items() if ONE in cells))
     channels = [one for one, cells in table.items() if set(cells) - {ONE}]
     channels.sort(key=lambda one: (len(table[one]), one.order, sp.count_ops(one.base), str(one.base)))
@@ -112,18 +113,19 @@ def _factored(matrix: sp.Matrix, monos: Sequence[sp.Expr]) -> tuple[list[sp.Expr
     theta = [sp.factor(sum((chosen[r, j] * mono for j, mono in enumerate(monos)), ZERO)) for r in range(len(pivots))]
     for r, value in enumerate(theta):  # numbers belong to the regressor
         number, rest = value.as_coeff_Mul()
+        if rest.is_Add and rest.could_extract_minus_sign():
+            number, rest = -number, -rest
         theta[r] = rest
         shares[:, r] = shares[:, r] * number
     return theta, shares
 
 
 def _positive(row: Row) -> Row:
-    """With a positive first coefficient in Y."""
+    """With a positive factor of the simplest term of Y."""
     if not row.known:
         return row
-    top = row.known[max(row.known)]
-    leading = min(terms_of(top), key=lambda term: str(term.as_coeff_Mul()[1])).as_coeff_Mul()[0]
-    if leading > 0:
+    lowest = (term.as_coeff_Mul() for term in terms_of(row.known[min(row.known)]))
+    if min(lowest, key=lambda one: (sp.count_ops(one[1]), str(one[1])))[0] > 0:
         return row
     return replace(row, known=times(row.known, -ONE), regressors=tuple(times(one, -ONE) for one in row.regressors))
 

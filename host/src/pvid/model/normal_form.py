@@ -7,6 +7,7 @@ from collections.abc import Collection
 
 import sympy as sp
 
+from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import Integral, jets, sgn
 from pvid.model.terms import varies
@@ -38,7 +39,7 @@ def normal_form(expression: sp.Expr, p: Collection[sp.Symbol]) -> sp.Expr:
         whole = sp.expand(numerator)
     for one in whole.atoms(sp.Pow):
         if varies(one.base) and not one.exp.is_Integer:
-            raise ModelError(f"{one} is no whole power of a signal: multiply it out, or measure it as a signal")
+            raise ModelError(f"{readable(one)} is no whole power of a signal: only those are supported")
     return whole
 
 

@@ -13,6 +13,7 @@ import sympy as sp
 from pvid.model.compiled import Row, Unknown
 from pvid.model.factor import divided
 from pvid.model.gradient import jacobian_at, rank
+from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 
 
@@ -51,7 +52,7 @@ def _normaliser(row: Row, unknowns: Sequence[Unknown]) -> sp.Expr:
     if not candidates:
         raise ModelError(
             f"{row.name} fixes its coefficients up to a common factor only: declare one of "
-            f"{', '.join(map(str, row.theta))} as known"
+            f"{', '.join(map(readable, row.theta))} as known"
         )
     highest = max(max(part) for _, part in candidates)
     among = [theta for theta, part in candidates if max(part) == highest]

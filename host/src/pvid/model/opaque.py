@@ -9,6 +9,7 @@ import sympy as sp
 
 from pvid.model.compiled import Part, Row
 from pvid.model.lower import OPAQUE
+from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import Jet, jets, sgn
 from pvid.model.terms import added, product, terms_of
@@ -32,7 +33,7 @@ class Opaque:
         return added(self._term(term) for term in terms_of(expression))
 
     def shown(self, row: Row) -> Row:
-        """The expressions in place of the auxiliary signals; their derivatives are those of the test functions."""
+        """The expressions in place of the auxiliary signals; what would be a derivative of one stays."""
         return replace(
             row,
             regressors=tuple(self._shown(part) for part in row.regressors),
@@ -54,7 +55,8 @@ class Opaque:
             if unmeasured and factor.has(sgn, sp.Abs):
                 names = " and ".join(sorted(unmeasured))
                 raise ModelError(
-                    f"{names} cannot be eliminated: {factor} is not linear in it; a sensor for {names} would help"
+                    f"{names} cannot be eliminated: {readable(factor)} is not linear in it; a sensor for "
+                    f"{names} would help"
                 )
             (inside if own and not unmeasured and not _has_unknown(factor) else outside).append(factor)
         if not any(factor.has(sgn, sp.Abs) for factor in inside):

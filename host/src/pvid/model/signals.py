@@ -46,7 +46,14 @@ class sgn(sp.Function):  # type: ignore[misc] # noqa: N801
 
     @classmethod
     def eval(cls, argument: sp.Expr) -> sp.Expr | None:
-        return sp.Integer(0) if argument == 0 else None
+        if argument == 0:
+            return sp.Integer(0)
+        number, rest = argument.as_coeff_Mul()
+        if rest == 1:
+            return sp.Integer(1 if number > 0 else -1)
+        if number != 1:
+            return cls(rest) if number > 0 else -cls(rest)
+        return -cls(-argument) if argument.could_extract_minus_sign() else None
 
 
 class Integral(sp.Function):  # type: ignore[misc]

@@ -8,6 +8,7 @@ from operator import mul
 
 import sympy as sp
 
+from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import TIME, Integral, Jet
 
@@ -53,9 +54,9 @@ def split(term: sp.Expr, p: Iterable[sp.Symbol]) -> tuple[sp.Expr, sp.Expr, sp.E
             if among:
                 names = " and ".join(sorted(map(str, among)))
                 raise ModelError(
-                    f"the unknown {names} stands inside {factor} together with a signal, so that no row is linear in a "
-                    f"function of the unknowns alone: declare {names} as known, or replace this term by a sum of "
-                    "products of unknowns and signals"
+                    f"the unknown {names} stands inside {readable(factor)} together with a signal, so that no row is "
+                    f"linear in a function of the unknowns alone: declare {names} as known, or replace this term by a "
+                    "sum of products of unknowns and signals"
                 )
             base.append(factor)
         else:

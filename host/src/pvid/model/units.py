@@ -15,6 +15,7 @@ import sympy as sp
 from sympy.physics import units as si
 from sympy.physics.units.systems.si import dimsys_SI
 
+from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import TIME, Integral, Jet, sgn
 
@@ -38,11 +39,35 @@ class Dimension:
         return Dimension(tuple(one * exponent for one in self.of))
 
     def __str__(self) -> str:
+        return _named(self) or self.in_base_units
+
+    @property
+    def in_base_units(self) -> str:
+        """As in "kg*m^2*s^-2"."""
         named = [(name, one) for name, one in zip(_BASE_NAMES, self.of, strict=True) if one != 0]
         return "*".join(name if one == 1 else f"{name}^{one}" for name, one in named) or "1"
 
 
 NUMBER = Dimension()
+
+# Derived units by which errors name a dimension, alone or with a power of s, m or A.
+_DERIVED = ("N", "N*m", "V", "ohm", "H", "F", "W", "A", "m", "kg", "s", "C", "Pa", "K", "kg*m", "kg*m^2")
+_WITH = ("", "*s", "/s", "/s^2", "*s^2", "/m", "/m^2", "*m", "*m^2", "/A", "*A", "*s/m", "/(A*s)", "/K")
+
+
+def _named(dimension: Dimension) -> str:
+    """The shortest of a derived unit and a power; "" where there is none, "1" of a number."""
+    return _names().get(dimension, "")
+
+
+@cache
+def _names() -> dict[Dimension, str]:
+    out = {NUMBER: "1", dimension_of_unit("1/s"): "1/s", dimension_of_unit("1/s^2"): "1/s^2"}
+    for text in sorted((one + other for one in _DERIVED for other in _WITH), key=len):
+        out.setdefault(dimension_of_unit(text), text)
+    return out
+
+
 PER_SECOND = Dimension(tuple(sp.Integer(-1 if name == "s" else 0) for name in _BASE_NAMES))
 
 
@@ -63,12 +88,13 @@ def dimension_of_unit(text: str) -> Dimension:
         raise ModelError(f'"{text}" is no unit: write it as in "kg*m^2/s", with units of SI') from error
     dimension, scale = _measured(quantity)
     if scale != 1:
-        raise ModelError(f'the unit "{text}" is {_plain(scale)} {dimension}: equations are in SI, use "{dimension}"')
+        coherent = "rad" if dimension == NUMBER else str(dimension)
+        raise ModelError(f'the unit "{text}" is {_plain(scale)} {coherent}: equations are in SI, use "{coherent}"')
     return dimension
 
 
 def _plain(scale: sp.Expr) -> str:
-    return str(scale) if scale.is_Integer or scale.is_Rational and scale.q < 1000 else f"{float(scale):.6g}"
+    return f"{float(scale):.6g}"
 
 
 def _quantity(node: ast.expr) -> sp.Expr:
@@ -155,17 +181,23 @@ def dimension_of(expression: sp.Expr, of: Mapping[str, Dimension]) -> Dimension 
 def _must_be_number(argument: sp.Expr, of: Mapping[str, Dimension], whole: sp.Expr) -> None:
     found = dimension_of(argument, of)
     if found is not None and found != NUMBER:
-        raise ModelError(f"{argument} inside {whole} has the unit {found}, it must be a pure number (or rad)")
+        raise ModelError(
+            f"{readable(argument)} inside {readable(whole)} has the unit {found}, it must be a pure number (or rad)"
+        )
+
+
+def _unsigned(term: sp.Expr) -> sp.Expr:
+    return -term if term.could_extract_minus_sign() else term
 
 
 def _of_sum(expression: sp.Expr, of: Mapping[str, Dimension]) -> Dimension | None:
-    first: tuple[sp.Expr, Dimension] | None = None
+    by_unit: dict[Dimension, list[sp.Expr]] = {}
     for term in expression.args:
         found = dimension_of(term, of)
-        if found is None:
-            continue
-        if first is None:
-            first = term, found
-        elif found != first[1]:
-            raise ModelError(f"{term} has the unit {found}, but {first[0]}, which is added, has {first[1]}")
-    return first[1] if first else None
+        if found is not None:
+            by_unit.setdefault(found, []).append(term)
+    if len(by_unit) > 1:
+        usual, *_, odd = sorted(by_unit, key=lambda one: -len(by_unit[one]))
+        wrong, right = (readable(_unsigned(by_unit[one][0])) for one in (odd, usual))
+        raise ModelError(f"the term {wrong} has the unit {odd}, but {right}, which is added to it, has {usual}")
+    return next(iter(by_unit), None)

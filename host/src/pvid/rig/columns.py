@@ -170,6 +170,11 @@ class Columns:
         return text if re.fullmatch(r"[\w=:,.\-]+", text, re.ASCII) else f"'{text}'"
 
 
+def parsed(text: str | None, channels: tuple[Channel, ...] = MODELS[DEFAULT].channels) -> Columns:
+    """Columns of the text of --columns, or of their own names; see `Columns.parse`."""
+    return Columns(channels=channels) if text is None else Columns.parse(text, channels)
+
+
 def _units(unit: str) -> dict[str, tuple[float, float]]:
     """Units of the same kind as one of SI; without a table only that one."""
     prefixed = {f"k{unit}": (1e3, 1.0), f"m{unit}": (1.0, 1e3), f"u{unit}": (1.0, 1e6)} if unit in _PREFIXED else {}

@@ -18,8 +18,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
+from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed, shown
@@ -96,6 +98,13 @@ class MechanismRig:
             if keys:
                 lines += ["", f"[{name}]", *(f"{key} = {value!r}" for key, value in keys.items())]
         return "\n".join(lines).lstrip("\n") + "\n"
+
+    def write(self, path: Path) -> None:
+        """Writes `text` to a file."""
+        try:
+            write_whole(path, self.text())
+        except OSError as error:
+            raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
 
     def applied(self, model: CompiledModel) -> CompiledModel:
         """The model with the values of this rig.

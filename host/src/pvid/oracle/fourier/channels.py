@@ -184,9 +184,18 @@ class Channels:
                 inside = broadcast(evaluated(integrand.xreplace(self.sign_marks), known), grid.size)
                 known[mark] = running_integrals(inside, grid.size - 1, int(fold), grid.design.dt)[int(fold)][0]
                 if fold == 1:
-                    known[mark] = known[mark] + inside[0] * grid.places[0] / grid.design.sample_rate
+                    known[mark] = known[mark] + self._before(integrand, grid, inside)
                 expression = expression.xreplace({one: mark})
             values[jet] = broadcast(evaluated(expression.xreplace(self.sign_marks), known), grid.size)
+
+    def _before(self, integrand: sp.Expr, grid: Grid, inside: Float) -> float:
+        """Integral from the run's first sample to the first step, from raw samples; else by the first step's value."""
+        last, rate = int(grid.places[0]), grid.design.sample_rate
+        if any(jet.order or jet.of not in grid.raw for jet in jets(integrand)) or integrand.has(sgn):
+            return float(inside[0]) * last / rate
+        raw = {jet: grid.raw[jet.of][: last + 1] for jet in jets(integrand)}
+        f = broadcast(evaluated(integrand, raw), last + 1)
+        return float(np.sum(f[1:] + f[:-1])) / (2 * rate)
 
     @cached_property
     def _sign_arguments(self) -> Any:

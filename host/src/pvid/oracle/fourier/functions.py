@@ -83,9 +83,19 @@ class TestFunctions:
         return np.asarray(2 * math.pi * np.arange(-self.highest, self.highest + 1) / self.length)
 
     def values(self, order: int) -> Float:
-        """chi^(order) at the samples 0..2 hop - 1 [2 hop, K], by the formula; for tests and for covariances."""
-        turns = np.exp(1j * np.outer(self.dt * np.arange(2 * self.hop), self.rates))
-        return np.real(turns @ (self.coefficients * ((1j * self.rates) ** order)[:, np.newaxis]))
+        """chi^(order) at the samples 0..2 hop - 1 [2 hop, K]; for covariances of neighbours."""
+        if order not in self._values:
+            # S_h of a unit sample at t_j is e^(i w_h t_j): its real and imaginary parts, as in `joined`.
+            places = np.outer(np.arange(2 * self.hop), np.arange(1, self.highest + 1)) % (2 * self.hop)
+            turn = math.pi / self.hop * np.arange(2 * self.hop)
+            parts = np.empty((2 * self.hop, 2 * self.highest + 1))
+            parts[:, 0], parts[:, 1::2], parts[:, 2::2] = 1.0, np.cos(turn)[places], np.sin(turn)[places]
+            self._values[order] = parts @ self.combine(order)
+        return self._values[order]
+
+    @cached_property
+    def _values(self) -> dict[int, Float]:
+        return {}
 
     def combine(self, order: int) -> Float:
         """[2 H + 1, K]: sum chi^(order) psi = (S_0, Re S_1, Im S_1, Re S_2, ...) @ combine."""
@@ -122,7 +132,7 @@ class TestFunctions:
 
     def half_sums(self, halves: Float) -> Complex:
         """A_h [..., halves, H + 1] of half windows [..., halves, hop]; time counts from each half's start."""
-        return np.asarray(halves @ self.circle)
+        return np.asarray((halves @ self.circle.real.copy()) + 1j * (halves @ self.circle.imag.copy()))
 
     def joined(self, first: Complex, second: Complex) -> Float:
         """S_h = A_h + (-1)^h B_h as (S_0, Re S_1, Im S_1, ...) [..., 2 H + 1] of two halves' sums [..., H + 1]."""

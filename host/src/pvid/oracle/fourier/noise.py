@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import sympy as sp
 
 from pvid.model.signals import Integral, jets
@@ -157,7 +158,7 @@ class ReversalNoise:
 
     Attributes
     ----------
-    windows : of each entry [entries]
+    windows : of each entry, rising [entries]
     events : reversal of each entry [entries]
     shapes : 2 sd chi^(order) of the columns that hold sgn [entries, columns, K]
     """
@@ -197,27 +198,35 @@ class ReversalNoise:
                 events.append(first + np.flatnonzero(inside))
                 shapes.append(2 * np.sqrt(signs.variances[inside])[:, np.newaxis, np.newaxis] * shape)
             first += len(signs.times)
-        self.windows, self.events = np.concatenate(windows), np.concatenate(events)
-        self.shapes = np.concatenate(shapes)
+        order = np.argsort(np.concatenate(windows), kind="stable")
+        self.windows, self.events = np.concatenate(windows)[order], np.concatenate(events)[order]
+        self.shapes = np.concatenate(shapes)[order]
 
     def directions(self, theta: Float) -> Float:
         """In the rows, one standard deviation long [entries, K]."""
         return np.asarray(np.einsum("ejk,j->ek", self.shapes, np.append(theta, -1.0)))
 
-    def covariance(self, theta: Float, windows: int) -> Float:
-        """[windows, K, K]"""
+    def covariance(self, theta: Float, windows: npt.NDArray[np.int64]) -> Float:
+        """Of each of some windows, by their numbers [windows, K, K]."""
         u = self.directions(theta)
-        out = np.zeros((windows, u.shape[1], u.shape[1]))
-        np.add.at(out, self.windows, u[:, :, np.newaxis] * u[:, np.newaxis, :])
+        out = np.zeros((len(windows), u.shape[1], u.shape[1]))
+        for k, window in enumerate(windows):
+            own = u[self._of(window)]
+            if len(own):
+                out[k] = own.T @ own
         return out
 
-    def with_next(self, theta: Float, windows: int) -> Float:
-        """Of each window with the next one [windows, K, K]; the last is 0."""
+    def with_next(self, theta: Float, windows: npt.NDArray[np.int64]) -> Float:
+        """Of each of some windows with the one after it [windows, K, K]."""
         u = self.directions(theta)
-        out = np.zeros((windows, u.shape[1], u.shape[1]))
-        earlier = {(int(w), int(e)): k for k, (w, e) in enumerate(zip(self.windows, self.events, strict=True))}
-        for (w, e), k in earlier.items():
-            later = earlier.get((w + 1, e))
-            if later is not None:
-                out[w] += np.outer(u[k], u[later])
+        out = np.zeros((len(windows), u.shape[1], u.shape[1]))
+        for k, window in enumerate(windows):
+            here, next_ = self._of(window), self._of(window + 1)
+            _, a, b = np.intersect1d(self.events[here], self.events[next_], return_indices=True)
+            if len(a):
+                out[k] = u[here][a].T @ u[next_][b]
         return out
+
+    def _of(self, window: int) -> slice:
+        """Entries of a window."""
+        return slice(*np.searchsorted(self.windows, [window, window + 1]))

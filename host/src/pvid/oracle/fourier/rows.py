@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
+from pvid.model.corners import with_corners
 from pvid.oracle.fourier.channels import Channels, Record
-from pvid.oracle.fourier.corners import with_corners, with_jumps
+from pvid.oracle.fourier.corners import with_jumps
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.front import grid_of
 from pvid.oracle.fourier.functions import Float
@@ -28,11 +29,13 @@ class Compiled:
 
     Attributes
     ----------
+    bare : as compiled
     model : its rows with the corners of sampled signals
     jumps : name of a signal in them -> input whose scaled jump it is
     """
 
     def __init__(self, model: CompiledModel) -> None:
+        self.bare = model
         model, self.jumps = with_corners(model)
         self.model = model
         self.channels = Channels(model)
@@ -65,6 +68,12 @@ class WhiteRows:
     whitener: Float
     free: int
 
+    def only(self, windows: slice) -> WhiteRows:
+        """Some of the windows."""
+        n = self.regressors[windows]
+        free = round(self.free * len(n) / len(self.regressors))
+        return WhiteRows(n, self.known[windows], self.whitener[windows], free)
+
     def moments(self, windows: slice | npt.NDArray[np.bool_] = slice(None)) -> tuple[Float, Float]:
         """M [thetas, thetas] and B [thetas] of some windows."""
         n, y = self.regressors[windows], self.known[windows]
@@ -80,6 +89,7 @@ class WeakRows:
     compiled : the model
     record : channels at every step
     columns : of each row kind [windows, columns, K]; theta's, then Y, then the nuisances
+    numbers : of the windows in the run; those with a missing sample are left out
     noise : covariances
     """
 
@@ -90,7 +100,7 @@ class WeakRows:
         whole = np.all([np.isfinite(one).all(axis=(1, 2)) for one in columns], axis=0)
         if not whole.any():
             raise PvidError("no window of the run is whole: every one has a missing sample")
-        self.whole = whole
+        self.numbers = np.flatnonzero(whole)
         self.columns = [one[whole] for one in columns]
         self.noise = NoiseModel(compiled.filters, record)
         self.reversals = [ReversalNoise(compiled.channels, record, kind) for kind in range(len(columns))]
@@ -116,27 +126,24 @@ class WeakRows:
         """Some of the windows; the noise stays that of the run."""
         out = copy.copy(self)
         out.columns = [one[windows] for one in self.columns]
-        out.whole = self.whole.copy()
-        places = np.flatnonzero(self.whole)
-        out.whole[np.setdiff1d(places, places[windows])] = False
+        out.numbers = self.numbers[windows]
         return out
 
     def end_times(self) -> Float:
         """Time [s] of the last sample of each window, from the run's first one."""
         grid = self.record.grid
         first = grid.places[0] / grid.design.sample_rate
-        ends = first + self.functions.dt * self.functions.hop * (2 + np.arange(len(self.whole)))
-        return np.asarray(ends[self.whole])
+        return np.asarray(first + self.functions.dt * self.functions.hop * (2 + self.numbers))
 
     def covariance(self, kind: int, theta: Float, error: EquationError) -> Float:
         """R0(p), the equation's error and that of located reversals [windows, K, K]."""
         run = self.noise.covariance(kind, theta) + error.variance * self.noise.gram(error.order, error.order)
-        return run + self.reversals[kind].covariance(theta, len(self.whole))[self.whole]
+        return run + self.reversals[kind].covariance(theta, self.numbers)
 
     def with_next(self, kind: int, theta: Float, error: EquationError) -> Float:
         """The same between each window and the next one [windows, K, K]; the last one is of no use."""
         run = self.noise.with_next(kind, theta) + error.variance * self.noise.overlap(error.order, error.order)
-        return run + self.reversals[kind].with_next(theta, len(self.whole))[self.whole]
+        return run + self.reversals[kind].with_next(theta, self.numbers)
 
     def whitener(self, kind: int, theta: Float, error: EquationError) -> Float:
         """L^-1 [windows, K, K] of the covariance; rows of a model without noise are scaled to their size."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,13 @@ class Moments:
     def of(cls, white: list[WhiteRows], windows: slice | Float = slice(None)) -> Moments:
         pairs = [one.moments(windows) for one in white]  # type: ignore[arg-type]
         return cls([m for m, _ in pairs], [b for _, b in pairs])
+
+    def plus(self, other: Moments) -> Moments:
+        """Of the windows of both."""
+        return Moments(
+            [a + b for a, b in zip(self.m, other.m, strict=True)],
+            [a + b for a, b in zip(self.b, other.b, strict=True)],
+        )
 
 
 def normal(parameters: Parameters, moments: Moments, p: Float) -> tuple[Float, Float]:
@@ -109,7 +116,16 @@ class Fit:
 
     @property
     def parameters(self) -> Parameters:
+        """Of its model."""
         return self.rows.compiled.parameters
+
+    def only(self, windows: slice) -> Fit:
+        """The same estimate and weights, with some of the windows."""
+        return replace(self, rows=self.rows.only(windows), white=[one.only(windows) for one in self.white])
+
+    def at(self, p: Float) -> Fit:
+        """Another estimate from the same weights."""
+        return replace(self, p=p)
 
     def designs(self) -> list[Float]:
         """d rows / d step of each kind [windows, K, n_p]."""
@@ -171,14 +187,14 @@ def differs(a: EquationError, b: EquationError) -> bool:
     return a.order != b.order or abs(a.variance - b.variance) > 1e-3 * max(a.variance, b.variance)
 
 
-def error_of(rows: WeakRows, kind: int, theta: Float, windows: slice = slice(None)) -> EquationError:
+def error_of(rows: WeakRows, kind: int, theta: Float) -> EquationError:
     """The equation's error of most likelihood: white noise of order 0.. in the row, beside that of the sensors.
 
     With R0 = L L^T, L^-1 Q L^-T = U diag(q) U^T and z = U^T L^-1 e the likelihood of the variance v is that of
     independent z_i of variances 1 + v q_i.
     """
     plain = rows.white(kind, theta, EquationError())
-    e = (plain.known - np.einsum("wjk,j->wk", plain.regressors, theta))[windows]
+    e = plain.known - np.einsum("wjk,j->wk", plain.regressors, theta)
     best, gain = EquationError(), _EVIDENCE
     # What the projection on the complement of the nuisances took out of the residuals.
     share = plain.free / (rows.windows * rows.functions.count)
@@ -222,27 +238,26 @@ def most_likely(q: Float, z: Float) -> tuple[float, float]:
 
 
 def online(rows: WeakRows, start: Float | None = None, equation_error: bool = True) -> Float:
-    """p after each window [windows, n_p]: every window whitened at the p of its moment, three steps each."""
+    """p after each window [windows, n_p]: every window whitened at the p of its moment, three steps each.
+
+    The sums of rows that were whitened at a poor p weigh wrongly. Here all rows are whitened anew when their number is
+    a power of two; an engine that keeps no rows lets its first sums fade instead.
+    """
     parameters = rows.compiled.parameters
     p = parameters.checked(start)
     prior = parameters.prior(p)
     errors = [EquationError()] * rows.kinds
-    moments: Moments | None = None
+    moments = Moments([], [])
     history = np.empty((rows.windows, len(p)))
     for w in range(rows.windows):
         theta = parameters.theta(p)
-        if equation_error and w >= 4 and w % 4 == 0:
-            errors = [error_of(rows, kind, theta[kind], slice(max(0, w - 16), w)) for kind in range(rows.kinds)]
-        one = rows.only(slice(w, w + 1))
-        new = Moments.of([one.white(kind, theta[kind], errors[kind]) for kind in range(rows.kinds)])
-        moments = (
-            new
-            if moments is None
-            else Moments(
-                [a + b for a, b in zip(moments.m, new.m, strict=True)],
-                [a + b for a, b in zip(moments.b, new.b, strict=True)],
-            )
-        )
+        anew = w & (w + 1) == 0
+        if anew and equation_error and w >= 3:
+            past = rows.only(slice(0, w))
+            errors = [error_of(past, kind, theta[kind]) for kind in range(rows.kinds)]
+        own = rows.only(slice(0 if anew else w, w + 1))
+        new = Moments.of([own.white(kind, theta[kind], errors[kind]) for kind in range(rows.kinds)])
+        moments = new if anew else moments.plus(new)
         p, _ = gauss_newton(parameters, moments, p, prior, 3)
         history[w] = p
     return history
