@@ -40,7 +40,6 @@ def bench_demo(update: Path | None) -> int:
 def bench_pages(names: tuple[str, ...], docs: Path) -> int:
     """Writes the pages of the shipped mechanisms: description, rows, verdict, measured against simulated."""
     from bench import mechanism_pages
-
     from pvid.models import mechanisms
 
     some = names or mechanisms.names()
