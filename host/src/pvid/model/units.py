@@ -88,12 +88,13 @@ def dimension_of_unit(text: str) -> Dimension:
         raise ModelError(f'"{text}" is no unit: write it as in "kg*m^2/s", with units of SI') from error
     dimension, scale = _measured(quantity)
     if scale != 1:
-        raise ModelError(f'the unit "{text}" is {_plain(scale)} {dimension}: equations are in SI, use "{dimension}"')
+        coherent = "rad" if dimension == NUMBER else str(dimension)
+        raise ModelError(f'the unit "{text}" is {_plain(scale)} {coherent}: equations are in SI, use "{coherent}"')
     return dimension
 
 
 def _plain(scale: sp.Expr) -> str:
-    return str(scale) if scale.is_Integer or scale.is_Rational and scale.q < 1000 else f"{float(scale):.6g}"
+    return f"{float(scale):.6g}"
 
 
 def _quantity(node: ast.expr) -> sp.Expr:

@@ -54,7 +54,7 @@ def described(name_or_path: str | Path) -> Model:
         raise PvidError(f"{path}: {error}") from None
     except SyntaxError as error:
         raise PvidError(f"{path.name}, line {error.lineno}: {error.msg}") from None
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         where = f"{path.name}, line {lines[-1]}" if lines else path.name
         raise PvidError(f"{where}: {type(error).__name__}: {error}") from None
