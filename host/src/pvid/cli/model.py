@@ -34,7 +34,7 @@ def check(model: str) -> int:
 
     compiled = compiled_of(model)
     click.echo(check_report(compiled))
-    return DONE if identifiable(compiled).all else NOTHING_IDENTIFIED
+    return DONE if identifiable(compiled).identifiable else NOTHING_IDENTIFIED
 
 
 @command.command()

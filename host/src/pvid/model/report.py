@@ -19,7 +19,7 @@ def check_report(compiled: CompiledModel) -> str:
     """The whole text, in lines of at most about 120 characters where terms allow it."""
     found = identifiable(compiled)
     blocks = [_head(compiled), *(_row(row) for row in compiled.rows), verdict(found), *_advice(compiled)]
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    return "\n\n".join(block for block in blocks if block)
 
 
 def verdict(found: Identifiability) -> str:
