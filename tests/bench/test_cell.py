@@ -1,4 +1,4 @@
-"""The records of tests/data/cell are those that `bench cell` describes."""
+"""The records of tests/data/cell are those that `bench cell` describes, and RC models predict them."""
 
 from __future__ import annotations
 
@@ -32,3 +32,20 @@ def test_provenance_lists_every_record() -> None:
     text = (DATA / "PROVENANCE.md").read_text(encoding="utf-8")
     assert all(f"| {load.name}.csv.gz |" in text for load in cell.LOADS)
     assert "PyBaMM" in text
+
+
+BAR = 5e-3  # V RMS, of the voltage under a load that the model was not identified on
+
+
+def test_two_rc_pairs_predict_another_load_at_a_fifth_of_the_capacity_an_hour() -> None:
+    found = cell.outcome("2 RC pairs", "battery_2rc", "steps-mild", "drive-mild")
+    assert found.other_rms < BAR
+    assert found.own_rms < BAR
+
+
+def test_stronger_load_needs_a_resistance_that_falls_with_the_current() -> None:
+    """At half the capacity an hour, with peaks of 1.6 times it, the reaction's curve shows."""
+    plain, reaction = (cell.outcome(title, name, "steps", "drive") for title, name in cell.MODELS)
+    assert reaction.other_rms < BAR < plain.other_rms
+    value, error = reaction.values["r"]
+    assert value > 3 * error > 0

@@ -12,6 +12,7 @@ from described import CHAIN, MOTOR
 from pvid.base.errors import PvidError
 from pvid.codegen.build import build, check, files_of
 from pvid.codegen.functions import functions_of
+from pvid.core.sources import source
 
 USER = """
 cmake_minimum_required(VERSION 3.20)
@@ -51,7 +52,7 @@ def test_two_lines_of_cmake_make_a_library_whose_test_passes(tmp_path: Path) -> 
         build(model, tmp_path / model.name)
     (tmp_path / "CMakeLists.txt").write_text(USER.format(root=ROOT, folder=tmp_path), encoding="utf-8")
     (tmp_path / "user.cpp").write_text(PROGRAM, encoding="utf-8")
-    run("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release")
+    run("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug")
     run("ninja", "-C", tmp_path / "b")
     assert "100% tests passed, 0 tests failed out of 3" in run("ctest", "--test-dir", tmp_path / "b")
 
@@ -59,11 +60,12 @@ def test_two_lines_of_cmake_make_a_library_whose_test_passes(tmp_path: Path) -> 
 def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:
     functions = functions_of(MOTOR)
     files = files_of(functions, "test")
-    assert "1.20000005f" not in files["motor_f32.c"]
     wrong = files["motor_f32.c"].replace("pvid_sign_f32", "pvid_magnitude_f32")
     for name, text in {**files, "motor_f32.c": wrong}.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    sources = [tmp_path / "motor_f32.c", tmp_path / "motor_test.c", ROOT / "firmware/src/number/elementary_f32.c"]
+    generated = [tmp_path / f"motor_{one}.c" for one in ("f32", "q31", "test")]
+    core = [source(f"{one}.c") for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
+    sources = [*generated, *core]
     includes = [f"-I{ROOT / 'firmware' / one}" for one in ("include", "src")]
     run("gcc", "-std=c99", "-O1", *includes, *sources, "-o", tmp_path / "test")
     done = subprocess.run([tmp_path / "test"], capture_output=True, text=True, check=False)

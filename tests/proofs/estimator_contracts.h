@@ -2,7 +2,6 @@
 #ifndef ESTIMATOR_CONTRACTS_H
 #define ESTIMATOR_CONTRACTS_H
 
-#include "solve/assess_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "pvid/gate_q31.h"

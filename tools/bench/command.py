@@ -34,6 +34,22 @@ def bench_demo(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="pages")
+@click.argument("names", nargs=-1)
+@click.option("--docs", type=click.Path(path_type=Path, exists=True), default="host/docs", show_default=True)
+def bench_pages(names: tuple[str, ...], docs: Path) -> int:
+    """Writes the pages of the shipped mechanisms: description, rows, verdict, measured against simulated."""
+    from bench import mechanism_pages
+    from pvid.models import mechanisms
+
+    some = names or mechanisms.names()
+    with progress_bar("pages", len(some)) as advance:
+        for done, name in enumerate(some, 1):
+            mechanism_pages.write_page(docs, name)
+            advance(done)
+    return DONE
+
+
 @bench.command(name="laws")
 @UPDATE
 def bench_laws(update: Path | None) -> int:
@@ -113,26 +129,43 @@ def bench_design_cost(update: bool) -> int:
 
 
 @bench.command(name="cell")
-@click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
-def bench_cell(folder: Path) -> int:
-    """Writes the records of a cell that is no RC circuit (needs PyBaMM)."""
+@click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@UPDATE
+def bench_cell(folder: Path | None, update: Path | None) -> int:
+    """RC models on a cell that is no RC circuit; --write makes its records (needs PyBaMM)."""
     from bench import cell
 
-    for path in cell.write(folder):
-        write_stderr(f"{path} written")
+    if folder is not None:
+        for path in cell.write(folder):
+            write_stderr(f"{path} written")
+        return DONE
+    put_table(update, "cell", markdown(cell.HEADER, [one.cells() for one in cell.outcomes()]))
     return DONE
 
 
 @bench.command(name="recordings")
-@click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
-@click.option("--into", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False), required=True)
-def bench_recordings(checkouts: Path, folder: Path) -> int:
-    """Cuts two pieces of each recording of real hardware from checkouts of the repositories that hold them."""
-    from bench import recordings
+@click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@UPDATE
+def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) -> int:
+    """Real rigs that others recorded: identified from one run, another one predicted, beside the published values.
 
-    for source in recordings.SOURCES:
-        for path in recordings.write_source(source, checkouts, folder):
-            write_stderr(f"{path} written")
+    FOLDER holds the pieces; --cut writes them there from checkouts of the repositories that hold the recordings.
+    """
+    from bench import recorded_rigs, recordings
+
+    if checkouts is not None:
+        for source in recordings.SOURCES:
+            for path in recordings.write_source(source, checkouts, folder):
+                write_stderr(f"{path} written")
+        return DONE
+    rigs = list(recorded_rigs.rigs(folder))
+    for name, header, rows_of in (
+        ("recordings", recorded_rigs.HEADER, recorded_rigs.value_rows),
+        ("predictions", recorded_rigs.PREDICTIONS, recorded_rigs.prediction_rows),
+        ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
+    ):
+        put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
     return DONE
 
 

@@ -1,6 +1,6 @@
 """Real hardware, recorded by other laboratories: where the recordings are, and how a short piece of each is cut.
 
-The recordings themselves are not in this repository. `./tools/pvid bench recordings --cut CHECKOUTS --into FOLDER`
+The recordings themselves are not in this repository. `./tools/pvid bench recordings FOLDER --cut CHECKOUTS`
 cuts two pieces of each from checkouts CHECKOUTS/OWNER/NAME of the public repositories: one to identify from, one to
 predict. The mechanisms are those of tests/data/recordings.
 """
@@ -306,7 +306,7 @@ SOURCES = (
         licence="MIT, Copyright (c) 2025 Silencefrog9305",
         read=_random_discharge,
         identify=Piece("Exp25_R1.mat", end=3000.0, part=25),
-        predict=Piece("Exp25_R1.mat", end=3000.0, part=2),
+        predict=Piece("Exp25_R1.mat", end=3000.0, part=26),
         channels=_CELL_CHANNELS,
         rate=0.1,
         decimals={"i": 4, "q": 3, "v": 4},

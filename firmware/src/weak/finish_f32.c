@@ -8,7 +8,7 @@
 
 #include "solve/cholesky_f32.h"
 #include "number/count.h"
-#include "solve/assess_f32.h"
+#include "solve/staged_f32.h"
 #include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"

@@ -5,7 +5,6 @@
 
 #include "solve/cholesky_q31.h"
 #include "number/count.h"
-#include "solve/assess_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "number/integer_q31.h"
@@ -122,7 +121,7 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_desi
         self->trace[i] = none;
     }
     /* in units of Y, independent of the sums' exponent */
-    const int64_t square = (int64_t)estimator->row_sd * estimator->row_sd;
+    const int64_t square = (int64_t)estimator->settings.row_sd * estimator->settings.row_sd;
     self->expected = pvid_scaled_plus_q31(pvid_scaled_of_q31(square, -2 * PVID_ROW_SD_BITS), pivot);
     self->whitened = true;
     self->saturated = false;

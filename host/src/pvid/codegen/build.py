@@ -6,9 +6,11 @@ from pathlib import Path
 
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
-from pvid.codegen import files_f32, self_test, twin_file
+from pvid.codegen import files_f32, files_q31, self_test, twin_file
 from pvid.codegen.banner import banner
+from pvid.codegen.fixed_model import fixed_model
 from pvid.codegen.functions import ModelFunctions, functions_of
+from pvid.codegen.reaches import Reaches
 from pvid.model.compiled import CompiledModel
 
 _CMAKE = """\
@@ -46,15 +48,21 @@ endif()
 """
 
 
-def files_of(functions: ModelFunctions, command: str) -> dict[str, str]:
-    """Name -> text of each file."""
+def files_of(functions: ModelFunctions, command: str, reaches: Reaches | None = None) -> dict[str, str]:
+    """Name -> text of each file; the fixed-point ones only where fixed point can compute all functions."""
     name = functions.name
     files = {
+        f"{name}_sizes.h": files_f32.sizes(functions, command),
         f"{name}.h": files_f32.header(functions, command),
         f"{name}_f32.c": files_f32.source(functions, command),
-        f"{name}_twin.py": twin_file.text(functions, command),
-        f"{name}_test.c": self_test.source(functions, command),
     }
+    fixed = None
+    if refusal(functions, reaches) is None:
+        fixed = fixed_model(functions, reaches)
+        files[f"{name}_q31.h"] = files_q31.header(fixed, command)
+        files[f"{name}_q31.c"] = files_q31.source(fixed, command)
+    files[f"{name}_twin.py"] = twin_file.text(functions, command, fixed)
+    files[f"{name}_test.c"] = self_test.source(functions, command, fixed)
     sources = " ".join(one for one in files if one.endswith(".c") and not one.endswith("_test.c"))
     files["CMakeLists.txt"] = _CMAKE.format(
         banner="\n# ".join(banner(functions, command)), name=name, upper=name.upper(), sources=sources
@@ -62,7 +70,18 @@ def files_of(functions: ModelFunctions, command: str) -> dict[str, str]:
     return files
 
 
-def build(compiled: CompiledModel, directory: Path, command: str | None = None) -> list[Path]:
+def refusal(functions: ModelFunctions, reaches: Reaches | None = None) -> str | None:
+    """Why the functions have no fixed-point form; None where they have one."""
+    try:
+        fixed_model(functions, reaches)
+    except PvidError as error:
+        return str(error)
+    return None
+
+
+def build(
+    compiled: CompiledModel, directory: Path, command: str | None = None, reaches: Reaches | None = None
+) -> list[Path]:
     """Writes the files of a model.
 
     Parameters
@@ -73,12 +92,14 @@ def build(compiled: CompiledModel, directory: Path, command: str | None = None) 
         Where; it is made if there is none.
     command
         For the banner; `pvid model build NAME` by default.
+    reaches
+        Of the inputs, for the fixed-point formats.
 
     Returns
     -------
     The files.
     """
-    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}")
+    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}", reaches)
     directory.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, text in files.items():
@@ -88,7 +109,7 @@ def build(compiled: CompiledModel, directory: Path, command: str | None = None) 
     return paths
 
 
-def check(compiled: CompiledModel, directory: Path, command: str | None = None) -> None:
+def check(compiled: CompiledModel, directory: Path, command: str | None = None, reaches: Reaches | None = None) -> None:
     """Whether the files in a folder are those of the model.
 
     Raises
@@ -96,7 +117,7 @@ def check(compiled: CompiledModel, directory: Path, command: str | None = None) 
     PvidError
         For the first file that is missing or differs.
     """
-    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}")
+    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}", reaches)
     for name, text in files.items():
         path = directory / name
         if not path.is_file():

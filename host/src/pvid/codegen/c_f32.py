@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pvid.codegen.literals import c_literal
-from pvid.codegen.names import temporary_prefix
-from pvid.codegen.operations import Argument, Literal, Program
+from pvid.codegen.operations import Program
+from pvid.codegen.statements import Language, statements, uses_arguments
 
 _CALLS = {
     "sin": "pvid_sin_f32({})",
@@ -17,30 +19,23 @@ _CALLS = {
 }
 
 
-def body(program: Program) -> list[str]:
-    """Statements that compute out[] from in[]."""
-    prefix = temporary_prefix(program.arguments)
-    names: list[str] = []
-    lines: list[str] = []
-    for place, value in enumerate(program.values):
-        if isinstance(value, Literal):
-            names.append(c_literal(value.value))
-        elif isinstance(value, Argument):
-            name = program.arguments[value.place]
-            lines.append(f"const float {name} = in[{value.place}];")
-            names.append(name)
-        else:
-            operands = [names[one] for one in value.operands]
-            call = _CALLS.get(value.kind, f"{{}} {value.kind} {{}}").format(*operands)
-            lines.append(f"const float {prefix}{place} = {call};")
-            names.append(f"{prefix}{place}")
-    if not any(isinstance(value, Argument) for value in program.values):
-        lines.append("(void)in;")
-    lines += [f"out[{k}] = {names[place]};" for k, place in enumerate(program.results)]
-    return lines
-
-
 def function(signature: str, program: Program) -> str:
-    """A definition."""
-    lines = "\n".join(f"    {line}" for line in body(program))
-    return f"{signature}\n{{\n{lines}\n}}"
+    """A definition that computes out[] from in[]."""
+    language = Language(
+        statement=lambda name, text: f"const float {name} = {text};",
+        argument=lambda place: f"in[{place}]",
+        literal=lambda place: c_literal(program.literal(place)),
+        operation=lambda place, operands: _CALLS.get(program.kind(place), f"{{}} {program.kind(place)} {{}}").format(
+            *operands
+        ),
+    )
+    lines, results = statements(program, language)
+    if not uses_arguments(program):
+        lines.append("(void)in;")
+    return definition(signature, [*lines, *(f"out[{k}] = {text};" for k, text in enumerate(results))])
+
+
+def definition(signature: str, lines: Sequence[str]) -> str:
+    """A function of these statements."""
+    body = "\n".join(f"    {line}" for line in lines)
+    return f"{signature}\n{{\n{body}\n}}"

@@ -12,30 +12,46 @@ from pvid.model.refusal import ModelError
 from pvid.model.units import NUMBER, PER_SECOND, Dimension, dimension_of, dimension_of_unit
 
 
+def everything(functions: ModelFunctions) -> list[str]:
+    """All names, with what they mean and their units."""
+    return [
+        "Units: SI. D(c) is the time derivative of a channel c, D2(c) the second derivative.",
+        "",
+        "Parameters:",
+        *parameters(functions),
+        "Inputs:",
+        *inputs(functions),
+        *(["Integrands:", *integrands(functions)] if functions.integrands.labels else []),
+        "Channels:",
+        *channels(functions),
+        *rows(functions),
+    ]
+
+
 def parameters(functions: ModelFunctions) -> list[str]:
     """p: name, unit, range."""
     rows = [
         (f"p[{k}]", one.name, f"[{one.unit or '1'}]", f"{one.low:.9g}..{one.high:.9g}", f"guess {one.guess:.9g}")
         for k, one in enumerate(functions.model.unknowns)
     ]
-    return _table(rows)
+    return table(rows)
 
 
 def inputs(functions: ModelFunctions) -> list[str]:
     """Inputs of channels: meaning, unit."""
-    return _table([(f"in[{k}]", one.meaning, f"[{one.unit or '1'}]") for k, one in enumerate(functions.inputs)])
+    return table([(f"in[{k}]", one.meaning, f"[{one.unit or '1'}]") for k, one in enumerate(functions.inputs)])
 
 
 def channels(functions: ModelFunctions) -> list[str]:
     """What each channel is."""
-    return _table([(f"channel[{k}]", label) for k, label in enumerate(functions.channels.labels)])
+    return table([(f"channel[{k}]", label) for k, label in enumerate(functions.channels.labels)])
 
 
 def integrands(functions: ModelFunctions) -> list[str]:
     """What is integrated, and how often."""
     places = [k for k, one in enumerate(functions.inputs) if one.fold]
     labels = zip(functions.integrands.labels, places, strict=True)
-    return _table([(f"integrand[{k}]", label, f"of in[{place}]") for k, (label, place) in enumerate(labels)])
+    return table([(f"integrand[{k}]", label, f"of in[{place}]") for k, (label, place) in enumerate(labels)])
 
 
 def rows(functions: ModelFunctions) -> list[str]:
@@ -44,15 +60,15 @@ def rows(functions: ModelFunctions) -> list[str]:
     dimensions = _dimensions(functions)
     for number, (kind, row) in enumerate(zip(functions.kinds, functions.model.rows, strict=True)):
         lines.append(f"Row {number}, {kind.name}:")
-        table = []
+        found = []
         for offset, (place, theta, part) in enumerate(zip(kind.theta, row.theta, row.regressors, strict=True)):
             units = _unit_of(theta, dimensions), _unit_of_part(part, dimensions)
             column = regressor(functions, kind.columns[offset])
-            table.append((f"theta[{place}]", str(theta), units[0], f"N[{offset}]", units[1], column))
-        table.append(("", "", "", "Y", _unit_of_part(row.known, dimensions), regressor(functions, kind.known)))
+            found.append((f"theta[{place}]", str(theta), units[0], f"N[{offset}]", units[1], column))
+        found.append(("", "", "", "Y", _unit_of_part(row.known, dimensions), regressor(functions, kind.known)))
         for k in range(kind.nuisances):
-            table.append(("", "free in each window", "", "", "", regressor(functions, kind.known + 1 + k)))
-        lines += _table(table)
+            found.append(("", "free in each window", "", "", "", regressor(functions, kind.known + 1 + k)))
+        lines += table(found)
     return lines
 
 
@@ -104,7 +120,7 @@ def _term(functions: ModelFunctions, term: Term, first: bool) -> str:
     return f"{head}{'' if size == 1 else f'{factor} '}{operator}({label})"
 
 
-def _table(rows: Sequence[tuple[str, ...]]) -> list[str]:
+def table(rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Columns under one another."""
     if not rows:
         return []

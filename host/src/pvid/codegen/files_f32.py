@@ -23,29 +23,19 @@ SIZES = {
 }
 
 
-def header(functions: ModelFunctions, command: str) -> str:
-    """NAME.h."""
+MEANING = {
+    "integrands": "From the inputs: what is integrated for the inputs that are integrals.",
+    "channels": "From the inputs of one instant: the channels.",
+    "theta": "From p: theta.",
+    "jacobian": "From p: the non-zeros of d theta / d p by columns, in the order of c_row and c_column.",
+}
+
+
+def sizes(functions: ModelFunctions, command: str) -> str:
+    """NAME_sizes.h."""
     name, upper = functions.name, functions.name.upper()
-    model = functions.model
-    guard = f"PVID_GENERATED_{upper}_H"
-    about = [
-        f"{name}.h - {model.title}: the functions of its rows sum theta_j(p) N_j = Y in float32.",
-        "",
-        *banner(functions, command),
-        "",
-        "Units: SI. D(c) is the time derivative of a channel c, D2(c) the second derivative.",
-        "",
-        "Parameters:",
-        *describe.parameters(functions),
-        "Inputs:",
-        *describe.inputs(functions),
-        *(["Integrands:", *describe.integrands(functions)] if functions.integrands.labels else []),
-        "Channels:",
-        *describe.channels(functions),
-        *describe.rows(functions),
-    ]
     counts = {
-        "P": len(model.unknowns),
+        "P": len(functions.model.unknowns),
         "THETA": len(functions.theta.labels),
         "C": len(functions.c_row),
         "KINDS": len(functions.kinds),
@@ -54,45 +44,51 @@ def header(functions: ModelFunctions, command: str) -> str:
     }
     if functions.integrands.labels:
         counts["INTEGRANDS"] = len(functions.integrands.labels)
-    lines = [
-        c_comment(about),
-        f"#ifndef {guard}",
-        f"#define {guard}",
+    about = [
+        f"{name}_sizes.h - how many parameters, coefficients and channels {name} has.",
         "",
-        '#include "pvid/model.h"',
+        *banner(functions, command),
+    ]
+    defined = [f"#define {upper}_{what} {count}" for what, count in counts.items()]
+    return guarded(f"{name}_sizes", about, defined)
+
+
+def guarded(name: str, about: list[str], body: list[str]) -> str:
+    """A header of this text."""
+    guard = f"PVID_GENERATED_{name.upper()}_H"
+    return "\n".join([c_comment(about), f"#ifndef {guard}", f"#define {guard}", "", *body, "", "#endif", ""])
+
+
+def for_cpp(body: list[str]) -> list[str]:
+    """Declarations that C++ reads as C."""
+    return ["#ifdef __cplusplus", 'extern "C" {', "#endif", "", *body, "#ifdef __cplusplus", "}", "#endif"]
+
+
+def header(functions: ModelFunctions, command: str) -> str:
+    """NAME.h."""
+    name = functions.name
+    about = [
+        f"{name}.h - {functions.model.title}: the functions of its rows sum theta_j(p) N_j = Y in float32.",
         "",
-        "#ifdef __cplusplus",
-        'extern "C" {',
-        "#endif",
+        *banner(functions, command),
         "",
-        *(f"#define {upper}_{what} {count}" for what, count in counts.items()),
-        "",
+        *describe.everything(functions),
+    ]
+    declared = [
         *_prototypes(functions),
         "/* theta and C of all rows for the estimator: n_theta counts the theta of every row; a row of one kind has 0",
         " * in the places of the others. */",
         f"extern const pvid_model_f32 {name}_model_f32;",
         "",
-        "#ifdef __cplusplus",
-        "}",
-        "#endif",
-        "",
-        "#endif",
-        "",
     ]
-    return "\n".join(lines)
+    return guarded(name, about, [f'#include "{name}_sizes.h"', '#include "pvid/model.h"', "", *for_cpp(declared)])
 
 
 def _prototypes(functions: ModelFunctions) -> list[str]:
-    meaning = {
-        "integrands": "From the inputs: what is integrated from the start of a window.",
-        "channels": "From the inputs of one instant: the channels.",
-        "theta": "From p: theta.",
-        "jacobian": "From p: the non-zeros of d theta / d p by columns, in the order of c_row and c_column.",
-    }
     lines: list[str] = []
     for function in functions.functions:
         lines += [
-            f"/* {meaning[function.name]} {function.program.operations} operations. */",
+            f"/* {MEANING[function.name]} {function.program.operations} operations. */",
             f"{signature(functions, function)};",
             "",
         ]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pvid.codegen.literals import python_literal
-from pvid.codegen.names import temporary_prefix
-from pvid.codegen.operations import Argument, Literal, Program
+from pvid.codegen.operations import Program
+from pvid.codegen.statements import Language, statements
 
 _CALLS = {
     "sin": "elementary.sine({})",
@@ -19,22 +19,15 @@ _CALLS = {
 
 def function(name: str, program: Program, summary: str) -> str:
     """A definition; of float32 [inputs, ...] it makes [results, ...]."""
-    prefix = temporary_prefix(program.arguments)
-    names: list[str] = []
-    lines: list[str] = []
-    for place, value in enumerate(program.values):
-        if isinstance(value, Literal):
-            names.append(python_literal(value.value))
-        elif isinstance(value, Argument):
-            argument = program.arguments[value.place]
-            lines.append(f"{argument} = _in[{value.place}]")
-            names.append(argument)
-        else:
-            operands = [names[one] for one in value.operands]
-            call = _CALLS.get(value.kind, f"{{}} {value.kind} {{}}").format(*operands)
-            lines.append(f"{prefix}{place} = {call}")
-            names.append(f"{prefix}{place}")
-    lines += [f"_out[{k}] = {names[place]}" for k, place in enumerate(program.results)]
+    language = Language(
+        statement=lambda one, text: f"{one} = {text}",
+        argument=lambda place: f"_in[{place}]",
+        literal=lambda place: python_literal(program.literal(place)),
+        operation=lambda place, operands: _CALLS.get(program.kind(place), f"{{}} {program.kind(place)} {{}}").format(
+            *operands
+        ),
+    )
+    lines, results = statements(program, language)
     return "\n".join(
         [
             f"def {name}(_in: Float32) -> Float32:",
@@ -42,6 +35,7 @@ def function(name: str, program: Program, summary: str) -> str:
             f"    _out = np.empty(({len(program.results)}, *_in.shape[1:]), np.float32)",
             '    with np.errstate(all="ignore"):',
             *(f"        {line}" for line in lines),
+            *(f"        _out[{k}] = {text}" for k, text in enumerate(results)),
             "    return _out",
         ]
     )

@@ -67,6 +67,22 @@ class Program:
         """How many there are."""
         return sum(isinstance(one, Operation) for one in self.values)
 
+    def literal(self, place: int) -> Fraction:
+        """The constant at a place."""
+        value = self.values[place]
+        assert isinstance(value, Literal)
+        return value.value
+
+    def operation(self, place: int) -> Operation:
+        """The operation at a place."""
+        value = self.values[place]
+        assert isinstance(value, Operation)
+        return value
+
+    def kind(self, place: int) -> Kind:
+        """Of the operation at a place."""
+        return self.operation(place).kind
+
     @property
     def kinds(self) -> set[Kind]:
         """Kinds of the operations."""

@@ -43,7 +43,8 @@ class SimulatedRig:
     friction_width
         speed over which the sign of a soft friction changes, tanh(v / width), in the unit of the sign's argument;
         0: there is no friction
-    window_s : window of the Cramer-Rao bound, and hint for the design [s]
+    window_s : window of the Cramer-Rao bound and of the design [s]
+    design : the rest of a design of the weak form that suits the rig: fields of FourierDesign
     knowns : values that differ from those of the model
     """
 
@@ -56,6 +57,7 @@ class SimulatedRig:
     substeps: int = 10
     friction_width: float = 0.0
     window_s: float = 1.0
+    design: Mapping[str, int] = field(default_factory=dict)
     knowns: Mapping[str, float] = field(default_factory=dict)
 
 

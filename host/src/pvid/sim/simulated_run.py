@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.models.mechanisms import compiled_of
@@ -197,9 +196,6 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     signals = {one.name: run[one.name] for one in model.signals}
     channels = tuple(Channel(one.name, one.unit, one.name) for one in model.signals)
     write_recording(path, Recording(run["t"], signals, rate), channels)
-    settings = path.with_suffix(".toml")
-    try:
-        write_whole(settings, MechanismRig(model.name, rate, known=simulation.rig.knowns).text())
-    except OSError as error:
-        raise PvidError(f"{settings}: cannot be written: {error.strerror}") from error
+    settings = path.with_name(f"{path.name.removesuffix('.gz').rpartition('.')[0]}.toml")
+    MechanismRig(model.name, rate, known=simulation.rig.knowns).write(settings)
     return settings

@@ -19,4 +19,5 @@ RIG = SimulatedRig(
     duration=4 * 3600.0,
     substeps=4,
     window_s=1200.0,
+    design=dict(functions=40),
 )

@@ -9,4 +9,5 @@ RIG = SimulatedRig(
     drive={"V": Sines(((3.5, 0.5, 1.6), (4.0, 1.4, 1.2), (3.5, 2.3, 2.0)))},
     start={"a": 0.3},
     window_s=1.0,
+    design=dict(functions=24, decimation=2, taps=15, degree=4, rate_taps=41, rate_degree=6),
 )

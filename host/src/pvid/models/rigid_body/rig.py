@@ -14,4 +14,5 @@ RIG = SimulatedRig(
     truth=dict(Ixx=0.012, Iyy=0.014, Izz=0.022, Ixy=5e-4, Ixz=-3e-4, Iyz=4e-4),
     drive={f"m{axis}": _servo(axis) for axis in range(3)},
     window_s=1.0,
+    design=dict(functions=12, decimation=8, taps=61, rate_taps=61, rate_degree=6),
 )

@@ -240,8 +240,8 @@ def most_likely(q: Float, z: Float) -> tuple[float, float]:
 def online(rows: WeakRows, start: Float | None = None, equation_error: bool = True) -> Float:
     """p after each window [windows, n_p]: every window whitened at the p of its moment, three steps each.
 
-    The sums of rows that were whitened at a poor p weigh wrongly. Here all rows are whitened anew when their number is a
-    power of two; an engine that keeps no rows lets its first sums fade instead.
+    The sums of rows that were whitened at a poor p weigh wrongly. Here all rows are whitened anew when their number is
+    a power of two; an engine that keeps no rows lets its first sums fade instead.
     """
     parameters = rows.compiled.parameters
     p = parameters.checked(start)
