@@ -37,6 +37,8 @@ def verdict(found: Identifiability) -> str:
 def _shift(one: Shift) -> str:
     names = listed(one.unknowns)
     shown = ", ".join(_in_order(value, one.unknowns) for value in one.combinations)
+    if not one.combinations and one.kind == "coefficients":
+        return f"  {names} change together without a trace: declare one of them as known, or add a sensor."
     if not one.combinations:
         return f"  {names}: not determined at all."
     only = f"only {shown}" if one.kind != "coefficients" else f"only what follows from {shown}"
