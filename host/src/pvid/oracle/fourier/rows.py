@@ -122,7 +122,7 @@ class WeakRows:
         """Row kinds."""
         return len(self.columns)
 
-    def only(self, windows: slice) -> WeakRows:
+    def only(self, windows: slice | npt.NDArray[np.bool_]) -> WeakRows:
         """Some of the windows; the noise stays that of the run."""
         out = copy.copy(self)
         out.columns = [one[windows] for one in self.columns]
