@@ -18,7 +18,18 @@ from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.solve import Fit, Moments, gauss_newton, inverse, normal
 
 Name = Literal[
-    "not_identified", "not_settled", "chi2", "shape", "halves", "windows", "feedback", "short", "range", "unexplained"
+    "not_identified",
+    "not_settled",
+    "chi2",
+    "shape",
+    "halves",
+    "windows",
+    "feedback",
+    "short",
+    "range",
+    "unexplained",
+    "sensor",
+    "scale",
 ]
 Status = Literal["good", "warning", "not_identified"]
 
