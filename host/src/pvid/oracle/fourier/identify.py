@@ -97,7 +97,7 @@ def identify(
     sample_rate: float,
     start: Mapping[str, float] | npt.ArrayLike | None = None,
     design: FourierDesign | None = None,
-    compensate: bool = False,
+    compensate: bool = True,
 ) -> Identified:
     """Parameters of a mechanism from a run.
 
