@@ -305,8 +305,9 @@ SOURCES = (
         commit=_CELL_COMMIT,
         licence="MIT, Copyright (c) 2025 Silencefrog9305",
         read=_random_discharge,
-        identify=Piece("Exp25_R1.mat", end=3000.0, part=25),
-        predict=Piece("Exp25_R1.mat", end=3000.0, part=26),
+        # both to 1.9 A h: a polynomial of the charge must not be extrapolated
+        identify=Piece("Exp25_R1.mat", end=3500.0, part=25),
+        predict=Piece("Exp25_R1.mat", end=2800.0, part=26),
         channels=_CELL_CHANNELS,
         rate=0.1,
         decimals={"i": 4, "q": 3, "v": 4},
