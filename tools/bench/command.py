@@ -143,6 +143,18 @@ def bench_cell(folder: Path | None, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="compare-methods")
+@UPDATE
+def bench_compare_methods(update: Path | None) -> int:
+    """Weak form, strong form, output error and pysindy's weak form on the shipped mechanisms (needs pysindy)."""
+    from bench import methods
+
+    with progress_bar("methods", len(methods.MECHANISMS) * len(methods.METHODS)) as advance:
+        rows = list(methods.rows(progress=lambda: advance(1)))
+    put_table(update, "compare-methods", markdown(methods.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="recordings")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False))
