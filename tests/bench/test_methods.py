@@ -42,8 +42,8 @@ def test_match_of_the_mean_is_zero() -> None:
 
 def test_output_error_finds_the_motor_from_near() -> None:
     motor = shortened("dc_motor", 0.8)
-    found = output_error(Replay(motor.model, methods.recorded(motor, 0), substeps=1), 1.01 * motor.truth, most=8)
-    np.testing.assert_allclose(found.p[:3], motor.truth[:3], rtol=2e-3)
+    found = output_error(Replay(motor.model, methods.recorded(motor, 0), substeps=1), 1.01 * motor.truth, most=20)
+    np.testing.assert_allclose(found.p[:3], motor.truth[:3], rtol=5e-4)  # 12-bit sensors, 0.8 s
 
 
 def test_strong_form_has_the_back_emf_and_not_the_inductance() -> None:
