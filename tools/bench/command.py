@@ -178,6 +178,8 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
         ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
     ):
         put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
+    traps = [row for rig in rigs for row in recorded_rigs.trap_rows(rig.source, folder)]
+    put_table(update, "traps", markdown(recorded_rigs.TRAPS, traps))
     return DONE
 
 
