@@ -98,6 +98,29 @@ def bench_tune(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="mechanisms")
+@click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@click.option("--imperfect", default=5, show_default=True, type=click.IntRange(min=0), help="Of each imperfection.")
+@UPDATE
+def bench_mechanisms(chosen: tuple[str, ...], seeds: int, imperfect: int, update: Path | None) -> int:
+    """The shipped mechanisms on simulated rigs, beside the Cramer-Rao bound, and on imperfect rigs."""
+    from bench import mechanisms
+    from pvid.models.mechanisms import names
+
+    unknown = set(chosen) - set(names())
+    if unknown:
+        raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
+    some = chosen or names()
+    cases = sum(mechanisms.number_of_cases(name) for name in some) if imperfect else 0
+    with progress_bar("mechanisms", 2 * seeds * len(some) + imperfect * cases) as advance:
+        tables = mechanisms.tables(some, seeds, imperfect, advance)
+    for marker, header, rows in tables:
+        if rows:
+            put_table(update, marker, markdown(header, rows))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:

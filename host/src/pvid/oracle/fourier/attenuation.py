@@ -75,7 +75,7 @@ def _combination(theta: Float, jacobian: Float, dependent: int | None) -> tuple[
 
 
 def _kind(fit: Fit, kind: int, theta: Float) -> _Kind:
-    white = fit.white[kind]
+    white = fit.alone(kind)
     columns = np.concatenate([white.regressors, white.known[:, np.newaxis, :]], axis=1)
     flat = columns.transpose(1, 0, 2).reshape(columns.shape[1], -1)
     products = flat @ flat.T

@@ -73,6 +73,8 @@ def lengths(samples: int, sample_rate: float) -> list[float]:
     """Windows to try [s], the longest first."""
     longest = 2 * samples / sample_rate / (_FEWEST_WINDOWS + 1)
     shortest = _SHORTEST_STEPS / sample_rate
+    if longest < shortest:
+        return []
     count = min(_LENGTHS, 1 + int(np.log2(max(longest / shortest, 1.0))))
     return [float(f"{longest / 2**k:.2g}") for k in range(count)]
 
@@ -124,6 +126,9 @@ def ranked(
         for count in ((*_FEW_FUNCTIONS, *_FUNCTIONS) if errors else _FUNCTIONS)
         if (length, count) != (best.design.window_s, best.design.functions)
     )
+    if len(model.model.rows) > 1:
+        best = min(tried, key=lambda one: one.score)
+        attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
     return sorted(tried, key=lambda one: one.score)
 
 

@@ -29,6 +29,8 @@ Name = Literal[
     "short",
     "range",
     "unexplained",
+    "sensor",
+    "scale",
 ]
 Status = Literal["good", "warning", "not_identified"]
 
