@@ -44,7 +44,7 @@ static pvid_system_f32 known_system(void)
     const pvid_system_f32 system = {
         .s = {{8.0f, 4.0f}, {0.0f, 10.0f}},
         .force = {8.0f, -8.0f},
-        .residual = 4.0f,
+        .rss = 4.0f,
         .weight = 34.0f,
     };
     return system;
@@ -227,7 +227,7 @@ static void no_step_is_taken_in_the_dead_zone(void **state)
     assert_true(solution.in_dead_zone && (solution.reason == PVID_UPDATED) && (solution.size == 0.0f));
     assert_memory_equal(p, start, sizeof start);
     /* larger residuals widen the zone up to row_sd^2 alone: 26 <= zone 2 0.25 */
-    system.residual = 4000.0f;
+    system.rss = 4000.0f;
     settings.dead_zone = 51.0f;
     assert_false(solved(&system, &settings, p).in_dead_zone);
     settings.dead_zone = 53.0f;
@@ -301,7 +301,7 @@ static void the_variance_has_its_limits(void **state)
     assert_true(pvid_assess_variance_f32(&system, &settings) == 0.25f);
     system.floor = 16.0f;
     assert_true(pvid_assess_variance_f32(&system, &settings) == 0.5f);
-    system.residual = NOT_A_NUMBER;
+    system.rss = NOT_A_NUMBER;
     assert_true(pvid_assess_variance_f32(&system, &settings) == (PVID_RESIDUAL_MAX / 32.0f));
     system.weight = 2.5f; /* no whole degree of freedom: row_sd^2 */
     assert_true(pvid_assess_variance_f32(&system, &settings) == 0.25f);
@@ -316,9 +316,9 @@ static void the_misfit_compares_the_residual_with_its_floor(void **state)
     system.floor = 2.0f;
     system.rounding = 100.0f; /* no part of it */
     assert_true(pvid_assess_misfit_f32(&system, &settings) == 2.0f);
-    system.residual = INFINITE;
+    system.rss = INFINITE;
     assert_true(pvid_assess_misfit_f32(&system, &settings) == PVID_RESIDUAL_MAX);
-    system.residual = NOT_A_NUMBER;
+    system.rss = NOT_A_NUMBER;
     assert_true(pvid_assess_misfit_f32(&system, &settings) == 0.0f);
     system = known_system();
     system.floor = 2.0f;

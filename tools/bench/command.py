@@ -456,3 +456,19 @@ def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
     rows = long.long_table(only)
     put_table(update, "long", markdown(long.HEADER, rows))
     return DONE if all(row[-1] == "passed" for row in rows) else DIFFERENT
+
+
+@bench.command(name="random-models")
+@UPDATE
+@click.option("--count", default=10_000, show_default=True, help="Of models.")
+@click.option("--first", default=0, show_default=True, help="Seed of the first one.")
+def bench_random_models(update: Path | None, count: int, first: int) -> int:
+    """`pvid model check` of random descriptions: a report or one sentence, never a traceback."""
+    from bench import random_models
+
+    with progress_bar("models", count) as advance:
+        tally = random_models.run(range(first, first + count), advance)
+    put_table(update, "random-models", markdown(random_models.HEADER, [tally.row()]))
+    for seed, error in tally.tracebacks[:20]:
+        click.echo(f"pvid: seed {seed}: {error}", err=True)
+    return DIFFERENT if tally.tracebacks else DONE

@@ -19,7 +19,7 @@ float pvid_assess_variance_f32(const pvid_system_f32 *system, const pvid_solve_s
     if (!(freedom >= 1.0f)) {
         return settings->row_variance;
     }
-    const float sum = system->residual + system->rounding;
+    const float sum = system->rss + system->rounding;
     const float residual = (sum <= PVID_RESIDUAL_MAX) ? sum : PVID_RESIDUAL_MAX;
     return ((residual > system->floor) ? residual : system->floor) / freedom;
 }
@@ -27,10 +27,10 @@ float pvid_assess_variance_f32(const pvid_system_f32 *system, const pvid_solve_s
 float pvid_assess_misfit_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings)
 {
     const bool free = freedom_of(system, settings) >= 1.0f;
-    if (!free || !(system->floor > 0.0f) || !(system->residual > 0.0f)) {
+    if (!free || !(system->floor > 0.0f) || !(system->rss > 0.0f)) {
         return 0.0f;
     }
-    const float misfit = system->residual / system->floor;
+    const float misfit = system->rss / system->floor;
     return (misfit <= PVID_RESIDUAL_MAX) ? misfit : PVID_RESIDUAL_MAX;
 }
 
