@@ -192,6 +192,14 @@ def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: 
     assert done.stdout == f"{core.running_hash:08x}"
 
 
+def test_a_guess_beyond_the_fixed_point_format_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text("l1 = 0.3\nsample_rate = 1000\n[nominal]\nl2 = 1e6\nrho2 = 0.0132\n", encoding="utf-8")
+    command = ["tables", "--core", "q31", "--rig", str(path)]
+    with pytest.raises(PvidError, match="beyond the fixed-point format .integer .* guess of the rig"):
+        CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False)
+
+
 def test_margins_are_positive_or_the_design_is_refused() -> None:
     design = weak_design_of(RigFile.standard(), 1000.0)
     tables = weak_tables_q31(design, 2 * np.pi / 2**14, 5e-6, 0.5, 0.03, 39.2)

@@ -213,7 +213,7 @@ def test_the_header_is_the_configuration_and_nothing_overflows(
     settings = replace(STRONG.identifier, differentiator=differentiator, stride=stride)  # type: ignore[arg-type]
     rig = replace(STRONG, identifier=settings)
     rig.write(tmp_path / "rig.toml")
-    command = ["tables", "--form", "strong", "--rig", str(tmp_path / "rig.toml"), "--name", "strong"]
+    command = ["tables", "--form", "strong", "--core", "q31", "--rig", str(tmp_path / "rig.toml"), "--name", "strong"]
     header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
     (tmp_path / "table.h").write_text(header)
     (tmp_path / "main.c").write_text(PROGRAM)
@@ -246,7 +246,7 @@ def test_the_header_is_the_configuration_and_nothing_overflows(
 
 
 def test_the_table_can_be_checked(recorded: tuple[Path, Path], tmp_path: Path) -> None:
-    command = ["tables", "--form", "strong", "--rig", str(recorded[1])]
+    command = ["tables", "--form", "strong", "--core", "q31", "--rig", str(recorded[1])]
     header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
     (tmp_path / "table.h").write_text(header)
     checked = [*command, "--check", str(tmp_path / "table.h")]

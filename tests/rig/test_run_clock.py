@@ -161,7 +161,7 @@ def test_interpolated_value_is_as_accurate_as_a_sample(rate: float, milliseconds
     firsts = np.arange(int(0.5 * rate), t.size - 100, int(0.3 * rate))
     gaps = (firsts[:, None] + np.arange(length)).ravel()
     phi[gaps] = y[gaps] = np.nan
-    bridge(phi, y, rate)
+    bridge([phi, y], rate)
     filled = np.isfinite(phi[gaps])
     assert filled.mean() > 0.95  # the others lie where chance makes the samples beside them rough
     # a sample's own error: half an LSB of noise and its rounding
@@ -174,7 +174,7 @@ def test_a_gap_is_not_interpolated_where_the_motion_is_too_fast_for_it() -> None
     phi = 0.1 * np.sin(150.0 * t)  # 24 Hz: 20 ms are half a period
     y = np.zeros(t.size)
     phi[1000:1020] = np.nan
-    bridge(phi, y, RATE)
+    bridge([phi, y], RATE)
     assert np.isnan(phi[1000:1020]).all() and np.isnan(y[1000:1020]).all()
 
 

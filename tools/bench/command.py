@@ -34,6 +34,22 @@ def bench_demo(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="pages")
+@click.argument("names", nargs=-1)
+@click.option("--docs", type=click.Path(path_type=Path, exists=True), default="host/docs", show_default=True)
+def bench_pages(names: tuple[str, ...], docs: Path) -> int:
+    """Writes the pages of the shipped mechanisms: description, rows, verdict, measured against simulated."""
+    from bench import mechanism_pages
+    from pvid.models import mechanisms
+
+    some = names or mechanisms.names()
+    with progress_bar("pages", len(some)) as advance:
+        for done, name in enumerate(some, 1):
+            mechanism_pages.write_page(docs, name)
+            advance(done)
+    return DONE
+
+
 @bench.command(name="laws")
 @UPDATE
 def bench_laws(update: Path | None) -> int:
@@ -82,6 +98,29 @@ def bench_tune(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="mechanisms")
+@click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@click.option("--imperfect", default=5, show_default=True, type=click.IntRange(min=0), help="Of each imperfection.")
+@UPDATE
+def bench_mechanisms(chosen: tuple[str, ...], seeds: int, imperfect: int, update: Path | None) -> int:
+    """The shipped mechanisms on simulated rigs, beside the Cramer-Rao bound, and on imperfect rigs."""
+    from bench import mechanisms
+    from pvid.models.mechanisms import names
+
+    unknown = set(chosen) - set(names())
+    if unknown:
+        raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
+    some = chosen or names()
+    cases = sum(mechanisms.number_of_cases(name) for name in some) if imperfect else 0
+    with progress_bar("mechanisms", 2 * seeds * len(some) + imperfect * cases) as advance:
+        tables = mechanisms.tables(some, seeds, imperfect, advance)
+    for marker, header, rows in tables:
+        if rows:
+            put_table(update, marker, markdown(header, rows))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:
@@ -109,6 +148,47 @@ def bench_design_cost(update: bool) -> int:
         write_whole(weak_cost.COEFFICIENTS_FILE, design_cost.as_toml(mean, longest))
         write_stderr(f"{weak_cost.COEFFICIENTS_FILE.name} written")
     click.echo(markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
+    return DONE
+
+
+@bench.command(name="cell")
+@click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@UPDATE
+def bench_cell(folder: Path | None, update: Path | None) -> int:
+    """RC models on a cell that is no RC circuit; --write makes its records (needs PyBaMM)."""
+    from bench import cell
+
+    if folder is not None:
+        for path in cell.write(folder):
+            write_stderr(f"{path} written")
+        return DONE
+    put_table(update, "cell", markdown(cell.HEADER, [one.cells() for one in cell.outcomes()]))
+    return DONE
+
+
+@bench.command(name="recordings")
+@click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@UPDATE
+def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) -> int:
+    """Real rigs that others recorded: identified from one run, another one predicted, beside the published values.
+
+    FOLDER holds the pieces; --cut writes them there from checkouts of the repositories that hold the recordings.
+    """
+    from bench import recorded_rigs, recordings
+
+    if checkouts is not None:
+        for source in recordings.SOURCES:
+            for path in recordings.write_source(source, checkouts, folder):
+                write_stderr(f"{path} written")
+        return DONE
+    rigs = list(recorded_rigs.rigs(folder))
+    for name, header, rows_of in (
+        ("recordings", recorded_rigs.HEADER, recorded_rigs.value_rows),
+        ("predictions", recorded_rigs.PREDICTIONS, recorded_rigs.prediction_rows),
+        ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
+    ):
+        put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
     return DONE
 
 
@@ -362,3 +442,19 @@ def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
     rows = long.long_table(only)
     put_table(update, "long", markdown(long.HEADER, rows))
     return DONE if all(row[-1] == "passed" for row in rows) else DIFFERENT
+
+
+@bench.command(name="random-models")
+@UPDATE
+@click.option("--count", default=10_000, show_default=True, help="Of models.")
+@click.option("--first", default=0, show_default=True, help="Seed of the first one.")
+def bench_random_models(update: Path | None, count: int, first: int) -> int:
+    """`pvid model check` of random descriptions: a report or one sentence, never a traceback."""
+    from bench import random_models
+
+    with progress_bar("models", count) as advance:
+        tally = random_models.run(range(first, first + count), advance)
+    put_table(update, "random-models", markdown(random_models.HEADER, [tally.row()]))
+    for seed, error in tally.tracebacks[:20]:
+        click.echo(f"pvid: seed {seed}: {error}", err=True)
+    return DIFFERENT if tally.tracebacks else DONE

@@ -5,7 +5,7 @@
  * reads 0 at the equilibrium:
  *
  *   static pvid_strong_q31 identifier;
- *   (config from the header that `pvid tables --form strong` writes)
+ *   (config from the header that `pvid tables --form strong --core q31` writes)
  *   if (pvid_strong_init_q31(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_strong_step_q31(&identifier, phi_counts, y_counts);
  *

@@ -8,28 +8,13 @@
 
 #include <stdint.h>
 
+#include "pvid/detail/shift_q31.h"
 #include "pvid/estimator_q31.h"
 
 #define PVID_WIDE ((int64_t)1 << 62)
 
 /* 1 in Q30. */
 #define PVID_ONE_Q30 ((int32_t)1 << 30)
-
-/* Greatest integer not above x 2^-s, s <= 63, any x. Only these two functions shift a signed number right: C99
- * leaves the result for negative numbers to the compiler, and every compiler for the targets repeats the sign.
- * MISRA deviation: 10.1, checked by the assertion below. */
-static inline int64_t pvid_floor_shift_q31(int64_t x, uint32_t s)
-{
-    return x >> s;
-}
-
-typedef char pvid_shift_repeats_the_sign[((-5 >> 1) == -3) ? 1 : -1];
-
-/* The same for 32 bits, s <= 31. */
-static inline int32_t pvid_floor_shift_32_q31(int32_t x, uint32_t s)
-{
-    return x >> s;
-}
 
 /* a b by four multiplications of 16 by 16 bits: half the cost of 64 by 64 on a core without a long multiplication. */
 int64_t pvid_product_in_halves_q31(int32_t a, int32_t b);
@@ -52,15 +37,6 @@ static inline int64_t pvid_square_q31(int32_t a)
 #else
     return (int64_t)a * a;
 #endif
-}
-
-/* x 2^-s rounded half up; any s >= 0, x < INT64_MAX. */
-static inline int64_t pvid_round_shift_q31(int64_t x, uint32_t s)
-{
-    if (s == 0u) {
-        return x;
-    }
-    return (s > 63u) ? 0 : pvid_floor_shift_q31(pvid_floor_shift_q31(x, s - 1u) + 1, 1);
 }
 
 /* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0; |x| < INT64_MAX. */

@@ -1,25 +1,12 @@
-/* Numbers of any size with 30 bits: the gate compares values beyond the range of an int64. Private to the core. */
-#ifndef PVID_SCALED_Q31_H
-#define PVID_SCALED_Q31_H
+/* Numbers of any size with 30 bits, what the core alone does with them: the gate compares values beyond the range of an
+ * int64. Private to the core. */
+#ifndef PVID_NUMBER_SCALED_Q31_H
+#define PVID_NUMBER_SCALED_Q31_H
 
 #include <stdbool.h>
 
 #include "number/integer_q31.h"
-
-/* x 2^exponent, |x| <= PVID_WIDE. */
-pvid_scaled_q31 pvid_scaled_of_q31(int64_t x, int32_t exponent);
-
-/* Each to 30 digits: a + b, a b, a / b (b > 0). Exponents stay within some thousands. */
-pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
-pvid_scaled_q31 pvid_scaled_times_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
-pvid_scaled_q31 pvid_scaled_over_q31(pvid_scaled_q31 a, pvid_scaled_q31 b);
-
-/* a - b, as a + b. */
-static inline pvid_scaled_q31 pvid_scaled_minus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
-{
-    const pvid_scaled_q31 less = {-b.m, b.e};
-    return pvid_scaled_plus_q31(a, less);
-}
+#include "pvid/scaled_q31.h"
 
 /* a > b, b >= 0: the exponents decide unless they are neighbours. */
 static inline bool pvid_scaled_exceeds_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)

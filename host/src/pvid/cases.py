@@ -102,6 +102,18 @@ class Case(ABC):
     def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
         """A C header that defines the settings as `name`, with their tables, for a rod of l1 [m]."""
 
+    def facts(self, config: Any) -> list[str]:
+        """Of the design of the weak form: its sizes, and the macros of pvid/config.h whose defaults it exceeds."""
+        if self.form == "strong":
+            return []
+        design = config.design
+        facts = [
+            f"taps {design.taps}, decimation {design.decimation}, windows of {design.window} samples, "
+            f"{design.functions} test functions"
+        ]
+        raised = [f"-D{macro}={value}" for macro, value in raised_bounds(design).items()]
+        return [*facts, f"build the core with {' '.join(raised)}"] if raised else facts
+
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
         """Macros of pvid/config.h that the settings need.
 
@@ -289,6 +301,10 @@ class _Fixed(Case):
     def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
         more = scale_lines(config, l1, name)
         return settings_header(config, name, made_by, self.umbrella, fixed_notes(config), more)
+
+    def facts(self, config: Any) -> list[str]:
+        spare = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
+        return [*super().facts(config), f"bits to spare at full scale: {spare}"]
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
         more = {"PVID_MAX_THETA_Q31": str(len(config.estimator.n_bits))}

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 def shown(text: str, longest: int = 40) -> str:
     """``text`` quoted for a sentence, on one line and of bounded length."""
     return ascii(text if len(text) <= longest else text[: longest - 3] + "...")
+
+
+def listed(names: Iterable[str]) -> str:
+    """``a``, ``a and b``, ``a, b and c``."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def reason(error: BaseException) -> str:

@@ -14,7 +14,6 @@ from pvid.base.console import DIFFERENT, DONE, progress_bar
 from pvid.cli.input import form_options, read_input, with_overrides
 from pvid.core.native import Native
 from pvid.log.rig_settings import rig_for
-from pvid.rig.columns import Columns
 from pvid.run.survey import fitted
 
 
@@ -35,7 +34,7 @@ def command(
     run_path: Path,
     rig_path: Path | None,
     settings: tuple[str, ...],
-    columns: Columns | None,
+    columns: str | None,
     law: str | None,
     form: str | None,
     core: str | None,

@@ -16,7 +16,6 @@ from pvid.base.rounding import with_error
 from pvid.cli.input import columns_option, read_input, rig_options
 from pvid.cli.simulate import tone
 from pvid.log.rig_settings import rig_for
-from pvid.rig.columns import Columns
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_RELEASE
 
 
@@ -38,7 +37,7 @@ def command(
     rig_path: Path | None,
     settings: tuple[str, ...],
     run_path: Path | None,
-    columns: Columns | None,
+    columns: str | None,
     tones: tuple[str, ...],
     release: tuple[float, float] | None,
     duration: float | None,

@@ -12,8 +12,8 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar,
 from pvid.cli.input import FigurePath, form_options, print_notes, read_input, with_overrides
 from pvid.cli.result import identified, print_result, print_warning, write_figure
 from pvid.core.native import Native
+from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
-from pvid.rig.columns import Columns
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.survey import fitted
@@ -21,6 +21,7 @@ from pvid.run.survey import fitted
 
 @click.command(name="identify")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
 @form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
 @click.option(
@@ -30,9 +31,10 @@ from pvid.run.survey import fitted
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 def command(
     run_path: Path,
+    model: str | None,
     rig_path: Path | None,
     settings: tuple[str, ...],
-    columns: Columns | None,
+    columns: str | None,
     law: str | None,
     form: str | None,
     core: str | None,
@@ -45,9 +47,18 @@ def command(
     --columns maps other names and units. Without a rig file --set l1=0.25, the length of rod 1 [m], is enough. Short
     gaps are interpolated, long gaps stay empty, a non-uniform clock is corrected; each correction is reported.
 
+    With --model, or a rig file with [model], the run is one of another mechanism (host/docs/models.md): its columns are
+    t and the signals of the model, and it is identified in float64.
+
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
     reported tick and at the end.
     """
+    described = mechanism_rig(run_path, rig_path, settings, model)
+    if described is not None:
+        from pvid.cli.mechanism import identify_run  # loads SymPy
+
+        options = {"core": core, "form": form, "law": law, "on": target}
+        return identify_run(run_path, described, columns, as_json=as_json, figure=figure, **options)
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
     run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)
     given, rig = rig, resolved(rig, run)

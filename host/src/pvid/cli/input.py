@@ -14,7 +14,7 @@ from pvid.base.console import write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import format_of
 from pvid.log.rig import LOG_SUFFIX, run_of_log
-from pvid.rig.columns import Columns
+from pvid.rig.columns import parsed
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run, read_run
 
@@ -45,8 +45,7 @@ def columns_option(command: Command) -> Command:
     return click.option(
         "--columns",
         metavar="MAP",
-        type=ColumnsType(),
-        help="Columns of RUN for t, phi and y, and their units: t=time_ms:ms,phi=angle_deg:deg,y=h:mm. A number "
+        help="Columns of RUN for t and the signals, and their units: t=time_ms:ms,phi=angle_deg:deg,y=h:mm. A number "
         "is the position of the column, from 1; units are s ms us ns min, rad mrad deg rev turn, m cm mm um in, a "
         "number of SI units, or one of these divided (rev/4096) or with opposite sign (-mm).",
     )(command)
@@ -78,16 +77,6 @@ log_argument = click.argument("log", type=click.Path(path_type=Path))
 log_rig = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
 
 
-class ColumnsType(click.ParamType[Columns]):
-    """Text of --columns."""
-
-    name = "columns"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Columns:
-        """See click."""
-        return value if isinstance(value, Columns) else Columns.parse(value)
-
-
 class FigurePath(click.Path):
     """Path of a figure to write; its format is checked before any computation."""
 
@@ -101,7 +90,7 @@ class FigurePath(click.Path):
         return path
 
 
-def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whole: bool = False) -> Run:
+def read_input(path: Path, rig: RigFile, columns: str | None = None, *, whole: bool = False) -> Run:
     """The run in a file or a log; prints what was done to it.
 
     Parameters
@@ -120,7 +109,7 @@ def read_input(path: Path, rig: RigFile, columns: Columns | None = None, *, whol
         if columns is not None:
             raise PvidError(f"{path} is a log with known columns: omit --columns")
         return aligned(run_of_log(path), rig.sensor.y_delay)
-    run = aligned(read_run(path, rig.sample_rate, columns), rig.sensor.y_delay)
+    run = aligned(read_run(path, rig.sample_rate, parsed(columns)), rig.sensor.y_delay)
     run.refuse_damaged()
     if whole:
         run = run.whole()

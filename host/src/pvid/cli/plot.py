@@ -9,7 +9,7 @@ import click
 from pvid.base.console import DONE
 from pvid.cli.input import FigurePath, columns_option, print_notes, rig_options
 from pvid.log.rig_settings import rig_for
-from pvid.rig.columns import Columns
+from pvid.rig.columns import parsed
 
 
 @click.command(name="plot")
@@ -17,16 +17,14 @@ from pvid.rig.columns import Columns
 @rig_options
 @columns_option
 @click.option("-o", "--out", type=FigurePath(), help="Figure file: png, svg or pdf.  [default: LOG with .png]")
-def command(
-    log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
-) -> int:
+def command(log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: str | None, out: Path | None) -> int:
     """Draws a report of a LOG: convergence, residuals and their autocorrelation, spectra, phase plot.
 
     A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first.
     """
     from pvid.show.report import recording_of, write_report  # matplotlib and scipy, which other commands do not need
 
-    recording = recording_of(log, rig_for(log, rig_path, settings), columns)
+    recording = recording_of(log, rig_for(log, rig_path, settings), parsed(columns))
     print_notes(recording.run.notes)
     out = out or log.with_suffix(".png")
     write_report(recording, out)

@@ -14,7 +14,6 @@ from pvid.cli.input import columns_option, read_input, rig_options
 from pvid.cli.result import identified, print_warning
 from pvid.core.native import Native
 from pvid.log.rig_settings import rig_for, rig_path_of
-from pvid.rig.columns import Columns
 from pvid.rig.sensor_steps import resolved
 from pvid.run import answer
 
@@ -25,7 +24,7 @@ from pvid.run import answer
 @columns_option
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Rig file to write.  [default: RUN-tuned.toml]")
 def command(
-    run_path: Path, rig_path: Path | None, settings: tuple[str, ...], columns: Columns | None, out: Path | None
+    run_path: Path, rig_path: Path | None, settings: tuple[str, ...], columns: str | None, out: Path | None
 ) -> int:
     """Chooses the weak form's settings for a recorded RUN: equations (full angles, friction), window, test functions,
     pass band, decimation, forgetting.

@@ -136,10 +136,16 @@ class Headers:
         return np.frombuffer(self.ffi.buffer(self.ffi.addressof(struct)), self.dtype(ctype), 1)[0].copy()  # type: ignore[no-any-return]
 
     def filled(self, kind: str, settings: Any) -> Filled:
-        """A struct of C with the settings' attributes of its fields' names."""
+        """A struct of C with the settings' attributes of its fields' names; PvidError where an integer does not fit."""
         owner = self.ffi.new(f"{kind} *")
         filled = Filled(owner[0], {}, {}, [owner])
-        self._fill(filled, owner[0], settings)
+        try:
+            self._fill(filled, owner[0], settings)
+        except OverflowError as error:
+            raise PvidError(
+                f"a setting is beyond the fixed-point format ({error}): is a length, a resolution or a guess of the "
+                "rig file far from that of a real rig?"
+            ) from error
         return filled
 
     def _fill(self, whole: Filled, struct: Any, settings: Any) -> None:

@@ -11,7 +11,7 @@ from pvid.base.errors import PvidError
 from pvid.link.frames import Hello
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.values import Values, is_rate
-from pvid.rig.columns import SIGNALS
+from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile
 from pvid.rig.run import MIN_ROWS, Run
 
@@ -90,7 +90,7 @@ def run_of_log(path: Path) -> Run:
         for rows in values.rows(record):
             if rows.table != "samples":
                 continue
-            columns = np.stack([rows.columns[name] for name in SIGNALS])
+            columns = np.stack([rows.columns[name] for name in Columns().units])
             columns[1:, ~(np.abs(columns[1:]) <= _LARGEST).all(axis=0)] = np.nan
             if record.tick != expected:
                 parts, length = [], 0

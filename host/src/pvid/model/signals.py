@@ -1,7 +1,7 @@
 """Signals and their time derivatives as symbols.
 
-A signal z is a family of plain symbols z, z', z'', ... (jets): `z.d(n)` is the nth one, z itself is z.d(0). An expression
-in jets has a total derivative by the chain rule; nothing here knows the time.
+A signal z is a family of plain symbols z, z', z'', ... (jets): `z.d(n)` is the nth one, z itself is z.d(0). An
+expression in jets has a total derivative by the chain rule; nothing here depends on the time itself.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ class Jet(sp.Symbol):  # type: ignore[misc]
     """The nth derivative of the signal `of`: a symbol named z, z_1, z_2, ..."""
 
     __slots__ = ("of", "order")
+
+    of: str
+    order: int
 
     def __new__(cls, of: str, order: int = 0) -> Jet:
         if order > MAX_ORDER:
@@ -43,13 +46,26 @@ class sgn(sp.Function):  # type: ignore[misc] # noqa: N801
 
     @classmethod
     def eval(cls, argument: sp.Expr) -> sp.Expr | None:
-        return sp.Integer(0) if argument == 0 else None
+        if argument == 0:
+            return sp.Integer(0)
+        number, rest = argument.as_coeff_Mul()
+        if rest == 1:
+            return sp.Integer(1 if number > 0 else -1)
+        if number != 1:
+            return cls(rest) if number > 0 else -cls(rest)
+        return -cls(-argument) if argument.could_extract_minus_sign() else None
 
 
 class Integral(sp.Function):  # type: ignore[misc]
-    """Integral(f, n): the n-fold running integral of a channel f from the start of a window."""
+    """Integral(f, n): the n-fold running integral of a channel f from the start of a window.
+
+    In a definition (`CompiledModel.opaque`) from the start of the run.
+    """
 
     nargs = 2
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"Integral({printer.doprint(self.args[0])}, {self.args[1]})"
 
 
 def jets(expression: Any) -> set[Jet]:

@@ -1,4 +1,4 @@
-"""The available mechanisms: every folder of pvid.models that defines MODEL."""
+"""The mechanisms with a hand-made C core: every folder of pvid.models that defines MODEL."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ DEFAULT = "kapitza"
 
 def _found() -> dict[str, Model]:
     folders = [one.name for one in pkgutil.iter_modules(pvid.models.__path__) if one.ispkg]
-    models: list[Model] = [importlib.import_module(f"pvid.models.{name}").MODEL for name in sorted(folders)]
+    packages = [importlib.import_module(f"pvid.models.{name}") for name in sorted(folders)]
+    models: list[Model] = [package.MODEL for package in packages if hasattr(package, "MODEL")]
     return {model.name: model for model in models}
 
 

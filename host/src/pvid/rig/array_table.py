@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import reason
-from pvid.rig.columns import SIGNALS, Columns
+from pvid.base.wording import listed, reason
+from pvid.rig.columns import Columns
 from pvid.rig.size import refuse_beyond
 from pvid.rig.table import Table, row_place
 
@@ -28,7 +28,7 @@ def read_npz(path: Path, columns: Columns) -> Table:
         with path.open("rb") as file:  # which np.load would leave open where it fails
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise PvidError(f"{path} holds one bare array, where an archive of t, phi and y is wanted.")
+                raise PvidError(f"{path} holds one bare array, where an archive of {listed(columns.units)} is wanted.")
             members = archive.zip.infolist() if archive.zip is not None else []
             refuse_beyond(path, max((member.file_size for member in members), default=0) // _LONGEST_NUMBER)
             return _table(path, list(archive.files), archive.__getitem__, columns)
@@ -82,7 +82,7 @@ def write_parquet(path: Path, named: dict[str, FloatArray]) -> bytes:
 def _table(path: Path, names: Sequence[str], column: Callable[[str], npt.NDArray[Any]], columns: Columns) -> Table:
     places = columns.places(path, names)
     signals: dict[str, FloatArray] = {}
-    for signal in SIGNALS:
+    for signal in columns.units:
         name = names[places[signal]]
         data = column(name)
         if data.dtype.kind not in "iuf":
@@ -92,5 +92,5 @@ def _table(path: Path, names: Sequence[str], column: Callable[[str], npt.NDArray
         signals[signal] = columns[signal].in_si(data.astype(np.float64, copy=False))
     sizes = [data.size for data in signals.values()]
     if len(set(sizes)) > 1:
-        raise PvidError(f"{path}: columns t, phi and y have {sizes[0]}, {sizes[1]} and {sizes[2]} rows.")
-    return Table(path, signals["t"], signals["phi"], signals["y"], columns, row_place)
+        raise PvidError(f"{path}: columns {listed(signals)} have {listed(map(str, sizes))} rows.")
+    return Table(path, signals.pop("t"), signals, columns, row_place)

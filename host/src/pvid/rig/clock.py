@@ -5,20 +5,21 @@ gets its tick, so that missing samples are seen, and one of two things holds:
 
 * t is only rounded, or samples are missing: the samples stay as they are, each at its tick.
 * t jitters. Whether the samples were taken at irregular times or only stamped late cannot be seen from t. But it can
-  often be seen from phi and y: a motion is smoother at its true times. Where it is clearly smoother at uniform times,
-  the samples stay as they are; else phi and y are interpolated at uniform times from the recorded ones, by cubic
+  often be seen from the signals: a motion is smoother at its true times. Where it is clearly smoother at uniform times,
+  the samples stay as they are; else they are interpolated at uniform times from the recorded ones, by cubic
   polynomials.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.rig.table import Table
 
 FloatArray = npt.NDArray[np.float64]
@@ -67,16 +68,17 @@ class Uniform:
 
     Attributes
     ----------
-    t, phi, y : ndarray, shape (n,)
-        [s], [rad], [m]; phi and y are NaN at ticks without a sample.
+    t : ndarray, shape (n,)
+        [s].
+    signals : of each name an ndarray, shape (n,)
+        In SI; NaN at ticks without a sample.
     sample_rate : float
         [Hz].
     notes : what was found and done, a sentence each
     """
 
     t: FloatArray
-    phi: FloatArray
-    y: FloatArray
+    signals: Mapping[str, FloatArray]
     sample_rate: float
     notes: tuple[str, ...]
 
@@ -103,7 +105,7 @@ def uniform(table: Table, promised: float | None) -> Uniform:
             raise table.error(t.size - 1, "t", f"{t[-1]!s} s is too far from the first time, {t[0]!s} s")
         if period > 0 and _largest_departure(t, period) <= _JITTER_PERIODS:
             rate, note = _rate(table, 1 / period, _end_error(t, period), promised)
-            return Uniform(t, table.phi, table.y, rate, (*table.notes, *note))
+            return Uniform(t, table.signals, rate, (*table.notes, *note))
         return _from_stamps(table, promised)
 
 
@@ -136,18 +138,11 @@ def _without_repeated_rows(table: Table, steps: FloatArray) -> tuple[Table, Floa
     again = np.flatnonzero(steps == 0) + 1
     if not 0 < again.size < _REPEATED_SHARE * table.t.size:
         return table, steps
-    if any((signal[again] != signal[again - 1]).any() for signal in (table.phi, table.y)):
+    if any((signal[again] != signal[again - 1]).any() for signal in table.signals.values()):
         return table, steps
     kept = np.delete(np.arange(table.t.size), again)
     note = f"rows that repeat the one before them, left out: {again.size} (first: {table.place(int(again[0]))})"
-    less = replace(
-        table,
-        t=table.t[kept],
-        phi=table.phi[kept],
-        y=table.y[kept],
-        place=lambda row: table.place(int(kept[row])),
-        notes=(*table.notes, note),
-    )
+    less = table.rows(kept, lambda row: table.place(int(kept[row])), note)
     return less, np.diff(less.t)
 
 
@@ -172,18 +167,18 @@ def _with_jitter(
         return _placed(table, None, rate, note)
     if stamped_late and _smoother_when_uniform(table, fit):
         note += (
-            f"t departs from a uniform clock {size}, but phi and y are smoother without that: the samples are taken as "
-            f"uniform at {rate:g} Hz",
+            f"t departs from a uniform clock {size}, but {listed(table.signals)} are smoother without that: the "
+            f"samples are taken as uniform at {rate:g} Hz",
         )
         return _placed(table, fit.ticks, rate, note)
     # the recorded times are believed: any rate near theirs will do
     rate = promised if promised is not None else _shortest_decimal(1 / fit.period, 1e-3)
-    t, phi, y = _interpolated(table, rate, fit.period)
-    text = f"t jitters {size}: phi and y are interpolated at {rate:g} Hz from the recorded times"
+    t, signals = _interpolated(table, rate, fit.period)
+    text = f"t jitters {size}: {listed(table.signals)} are interpolated at {rate:g} Hz from the recorded times"
     long = int(np.count_nonzero(np.diff(table.t) > _GAP_PERIODS * fit.period))
     if long:
         text += f"; steps longer than {_GAP_PERIODS:g} periods, of late samples or missing ones: {long}"
-    return Uniform(t, phi, y, rate, (*table.notes, text))
+    return Uniform(t, signals, rate, (*table.notes, text))
 
 
 def _placed(table: Table, ticks: IntArray | None, rate: float, notes: tuple[str, ...]) -> Uniform:
@@ -191,10 +186,11 @@ def _placed(table: Table, ticks: IntArray | None, rate: float, notes: tuple[str,
     count = table.t.size if ticks is None else int(ticks[-1]) + 1
     t = _times(table.t[0], count, rate)
     if ticks is None or count == ticks.size:
-        return Uniform(t, table.phi, table.y, rate, notes)
-    phi, y = np.full(t.size, np.nan), np.full(t.size, np.nan)
-    phi[ticks], y[ticks] = table.phi, table.y
-    return Uniform(t, phi, y, rate, notes)
+        return Uniform(t, table.signals, rate, notes)
+    signals = {name: np.full(t.size, np.nan) for name in table.signals}
+    for name, values in table.signals.items():
+        signals[name][ticks] = values
+    return Uniform(t, signals, rate, notes)
 
 
 def _times(first: float, count: int, rate: float) -> FloatArray:
@@ -392,7 +388,7 @@ def _shortest_decimal(value: float, tolerance: float) -> float:
 
 
 def _smoother_when_uniform(table: Table, fit: _Fit) -> bool:
-    """Whether phi and y are clearly smoother at uniform times than at the recorded ones.
+    """Whether the signals are clearly smoother at uniform times than at the recorded ones.
 
     Blocks of rows all over the run are compared with a polynomial, by least squares, at either times.
     """
@@ -403,7 +399,7 @@ def _smoother_when_uniform(table: Table, fit: _Fit) -> bool:
     ticks = rows.astype(np.float64) if fit.ticks is None else fit.ticks[rows].astype(np.float64)
     stamps = table.t[rows] / fit.period
     scores = np.zeros(len(rows))
-    for signal in (table.phi[rows], table.y[rows]):
+    for signal in (one[rows] for one in table.signals.values()):
         scores += np.log(_unexplained(signal, ticks) / _unexplained(signal, stamps))
     scores = scores[np.isfinite(scores)]
     if scores.size < _LEAST_BLOCKS:
@@ -421,15 +417,15 @@ def _unexplained(x: FloatArray, t: FloatArray) -> FloatArray:
     return energy
 
 
-def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """t, phi and y at uniform times from the cubics through the four samples around them; NaN within gaps."""
-    there = np.isfinite(table.phi) & np.isfinite(table.y)
-    times, phi, y = table.t, table.phi, table.y
+def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """t and the signals at uniform times from the cubics through the four samples around them; NaN within gaps."""
+    there = table.complete
+    times, values = table.t, list(table.signals.values())
     if not there.all():
-        times, phi, y = times[there], phi[there], y[there]
+        times, values = times[there], [one[there] for one in values]
     first, last = float(times[0]), float(times[-1])
     t = _times(first, int(np.floor((last - first) * rate * (1 + 1e-12))) + 1, rate)
-    out = np.empty((2, t.size))
+    out = np.empty((len(values), t.size))
     for begin in range(0, t.size, _CHUNK):
         at = t[begin : begin + _CHUNK]
         right = np.clip(np.searchsorted(times, at, side="right"), 1, times.size - 1)
@@ -442,11 +438,11 @@ def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray,
             for j in range(4):
                 if j != i:
                     weight *= gaps[j] / (gaps[j] - gaps[i])
-            piece[0] += weight * phi[start + i]
-            piece[1] += weight * y[start + i]
+            for row, one in zip(piece, values, strict=True):
+                row += weight * one[start + i]
         # a sample within half a period is as good as one at the tick
         nearest = np.minimum(np.abs(times[right] - at), np.abs(at - times[right - 1]))
         within = (times[right] - times[right - 1] > _EMPTY_PERIODS * period) & (nearest > period / 2)
         piece[:, within] = np.nan
     end = t.size - int(np.argmax(np.isfinite(out[0, ::-1])))
-    return t[:end], out[0, :end], out[1, :end]
+    return t[:end], dict(zip(table.signals, out[:, :end], strict=True))

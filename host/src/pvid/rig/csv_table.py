@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import reason, shown
-from pvid.rig.columns import SIGNALS, Columns
+from pvid.rig.columns import Columns
 from pvid.rig.size import refuse_beyond
 from pvid.rig.table import Table
 
@@ -78,7 +78,7 @@ def read_csv(path: Path, columns: Columns) -> Table:
     """
     layout: _Layout | None = None
     places: dict[str, int] = {}
-    signals = {signal: _Growing() for signal in SIGNALS}
+    signals = {signal: _Growing() for signal in columns.units}
     tail: list[str] = []
     notes: tuple[str, ...] = ()
     first_line = 1
@@ -104,11 +104,12 @@ def read_csv(path: Path, columns: Columns) -> Table:
         refuse_beyond(path, signals["t"].size)
     if layout is None:
         raise PvidError(f"{path} is empty.")
-    t, phi, y = (one.values for one in signals.values())
+    found = {signal: one.values for signal, one in signals.items()}
+    t = found.pop("t")
     if not t.size:
         raise PvidError(f"{path} has a header but no data.")
     body = layout.body
-    return Table(path, t, phi, y, columns, lambda row: f"line {_line_of_row(path, body, row)}", notes)
+    return Table(path, t, found, columns, lambda row: f"line {_line_of_row(path, body, row)}", notes)
 
 
 def write_csv(path: Path, named: dict[str, FloatArray]) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -25,33 +26,34 @@ def stretches(flags: npt.NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
     return edges[::2], edges[1::2]
 
 
-def bridge(phi: FloatArray, y: FloatArray, sample_rate: float) -> tuple[IntArray, IntArray]:
+def bridge(signals: Sequence[FloatArray], sample_rate: float) -> tuple[IntArray, IntArray]:
     """Interpolates the short gaps in place; returns first and last + 1 of all gaps.
 
-    A tick is missing when phi or y is NaN there. A gap takes the polynomial of degree 5, by least squares, through as
-    many samples on either side as are missing, at least 6. It stays NaN, in both signals, when it is longer than 20 ms
+    A tick is missing when a signal is NaN there. A gap takes the polynomial of degree 5, by least squares, through as
+    many samples on either side as are missing, at least 6. It stays NaN, in all signals, when it is longer than 20 ms
     and than one tick, or when the polynomial misses those samples by more than their noise.
 
     Parameters
     ----------
-    phi, y : ndarray, shape (n,)
-        [rad], [m]; the first and the last sample are there.
+    signals : of ndarray, shape (n,)
+        The first and the last sample are there.
     sample_rate : float
         [Hz].
     """
-    missing = np.isnan(phi) | np.isnan(y)
+    missing = np.logical_or.reduce([np.isnan(signal) for signal in signals])
     firsts, ends = stretches(missing)
     if not firsts.size:
         return firsts, ends
     longest = max(1, int(_BRIDGED_S * sample_rate + 1e-9))
-    noise = [_FITTING * _noise(signal[:_NOISE_SAMPLES]) for signal in (phi, y)]
+    noise = [_FITTING * _noise(signal[:_NOISE_SAMPLES]) for signal in signals]
     for first, end in zip(firsts.tolist(), ends.tolist(), strict=True):
         gap = slice(first, end)
         if end - first > longest:
-            phi[gap] = y[gap] = np.nan
+            for signal in signals:
+                signal[gap] = np.nan
             continue
         beside = max(_BESIDE, end - first)
-        low, high = max(0, first - beside), min(phi.size, end + beside)
+        low, high = max(0, first - beside), min(missing.size, end + beside)
         known = np.arange(low, high)[~missing[low:high]]
         middle, scale = (first + end - 1) / 2, (high - low) / 2
         powers = np.vander((known - middle) / scale, min(_DEGREE + 1, known.size), increasing=True)
@@ -59,13 +61,14 @@ def bridge(phi: FloatArray, y: FloatArray, sample_rate: float) -> tuple[IntArray
         within = np.vander((np.arange(first, end) - middle) / scale, powers.shape[1], increasing=True)
         free = known.size - powers.shape[1]
         found = []
-        for signal, largest in zip((phi, y), noise, strict=True):
+        for signal, largest in zip(signals, noise, strict=True):
             coefficients = inverse @ signal[known]
             residual = signal[known] - powers @ coefficients
             if free > 0 and float(residual @ residual) > free * largest**2:
                 break
             found.append(within @ coefficients)
-        phi[gap], y[gap] = found if len(found) == 2 else (np.nan, np.nan)
+        for k, signal in enumerate(signals):
+            signal[gap] = found[k] if len(found) == len(signals) else np.nan
     return firsts, ends
 
 

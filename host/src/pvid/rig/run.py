@@ -1,9 +1,10 @@
 """Recorded runs on disk: text tables, NPZ and Parquet, with every check a stranger's file needs.
 
-A run has the columns ``t`` [s], ``phi`` [rad] and ``y`` [m], in any order and among others; `Columns` maps other names
-and units. Jumps of a whole turn are joined (`run_turns`), its clock is made uniform (`run_clock`) and short gaps are
-interpolated (`run_gaps`). `Run.notes` lists the corrections; a run that needs none keeps every bit. A fault of a file
-raises a `PvidError` of one sentence with the file and, if known, the line and the column.
+A recording has the column ``t`` [s] and one for each signal of its mechanism (of the pendulum ``phi`` [rad] and ``y``
+[m]), in any order and among others; `Columns` maps other names and units. Jumps of a whole turn are joined (`turns`),
+its clock is made uniform (`clock`) and short gaps are interpolated (`gaps`). `Recording.notes` lists the corrections; a
+recording that needs none keeps every bit. A fault of a file raises a `PvidError` of one sentence with the file and, if
+known, the line and the column.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ import numpy.typing as npt
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.base.wording import reason
+from pvid.base.wording import listed, reason
+from pvid.models.model import Channel
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.array_table import read_npz, read_parquet, write_npz, write_parquet
 from pvid.rig.clock import Uniform, uniform
-from pvid.rig.columns import SIGNALS, Columns
+from pvid.rig.columns import Columns
 from pvid.rig.csv_table import read_csv, write_csv, write_csv_gz
 from pvid.rig.gaps import bridge, stretches
 from pvid.rig.table import Table, row_place
@@ -38,17 +41,15 @@ _LARGEST = 1e12  # [rad] or [m]: counts of 40 bits
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """One recorded run: three signals on a common, uniform clock.
+class Recording:
+    """Signals of any mechanism on a common, uniform clock.
 
     Attributes
     ----------
     t : ndarray, shape (n,)
         Time [s].
-    phi : ndarray, shape (n,)
-        Measured relative angle [rad]; NaN at a tick without a sample.
-    y : ndarray, shape (n,)
-        Measured height of the pivot [m]; NaN likewise.
+    signals : of each name an ndarray, shape (n,)
+        In SI; NaN at a tick without a sample.
     sample_rate : float
         [Hz].
     notes : tuple of str
@@ -56,18 +57,9 @@ class Run:
     """
 
     t: FloatArray
-    phi: FloatArray
-    y: FloatArray
+    signals: Mapping[str, FloatArray]
     sample_rate: float
     notes: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for name in SIGNALS:
-            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
-        for name in SIGNALS:
-            data = getattr(self, name)
-            if data.ndim != 1 or data.size != self.t.size:
-                raise PvidError(f"A run's column {name} must hold one number a sample ({self.t.size}).")
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -80,24 +72,24 @@ class Run:
         PvidError
             Naming the first.
         """
-        for name in list(SIGNALS)[1:]:
-            beyond = np.abs(getattr(self, name)) > _LARGEST
+        for name, values in self.signals.items():
+            beyond = np.abs(values) > _LARGEST
             if beyond.any():
                 at = int(np.argmax(beyond))
                 raise PvidError(
-                    f"{name} is {getattr(self, name)[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: "
+                    f"{name} is {values[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: "
                     "is the file damaged?"
                 )
 
-    def whole(self) -> Run:
-        """The longest stretch without a missing tick, for what cannot leave ticks out; this run when none is missing.
+    def whole(self) -> Recording:
+        """The longest stretch without a missing tick, for what cannot leave ticks out; itself when none is missing.
 
         Raises
         ------
         PvidError
             When no stretch has `MIN_ROWS` samples.
         """
-        there = np.isfinite(self.phi) & np.isfinite(self.y)
+        there = np.logical_and.reduce([np.isfinite(one) for one in self.signals.values()])
         if there.all():
             return self
         firsts, ends = stretches(there)
@@ -107,11 +99,76 @@ class Run:
         part = slice(int(firsts[longest]), int(ends[longest]))
         t = self.t[part]
         note = f"used is the longest stretch without a gap: {t[0]:.6g} s to {t[-1]:.6g} s"
-        return replace(self, t=t, phi=self.phi[part], y=self.y[part], notes=(*self.notes, note))
+        signals = {name: one[part] for name, one in self.signals.items()}
+        return replace(self, t=t, signals=signals, notes=(*self.notes, note))
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A recording of the pendulum.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Time [s].
+    phi : ndarray, shape (n,)
+        Measured relative angle [rad]; NaN at a tick without a sample.
+    y : ndarray, shape (n,)
+        Measured height of the pivot [m]; NaN likewise.
+    sample_rate : float
+        [Hz].
+    notes : tuple of str
+        As of a `Recording`.
+    """
+
+    t: FloatArray
+    phi: FloatArray
+    y: FloatArray
+    sample_rate: float
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("t", "phi", "y"):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
+        for name in ("t", "phi", "y"):
+            data = getattr(self, name)
+            if data.ndim != 1 or data.size != self.t.size:
+                raise PvidError(f"A run's column {name} must hold one number a sample ({self.t.size}).")
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    @classmethod
+    def of(cls, recording: Recording) -> Run:
+        """A recording with the signals phi and y."""
+        phi, y = (recording.signals[name] for name in ("phi", "y"))
+        return cls(recording.t, phi, y, recording.sample_rate, recording.notes)
+
+    @property
+    def recording(self) -> Recording:
+        """The same as a recording of any mechanism."""
+        return Recording(self.t, {"phi": self.phi, "y": self.y}, self.sample_rate, self.notes)
+
+    def refuse_damaged(self) -> None:
+        """See `Recording`."""
+        self.recording.refuse_damaged()
+
+    def whole(self) -> Run:
+        """See `Recording`; this run when no tick is missing."""
+        recording = self.recording
+        whole = recording.whole()
+        return self if whole is recording else Run.of(whole)
 
 
 def read_run(path: str | os.PathLike[str], rate: float | None = None, columns: Columns | None = None) -> Run:
-    """Read a run from a text table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, also ``.gz``), ``.npz`` or ``.parquet``.
+    """Read a run of the pendulum; see `read_recording`."""
+    return Run.of(read_recording(path, rate, columns))
+
+
+def read_recording(
+    path: str | os.PathLike[str], rate: float | None = None, columns: Columns | None = None
+) -> Recording:
+    """Read a text table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, also ``.gz``), ``.npz`` or ``.parquet``.
 
     Parameters
     ----------
@@ -119,7 +176,7 @@ def read_run(path: str | os.PathLike[str], rate: float | None = None, columns: C
     rate : float, optional
         The sample rate the rig file promises [Hz].
     columns : Columns, optional
-        Which columns are t, phi and y, and their units; those names, in SI, by default.
+        Which columns are t and the signals, and their units; t, phi and y in SI by default.
 
     Raises
     ------
@@ -142,31 +199,38 @@ def read_run(path: str | os.PathLike[str], rate: float | None = None, columns: C
         raise PvidError(f"{path} cannot be read: {reason(error)}.") from error
     except MemoryError as error:
         raise PvidError(f"{path} does not fit into memory.") from error
-    return _run(_checked(table), rate)
+    return _recording(_checked(table), rate)
 
 
 def write_run(path: str | os.PathLike[str], run: Run) -> None:
-    """Write a run; the suffix gives the format, and `read_run` gives every float64 back exactly.
+    """Write a run of the pendulum; see `write_recording`."""
+    write_recording(path, run.recording)
 
-    The file appears whole or not at all (temporary file, then rename), and the same run gives the same bytes.
+
+def write_recording(
+    path: str | os.PathLike[str], recording: Recording, channels: tuple[Channel, ...] = MODELS[DEFAULT].channels
+) -> None:
+    """Write a recording; the suffix gives the format, and `read_recording` gives every float64 back exactly.
+
+    The file appears whole or not at all (temporary file, then rename), and the same recording gives the same bytes.
 
     Raises
     ------
     PvidError
-        When the run is one that `read_run` would not give back, or the file cannot be written.
+        When `read_recording` would not give it back, or the file cannot be written.
     """
     path = Path(path)
     write = _format(path, _WRITERS)
-    for name in SIGNALS:
-        data = getattr(run, name)
+    named = {"t": recording.t, **recording.signals}
+    for name, data in named.items():
         if not np.isfinite(data).all():
             row = int(np.argmin(np.isfinite(data)))
             raise PvidError(f"{path} is not written: {row_place(row)}, column {name}: {data[row]} is no number.")
-    table = Table(path, run.t, run.phi, run.y, Columns(), row_place)
-    again = _run(_checked(table), run.sample_rate)
+    table = Table(path, recording.t, recording.signals, Columns(channels=channels), row_place)
+    again = _recording(_checked(table), recording.sample_rate)
     if again.notes:
         raise PvidError(f"{path} is not written: {again.notes[0]}.")
-    content = write(path, {name: getattr(run, name) for name in SIGNALS})
+    content = write(path, named)
     try:
         write_whole(path, content)
     except OSError as error:
@@ -180,49 +244,42 @@ def is_run(path: Path) -> bool:
 
 def _checked(table: Table) -> Table:
     """The rows between the first and the last sample; refused when there are too few, or a number is infinite."""
-    for signal in SIGNALS:
-        data = getattr(table, signal)
+    for signal, data in {"t": table.t, **table.signals}.items():
         if np.isinf(data).any():
             row = int(np.argmax(np.isinf(data)))
             raise table.error(row, signal, f"{data[row]} is not a finite number")
-    there = np.isfinite(table.phi) & np.isfinite(table.y)
+    there = table.complete
     rows = int(np.count_nonzero(there))
     if rows < MIN_ROWS:
         raise PvidError(f"{table.path} has {rows} rows of data; a run needs at least {MIN_ROWS}.")
     first, last = int(np.argmax(there)), there.size - 1 - int(np.argmax(there[::-1]))
     if not np.isfinite(table.t[first : last + 1]).all():
         row = first + int(np.argmin(np.isfinite(table.t[first : last + 1])))
-        raise table.error(row, "t", "the cell is empty or nan, and only phi and y may be missing")
+        raise table.error(row, "t", f"the cell is empty or nan, and only {listed(table.signals)} may be missing")
     if (first, last) == (0, there.size - 1):
         return table
-    part = slice(first, last + 1)
     note = f"rows without numbers at the ends, left out: {there.size - (last + 1 - first)}"
-    return replace(
-        table,
-        t=table.t[part],
-        phi=table.phi[part],
-        y=table.y[part],
-        place=lambda row: table.place(row + first),
-        notes=(*table.notes, note),
-    )
+    return table.rows(slice(first, last + 1), lambda row: table.place(row + first), note)
 
 
-def _run(table: Table, rate: float | None) -> Run:
-    phi, jumps = joined(table.phi)
-    if jumps:
-        name = table.columns["phi"].name
-        note = f"{name} jumps by a turn, {jumps} times: joined (the encoder starts over there)"
-        table = replace(table, phi=phi, notes=(*table.notes, note))
+def _recording(table: Table, rate: float | None) -> Recording:
+    angles = [name for name, unit in table.columns.units.items() if unit == "rad"]
+    for angle in angles:
+        values, jumps = joined(table.signals[angle])
+        if jumps:
+            name = table.columns[angle].name
+            note = f"{name} jumps by a turn, {jumps} times: joined (the encoder starts over there)"
+            table = replace(table, signals={**table.signals, angle: values}, notes=(*table.notes, note))
     clocked = uniform(table, rate)
-    firsts, ends = bridge(clocked.phi, clocked.y, clocked.sample_rate)
+    firsts, ends = bridge(list(clocked.signals.values()), clocked.sample_rate)
     notes = (*clocked.notes, *_gap_notes(clocked, firsts, ends))
-    return Run(clocked.t, clocked.phi, clocked.y, clocked.sample_rate, notes)
+    return Recording(clocked.t, clocked.signals, clocked.sample_rate, notes)
 
 
 def _gap_notes(clocked: Uniform, firsts: npt.NDArray[np.int64], ends: npt.NDArray[np.int64]) -> tuple[str, ...]:
     lengths = ends - firsts
     rate = clocked.sample_rate
-    filled = np.isfinite(clocked.phi[firsts])
+    filled = np.isfinite(next(iter(clocked.signals.values()))[firsts])
     notes = []
     for chosen, done in (
         (filled, "interpolated"),

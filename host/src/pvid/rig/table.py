@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +13,20 @@ from pvid.base.errors import PvidError
 from pvid.rig.columns import Columns
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Three columns of a file.
+    """The columns of a file that hold signals.
 
     Attributes
     ----------
     path : where they come from
-    t, phi, y : ndarray, shape (n,)
-        [s], [rad], [m]; NaN where a cell is empty.
+    t : ndarray, shape (n,)
+        [s]; NaN where a cell is empty.
+    signals : of each name an ndarray, shape (n,)
+        In SI; NaN where a cell is empty.
     columns : how the file calls them
     place : how to call the place of row k: a line or a row
     notes : what was left out, a sentence each
@@ -31,11 +34,21 @@ class Table:
 
     path: Path
     t: FloatArray
-    phi: FloatArray
-    y: FloatArray
+    signals: Mapping[str, FloatArray]
     columns: Columns
     place: Callable[[int], str]
     notes: tuple[str, ...] = ()
+
+    @property
+    def complete(self) -> npt.NDArray[np.bool_]:
+        """Whether every signal has a number in the row, shape (n,)."""
+        there: npt.NDArray[np.bool_] = np.all([np.isfinite(one) for one in self.signals.values()], axis=0)
+        return there
+
+    def rows(self, kept: slice | IntArray, place: Callable[[int], str], note: str) -> Table:
+        """Some of the rows, with a note on the others."""
+        signals = {name: one[kept] for name, one in self.signals.items()}
+        return replace(self, t=self.t[kept], signals=signals, place=place, notes=(*self.notes, note))
 
     def error(self, row: int, signal: str, complaint: str) -> PvidError:
         """The refusal of a cell."""

@@ -1,0 +1,40 @@
+/* pvid/elementary.h - sine, cosine and sign in float32, with the same bits on every processor.
+ *
+ * What the functions that `pvid model build` writes call. They use + - * / and comparisons only, no library function;
+ * pvid.twin.f32.elementary has the same operations in numpy. Pure functions: no state, reentrant.
+ *
+ *   const float moment = weight * pvid_sin_f32(angle);
+ */
+#ifndef PVID_ELEMENTARY_H
+#define PVID_ELEMENTARY_H
+
+#include "pvid/config.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Largest |x| [rad] of sine and cosine. Neighbouring floats are 0.001 rad apart there. */
+#define PVID_ANGLE_LIMIT_F32 16384.0f
+
+/* sin x, cos x [-1..1] of x [rad], |x| <= PVID_ANGLE_LIMIT_F32; else NaN, so that the estimator refuses the row.
+ * Error: below 1.3e-7 for |x| <= 1000, below 3e-7 up to the limit. cos 0 is 1. Method: x less the nearest multiple of
+ * pi (for cosine of pi + 1/2), in three parts of pi of which the products with the first two are exact; a polynomial of
+ * degree 9. Cost: about 20 operations. */
+float pvid_sin_f32(float x);
+float pvid_cos_f32(float x);
+
+/* Sign of v: -1, 0 or 1; of NaN 0. */
+float pvid_sign_f32(float v);
+
+/* v / (|v| + width): a sign that is 1/2 at v = width; width > 0 [unit of v]. */
+float pvid_soft_sign_f32(float v, float width);
+
+/* |x| */
+float pvid_magnitude_f32(float x);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

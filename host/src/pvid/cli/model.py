@@ -1,0 +1,163 @@
+"""`pvid model`: check, predict, simulate and build a mechanism that is described in a model file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.base.errors import PvidError
+
+_MODEL = click.argument("model", metavar="MODEL")
+
+
+@click.group(name="model")
+def command() -> None:
+    """Describes, judges, simulates and prints mechanisms.
+
+    MODEL is one of the list of `pvid models`, or the path of a model file: a Python file of some ten lines that leaves
+    a variable `model` (host/docs/models.md).
+    """
+
+
+@command.command()
+@_MODEL
+def check(model: str) -> int:
+    """Prints the rows that MODEL becomes, its theta, and which parameters are identifiable.
+
+    Exit code 3: a parameter is not identifiable; the report names the combination that is.
+    """
+    from pvid.model.report import check_report, identifiable
+    from pvid.models.mechanisms import compiled_of
+
+    compiled = compiled_of(model)
+    click.echo(check_report(compiled))
+    return DONE if identifiable(compiled).identifiable else NOTHING_IDENTIFIED
+
+
+@command.command()
+@_MODEL
+@click.option("--drive", "only", help="Only this drive.  [default: each of the list]")
+@click.option("--band", nargs=2, type=float, help="Of the drives [Hz].  [default: 10/duration to rate/50]")
+@click.option("--share", default=0.5, show_default=True, help="Largest value of a drive over the reach of its signal.")
+@click.option(
+    "--duration", type=click.FloatRange(min=0.0, min_open=True), help="Of a run [s].  [default: the rig's, 20]"
+)
+@click.option(
+    "--rate", type=click.FloatRange(min=0.0, min_open=True), help="Sample rate [Hz].  [default: the rig's, 1000]"
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def predict(
+    model: str,
+    only: str | None,
+    band: tuple[float, float] | None,
+    share: float,
+    duration: float | None,
+    rate: float | None,
+    as_json: bool,
+) -> int:
+    """Predicts the standard errors of MODEL's parameters for several drives, and names the best one.
+
+    Each drive is simulated with its sensors at the model's guesses, and identified. The first column is the shipped
+    mechanism's own rig. The last rows name the parameter that is known worst, and the one whose change looks alike.
+    """
+    from pvid.models.mechanisms import compiled_of
+    from pvid.models.mechanisms import names as names_of_shipped
+    from pvid.models.simulated_rig import simulated_rig
+    from pvid.run.prediction import advice, predicted
+    from pvid.sim.drives import DRIVES, drive_named
+    from pvid.sim.simulated_run import RigSimulation, rig_of_guess
+
+    compiled = compiled_of(model)
+    own = simulated_rig(compiled.name) if model in names_of_shipped() else None
+    length = duration or (own.duration if own else 20.0)
+    hz = rate or (own.sample_rate if own else 1000.0)
+    low, high = band or (10 / length, hz / 50)
+    names = [only] if only else list(DRIVES)
+    drive_named(names[0], 1.0, low, high)  # a wrong name or band is refused before anything is simulated
+    cases = [] if own is None or only else [("its own rig", RigSimulation.of(compiled, own))]
+    cases += [
+        (
+            name,
+            RigSimulation.of(compiled, rig_of_guess(compiled, name, low, high, rate=hz, duration=length, share=share)),
+        )
+        for name in names
+    ]
+    with progress_bar("drives", len(cases)) as advance:
+        found = []
+        for name, simulation in cases:
+            found.append(predicted(name, simulation))
+            advance(len(found))
+    if as_json:
+        listing = {
+            one.drive: one.failure or dict(zip(compiled.p_names, one.relative.tolist(), strict=True)) for one in found
+        }
+        click.echo(json.dumps({"relative_se": listing, "advice": advice(compiled, found)}))
+        return DONE
+    table = Table("", *(one.drive for one in found), title=f"{compiled.title}: standard errors [%]")
+    for k, name in enumerate(compiled.p_names):
+        table.add_row(name, *("-" if one.failure else f"{100 * one.relative[k]:.2g}" for one in found))
+    table.add_row("worst", *(one.worst or "-" for one in found))
+    table.add_row("looks like", *(one.partner or "-" for one in found))
+    Console().print(table)
+    for one in found:
+        if one.failure:
+            write_stderr(f"pvid: {one.drive}: {one.failure}")
+    click.echo(advice(compiled, found))
+    return DONE if not all(one.failure for one in found) else NOTHING_IDENTIFIED
+
+
+@command.command()
+@_MODEL
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder to write.")
+@click.option("--check", "only_check", is_flag=True, help="Compare the folder's files with the output instead.")
+def build(model: str, out: Path, only_check: bool) -> int:
+    """Writes the C of MODEL, its numpy twin, a header with every name and unit, a CMake target and a test.
+
+    In the CMakeLists.txt of your firmware: add_subdirectory(OUT) and target_link_libraries(my_firmware PRIVATE NAME).
+    """
+    from pvid.codegen import build as generated
+    from pvid.models.mechanisms import compiled_of
+
+    compiled = compiled_of(model)
+    if not only_check:
+        for path in generated.build(compiled, out):
+            click.echo(path)
+        return DONE
+    try:
+        generated.check(compiled, out)
+    except PvidError as error:
+        write_stderr(f"pvid: {error}")
+        return DIFFERENT
+    click.echo(f"{out}: as generated")
+    return DONE
+
+
+@command.command()
+@_MODEL
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.")
+@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Length [s].  [default: the rig's]")
+@click.option("--friction", type=click.Choice(["soft", "sharp"]), default="soft", show_default=True)
+@click.option("--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp.")
+def simulate(model: str, out: Path, seed: int, duration: float | None, friction: str, stiction: float) -> int:
+    """Simulates the shipped rig of MODEL with its sensors; writes the run OUT and its rig file."""
+    from pvid.models.mechanisms import compiled_of
+    from pvid.models.simulated_rig import simulated_rig
+    from pvid.sim.imperfections import Imperfections
+    from pvid.sim.simulated_run import RigSimulation, write_simulated_run
+
+    compiled = compiled_of(model)
+    rig = simulated_rig(compiled.name)
+    rig = rig if duration is None else replace(rig, duration=duration)
+    law = Imperfections(friction="sharp" if friction == "sharp" else "soft", breakaway=stiction)
+    simulation = RigSimulation.of(compiled, rig)
+    run = simulation.run(seed, law)
+    settings = write_simulated_run(out, run, simulation)
+    write_stderr(f"{out}: {simulation.samples} samples of {', '.join(run)}; rig file {settings}")
+    return DONE

@@ -1,0 +1,126 @@
+"""A folder with the generated files of a model: C, its twin, a CMake target and a test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pvid.base.atomic_write import appearing
+from pvid.base.errors import PvidError
+from pvid.codegen import files_f32, files_q31, self_test, twin_file
+from pvid.codegen.banner import banner
+from pvid.codegen.fixed_model import fixed_model
+from pvid.codegen.functions import ModelFunctions, functions_of
+from pvid.codegen.reaches import Reaches
+from pvid.model.compiled import CompiledModel
+
+_CMAKE = """\
+# {banner}
+#
+# In your own CMakeLists.txt, behind what provides pvid::pvid (add_subdirectory, FetchContent or find_package):
+#
+#     add_subdirectory({name})
+#     target_link_libraries(my_firmware PRIVATE {name})
+cmake_minimum_required(VERSION 3.20)
+if(CMAKE_SOURCE_DIR STREQUAL CMAKE_CURRENT_SOURCE_DIR)
+  project({name} LANGUAGES C)
+endif()
+if(NOT TARGET pvid::pvid)
+  find_package(pvid REQUIRED CONFIG)
+endif()
+
+add_library({name} STATIC {sources})
+target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
+target_link_libraries({name} PUBLIC pvid::pvid)
+set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  target_compile_options({name} PRIVATE -ffp-contract=off -fno-fast-math)
+endif()
+
+# The generated functions against the bits of their twin: ctest.
+option({upper}_TEST "Build the test of {name}" ${{PROJECT_IS_TOP_LEVEL}})
+if({upper}_TEST)
+  enable_testing()
+  add_executable({name}_test {name}_test.c)
+  target_link_libraries({name}_test PRIVATE {name})
+  set_target_properties({name}_test PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+  add_test(NAME {name} COMMAND {name}_test)
+endif()
+"""
+
+
+def files_of(functions: ModelFunctions, command: str, reaches: Reaches | None = None) -> dict[str, str]:
+    """Name -> text of each file; the fixed-point ones only where fixed point can compute all functions."""
+    name = functions.name
+    files = {
+        f"{name}_sizes.h": files_f32.sizes(functions, command),
+        f"{name}.h": files_f32.header(functions, command),
+        f"{name}_f32.c": files_f32.source(functions, command),
+    }
+    fixed = None
+    if refusal(functions, reaches) is None:
+        fixed = fixed_model(functions, reaches)
+        files[f"{name}_q31.h"] = files_q31.header(fixed, command)
+        files[f"{name}_q31.c"] = files_q31.source(fixed, command)
+    files[f"{name}_twin.py"] = twin_file.text(functions, command, fixed)
+    files[f"{name}_test.c"] = self_test.source(functions, command, fixed)
+    sources = " ".join(one for one in files if one.endswith(".c") and not one.endswith("_test.c"))
+    files["CMakeLists.txt"] = _CMAKE.format(
+        banner="\n# ".join(banner(functions, command)), name=name, upper=name.upper(), sources=sources
+    )
+    return files
+
+
+def refusal(functions: ModelFunctions, reaches: Reaches | None = None) -> str | None:
+    """Why the functions have no fixed-point form; None where they have one."""
+    try:
+        fixed_model(functions, reaches)
+    except PvidError as error:
+        return str(error)
+    return None
+
+
+def build(
+    compiled: CompiledModel, directory: Path, command: str | None = None, reaches: Reaches | None = None
+) -> list[Path]:
+    """Writes the files of a model.
+
+    Parameters
+    ----------
+    compiled
+        The model.
+    directory
+        Where; it is made if there is none.
+    command
+        For the banner; `pvid model build NAME` by default.
+    reaches
+        Of the inputs, for the fixed-point formats.
+
+    Returns
+    -------
+    The files.
+    """
+    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}", reaches)
+    directory.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, text in files.items():
+        with appearing(directory / name) as path:
+            path.write_text(text, encoding="utf-8")
+        paths.append(directory / name)
+    return paths
+
+
+def check(compiled: CompiledModel, directory: Path, command: str | None = None, reaches: Reaches | None = None) -> None:
+    """Whether the files in a folder are those of the model.
+
+    Raises
+    ------
+    PvidError
+        For the first file that is missing or differs.
+    """
+    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}", reaches)
+    for name, text in files.items():
+        path = directory / name
+        if not path.is_file():
+            raise PvidError(f"{path} is missing: build the model again")
+        if path.read_text(encoding="utf-8") != text:
+            raise PvidError(f"{path} is not what {compiled.name} generates now: build the model again")

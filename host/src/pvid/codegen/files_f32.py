@@ -1,0 +1,141 @@
+"""The float32 files of a model: header and source."""
+
+from __future__ import annotations
+
+from pvid.codegen import c_f32, describe
+from pvid.codegen.banner import banner, c_comment
+from pvid.codegen.functions import Function, ModelFunctions
+
+UNCONTRACTED = """\
+/* No fused multiply-add in this file, whatever the compiler's options: it would change the bits. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#endif"""
+
+# Sizes of what each function is given and writes, as in NAME_P.
+SIZES = {
+    "integrands": ("INPUTS", "INTEGRANDS"),
+    "channels": ("INPUTS", "CHANNELS"),
+    "theta": ("P", "THETA"),
+    "jacobian": ("P", "C"),
+}
+
+
+MEANING = {
+    "integrands": "From the inputs: what is integrated for the inputs that are integrals.",
+    "channels": "From the inputs of one instant: the channels.",
+    "theta": "From p: theta.",
+    "jacobian": "From p: the non-zeros of d theta / d p by columns, in the order of c_row and c_column.",
+}
+
+
+def sizes(functions: ModelFunctions, command: str) -> str:
+    """NAME_sizes.h."""
+    name, upper = functions.name, functions.name.upper()
+    counts = {
+        "P": len(functions.model.unknowns),
+        "THETA": len(functions.theta.labels),
+        "C": len(functions.c_row),
+        "KINDS": len(functions.kinds),
+        "INPUTS": len(functions.inputs),
+        "CHANNELS": len(functions.channels.labels),
+    }
+    if functions.integrands.labels:
+        counts["INTEGRANDS"] = len(functions.integrands.labels)
+    about = [
+        f"{name}_sizes.h - how many parameters, coefficients and channels {name} has.",
+        "",
+        *banner(functions, command),
+    ]
+    defined = [f"#define {upper}_{what} {count}" for what, count in counts.items()]
+    return guarded(f"{name}_sizes", about, defined)
+
+
+def guarded(name: str, about: list[str], body: list[str]) -> str:
+    """A header of this text."""
+    guard = f"PVID_GENERATED_{name.upper()}_H"
+    return "\n".join([c_comment(about), f"#ifndef {guard}", f"#define {guard}", "", *body, "", "#endif", ""])
+
+
+def for_cpp(body: list[str]) -> list[str]:
+    """Declarations that C++ reads as C."""
+    return ["#ifdef __cplusplus", 'extern "C" {', "#endif", "", *body, "#ifdef __cplusplus", "}", "#endif"]
+
+
+def header(functions: ModelFunctions, command: str) -> str:
+    """NAME.h."""
+    name = functions.name
+    about = [
+        f"{name}.h - {functions.model.title}: the functions of its rows sum theta_j(p) N_j = Y in float32.",
+        "",
+        *banner(functions, command),
+        "",
+        *describe.everything(functions),
+    ]
+    declared = [
+        *_prototypes(functions),
+        "/* theta and C of all rows for the estimator: n_theta counts the theta of every row; a row of one kind has 0",
+        " * in the places of the others. */",
+        f"extern const pvid_model_f32 {name}_model_f32;",
+        "",
+    ]
+    return guarded(name, about, [f'#include "{name}_sizes.h"', '#include "pvid/model.h"', "", *for_cpp(declared)])
+
+
+def _prototypes(functions: ModelFunctions) -> list[str]:
+    lines: list[str] = []
+    for function in functions.functions:
+        lines += [
+            f"/* {MEANING[function.name]} {function.program.operations} operations. */",
+            f"{signature(functions, function)};",
+            "",
+        ]
+    return lines
+
+
+def signature(functions: ModelFunctions, function: Function) -> str:
+    """As in the header."""
+    upper = functions.name.upper()
+    given, written = SIZES[function.name]
+    return f"void {functions.name}_{function.name}_f32(const float in[{upper}_{given}], float out[{upper}_{written}])"
+
+
+def source(functions: ModelFunctions, command: str) -> str:
+    """NAME_f32.c."""
+    name, upper = functions.name, functions.name.upper()
+    model = functions.model
+    kinds = {kind for function in functions.functions for kind in function.program.kinds}
+    includes = [f'#include "{name}.h"']
+    if kinds & {"sin", "cos", "sign", "soft_sign", "abs"}:
+        includes += ["", '#include "pvid/elementary.h"']
+    if "sqrt" in kinds:
+        includes += ["", "#include <math.h>"]
+    positive = sum(1 << k for k, one in enumerate(model.unknowns) if one.positive)
+    n_theta = len(functions.theta.labels)
+    definitions = [c_f32.function(signature(functions, one), one.program) for one in functions.functions]
+    parts = [
+        c_comment(banner(functions, command)),
+        UNCONTRACTED,
+        "\n".join(includes),
+        *definitions,
+        f"static const uint8_t c_row[{upper}_C] = {{{', '.join(map(str, functions.c_row))}}};\n"
+        f"static const uint8_t c_column[{upper}_C] = {{{', '.join(map(str, functions.c_column))}}};",
+        "\n".join(
+            [
+                f"const pvid_model_f32 {name}_model_f32 = {{",
+                f"    .n_theta = {upper}_THETA,",
+                f"    .n_p = {upper}_P,",
+                f"    .n_moments = {n_theta * (n_theta + 1) // 2},",
+                f"    .n_c = {upper}_C,",
+                f"    .positive = {positive}u,",
+                "    .c_row = c_row,",
+                "    .c_column = c_column,",
+                f"    .theta = {name}_theta_f32,",
+                f"    .jacobian = {name}_jacobian_f32,",
+                "};",
+            ]
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"

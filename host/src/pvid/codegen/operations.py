@@ -1,0 +1,245 @@
+"""SymPy expressions as one list of three-address operations.
+
+Every printer reads this list: an operation has at most two operands, each value is computed once, and the order of the
+operands is fixed here. So what is printed in C and in numpy rounds alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal as OneOf
+
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.model.signals import sgn
+
+Kind = OneOf["+", "-", "*", "/", "neg", "sin", "cos", "sign", "soft_sign", "abs", "sqrt"]
+
+_COMMUTES = ("+", "*")
+_DIGITS = 40  # of an irrational constant before it is rounded to a literal
+
+
+@dataclass(frozen=True)
+class Literal:
+    """A constant; each printer rounds it once."""
+
+    value: Fraction
+
+
+@dataclass(frozen=True)
+class Argument:
+    """The input at a place."""
+
+    place: int
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operation on values at these places of the list; soft_sign has its width as second operand."""
+
+    kind: Kind
+    operands: tuple[int, ...]
+
+
+Value = Literal | Argument | Operation
+
+
+@dataclass(frozen=True)
+class Program:
+    """A function as a list of values, each of which uses those before it.
+
+    Attributes
+    ----------
+    arguments : names of the inputs
+    values : literals, arguments and operations
+    results : places of the outputs
+    """
+
+    arguments: tuple[str, ...]
+    values: tuple[Value, ...]
+    results: tuple[int, ...]
+
+    @property
+    def operations(self) -> int:
+        """How many there are."""
+        return sum(isinstance(one, Operation) for one in self.values)
+
+    def literal(self, place: int) -> Fraction:
+        """The constant at a place."""
+        value = self.values[place]
+        assert isinstance(value, Literal)
+        return value.value
+
+    def operation(self, place: int) -> Operation:
+        """The operation at a place."""
+        value = self.values[place]
+        assert isinstance(value, Operation)
+        return value
+
+    def kind(self, place: int) -> Kind:
+        """Of the operation at a place."""
+        return self.operation(place).kind
+
+    @property
+    def kinds(self) -> set[Kind]:
+        """Kinds of the operations."""
+        return {one.kind for one in self.values if isinstance(one, Operation)}
+
+
+def program_of(
+    arguments: Sequence[sp.Expr],
+    expressions: Iterable[sp.Expr],
+    names: Sequence[str] | None = None,
+    widths: Mapping[sp.Expr, float] | None = None,
+) -> Program:
+    """The operations that compute the expressions.
+
+    Parameters
+    ----------
+    arguments
+        What is given: symbols, and other expressions that are inputs as a whole (an integral).
+    expressions
+        What is computed, in this order.
+    names
+        Of the arguments; their text by default.
+    widths
+        Argument of a sgn -> width of the soft sign v / (|v| + width) in its place; a plain sign without an entry.
+
+    Raises
+    ------
+    PvidError
+        For a symbol that is no argument, and for a function other than sin, cos, tan, sgn, abs and sqrt.
+    """
+    builder = _Builder(arguments, widths or {})
+    results = tuple(builder.place_of(sp.sympify(one)) for one in expressions)
+    return Program(tuple(names or map(str, arguments)), tuple(builder.values), results)
+
+
+class _Builder:
+    """The list as it grows; equal values share a place."""
+
+    def __init__(self, arguments: Sequence[sp.Expr], widths: Mapping[sp.Expr, float]) -> None:
+        self.values: list[Value] = []
+        self._places: dict[Value, int] = {}
+        self._arguments = {one: Argument(place) for place, one in enumerate(arguments)}
+        self._widths = widths
+
+    def _put(self, value: Value) -> int:
+        if value not in self._places:
+            self._places[value] = len(self.values)
+            self.values.append(value)
+        return self._places[value]
+
+    def _do(self, kind: Kind, *operands: int) -> int:
+        if kind in _COMMUTES:
+            operands = tuple(sorted(operands, key=lambda place: (not isinstance(self.values[place], Literal), place)))
+        return self._put(Operation(kind, operands))
+
+    def place_of(self, e: sp.Expr) -> int:
+        """The place of its value."""
+        if e in self._arguments:
+            return self._put(self._arguments[e])
+        if e.is_number:
+            return self._put(Literal(exact(e)))
+        if e.is_Symbol:
+            raise PvidError(f"{e} has no value in a generated function of {', '.join(map(str, self._arguments))}")
+        if e.is_Add:
+            return self._sum(sorted(e.args, key=sp.default_sort_key))
+        if e.is_Mul:
+            return self._product(e)
+        if e.is_Pow:
+            return self._power(e.base, e.exp)
+        return self._function(e)
+
+    def _sum(self, terms: Sequence[sp.Expr]) -> int:
+        """Positive terms and differences: no term is negated but a sum that has negative terms only."""
+        signed = [(_is_negative(term), term) for term in terms]
+        if all(negative for negative, _ in signed):
+            return self._do("neg", self._sum([-term for _, term in signed]))
+        first = next(k for k, (negative, _) in enumerate(signed) if not negative)
+        total = self.place_of(signed[first][1])
+        for negative, term in signed[:first] + signed[first + 1 :]:
+            if negative:
+                total = self._do("-", total, self.place_of(-term))
+            else:
+                total = self._do("+", total, self.place_of(term))
+        return total
+
+    def _product(self, e: sp.Expr) -> int:
+        constant, rest = e.as_independent(*e.free_symbols, as_Add=False)
+        factor = exact(constant)
+        if factor < 0:
+            return self._do("neg", self.place_of(-e))
+        above: list[int] = []
+        below: list[int] = []
+        for one in sorted(sp.Mul.make_args(rest), key=sp.default_sort_key):
+            if one.is_Pow and one.exp.is_number and one.exp.is_negative:
+                below.append(self.place_of(one.base**-one.exp))
+            else:
+                above.append(self.place_of(one))
+        numerator = self._all(above)
+        if factor != 1 or numerator is None:
+            literal = self._put(Literal(factor))
+            numerator = literal if numerator is None else self._do("*", literal, numerator)
+        denominator = self._all(below)
+        return numerator if denominator is None else self._do("/", numerator, denominator)
+
+    def _all(self, factors: Sequence[int]) -> int | None:
+        """Their product from the left."""
+        product: int | None = None
+        for one in factors:
+            product = one if product is None else self._do("*", product, one)
+        return product
+
+    def _power(self, base: sp.Expr, exponent: sp.Expr) -> int:
+        if exponent.is_number and exponent.is_negative:
+            return self._do("/", self._put(Literal(Fraction(1))), self.place_of(base**-exponent))
+        if exponent == sp.Rational(1, 2):
+            return self._do("sqrt", self.place_of(base))
+        if exponent.is_Rational and exponent.q == 2:
+            root = self._do("sqrt", self.place_of(base))
+            return self._do("*", self._integer_power(self.place_of(base), int(exponent.p) // 2), root)
+        if not exponent.is_Integer:
+            raise PvidError(f"{base**exponent} cannot be generated: powers are integers or halves")
+        return self._integer_power(self.place_of(base), int(exponent))
+
+    def _integer_power(self, base: int, exponent: int) -> int:
+        """By squares, exponent >= 1."""
+        if exponent == 1:
+            return base
+        half = self._integer_power(base, exponent // 2)
+        square = self._do("*", half, half)
+        return self._do("*", square, base) if exponent % 2 else square
+
+    def _function(self, e: sp.Expr) -> int:
+        if isinstance(e, sp.tan):
+            return self._do("/", self.place_of(sp.sin(e.args[0])), self.place_of(sp.cos(e.args[0])))
+        if isinstance(e, sp.sin):
+            return self._do("sin", self.place_of(e.args[0]))
+        if isinstance(e, sp.cos):
+            return self._do("cos", self.place_of(e.args[0]))
+        if isinstance(e, sp.Abs):
+            return self._do("abs", self.place_of(e.args[0]))
+        if isinstance(e, sgn | sp.sign):
+            width = self._widths.get(e.args[0], 0.0)
+            if width > 0:
+                return self._do("soft_sign", self.place_of(e.args[0]), self._put(Literal(Fraction(width))))
+            return self._do("sign", self.place_of(e.args[0]))
+        raise PvidError(
+            f"{e} cannot be generated: the functions are sin, cos, tan, sgn, abs and sqrt; describe the mechanism with "
+            f"these, or give {e.func} of a signal as a signal of its own"
+        )
+
+
+def _is_negative(term: sp.Expr) -> bool:
+    return bool(exact(term.as_independent(*term.free_symbols, as_Add=False)[0]) < 0)
+
+
+def exact(number: sp.Expr) -> Fraction:
+    """A real constant as a fraction; one that is none with 40 digits."""
+    if not number.is_Rational:
+        number = sp.Rational(number if number.is_Float else sp.N(number, _DIGITS))
+    return Fraction(int(number.p), int(number.q))

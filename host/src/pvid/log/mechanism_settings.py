@@ -1,0 +1,47 @@
+"""The rig of a mechanism with a compiled model: --model, --rig, RUN.toml beside RUN.csv, and --set over any of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pvid.base.toml_text import toml_document
+from pvid.log.rig_settings import rig_path_of
+from pvid.models.registry import DEFAULT, MODELS
+from pvid.rig.file import parsed_file
+from pvid.rig.mechanism_file import MechanismRig, with_settings
+from pvid.rig.run import is_run
+
+
+def mechanism_rig(
+    run_path: Path | None, rig_path: Path | None, settings: Sequence[str], model: str | None
+) -> MechanismRig | None:
+    """The rig of a run of a described mechanism; None: it is one that the C core identifies.
+
+    Parameters
+    ----------
+    run_path, rig_path : a run may have a rig file beside it; the other one comes before it
+    settings : `KEY=VALUE`, which come before the file
+    model : name or model file, before both
+
+    Raises
+    ------
+    PvidError
+        Where the file cannot be read, or a key or a value is wrong.
+    """
+    if rig_path is None and run_path is not None and is_run(run_path) and rig_path_of(run_path).is_file():
+        rig_path = rig_path_of(run_path)
+    if model is None and rig_path is None:
+        return None
+    document = {} if rig_path is None else parsed_file(rig_path, toml_document)
+    table = document.get("model", {})
+    if model is not None:
+        document = {**document, "model": {**(table if isinstance(table, dict) else {}), "name": model}}
+    elif not isinstance(table, dict) or table.get("name", DEFAULT) in MODELS:
+        return None
+    elif rig_path is not None and str(table["name"]).endswith(".py"):
+        document["model"]["name"] = str(rig_path.parent / table["name"])
+    if model in MODELS:
+        return None
+    rig = MechanismRig.of_document(with_settings(document, settings))
+    return rig

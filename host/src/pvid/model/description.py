@@ -1,0 +1,320 @@
+"""What a person writes: signals, constants, unknowns and equations."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import sympy as sp
+
+from pvid.model.compiled import CompiledModel, Known, Output, Signal, Unknown
+from pvid.model.compiler import rows_of
+from pvid.model.eliminate import Equation
+from pvid.model.mechanics import equations_of
+from pvid.model.normal_form import rational
+from pvid.model.refusal import ModelError, place_of_caller
+from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
+from pvid.model.units import Dimension, dimension_of, dimension_of_unit
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
+_TAKEN = {"t": "the time", "theta": "the coefficients of a row"}
+
+
+class Model:
+    """A mechanism; `compiled` makes rows of it.
+
+    Each of sensor, input, unmeasured, define, known and unknown returns a SymPy symbol for the equations.
+    """
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.signals: list[Signal] = []
+        self.unknowns: list[Unknown] = []
+        self.knowns: list[Known] = []
+        self.outputs: list[Output] = []
+        self.hidden: list[Jet] = []
+        self.defined: dict[Jet, sp.Expr] = {}
+        self.equations: list[Equation] = []
+        self._dimensions: dict[str, Dimension] = {}
+
+    # ---- quantities
+
+    def sensor(
+        self,
+        name: str,
+        unit: str,
+        resolution: float = 0.0,
+        noise: float | None = None,
+        reach: float = 1.0,
+        driven: bool = False,
+        gain_sd: float = 0.0,
+    ) -> Jet:
+        """A measured signal.
+
+        Parameters
+        ----------
+        resolution : of the sensor [unit]
+        noise : standard deviation of its white noise, in resolutions (0.5); in its unit where there is no resolution
+        reach : largest absolute value [unit]
+        driven : it measures what the drive imposes, such as the current of a load
+        gain_sd : relative standard deviation of its gain, which most runs do not show
+        """
+        if resolution < 0 or not math.isfinite(resolution):
+            raise self._refused(f"{name}: resolution must not be negative")
+        if noise is None and resolution == 0:
+            raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
+        level = 0.5 if noise is None else noise
+        jet = self._signal(name, unit, reach)
+        self._gain(name, gain_sd)
+        self.signals.append(
+            Signal(
+                jet,
+                unit,
+                "sensor",
+                float(resolution),
+                float(level),
+                float(reach),
+                driven=driven,
+                gain_sd=float(gain_sd),
+            )
+        )
+        return jet
+
+    def input(
+        self, name: str, unit: str, hold: Literal["zoh", "sampled"], reach: float = 1.0, gain_sd: float = 0.0
+    ) -> Jet:
+        """A signal that is known exactly but for its gain (relative standard deviation gain_sd); hold "zoh": the value
+        set at t_k holds until t_(k+1), "sampled": it is a value at t_k."""
+        if hold not in ("zoh", "sampled"):
+            raise self._refused(f'{name}: hold is "{hold}", it must be "zoh" or "sampled"')
+        jet = self._signal(name, unit, reach)
+        self._gain(name, gain_sd)
+        self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, True, float(gain_sd)))
+        return jet
+
+    def _gain(self, name: str, gain_sd: float) -> None:
+        if not 0 <= gain_sd < 1:
+            raise self._refused(f"{name}: gain_sd is a relative standard deviation, from 0 to below 1")
+
+    def unmeasured(self, name: str, unit: str) -> Jet:
+        """A coordinate that no sensor measures; the compiler eliminates it."""
+        jet = self._signal(name, unit, 1.0)
+        self.hidden.append(jet)
+        return jet
+
+    def define(self, name: str, unit: str, expression: sp.Expr) -> Jet:
+        """A signal that is computed of others and treated like a measured one: a second derivative, or
+        Integral(i, 1), the integral of i since the start of the run."""
+        jet = self._signal(name, unit, 1.0)
+        self.defined[jet] = rational(expression)
+        self._agree(jet - self.defined[jet], f"the definition of {name}")
+        return jet
+
+    def known(self, name: str, unit: str, value: float) -> sp.Symbol:
+        """A constant with a value, which a rig file may change."""
+        symbol = self._symbol(name, unit)
+        if not math.isfinite(value):
+            raise self._refused(f"{name}: its value {value} is no number")
+        self.knowns.append(Known(symbol, unit, float(value)))
+        return symbol
+
+    def unknown(
+        self,
+        name: str,
+        unit: str,
+        guess: float,
+        positive: bool = True,
+        low: float | None = None,
+        high: float | None = None,
+        sd: float | None = None,
+    ) -> sp.Symbol:
+        """A parameter to identify.
+
+        Parameters
+        ----------
+        guess : rough value [unit]
+        positive : it cannot be 0 or below
+        low, high : range of the plausible [unit]; a hundredth and a hundred times the guess, or 10 sd around it
+        sd : how far off the guess can be [unit]; 2 |guess|
+        """
+        if not math.isfinite(guess) or positive and guess <= 0:
+            raise self._refused(
+                f"{name}: the guess {guess} is not positive; give positive=False if it may have any sign"
+            )
+        if sd is None and guess == 0:
+            raise self._refused(f"{name}: with a guess of 0, give sd, how far off it can be [{unit or 1}]")
+        spread = 2 * abs(guess) if sd is None else sd
+        if not spread > 0:
+            raise self._refused(f"{name}: sd must be positive")
+        least = (guess / 100 if positive else guess - 10 * spread) if low is None else low
+        most = (guess * 100 if positive else guess + 10 * spread) if high is None else high
+        if not least <= guess <= most:
+            raise self._refused(f"{name}: the guess {guess} is outside {least} to {most}")
+        symbol = self._symbol(name, unit)
+        self.unknowns.append(Unknown(symbol, unit, float(guess), positive, float(least), float(most), float(spread)))
+        return symbol
+
+    def output(self, name: str, unit: str, expression: sp.Expr) -> None:
+        """A physical parameter that follows from the unknowns."""
+        value = rational(expression)
+        self._declared(value)
+        if jets(value):
+            raise self._refused(f"the output {name} contains a signal; it must follow from unknowns and constants")
+        found, wanted = dimension_of(value, self._dimensions), self._unit(unit)
+        if found is not None and found != wanted:
+            raise self._refused(f"the output {name} has the unit {found}, not {unit or 1}")
+        self.outputs.append(Output(name, unit, value))
+
+    # ---- equations
+
+    def equation(self, expression: sp.Expr, name: str = "") -> None:
+        """expression = 0."""
+        whole = rational(expression)
+        title = name or f"equation {len(self.equations) + 1}"
+        if whole == 0 or not jets(whole):
+            raise self._refused(f"{title} contains no signal")
+        self._agree(whole, title)
+        self.equations.append(Equation(title, whole, place_of_caller()))
+
+    def lagrange(self, lagrangian: sp.Expr, coordinates: Sequence[Jet], forces: Sequence[sp.Expr]) -> None:
+        """d/dt dL/dq' - dL/dq = force, for each coordinate."""
+        if len(coordinates) != len(forces):
+            raise self._refused(f"lagrange: {len(coordinates)} coordinates but {len(forces)} generalised forces")
+        whole = rational(lagrangian)
+        self._agree(whole, "the Lagrangian")
+        for q, force in zip(coordinates, forces, strict=True):
+            momentum = sp.diff(whole, q.d())
+            self.equation(total_derivative(momentum) - sp.diff(whole, q) - sp.sympify(force), f"equation of {q}")
+
+    def mechanics(self, method: Any, signals: Mapping[Any, sp.Expr]) -> None:
+        """The equations of a LagrangesMethod, KanesMethod or System of sympy.physics.mechanics.
+
+        Parameters
+        ----------
+        signals : dynamicsymbol or constant -> the signal, unknown or known constant of this model
+        """
+        try:
+            found = equations_of(method, signals)
+        except ModelError as error:
+            raise error.at(place_of_caller()) from None
+        for one in found:
+            self.equation(one)
+
+    # ---- result
+
+    def compiled(self, name: str = "") -> CompiledModel:
+        """Rows, theta and the rest.
+
+        Raises
+        ------
+        ModelError
+            Where it cannot be done, with the cause.
+        """
+        return self._compiled(name, "")
+
+    def compiled_variants(self, name: str = "") -> dict[str, CompiledModel]:
+        """Alternatives of integration by parts: "" is the usual one, another key is the signal whose derivative is
+        moved to the test function at the price of a derivative of another signal."""
+        usual = self._compiled(name, "")
+        out = {"": usual}
+        for signal in self.signals:
+            other = self._compiled(name, signal.name)
+            if other.rows != usual.rows:
+                out[signal.name] = other
+        return out
+
+    def _compiled(self, name: str, by_parts: str) -> CompiledModel:
+        if not self.equations:
+            raise ModelError(f"{self.title}: the model has no equation")
+        if not self.unknowns:
+            raise ModelError(f"{self.title}: the model has no unknown")
+        integrals = {jet: value for jet, value in self.defined.items() if value.has(Integral)}
+        rates = {jet.of: total_derivative(value) for jet, value in integrals.items()}
+        hidden = [jet.of for jet in self.hidden]
+        rows = rows_of(self.equations, hidden, self.unknowns, rates, by_parts)
+        used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
+        for one in self.unknowns:
+            if one.symbol not in used:
+                raise ModelError(
+                    f"no row contains the unknown {one.name}, so that it cannot be identified: declare it as known"
+                )
+        plain = {jet: value for jet, value in self.defined.items() if jet not in integrals}
+        simulated = [_inserted(one.expression, plain) for one in self.equations]
+        simulated += [jet.d() - rates[jet.of] for jet in integrals]
+        return CompiledModel(
+            name or re.sub(r"\W+", "_", self.title.lower()).strip("_"),
+            self.title,
+            tuple(self.signals),
+            tuple(self.unknowns),
+            tuple(self.knowns),
+            tuple(self.outputs),
+            tuple(rows),
+            dict(self.defined),
+            tuple(simulated),
+            (*self.hidden, *integrals),
+        )
+
+    # ---- checks
+
+    def _refused(self, cause: str) -> ModelError:
+        return ModelError(cause, place_of_caller())
+
+    def _unit(self, unit: str) -> Dimension:
+        try:
+            return dimension_of_unit(unit)
+        except ModelError as error:
+            raise error.at(place_of_caller()) from None
+
+    def _new(self, name: str, unit: str) -> None:
+        if not isinstance(name, str) or not _NAME.match(name):
+            raise self._refused(f"{name!r} is no name: letters, digits and _ after a letter")
+        if name in _TAKEN:
+            raise self._refused(f"{name} is {_TAKEN[name]}: choose another name")
+        signals = [jet.of for jet in self._jets()]
+        clash = {f"{one}_{k}" for one in signals for k in range(1, MAX_ORDER + 1)}
+        ahead = {f"{name}_{k}" for k in range(1, MAX_ORDER + 1)}
+        if name in self._dimensions or name in clash or ahead & set(self._dimensions):
+            raise self._refused(f"{name} is declared twice, or is the name of a derivative of another signal")
+        self._dimensions[name] = self._unit(unit)
+
+    def _jets(self) -> list[Jet]:
+        return [*(one.jet for one in self.signals), *self.hidden, *self.defined]
+
+    def _signal(self, name: str, unit: str, reach: float) -> Jet:
+        self._new(name, unit)
+        if not 0 < reach < math.inf:
+            raise self._refused(f"{name}: reach must be positive")
+        return Jet(name)
+
+    def _symbol(self, name: str, unit: str) -> sp.Symbol:
+        self._new(name, unit)
+        return sp.Symbol(name, real=True)
+
+    def _declared(self, expression: sp.Expr) -> None:
+        own = {jet.of for jet in self._jets()}
+        symbols = {one.symbol for one in self.unknowns} | {one.symbol for one in self.knowns}
+        for one in sorted(expression.free_symbols, key=str):
+            if one in symbols or isinstance(one, Jet) and one.of in own:
+                continue
+            raise self._refused(
+                f"{one} is not declared: model.unknown, model.known, model.sensor, model.input or model.unmeasured does"
+            )
+
+    def _agree(self, expression: sp.Expr, title: str) -> None:
+        self._declared(expression)
+        try:
+            dimension_of(expression, self._dimensions)
+        except ModelError as error:
+            raise self._refused(f"{title}: {error.cause}") from None
+
+
+def _inserted(expression: sp.Expr, defined: dict[Jet, sp.Expr]) -> sp.Expr:
+    """Definitions in place of the signals that they define."""
+    values: dict[Any, Any] = {}
+    for jet, value in defined.items():
+        for one in jets(expression):
+            if one.of == jet.of:
+                values[one] = total_derivative(value, one.order)
+    return expression.xreplace(values) if values else expression

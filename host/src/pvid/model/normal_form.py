@@ -1,0 +1,73 @@
+"""An equation as the compiler reads it: rational numbers, offsets outside sines, no denominator that contains a signal
+and an unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import sympy as sp
+
+from pvid.model.readable import readable
+from pvid.model.refusal import ModelError
+from pvid.model.signals import Integral, jets, sgn
+from pvid.model.terms import varies
+
+_FUNCTIONS = (sp.sin, sp.cos, sp.Abs, sgn, Integral)
+
+
+def rational(expression: sp.Expr) -> sp.Expr:
+    """Floats as the decimal fractions that they are written as."""
+    whole = sp.sympify(expression)
+    return whole.xreplace({one: sp.Rational(repr(float(one))) for one in whole.atoms(sp.Float)})
+
+
+def normal_form(expression: sp.Expr, p: Collection[sp.Symbol]) -> sp.Expr:
+    """Expanded; multiplied, where needed, by a common denominator.
+
+    Raises
+    ------
+    ModelError
+        Where a function or a power is none that rows can be made of.
+    """
+    whole = rational(expression)
+    whole = whole.replace(sp.sign, sgn).replace(sp.tan, lambda x: sp.sin(x) / sp.cos(x))
+    _check_functions(whole)
+    whole = whole.replace(lambda one: isinstance(one, sp.sin | sp.cos), lambda one: _without_offset(one, set(p)))
+    whole = sp.expand(whole)
+    if any(_mixed(one, p) for one in whole.atoms(sp.Pow)):
+        numerator, _ = sp.fraction(sp.together(whole))
+        whole = sp.expand(numerator)
+    for one in whole.atoms(sp.Pow):
+        if varies(one.base) and not one.exp.is_Integer:
+            raise ModelError(f"{readable(one)} is no whole power of a signal: only those are supported")
+    return whole
+
+
+def _mixed(power: sp.Pow, p: Collection[sp.Symbol]) -> bool:
+    below = bool(power.exp.could_extract_minus_sign())
+    return below and varies(power.base) and bool(power.base.free_symbols & set(p))
+
+
+def _check_functions(whole: sp.Expr) -> None:
+    for one in whole.atoms(sp.Function):
+        if isinstance(one, sp.core.function.AppliedUndef):
+            raise ModelError(f"{one} is no signal of the model: use what model.sensor(..) returned and its .d()")
+        if varies(one) and not isinstance(one, _FUNCTIONS):
+            raise ModelError(
+                f"{type(one).__name__}(..) of a signal is not supported: sin, cos, sgn, abs and rational functions are"
+            )
+    if whole.has(sp.Derivative, sp.Integral, sp.Piecewise):
+        raise ModelError("derivatives are written as signal.d(n), and no cases are possible")
+
+
+def _without_offset(one: sp.Expr, p: set[sp.Symbol]) -> sp.Expr:
+    """sin(a - c) with an unknown c as sin a cos c - cos a sin c."""
+    argument = sp.expand(one.args[0])
+    if not argument.free_symbols & p or not jets(argument):
+        return one
+    terms = sp.Add.make_args(argument)
+    moving = sp.Add(*(term for term in terms if varies(term)))
+    fixed = sp.Add(*(term for term in terms if not varies(term)))
+    if isinstance(one, sp.sin):
+        return sp.sin(moving) * sp.cos(fixed) + sp.cos(moving) * sp.sin(fixed)
+    return sp.cos(moving) * sp.cos(fixed) - sp.sin(moving) * sp.sin(fixed)

@@ -1,0 +1,59 @@
+"""Homogeneous rows: every term has an unknown, so that a row fixes theta up to a factor only.
+
+Such a row is kept where another row fixes one of its theta (Kt = Ke of a motor's torque balance); else it is divided by
+one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from pvid.model.compiled import Row, Unknown
+from pvid.model.factor import divided
+from pvid.model.gradient import jacobian_at, rank
+from pvid.model.readable import readable
+from pvid.model.refusal import ModelError
+
+
+def with_scales(rows: Sequence[Row], unknowns: Sequence[Unknown]) -> list[Row]:
+    """Rows of which each has a scale, in the same order."""
+    p = [one.symbol for one in unknowns]
+    out: dict[int, Row] = {k: row for k, row in enumerate(rows) if row.known}
+    waiting = [k for k, row in enumerate(rows) if not row.known]
+    while waiting:
+        fixed = [theta for row in out.values() for theta in row.theta]
+        kept = next((k for k in waiting if any(_follows(theta, fixed, p) for theta in rows[k].theta)), None)
+        k = waiting[0] if kept is None else kept
+        out[k] = rows[k] if kept is not None else divided(rows[k], _normaliser(rows[k], unknowns), p)
+        waiting.remove(k)
+    return [out[k] for k in range(len(rows))]
+
+
+def _follows(theta: sp.Expr, fixed: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -> bool:
+    """Whether it is, near any point, a function of the fixed ones."""
+    if not fixed:
+        return False
+    both, _ = jacobian_at([*fixed, theta], p)
+    return rank(both[:-1, :]) == rank(both)
+
+
+def _normaliser(row: Row, unknowns: Sequence[Unknown]) -> sp.Expr:
+    """A theta that cannot be 0: a product of positive unknowns, of the regressor that takes the most derivatives, whose
+    noise is largest and does no harm in Y."""
+    positive = {one.symbol for one in unknowns if one.positive}
+    own = {one.symbol for one in unknowns}
+    candidates = [
+        (theta, part)
+        for theta, part in zip(row.theta, row.regressors, strict=True)
+        if not theta.is_Add and theta.free_symbols & own <= positive and not theta.atoms(sp.sin, sp.cos)
+    ]
+    if not candidates:
+        raise ModelError(
+            f"{row.name} fixes its coefficients up to a common factor only: declare one of "
+            f"{', '.join(map(readable, row.theta))} as known"
+        )
+    highest = max(max(part) for _, part in candidates)
+    among = [theta for theta, part in candidates if max(part) == highest]
+    return min(among, key=lambda theta: (sp.count_ops(theta), str(theta)))

@@ -1,0 +1,108 @@
+"""What `pvid model check` prints: rows, coefficients, what is identifiable, and advice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from pvid.model.compiled import CompiledModel, Row
+from pvid.model.corners import slopes
+from pvid.model.identifiability import Identifiability, Shift, Symmetry, identifiable
+from pvid.model.readable import listed, readable, readable_part
+from pvid.model.signals import jets
+
+__all__ = ["Identifiability", "check_report", "identifiable", "verdict"]
+
+
+def check_report(compiled: CompiledModel) -> str:
+    """The whole text, in lines of at most about 120 characters where terms allow it."""
+    found = identifiable(compiled)
+    blocks = [_head(compiled), *(_row(row) for row in compiled.rows), verdict(found), *_advice(compiled)]
+    return "\n\n".join(block for block in blocks if block)
+
+
+def verdict(found: Identifiability) -> str:
+    """In one sentence for each group of unknowns."""
+    lines = []
+    if found.identifiable:
+        lines.append(f"Identifiable: all {found.unknowns} unknowns, given enough excitation.")
+    else:
+        lines.append(f"Not identifiable: {found.rank} functions of the {found.unknowns} unknowns are determined.")
+        lines += [_shift(one) for one in found.shifts]
+    lines += [_symmetry(one) for one in found.symmetries]
+    return "\n".join(lines)
+
+
+def _shift(one: Shift) -> str:
+    names = listed(one.unknowns)
+    shown = ", ".join(_in_order(value, one.unknowns) for value in one.combinations)
+    if not one.combinations and one.kind == "coefficients":
+        return f"  {names} change together without a trace: declare one of them as known, or add a sensor."
+    if not one.combinations:
+        return f"  {names}: not determined at all."
+    only = f"only {shown}" if one.kind != "coefficients" else f"only what follows from {shown}"
+    return f"  {names}: {only} can be identified; declare one of them as known, or add a sensor."
+
+
+def _in_order(value: sp.Expr, names: Sequence[str]) -> str:
+    """A sum in the order in which the unknowns are declared."""
+    if not value.is_Add:
+        return readable(value)
+    rank = {name: k for k, name in enumerate(names)}
+    terms = sorted(value.args, key=lambda term: min(rank.get(str(one), len(rank)) for one in term.free_symbols))
+    text = "".join(f" - {readable(-one)}" if one.could_extract_minus_sign() else f" + {readable(one)}" for one in terms)
+    return text.removeprefix(" + ") if text.startswith(" + ") else "-" + text.removeprefix(" - ")
+
+
+def _symmetry(one: Symmetry) -> str:
+    if one.swapped:
+        what = listed([f"{a} with {b}" for a, b in one.swapped])
+        text = f"The same data allow a second solution that exchanges {what}"
+    else:
+        text = f"The same data allow a second solution with the opposite sign of {listed(one.negated)}"
+    cure = "; the ranges exclude it." if one.excluded else ": give ranges (low, high) that exclude it."
+    return f"Warning: {text}{cure}" if not one.excluded else f"{text}{cure}"
+
+
+def _head(compiled: CompiledModel) -> str:
+    lines = [f"{compiled.name}: {compiled.title}"]
+    lines.append("measured   " + ", ".join(f"{one.name} [{one.unit or 1}]" for one in compiled.signals))
+    if compiled.opaque:
+        lines.append("computed   " + ", ".join(f"{jet} = {readable(value)}" for jet, value in compiled.opaque.items()))
+    hidden = [jet.of for jet in compiled.hidden if jet not in compiled.opaque]
+    if hidden:
+        lines.append("eliminated " + ", ".join(hidden))
+    lines.append("unknown    " + ", ".join(f"{one.name} [{one.unit or 1}]" for one in compiled.unknowns))
+    if compiled.knowns:
+        values = (f"{one.name} = {one.value:g} {one.unit}".strip() for one in compiled.knowns)
+        lines.append("known      " + ", ".join(values))
+    return "\n".join(lines)
+
+
+def _row(row: Row) -> str:
+    lines = [f"{row.name}: sum of theta * N = Y, {len(row.theta)} theta, derivatives up to order {row.top}"]
+    width = min(40, max(len(readable(one)) for one in row.theta))
+    lines.append(f"  {'Y':{width}}   {readable_part(row.known)}")
+    for theta, part in zip(row.theta, row.regressors, strict=True):
+        lines.append(f"  {readable(theta):{width}}   {readable_part(part)}")
+    lines += [f"  {'(free)':{width}}   {readable_part(part)}" for part in row.nuisances]
+    return "\n".join(lines)
+
+
+def _advice(compiled: CompiledModel) -> list[str]:
+    """Remarks on what the rows need of the sensors."""
+    lines = [
+        f"{sensor} has a corner at every step of {name}: rows get a channel for it, with the factor {readable(slope)}."
+        for (sensor, name), slope in slopes(compiled).items()
+    ]
+    for row in compiled.rows:
+        psis = [psi for part in (*row.regressors, row.known) for psi in part.values()]
+        needs = sorted({jet for psi in psis for jet in jets(psi) if jet.order > 0}, key=str)
+        if needs:
+            lines.append(f"{row.name} needs {listed([readable(one) for one in needs])}, smoothed.")
+        if not row.known:
+            lines.append(f"{row.name} has no known term; another row fixes its scale.")
+        if row.top >= 4:
+            lines.append(f"{row.name} takes {row.top} derivatives: it needs a smooth window and a good sensor.")
+    return ["\n".join(lines)] if lines else []

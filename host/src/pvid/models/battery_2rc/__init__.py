@@ -1,0 +1,1 @@
+"""A cell: open-circuit voltage, resistance and two RC pairs."""

@@ -1,0 +1,75 @@
+"""Mechanisms that are described and compiled: the shipped ones (folders with mechanism.py) and a user's own file."""
+
+from __future__ import annotations
+
+import traceback
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from pvid.base.errors import PvidError
+from pvid.model.compiled import CompiledModel
+from pvid.model.description import Model
+
+_FOLDER = Path(__file__).parent
+_FILE = "mechanism.py"
+
+
+def names() -> tuple[str, ...]:
+    """Of the shipped mechanisms."""
+    return tuple(sorted(path.parent.name for path in _FOLDER.glob(f"*/{_FILE}")))
+
+
+def path_of(name_or_path: str | Path) -> tuple[str, Path]:
+    """A mechanism's name and file.
+
+    Raises
+    ------
+    PvidError
+        Where there is no such mechanism or file.
+    """
+    if str(name_or_path) in names():
+        return str(name_or_path), _FOLDER / str(name_or_path) / _FILE
+    path = Path(name_or_path)
+    if path.suffix == ".py" and path.is_file():
+        return path.parent.name if path.name == _FILE else path.stem, path
+    raise PvidError(f"{name_or_path}: no such model; give a .py file or one of {', '.join(names())}")
+
+
+def described(name_or_path: str | Path) -> Model:
+    """The description in a model file.
+
+    Raises
+    ------
+    PvidError
+        Where the file cannot be read or run, or leaves no `model`; the sentence contains the line.
+    """
+    _, path = path_of(name_or_path)
+    space: dict[str, Any] = {"__name__": "pvid_model_file", "__file__": str(path)}
+    try:
+        exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), space)
+    except PvidError:
+        raise
+    except (OSError, UnicodeDecodeError) as error:
+        raise PvidError(f"{path}: {error}") from None
+    except SyntaxError as error:
+        raise PvidError(f"{path.name}, line {error.lineno}: {error.msg}") from None
+    except (Exception, SystemExit) as error:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+        where = f"{path.name}, line {lines[-1]}" if lines else path.name
+        raise PvidError(f"{where}: {type(error).__name__}: {error}") from None
+    model = space.get("model")
+    if not isinstance(model, Model):
+        raise PvidError(f"{path.name}: the file leaves no variable `model` that is a pvid.model.Model")
+    return model
+
+
+def compiled_of(name_or_path: str | Path) -> CompiledModel:
+    """A mechanism by name or model file, compiled; kept while the file does not change."""
+    name, path = path_of(name_or_path)
+    return _compiled(name, str(path), path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=32)
+def _compiled(name: str, path: str, changed: int) -> CompiledModel:
+    return described(path).compiled(name)

@@ -1,0 +1,1 @@
+"""A rigid body with gyros and known torques."""

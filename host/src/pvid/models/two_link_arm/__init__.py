@@ -1,0 +1,1 @@
+"""An arm with two driven joints."""

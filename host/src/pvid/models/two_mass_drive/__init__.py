@@ -1,0 +1,1 @@
+"""A drive with an elastic shaft whose load is not measured."""

@@ -1,0 +1,140 @@
+"""The design of a weak form for a model and a run: the one with the least predicted errors.
+
+The score of a design is the geometric mean over the parameters of predicted s.e. x sqrt(max(1, chi^2)), both from the
+run. Measured: where chi^2 is about 1 the score is the true error; where it is large the best by score is within 20 % of
+the best by truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.errors import uncertainty
+from pvid.oracle.fourier.front import samples_of
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.rows import Compiled, WeakRows
+from pvid.oracle.fourier.solve import batch
+
+_FEWEST_WINDOWS = 18
+_SHORTEST_STEPS = 40  # of a window
+_LENGTHS = 6
+_FUNCTIONS = (12, 24, 40)
+_RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
+
+# Above this the equations' own errors are estimated when designs are compared.
+_MODEL_ERROR = 5.0
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A design with its score, and p there."""
+
+    design: FourierDesign
+    score: float
+    p: Float
+    chi2: float
+
+
+def score_of(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, start: Float | None, errors: bool
+) -> Scored | None:
+    """None where the design does not fit the run."""
+    try:
+        rows = WeakRows.of(model, run, design)
+        if rows.windows < _FEWEST_WINDOWS - 2:
+            return None
+        fit = batch(rows, start, equation_error=errors)
+        found = uncertainty(fit)
+    except (PvidError, np.linalg.LinAlgError):
+        return None
+    size = np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd)
+    relative = found.predicted / size
+    if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
+        return None
+    return Scored(design, float(np.exp(np.mean(np.log(relative)))), fit.p, found.chi2)
+
+
+def power_of(model: Compiled) -> int:
+    """n of sin^n: even, 2 above the highest order, 6 at least."""
+    return max(6, 2 * ((model.channels.top + 3) // 2), 8 if model.channels.top >= 4 else 6)
+
+
+def lengths(samples: int, sample_rate: float) -> list[float]:
+    """Windows to try [s], the longest first."""
+    longest = 2 * samples / sample_rate / (_FEWEST_WINDOWS + 1)
+    shortest = _SHORTEST_STEPS / sample_rate
+    if longest < shortest:
+        return []
+    count = min(_LENGTHS, 1 + int(np.log2(max(longest / shortest, 1.0))))
+    return [float(f"{longest / 2**k:.2g}") for k in range(count)]
+
+
+def chosen(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], sample_rate: float, start: Float | None = None
+) -> FourierDesign:
+    """The design of least score, one choice after the other: length, smoothing of rates, number of functions."""
+    return ranked(model, run, sample_rate, start)[0].design
+
+
+def ranked(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], sample_rate: float, start: Float | None = None
+) -> list[Scored]:
+    """All designs tried, the best first."""
+    plain = {name: x for name, x in run.items()}
+    samples = next(iter(samples_of(model.bare, plain).values())).size
+    rates = any(jet.order for jet in model.channels.needed)
+    basis = FourierDesign(sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
+    tried: list[Scored] = []
+    errors = False
+
+    def attempt(designs: Iterable[FourierDesign]) -> None:
+        for design in designs:
+            best = min(tried, key=lambda one: one.score, default=None)
+            found = score_of(model, run, design, best.p if best else start, errors)
+            if found is not None:
+                tried.append(found)
+
+    windows = lengths(samples, sample_rate)
+    attempt(made(basis, window_s=one) for one in windows)
+    if not tried:
+        raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
+    best = min(tried, key=lambda one: one.score)
+    if best.chi2 > _MODEL_ERROR:
+        errors = True
+        tried.clear()
+        attempt([best.design])
+        attempt(made(basis, window_s=one) for one in windows)
+        best = min(tried, key=lambda one: one.score)
+    if rates:
+        attempt(made(best.design, rate_taps=taps, rate_degree=degree) for taps, degree in _RATES)
+        best = min(tried, key=lambda one: one.score)
+    place = windows.index(best.design.window_s)
+    near = windows[max(place - 1, 0) : place + 2]
+    attempt(
+        made(best.design, window_s=length, functions=count)
+        for length in near
+        for count in _FUNCTIONS
+        if (length, count) != (best.design.window_s, best.design.functions)
+    )
+    if len(model.model.rows) > 1:
+        best = min(tried, key=lambda one: one.score)
+        attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
+    return sorted(tried, key=lambda one: one.score)
+
+
+def made(design: FourierDesign, **changes: float) -> FourierDesign:
+    """A changed design; one that is impossible gets fewer functions."""
+    while True:
+        try:
+            return replace(design, **changes)  # type: ignore[arg-type]
+        except PvidError:
+            count = int(changes.get("functions", design.functions)) - 2
+            if count < 2:
+                raise
+            changes["functions"] = count

@@ -1,0 +1,144 @@
+"""Test functions sin^n(pi t/T) times harmonics, as short sums of exponentials, and what follows from that.
+
+    chi_k(t) = sin^n(pi t/T) {1, cos(2 pi f (t/T - 1/2)), sin(2 pi f (t/T - 1/2))},   f = 1..M,   0 <= t <= T
+
+Every chi_k^(m) is a sum of e^(2 pi i h t/T), |h| <= H = M + n/2, so that a window needs of each channel only the sums
+S_h = sum psi(t_j) e^(2 pi i h t_j/T) (`half_sums`, `joined`), and `combine` turns them into K rows of any order m.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class TestFunctions:
+    """K test functions on windows of 2 hop steps of dt [s].
+
+    Attributes
+    ----------
+    count : K; the first is the bell alone, then cosine and sine of each frequency
+    power : n, even
+    hop : samples of a half window
+    dt : step [s]
+    """
+
+    __test__ = False  # not a test, whatever pytest reads in its name
+
+    count: int
+    power: int
+    hop: int
+    dt: float
+
+    def __post_init__(self) -> None:
+        if self.power < 2 or self.power % 2:
+            raise ValueError(f"the power of a test function must be even and at least 2, not {self.power}")
+        if self.count < 1 or self.hop < 2:
+            raise ValueError("a window needs one test function and a half of two samples at least")
+
+    @property
+    def length(self) -> float:
+        """T [s]."""
+        return 2 * self.hop * self.dt
+
+    @property
+    def highest(self) -> int:
+        """H, the highest harmonic."""
+        return self.count // 2 + self.power // 2
+
+    @property
+    def resolved(self) -> bool:
+        """Products of two test functions do not alias: their sums over the samples are integrals."""
+        return 2 * self.highest < 2 * self.hop
+
+    @cached_property
+    def coefficients(self) -> Complex:
+        """c [2 H + 1, K] with chi_k = sum_h c_hk e^(2 pi i h t/T), h = -H..H."""
+        n, top = self.power, self.highest
+        out = np.zeros((2 * top + 1, self.count), np.complex128)
+        for j in range(n + 1):
+            # Counted from the window's middle, sin^n is cos^n = sum_j C(n, j)/2^n e^(2 pi i h x), h = j - n/2.
+            h, weight = j - n // 2, math.comb(n, j) / 2**n
+            for k in range(self.count):
+                f, factor = (k + 1) // 2, 0.5 if k % 2 else -0.5j
+                if k == 0:
+                    out[top + h, k] += weight
+                else:
+                    out[top + h + f, k] += weight * factor
+                    out[top + h - f, k] += weight * np.conj(factor)
+        # And from its start: x = t/T - 1/2.
+        return out * ((-1.0) ** np.arange(-top, top + 1))[:, np.newaxis]
+
+    @cached_property
+    def rates(self) -> Float:
+        """omega_h = 2 pi h/T [rad/s], h = -H..H."""
+        return np.asarray(2 * math.pi * np.arange(-self.highest, self.highest + 1) / self.length)
+
+    def values(self, order: int) -> Float:
+        """chi^(order) at the samples 0..2 hop - 1 [2 hop, K]; for covariances of neighbours."""
+        if order not in self._values:
+            # S_h of a unit sample at t_j is e^(i w_h t_j): its real and imaginary parts, as in `joined`.
+            places = np.outer(np.arange(2 * self.hop), np.arange(1, self.highest + 1)) % (2 * self.hop)
+            turn = math.pi / self.hop * np.arange(2 * self.hop)
+            parts = np.empty((2 * self.hop, 2 * self.highest + 1))
+            parts[:, 0], parts[:, 1::2], parts[:, 2::2] = 1.0, np.cos(turn)[places], np.sin(turn)[places]
+            self._values[order] = parts @ self.combine(order)
+        return self._values[order]
+
+    @cached_property
+    def _values(self) -> dict[int, Float]:
+        return {}
+
+    def combine(self, order: int) -> Float:
+        """[2 H + 1, K]: sum chi^(order) psi = (S_0, Re S_1, Im S_1, Re S_2, ...) @ combine."""
+        top = self.highest
+        weights = self.coefficients * ((1j * self.rates) ** order)[:, np.newaxis]
+        out = np.empty((2 * top + 1, self.count))
+        out[0] = np.real(weights[top])
+        out[1::2] = np.real(weights[top + 1 :] + weights[:top][::-1])
+        out[2::2] = -np.imag(weights[top + 1 :] - weights[:top][::-1])
+        return out
+
+    def gram(self, first: int, second: int) -> Float:
+        """Sum over the samples of chi^(first) chi^(second)^T [K, K], from the harmonics alone."""
+        energy = np.full(2 * self.highest + 1, 0.5)
+        energy[0] = 1.0
+        return np.asarray(
+            2 * self.hop * self.combine(first).T @ (energy[:, np.newaxis] * self.combine(second)), np.float64
+        )
+
+    def overlap(self, first: int, second: int) -> Float:
+        """The same over the half that two neighbours share: chi^(first) of the earlier, chi^(second) of the later."""
+        return np.asarray(self.values(first)[self.hop :].T @ self.values(second)[: self.hop])
+
+    @cached_property
+    def circle(self) -> Complex:
+        """e^(2 pi i h j/(2 hop)) [hop, H + 1]: the factors of the samples of a half window."""
+        places = np.outer(np.arange(self.hop), np.arange(self.highest + 1)) % (2 * self.hop)
+        return np.asarray(np.exp(1j * math.pi / self.hop * np.arange(2 * self.hop))[places])
+
+    def halves(self, x: Float) -> Float:
+        """Whole half windows [..., halves, hop] of samples [..., n]; what is left over at the end is dropped."""
+        whole = x.shape[-1] // self.hop
+        return x[..., : whole * self.hop].reshape(*x.shape[:-1], whole, self.hop)
+
+    def half_sums(self, halves: Float) -> Complex:
+        """A_h [..., halves, H + 1] of half windows [..., halves, hop]; time counts from each half's start."""
+        return np.asarray((halves @ self.circle.real.copy()) + 1j * (halves @ self.circle.imag.copy()))
+
+    def joined(self, first: Complex, second: Complex) -> Float:
+        """S_h = A_h + (-1)^h B_h as (S_0, Re S_1, Im S_1, ...) [..., 2 H + 1] of two halves' sums [..., H + 1]."""
+        whole = first + second * (-1.0) ** np.arange(self.highest + 1)
+        out = np.empty((*whole.shape[:-1], 2 * self.highest + 1))
+        out[..., 0] = whole[..., 0].real
+        out[..., 1::2] = whole[..., 1:].real
+        out[..., 2::2] = whole[..., 1:].imag
+        return out

@@ -1,0 +1,166 @@
+"""From a compiled model and a recorded run to parameters, standard errors and a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.fourier import verdict
+from pvid.oracle.fourier.choice import chosen
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.errors import uncertainty
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.fourier.sensor_errors import SensorErrors, of_scale, of_sensors
+from pvid.oracle.fourier.solve import Fit, batch, online
+from pvid.oracle.fourier.verdict import Halves, Verdict
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What a run says about a mechanism.
+
+    Attributes
+    ----------
+    names, units : of the parameters
+    p : [n_p]
+    se : published standard errors, those of gains included [n_p]
+    by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
+    predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
+    chi2 : mean square of the residuals over what the sensors alone explain
+    verdict : whether to trust it
+    r2 : of each row kind
+    times, history : end of each window [s]; p after it, window by window [windows, n_p]
+    design : of the windows
+    equation_errors : of each row kind
+    halves : p of either half; None: too short
+    fit : rows and residuals, for plots
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    p: Float
+    se: Float
+    predicted: Float
+    clustered: Float
+    chi2: float
+    verdict: Verdict
+    r2: dict[str, float]
+    times: Float
+    history: Float
+    design: FourierDesign
+    equation_errors: dict[str, EquationError]
+    halves: Halves | None
+    fit: Fit
+    by_gain: dict[str, Float]
+
+    @property
+    def values(self) -> dict[str, tuple[float, float]]:
+        """name -> (value, standard error)."""
+        return {name: (float(p), float(se)) for name, p, se in zip(self.names, self.p, self.se, strict=True)}
+
+
+_KEPT = 16
+_ready: dict[int, Compiled] = {}
+
+
+def ready(model: CompiledModel) -> Compiled:
+    """A model with its functions, made once for each object and kept for the last few."""
+    found = _ready.get(id(model))
+    if found is None or found.bare is not model:
+        found = _ready[id(model)] = Compiled(model)
+        while len(_ready) > _KEPT:
+            del _ready[next(iter(_ready))]
+    return found
+
+
+def start_of(model: CompiledModel, start: Mapping[str, float] | npt.ArrayLike | None) -> Float | None:
+    """A start as an array; names that a mapping leaves out start at their guess."""
+    if start is None:
+        return None
+    if isinstance(start, Mapping):
+        unknown = [name for name in start if name not in model.p_names]
+        if unknown:
+            raise PvidError(f"{model.name} has no unknown {unknown[0]}; its unknowns are {', '.join(model.p_names)}")
+        return np.array([float(start.get(one.name, one.guess)) for one in model.unknowns])
+    return np.asarray(start, np.float64)
+
+
+def identify(
+    compiled: CompiledModel,
+    run: Mapping[str, npt.ArrayLike],
+    sample_rate: float,
+    start: Mapping[str, float] | npt.ArrayLike | None = None,
+    design: FourierDesign | None = None,
+    compensate: bool = True,
+) -> Identified:
+    """Parameters of a mechanism from a run.
+
+    Parameters
+    ----------
+    run : name of each signal -> samples [n], in the model's units
+    sample_rate : [Hz]
+    start : of p, by name or in order; the guesses of the model where none is given
+    design : None: chosen by predicted errors and chi^2 on this run
+    compensate : take the bias of noisy regressors off
+    """
+    model = ready(compiled)
+    begun = start_of(compiled, start)
+    used = design or chosen(model, run, sample_rate, begun)
+    rows = WeakRows.of(model, run, used)
+    fit = batch(rows, begun, compensate=compensate)
+    found = uncertainty(fit)
+    halves = verdict.halves_of(fit)
+    reasons = {
+        "not_identified": verdict.not_identified(compiled, fit, found),
+        "not_settled": verdict.settled(fit),
+        "halves": verdict.of_halves(compiled, fit, halves),
+        "feedback": verdict.of_feedback(compiled, fit),
+        "residuals": verdict.of_residuals(found),
+        "range": verdict.of_range(compiled, fit.p),
+    }
+    other = other_length(model, run, used, fit.p)
+    if other is not None:
+        reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
+    sensors = SensorErrors(run, used, fit)
+    by_gain = {one.name: sensors.by_gain(one) for one in compiled.signals if one.gain_sd > 0 or one.unit != "rad"}
+    reasons["sensors"] = of_sensors(compiled, sensors.found(found.se), found.se)
+    reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
+    gains = [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
+    history = online(rows, begun)
+    return Identified(
+        names=compiled.p_names,
+        units=tuple(one.unit for one in compiled.unknowns),
+        p=fit.p,
+        se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains]), axis=0)),
+        predicted=found.predicted,
+        clustered=found.clustered,
+        chi2=found.chi2,
+        verdict=Verdict(verdict.named(reasons)),
+        r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},
+        times=rows.end_times(),
+        history=history,
+        design=used,
+        equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
+        halves=halves,
+        fit=fit,
+        by_gain=by_gain,
+    )
+
+
+def other_length(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:
+    """The same with windows of another length, twice if the run has enough of them, else half; None: neither fits."""
+    for factor in (2.0, 0.5):
+        try:
+            other = replace(design, window_s=factor * design.window_s)
+            rows = WeakRows.of(model, run, other)
+        except PvidError:
+            continue
+        if rows.windows >= 8:
+            return batch(rows, p)
+    return None

@@ -1,0 +1,278 @@
+"""The noise of a window's rows: filters from the channels' symbolic derivatives, covariances by harmonics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+
+from pvid.model.signals import Integral, jets
+from pvid.oracle.fourier.channels import Channels, Record, broadcast
+from pvid.oracle.fourier.front import density
+from pvid.oracle.fourier.functions import Float
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A sensor's noise n enters column `column` as sum chi^(order) gain(t) n."""
+
+    column: int
+    order: int
+    values: Float
+
+
+class NoiseFilters:
+    """How the noise of each sensor enters the columns of each row kind, to first order, from the symbolic derivatives.
+
+    D^m[psi(z, z')] with noise n in z: sum over d of (-1)^m (-D)^d [chi^(m) dpsi/dz^(d)] n. Running integrals smooth
+    their noise away and are left out; so is what noise in a velocity does inside sgn but for the times of reversals.
+    """
+
+    def __init__(self, channels: Channels) -> None:
+        self.channels = channels
+        self.entries: list[tuple[int, str, int]] = []  # channel, sensor, order of the jet
+        expressions: list[sp.Expr] = []
+        auxiliary = {jet: expression for jet, expression in channels.opaque.items() if not expression.has(Integral)}
+        for place, one in enumerate(channels.channels):
+            if one.fold:
+                continue
+            full = one.gain.xreplace(auxiliary).xreplace(channels.sign_marks)
+            for jet in sorted(jets(full), key=str):
+                slope = sp.diff(full, jet)
+                if slope != 0 and jet.of not in {a.of for a in channels.model.opaque}:
+                    if channels.model.signal(jet.of).sd > 0:
+                        self.entries.append((place, jet.of, jet.order))
+                        expressions.append(slope)
+        self._function = sp.lambdify(channels.plain, expressions, "numpy", cse=True)
+
+    def gains(self, record: Record) -> list[dict[str, list[Gain]]]:
+        """Of each row kind: sensor -> gains. (Nuisances are left out: their noise is second order.)"""
+        size, design = record.grid.size, record.grid.design
+        slopes = [broadcast(one, size) for one in self._function(*record.arguments)]
+        smooth = max(design.rate_taps // (2 * design.decimation), 1)
+        out = []
+        for row in self.channels.rows:
+            found: dict[tuple[str, int, int], Float] = {}
+            for term in row.terms:
+                if term.column > row.thetas:
+                    continue
+                for (place, sensor, depth), slope in zip(self.entries, slopes, strict=True):
+                    if place != term.channel:
+                        continue
+                    # (-1)^m (-D)^d [chi^(m) g] = (-1)^(m + d) sum_i C(d, i) chi^(m + d - i) g^(i)
+                    g = slope
+                    for i in range(depth + 1):
+                        factor = (-1.0) ** (term.order + depth) * float(sp.binomial(depth, i)) * term.factor
+                        key = (sensor, term.column, term.order + depth - i)
+                        found[key] = found.get(key, np.zeros(size)) + factor * g
+                        g = slope_of(g, smooth, design.dt)
+            of_row: dict[str, list[Gain]] = {}
+            for (sensor, column, order), values in found.items():
+                if values.any():
+                    of_row.setdefault(sensor, []).append(Gain(column, order, values))
+            out.append(of_row)
+        return out
+
+
+def slope_of(g: Float, reach: int, dt: float) -> Float:
+    """Derivative over +-reach steps; at the ends over what there is."""
+    if not np.any(g != g[0]):
+        return np.zeros(g.shape)
+    k = np.arange(len(g))
+    high, low = np.minimum(k + reach, len(g) - 1), np.maximum(k - reach, 0)
+    return np.asarray((g[high] - g[low]) / (dt * (high - low)))
+
+
+class NoiseModel:
+    """Covariances of the rows of a window, R0(p), and of neighbours, R1(p), of each pair of row kinds.
+
+    With gains averaged over the run, R0 = sum over pairs of orders P_mn(theta) gram(m, n), gram from the harmonics.
+    """
+
+    def __init__(self, filters: NoiseFilters, record: Record) -> None:
+        self.functions = record.grid.design.test_functions
+        of_kinds = filters.gains(record)
+        self._columns = max(row.thetas + 1 for row in filters.channels.rows)
+        self._sensors: list[_SensorGains] = []
+        for sensor in sorted(set().union(*of_kinds)):
+            own = [(kind, gain) for kind, row in enumerate(of_kinds) for gain in row.get(sensor, [])]
+            stack = np.array([gain.values for _, gain in own])
+            stack = stack[:, np.isfinite(stack).all(axis=0)]
+            variance = density(filters.channels.model.signal(sensor), record.grid.design)
+            self._sensors.append(
+                _SensorGains(
+                    variance * (stack @ stack.T) / stack.shape[1],
+                    np.array([kind for kind, _ in own]),
+                    np.array([gain.column for _, gain in own]),
+                    np.array([gain.order for _, gain in own]),
+                )
+            )
+        self._gram: dict[tuple[int, int], Float] = {}
+        self._overlap: dict[tuple[int, int], Float] = {}
+
+    def _of_orders(self, a: int, left: Float, b: int, right: Float) -> dict[tuple[int, int], float]:
+        """Weights P of the pairs of orders of two kinds, for factors of their columns."""
+        out: dict[tuple[int, int], float] = {}
+        for one in self._sensors:
+            i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
+            weights = left[one.columns[i]][:, np.newaxis] * one.products[np.ix_(i, j)] * right[one.columns[j]]
+            top = 1 + int(np.max(one.orders))
+            places = one.orders[i][:, np.newaxis] * top + one.orders[j]
+            sums = np.bincount(places.reshape(-1), weights.reshape(-1), top * top)
+            for place in np.flatnonzero(sums):
+                mn = divmod(int(place), top)
+                out[mn] = out.get(mn, 0.0) + float(sums[place])
+        return out
+
+    def gram(self, m: int, n: int) -> Float:
+        """Of the test functions."""
+        if (m, n) not in self._gram:
+            self._gram[m, n] = self.functions.gram(m, n)
+        return self._gram[m, n]
+
+    def overlap(self, m: int, n: int) -> Float:
+        """Of the test functions of neighbours."""
+        if (m, n) not in self._overlap:
+            self._overlap[m, n] = self.functions.overlap(m, n)
+        return self._overlap[m, n]
+
+    def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """R0 [K, K] of two row kinds in one window."""
+        weights = self._of_orders(a, np.append(theta_a, -1.0), b, np.append(theta_b, -1.0))
+        return sum((w * self.gram(*mn) for mn, w in weights.items()), self._nothing())
+
+    def with_next(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """R1 [K, K]: of the rows of a kind with those of another in the next window."""
+        weights = self._of_orders(a, np.append(theta_a, -1.0), b, np.append(theta_b, -1.0))
+        return sum((w * self.overlap(*mn) for mn, w in weights.items()), self._nothing())
+
+    def pull(self, a: int, b: int, theta_b: Float, weight: Float) -> Float:
+        """1/2 tr(weight dR0/d theta) with the thetas of kind a; weight [K, K] stands at the rows of a and b."""
+        right = np.append(theta_b, -1.0)
+        out = np.zeros(self._columns)
+        traces = np.einsum("mnkl,kl->mn", self._grams, weight, optimize=True)
+        for one in self._sensors:
+            i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
+            shares = one.products[np.ix_(i, j)] * right[one.columns[j]] * traces[np.ix_(one.orders[i], one.orders[j])]
+            out += np.bincount(one.columns[i], shares.sum(axis=1), self._columns)
+        return out
+
+    @cached_property
+    def _grams(self) -> Float:
+        """Of all pairs of orders [orders, orders, K, K]."""
+        orders = range(1 + max((int(np.max(one.orders)) for one in self._sensors), default=0))
+        return np.array([[self.gram(m, n) for n in orders] for m in orders])
+
+    def _nothing(self) -> Float:
+        return np.zeros((self.functions.count, self.functions.count))
+
+
+@dataclass(frozen=True)
+class _SensorGains:
+    """Mean products of the gains of one sensor [gains, gains] times its noise, and where each gain belongs."""
+
+    products: Float
+    kinds: npt.NDArray[np.int64]
+    columns: npt.NDArray[np.int64]
+    orders: npt.NDArray[np.int64]
+
+
+class ReversalNoise:
+    """The errors of the located times of reversals in the rows.
+
+    A time that is off by dt moves the sum of a test function times sgn(v) by 2 chi dt: one direction in the rows of
+    each window that holds the reversal.
+
+    Attributes
+    ----------
+    windows : of each entry, rising [entries]
+    events : reversal of each entry [entries]
+    shapes : of each row kind, 2 sd chi^(order) of the columns that hold sgn [entries, columns, K]
+    """
+
+    def __init__(self, channels: Channels, record: Record) -> None:
+        functions = record.grid.design.test_functions
+        auxiliary = dict(channels.opaque)
+        full = [one.gain.xreplace(auxiliary).xreplace(channels.sign_marks) for one in channels.channels]
+        windows, events = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        shapes = [[np.zeros((0, row.thetas + 1, functions.count))] for row in channels.rows]
+        first = 0
+        for mark, signs in zip(channels.sign_marks.values(), record.signs, strict=True):
+            holders = {k: sp.diff(one, mark) for k, one in enumerate(full) if one.has(mark)}
+            if not len(signs.times) or not holders:
+                continue
+            slopes = sp.lambdify(channels.plain, list(holders.values()), "numpy", cse=True)(*record.arguments)
+            at = np.clip(np.round(signs.times).astype(np.int64), 0, record.grid.size - 1)
+            weight = {k: broadcast(one, record.grid.size)[at] for k, one in zip(holders, slopes, strict=True)}
+            half = np.floor(signs.times / functions.hop).astype(np.int64)
+            for back in (0, 1):
+                window = half - back
+                inside = (window >= 0) & (window < record.grid.size // functions.hop - 1)
+                t = functions.dt * (signs.times - functions.hop * window)[inside]
+                turns = np.exp(1j * np.outer(t, functions.rates))
+                scale = 2 * np.sqrt(signs.variances[inside])
+                for row, own in zip(channels.rows, shapes, strict=True):
+                    shape = np.zeros((len(t), row.thetas + 1, functions.count))
+                    for term in row.terms:
+                        if term.channel not in holders or term.column > row.thetas:
+                            continue
+                        rates = ((1j * functions.rates) ** term.order)[:, np.newaxis]
+                        chi = np.real(turns @ (functions.coefficients * rates))
+                        factor = (-1.0) ** term.order * term.factor * weight[term.channel][inside] * scale
+                        shape[:, term.column] += factor[:, np.newaxis] * chi
+                    own.append(shape)
+                windows.append(window[inside])
+                events.append(first + np.flatnonzero(inside))
+            first += len(signs.times)
+        order = np.argsort(np.concatenate(windows), kind="stable")
+        self.windows, self.events = np.concatenate(windows)[order], np.concatenate(events)[order]
+        self.shapes = [np.concatenate(own)[order] for own in shapes]
+
+    def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
+        """In the rows of some kinds, one standard deviation long [entries, K of each kind]."""
+        return np.concatenate(
+            [np.einsum("ejk,j->ek", self.shapes[kind], np.append(theta[kind], -1.0)) for kind in kinds], axis=1
+        )
+
+    def covariance(self, directions: Float, windows: npt.NDArray[np.int64]) -> Float:
+        """Of each of some windows, by their numbers [windows, rows, rows]."""
+        out = np.zeros((len(windows), directions.shape[1], directions.shape[1]))
+        for k, window in enumerate(windows):
+            own = directions[self._of(window)]
+            if len(own):
+                out[k] = own.T @ own
+        return out
+
+    def slopes(
+        self, kinds: Sequence[int], theta: Sequence[Float], weight: Float, windows: npt.NDArray[np.int64]
+    ) -> Float:
+        """1/2 tr(weight d covariance / d theta) over some windows [thetas of the kinds]; weight [windows, R, R]."""
+        directions = self.directions(kinds, theta)
+        k = self.shapes[0].shape[2]
+        pulled = np.zeros(directions.shape)
+        for one, window in zip(weight, windows, strict=True):
+            pulled[self._of(window)] += directions[self._of(window)] @ one
+        return np.concatenate(
+            [
+                np.einsum("ejk,ek->j", self.shapes[kind][:, :-1], pulled[:, place * k : (place + 1) * k])
+                for place, kind in enumerate(kinds)
+            ]
+        )
+
+    def with_next(self, directions: Float, windows: npt.NDArray[np.int64]) -> Float:
+        """Of each of some windows with the one after it [windows, rows, rows]."""
+        out = np.zeros((len(windows), directions.shape[1], directions.shape[1]))
+        for k, window in enumerate(windows):
+            here, after = self._of(window), self._of(window + 1)
+            _, a, b = np.intersect1d(self.events[here], self.events[after], return_indices=True)
+            if len(a):
+                out[k] = directions[here][a].T @ directions[after][b]
+        return out
+
+    def _of(self, window: int) -> slice:
+        """Entries of a window."""
+        return slice(*np.searchsorted(self.windows, [window, window + 1]))

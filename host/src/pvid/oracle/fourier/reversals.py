@@ -1,0 +1,213 @@
+"""sgn(v) for sums: when v changes its sign, and which values at the steps give the exact integral.
+
+A plain sum of sgn(v_k) misplaces each reversal by up to a step. Here each reversal is located (the zero of v between
+two steps, refined by a parabola of the position that may have another curvature before and after), and the four steps
+around it get the values with which the sum equals the integral of sgn(v) g(t) for every cubic g.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+
+# The sign is in doubt where the velocity is below so many standard deviations of its noise, plus its blur.
+_NOISES = 3.0
+
+# A located time may be off by this much [steps], and by this part of the time the sign is in doubt, for what the
+# parabola leaves out.
+_FLOOR = 0.3
+_DOUBT = 0.15
+
+
+@dataclass(frozen=True)
+class Signs:
+    """sgn(v) at the steps.
+
+    Attributes
+    ----------
+    values : with the corrected steps around each reversal; 0 where the mechanism sticks [n]
+    times : places at which the integral of the sign is in doubt: reversals, near misses, pieces of sticking [steps]
+    variances : of the times of reversals, or what has the same effect [steps^2]
+    reversals : how many of the times are such
+    stuck : steps at which the sign stays in doubt for longer than a piece [n]
+    """
+
+    values: Float
+    times: Float
+    variances: Float
+    reversals: int
+    stuck: npt.NDArray[np.bool_]
+
+
+def soft(v: Float, width: float) -> Signs:
+    """tanh(v / width)."""
+    none = np.zeros(0)
+    return Signs(np.tanh(v / width), none, none, 0, np.zeros(v.shape, bool))
+
+
+def averaged(v: Float) -> Signs:
+    """Mean of sgn over each step, v linear there."""
+    none = np.zeros(0)
+    return Signs(np.clip(2 * v / (np.abs(np.gradient(v)) + 1e-300), -1, 1), none, none, 0, np.zeros(v.shape, bool))
+
+
+def correction(f: Float) -> Float:
+    """Values [..., 4] that steps k - 1..k + 2 need on top of sgn = -1 up to k and +1 from k + 1, reversal at k + f.
+
+    By Euler-Maclaurin the plain sum of -g up to k and +g from k + 1 is the integral but for terms in g, g', g''' at k
+    and k + 1; what is missing is matched for 1, t, t^2, t^3.
+    """
+    f = np.asarray(f, np.float64)[..., np.newaxis]
+    j = np.arange(4)
+    integral = (1 - 2 * f ** (j + 1)) / (j + 1)
+    at_k = np.array([0.5, 1 / 12, 0.0, -6 / 720])
+    at_next = np.array([-0.5, -0.5 + 1 / 12, -0.5 + 2 / 12, -0.5 + 3 / 12 - 6 / 720])
+    moments = integral + at_k + at_next
+    powers = np.vander(np.arange(-1.0, 3.0), 4, increasing=True).T  # [moment, step]
+    return np.asarray(np.linalg.solve(powers, moments[..., np.newaxis])[..., 0])
+
+
+def in_doubt(v: Float, threshold: Float) -> npt.NDArray[np.int64]:
+    """First step and first step behind of each stretch with |v| <= threshold, or of no step between opposite signs."""
+    low = (np.abs(v) <= threshold).astype(np.int8)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], low, [0]])))
+    jumps = np.flatnonzero((v[1:] * v[:-1] < 0) & (low[1:] == 0) & (low[:-1] == 0)) + 1
+    stretches = np.concatenate([edges.reshape(-1, 2), np.stack([jumps, jumps], axis=1)])
+    return stretches[np.argsort(stretches[:, 0], kind="stable")]
+
+
+def zero_between(v: Float, first: int, behind: int) -> float:
+    """Zero [steps] of the straight line through v from the step before `first` to `behind`."""
+    i, j = first - 1, behind
+    if j - i == 1:
+        return float(i + v[i] / (v[i] - v[j]))
+    t = np.arange(j - i + 1)
+    slope, level = np.polyfit(t, v[i : j + 1], 1)
+    zero = -level / slope if slope * (v[j] - v[i]) > 0 else (j - i) / 2
+    return float(i + min(max(zero, 0.0), j - i))
+
+
+def refined(position: Float, start: Float, half: int, sd: float) -> tuple[Float, Float]:
+    """Times of reversals [samples] and their variances, from the position's own samples.
+
+    Around t0 the position is c + j s^3/6 + a s^2/2 with one a before and another after t0 (s = t - t0): Coulomb
+    friction changes the acceleration. Gauss-Newton on t0, c, both a and j. Where it fails the start is kept.
+
+    Parameters
+    ----------
+    position : raw samples [n]
+    start : times [samples]
+    half : samples before and after
+    sd : of the position's noise
+    """
+    n = len(position)
+    centre = np.clip(np.round(start).astype(np.int64), half, n - half - 1)
+    places = centre[:, np.newaxis] + np.arange(-half, half + 1)
+    x = position[places] - position[centre][:, np.newaxis]
+    t0 = start.copy()
+    scale = float(half)
+    information = np.ones(len(start))
+    for _ in range(6):
+        s = (places - t0[:, np.newaxis]) / scale
+        before, after = np.where(s < 0, s**2 / 2, 0.0), np.where(s >= 0, s**2 / 2, 0.0)
+        shape = np.stack([np.ones_like(s), before, after, s**3 / 6], axis=-1)
+        q, r = np.linalg.qr(shape)
+        inner = np.einsum("ejk,ej->ek", q, x)
+        c = np.linalg.solve(r + 1e-9 * np.eye(4), inner[..., np.newaxis])[..., 0]
+        residual = x - np.einsum("ejk,ek->ej", q, inner)
+        slope = -(np.where(s < 0, c[:, 1:2], c[:, 2:3]) * s + c[:, 3:4] * s**2 / 2) / scale
+        slope = slope - np.einsum("ejk,ek->ej", q, np.einsum("ejk,ej->ek", q, slope))
+        information = np.maximum(np.sum(slope**2, axis=1), 1e-300)
+        step = np.sum(slope * residual, axis=1) / information
+        t0 = t0 + np.clip(step, -half / 4, half / 4)
+    noise = np.maximum(np.sum(residual**2, axis=1) / (2 * half + 1 - 5), sd**2)
+    good = np.isfinite(t0) & (np.abs(t0 - start) < half / 2) & (c[:, 1] * c[:, 2] > 0)
+    return np.where(good, t0, start), np.where(good, noise / information, np.nan)
+
+
+@dataclass(frozen=True)
+class Position:
+    """The position whose derivative a velocity is.
+
+    Attributes
+    ----------
+    samples : raw [n]
+    places : sample of each step
+    half : samples before and after a reversal that its parabola takes
+    sd : of a sample's noise
+    """
+
+    samples: Float
+    places: npt.NDArray[np.int64]
+    half: int
+    sd: float
+
+
+def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position | None = None) -> Signs:
+    """Signs with every reversal located, and what stays in doubt.
+
+    Parameters
+    ----------
+    v : velocity at the steps [n]
+    sd_v : standard deviation of its noise
+    blur : how far its smoothing may be off [n]
+    piece : a stretch in doubt that is longer [steps] is cut into pieces; a test function hardly changes within one
+    position : None: reversals are zeros of v
+    """
+    stretches = in_doubt(v, _NOISES * sd_v + blur)
+    values = np.sign(v)
+    stuck = np.zeros(v.shape, bool)
+    n = len(v)
+    times, spans, turning = [], [], []
+    for i, j in stretches:
+        before = np.sign(v[i - 1]) if i > 0 else 0.0
+        after = np.sign(v[j]) if j < n else 0.0
+        if j - i > piece or before * after == 0:
+            stuck[i:j] = True
+            values[i:j] = 0.0
+            count = -(-(j - i) // piece)
+            times += list(i + (np.arange(count) + 0.5) * (j - i) / count - 0.5)
+            spans += [(j - i) / count] * count
+            turning += [0.0] * count
+        elif before == after:
+            values[i:j] = before
+            times.append((i + j - 1) / 2)
+            spans.append(float(j - i))
+            turning.append(0.0)
+        else:
+            times.append(zero_between(v, int(i), int(j)))
+            spans.append(float(j - i + 1))
+            turning.append(after)
+            values[i:j] = 0.0
+    t, span, up = np.array(times), np.array(spans), np.array(turning)
+    # A sign anywhere in -1..1 over L steps is as a reversal with a standard deviation of L / sqrt(12).
+    variances = span**2 / 12
+    turns = np.flatnonzero(up)
+    if len(turns):
+        slope = np.abs(
+            v[np.minimum(np.ceil(t[turns] + span[turns] / 2).astype(int), n - 1)]
+            - v[np.maximum(np.floor(t[turns] - span[turns] / 2).astype(int), 0)]
+        ) / (span[turns] + 1)
+        variances[turns] = (sd_v / np.maximum(slope, 1e-300)) ** 2
+        if position is not None:
+            stride = float(position.places[1] - position.places[0])
+            start = position.places[0] + t[turns] * stride
+            raw, spread = refined(position.samples, start, position.half, position.sd)
+            better = np.isfinite(spread) & (np.abs(raw - start) < (span[turns] + 2) * stride)
+            t[turns] = np.where(better, (raw - position.places[0]) / stride, t[turns])
+            variances[turns] = np.where(better, spread / stride**2, variances[turns] + span[turns] ** 2 / 12)
+        variances[turns] += _FLOOR**2 + (_DOUBT * span[turns]) ** 2
+    for k in turns:
+        at = int(np.floor(t[k]))
+        low, high = max(int(t[k] - span[k]) - 2, 0), min(int(t[k] + span[k]) + 3, n)
+        own = np.arange(low, high)
+        own = own[(values[own] == 0) | (np.abs(own - t[k]) <= span[k])]
+        own = own[~stuck[own]]
+        values[own] = np.where(own <= t[k], -up[k], up[k])
+        if 1 <= at < n - 2:
+            values[at - 1 : at + 3] += up[k] * correction(np.array(t[k] - at))
+    return Signs(values, t, variances, len(turns), stuck)

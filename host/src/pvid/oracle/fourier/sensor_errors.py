@@ -1,0 +1,223 @@
+"""Would a systematic error of one sensor explain the residuals, and how far would it move the estimate?
+
+An error a f(t) in a recorded signal z moves the residuals by a c, c = (e(z + step f) - e(z))/step. Residuals e are then
+fitted by J dp + a c: a and its standard error show whether the error is there, dp how far p moves with it. Errors that
+are tried: a delay, a play (backlash), an eccentric encoder, the gain of an input. Where a gain only scales p no data
+show it: p is then off by what `by_gain` gives, and that belongs to its standard errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.model.compiled import CompiledModel, Signal
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.errors import clustered_variance
+from pvid.oracle.fourier.front import filtered, polynomial_weights
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.rows import WeakRows
+from pvid.oracle.fourier.solve import Fit, inverse
+from pvid.oracle.fourier.verdict import Reason, listed
+from pvid.sim.imperfections import with_play
+
+Kind = Literal["delay", "play", "eccentric", "gain"]
+
+# An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
+_CERTAIN = 6.0
+_MOVES = 2.0
+
+# An encoder shows an eccentricity only where it turns by this much [rad].
+_TURNS = 2.0
+
+# A column that the parameters explain but for this part of its square is theirs: no data show it.
+_OWN = 1e-6
+
+_A_GAIN = 0.01  # that a note on scale supposes
+# Beyond these sizes a column is the residuals themselves: where p explains a gain, what is left of it is their noise.
+_LARGEST_GAIN = 0.2
+_LARGEST = 100.0  # play or eccentricity [resolutions]
+_LONGEST = 0.25  # delay [windows]
+
+_SMOOTHED = 21  # samples, for the direction of a play
+_PLAY = 3.0  # width of the play that is tried [resolutions]
+_PART = 1e-3  # of a resolution or of a signal's size: steps of the differences
+
+
+@dataclass(frozen=True)
+class SensorError:
+    """A systematic error that explains residuals.
+
+    Attributes
+    ----------
+    signal : name
+    kind : what it is
+    size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal], gain less 1
+    certainty : size over its standard error
+    shift : by how much p moves when the error is taken off [n_p]
+    """
+
+    signal: str
+    kind: Kind
+    size: float
+    certainty: float
+    shift: Float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        if self.kind == "delay":
+            late = "late" if self.size > 0 else "early"
+            return f"{self.signal} seems to be sampled {abs(self.size):.2g} s {late}"
+        if self.kind == "gain":
+            than = "larger" if self.size < 0 else "smaller"
+            return f"{self.signal} seems to be {100 * abs(self.size):.2g} % {than} than recorded"
+        what = "a play of" if self.kind == "play" else "an eccentric encoder, amplitude"
+        return f"{self.signal} seems to have {what} {abs(self.size):.2g}"
+
+
+class SensorErrors:
+    """Tests of one estimate.
+
+    Parameters
+    ----------
+    run, design, fit
+        As they gave the estimate.
+    """
+
+    def __init__(self, run: Mapping[str, npt.ArrayLike], design: FourierDesign, fit: Fit) -> None:
+        self.model: CompiledModel = fit.rows.compiled.bare
+        self.run = {name: np.asarray(values, np.float64) for name, values in run.items()}
+        self.design, self.fit = design, fit
+        self.theta = fit.parameters.theta(fit.p)
+        self.designs = np.concatenate(fit.designs(), axis=1)  # [windows, rows of all kinds, n_p]
+        self.residuals = np.concatenate(fit.residuals(), axis=1)
+        information = np.einsum("wkp,wkq->pq", self.designs, self.designs) + np.diag(fit.parameters.prior(fit.start))
+        self.inverse = inverse(information)
+        self.unit = fit.parameters.unit(fit.p)
+        self._bare = self._raw(fit.rows)
+
+    def found(self, se: Float) -> SensorError | None:
+        """The surest of the errors that are there and move p by more than its standard errors [n_p] allow."""
+        out = [one for one in self.tried() if one.certainty > _CERTAIN and np.any(np.abs(one.shift) > _MOVES * se)]
+        return max(out, key=lambda one: one.certainty, default=None)
+
+    def tried(self) -> Iterator[SensorError]:
+        """All tests."""
+        for signal in self.model.signals:
+            if signal.name not in self.run:
+                continue
+            yield self._test(signal, "delay", [self._delay(signal)])
+            if signal.kind == "input":
+                yield self._test(signal, "gain", [self._gain(signal)])
+            if signal.kind == "sensor" and not signal.driven and signal.resolution:
+                yield self._test(signal, "play", [self._play(signal)])
+                if signal.unit == "rad" and np.ptp(self.run[signal.name]) > _TURNS:
+                    yield self._test(signal, "eccentric", self._eccentric(signal))
+
+    def by_gain(self, signal: Signal) -> Float:
+        """What p is off by if a signal is recorded (1 + g) times as large as it is, over g [n_p]."""
+        return np.asarray(self.unit * (self.inverse @ np.einsum("wkp,wk->p", self.designs, self._gain(signal))))
+
+    def _gain(self, signal: Signal) -> Float:
+        """Column of a gain less 1."""
+        return self._column({signal.name: self.run[signal.name] * (1 + _PART)}, _PART)
+
+    def _test(self, signal: Signal, kind: Kind, columns: list[Float]) -> SensorError:
+        c = np.stack(columns, axis=-1)
+        mixed = np.einsum("wkp,wkc->pc", self.designs, c)
+        rest = c - self.designs @ (self.inverse @ mixed)
+        normal = np.einsum("wkc,wkd->cd", rest, rest)
+        whole = np.einsum("wkc,wkc->c", c, c)
+        if not np.all(np.diag(normal) > _OWN * np.maximum(whole, 1e-300)):
+            return SensorError(signal.name, kind, 0.0, 0.0, np.zeros(len(self.unit)))
+        back = inverse(normal)
+        size = back @ np.einsum("wkc,wk->c", rest, self.residuals)
+        left = self.residuals - rest @ size
+        variance = clustered_variance(np.einsum("wkc,wk->wc", rest, left), back)
+        shift = -self.unit * (self.inverse @ (mixed @ size))
+        amount = float(size[0]) if len(size) == 1 else float(np.hypot(*size))
+        certainty = (
+            float(np.max(np.abs(size) / np.sqrt(variance))) if abs(amount) < self._largest(signal, kind) else 0.0
+        )
+        return SensorError(signal.name, kind, amount, certainty, shift)
+
+    def _largest(self, signal: Signal, kind: Kind) -> float:
+        if kind == "gain":
+            return _LARGEST_GAIN
+        return _LONGEST * self.design.window_s if kind == "delay" else _LARGEST * signal.resolution
+
+    def _delay(self, signal: Signal) -> Float:
+        """Column of a delay [s]."""
+        values = self.run[signal.name]
+        step = 1 / self.design.sample_rate
+        late = np.concatenate([values[:1], values[:-1]])
+        early = np.concatenate([values[1:], values[-1:]])
+        return self._column({signal.name: values + (late - early) / 2}, step)
+
+    def _play(self, signal: Signal) -> Float:
+        """Column of a play's width."""
+        values = self.run[signal.name]
+        smooth = filtered(values, polynomial_weights(_SMOOTHED, 2, 0))
+        width = _PLAY * signal.resolution
+        return self._column({signal.name: values + _PART * (with_play(smooth, width) - smooth)}, _PART * width)
+
+    def _eccentric(self, signal: Signal) -> list[Float]:
+        """Columns of an error once a turn."""
+        values = self.run[signal.name]
+        step = _PART * (signal.resolution or 1.0)
+        return [self._column({signal.name: values + step * wave(values)}, step) for wave in (np.sin, np.cos)]
+
+    def _column(self, changed: Mapping[str, Float], step: float) -> Float:
+        """How the whitened residuals move [windows, rows of all kinds] per unit of an error."""
+        rows = WeakRows.of(self.fit.rows.compiled, {**self.run, **changed}, self.design)
+        moved = self._raw(rows.only(np.isin(rows.numbers, self.fit.rows.numbers)))
+        out = []
+        for kind, (now, before) in enumerate(zip(moved, self._bare, strict=True)):
+            white = self.fit.white[kind].whitener
+            change = np.einsum("wjk,wk->wj", white, (now - before) / step)
+            out.append(self._without_nuisances(kind, change))
+        return np.concatenate(out, axis=1)
+
+    def _raw(self, rows: WeakRows) -> list[Float]:
+        """Residuals at p before whitening, of each kind [windows, K]."""
+        return [
+            columns[:, len(th)] - np.einsum("wjk,j->wk", columns[:, : len(th)], th)
+            for columns, th in zip(rows.columns, self.theta, strict=True)
+        ]
+
+    def _without_nuisances(self, kind: int, rows: Float) -> Float:
+        columns = self.fit.rows.columns[kind][:, len(self.theta[kind]) + 1 :]
+        if not columns.shape[1]:
+            return rows
+        white = columns @ self.fit.white[kind].whitener.transpose(0, 2, 1)
+        q = np.linalg.qr(white.transpose(0, 2, 1))[0]
+        return np.asarray(rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows)))
+
+
+def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> list[Reason]:
+    """A sensor's error explains the residuals."""
+    if error is None:
+        return []
+    names = [model.p_names[k] for k in np.argsort(-np.abs(error.shift) / se) if abs(error.shift[k]) > _MOVES * se[k]]
+    text = f"{error.text} ({error.certainty:.0f} standard errors from none), which moves {listed(names)}."
+    return [Reason("sensor", text)]
+
+
+def of_scale(model: CompiledModel, by_gain: Mapping[str, Float], p: Float, se: Float) -> list[Reason]:
+    """Gains that scale p and of which the description gives no error."""
+    scales = []
+    for signal in model.signals:
+        moved = np.abs(by_gain.get(signal.name, np.zeros(len(p)))) * _A_GAIN
+        if signal.gain_sd == 0 and np.any(moved > 2 * se):
+            k = int(np.argmax(moved / np.maximum(np.abs(p), 1e-300) * (moved > 2 * se)))
+            scales.append(f"{signal.name} ({100 * moved[k] / abs(p[k]):.2g} % of {model.p_names[k]})")
+    if not scales:
+        return []
+    text = "The standard errors contain no error of gains (gain_sd); one of 1 % moves the estimate: "
+    text += ", ".join(scales) + "."
+    return [Reason("scale", text, alarm=False)]

@@ -1,0 +1,305 @@
+"""Is an estimate to be trusted? Each doubt has a name and a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import sympy as sp
+
+from pvid.model.compiled import CompiledModel
+from pvid.model.signals import Jet
+from pvid.oracle.fourier.errors import Uncertainty, uncertainty
+from pvid.oracle.fourier.front import filtered, weights_of
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.fourier.solve import Fit, Moments, gauss_newton, inverse, normal
+
+Name = Literal[
+    "not_identified",
+    "not_settled",
+    "chi2",
+    "shape",
+    "halves",
+    "windows",
+    "feedback",
+    "short",
+    "range",
+    "unexplained",
+    "sensor",
+    "scale",
+]
+Status = Literal["good", "warning", "not_identified"]
+
+# A standard error of a positive parameter beyond this part of it, or of another one beyond this part of its range,
+# means that the run does not determine it.
+_UNKNOWN = 0.3
+_UNKNOWN_OF_RANGE = 0.5
+
+# Two estimates disagree if they differ by so many standard errors of the difference ...
+_CLASH = 4.0
+# ... and by this part of the value, so that a rig whose noise is tiny is not blamed for what nobody sees.
+_VISIBLE = 1e-3
+
+# Residuals above this many times what the sensors explain are reported.
+_CHI2 = 2.0
+_CHI2_WEIGHTED = 3.0
+
+# An input is explained by the outputs if a static law of them leaves less than this part of it, and less than this many
+# times what the model leaves.
+_LAW = 0.02
+_NO_BETTER = 3.0
+
+_FEW_WINDOWS = 8
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A doubt.
+
+    Attributes
+    ----------
+    name : for programs
+    text : a sentence
+    alarm : the standard errors may not cover it
+    """
+
+    name: Name
+    text: str
+    alarm: bool = True
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether p may be used.
+
+    Attributes
+    ----------
+    reasons : doubts, the gravest first
+    """
+
+    reasons: tuple[Reason, ...] = ()
+
+    @property
+    def identified(self) -> bool:
+        """Every parameter has a value that means something."""
+        return not any(one.name == "not_identified" for one in self.reasons)
+
+    @property
+    def status(self) -> Status:
+        """In a word."""
+        if not self.identified:
+            return "not_identified"
+        return "warning" if any(one.alarm for one in self.reasons) else "good"
+
+    @property
+    def warning(self) -> str | None:
+        """The alarms in plain sentences; None: there is none."""
+        return " ".join(one.text for one in self.reasons if one.alarm) or None
+
+
+@dataclass(frozen=True)
+class Halves:
+    """Estimates from the windows of each half of a run, and how they differ [n_p] in their standard errors."""
+
+    first: Float
+    second: Float
+    clash: Float
+
+
+def listed(names: list[str]) -> str:
+    """a, b and c."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[Reason]:
+    """Parameters that the run does not determine, and with what the worst is mixed."""
+    p, parameters = fit.p, fit.parameters
+    relative = np.where(
+        parameters.positive, found.se / np.abs(p) / _UNKNOWN, found.se / parameters.sd / _UNKNOWN_OF_RANGE
+    )
+    bad = [k for k in np.argsort(-relative) if relative[k] > 1 or not np.isfinite(relative[k])]
+    if not bad:
+        return []
+    names = [model.p_names[k] for k in bad]
+    partner = partner_of(fit, int(bad[0]))
+    mixed = f"; the run cannot separate {names[0]} from {model.p_names[partner]}" if partner is not None else ""
+    error = f"the standard error of {names[0]} is {found.se[bad[0]]:.2g}"
+    return [Reason("not_identified", f"The run does not determine {listed(names)}: {error}{mixed}.")]
+
+
+def partner_of(fit: Fit, worst: int) -> int | None:
+    """The parameter that compensates a change of the worst one best; None where none does much."""
+    information, _ = normal(fit.parameters, Moments.of(fit.white), fit.p)
+    covariance = inverse(information + np.diag(fit.parameters.prior(fit.start)))
+    scale = np.sqrt(np.diag(covariance))
+    correlation = np.abs(covariance[worst] / (scale[worst] * scale))
+    correlation[worst] = 0.0
+    best = int(np.argmax(correlation))
+    return best if correlation[best] > 0.7 else None
+
+
+def halves_of(fit: Fit) -> Halves | None:
+    """The run's two halves, each from its own windows; None where there are too few."""
+    count = fit.rows.windows
+    if count < 2 * _FEW_WINDOWS:
+        return None
+    parts = []
+    for windows in (slice(0, count // 2), slice(count - count // 2, None)):
+        own = fit.only(windows)
+        p, _ = gauss_newton(own.parameters, Moments.of(own.white), own.p, own.parameters.prior(own.start), 30)
+        moved = own.at(p)
+        parts.append((p, uncertainty(moved).se))
+    spread = np.hypot(parts[0][1], parts[1][1])
+    return Halves(parts[0][0], parts[1][0], np.abs(parts[0][0] - parts[1][0]) / spread)
+
+
+def differing(parameters: Parameters, names: tuple[str, ...], one: Float, other: Float, clash: Float) -> list[str]:
+    """Names of the parameters in which two estimates disagree."""
+    size = np.where(parameters.positive, np.maximum(np.abs(one), np.abs(other)), parameters.sd)
+    apart = (clash > _CLASH) & (np.abs(one - other) > _VISIBLE * size)
+    return [name for name, bad in zip(names, apart, strict=True) if bad]
+
+
+def of_halves(model: CompiledModel, fit: Fit, halves: Halves | None) -> list[Reason]:
+    """The halves of a run disagree."""
+    if halves is None:
+        return [Reason("short", "The run is too short to compare its halves.", alarm=False)]
+    names = differing(fit.parameters, model.p_names, halves.first, halves.second, halves.clash)
+    if not names:
+        return []
+    k = model.p_names.index(names[0])
+    return [
+        Reason(
+            "halves",
+            f"The halves of the run disagree on {listed(names)} ({names[0]}: {halves.first[k]:.4g} and "
+            f"{halves.second[k]:.4g}): something changed, or the equations lack a term.",
+        )
+    ]
+
+
+def of_windows(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+    """Two lengths of window disagree."""
+    # Both come from the same samples: the larger error bounds that of the difference.
+    clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
+    names = differing(fit.parameters, model.p_names, fit.p, other.p, clash)
+    if not names:
+        return []
+    k = model.p_names.index(names[0])
+    lengths = [one.rows.functions.length for one in (fit, other)]
+    return [
+        Reason(
+            "windows",
+            f"Windows of {lengths[0]:.3g} s and {lengths[1]:.3g} s disagree on {listed(names)} ({names[0]}: "
+            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): noise inside the motion or a missing term bends the estimate.",
+        )
+    ]
+
+
+def of_residuals(found: Uncertainty) -> list[Reason]:
+    """Residuals beyond what the sensors explain."""
+    out = []
+    if found.weighted_chi2 > _CHI2_WEIGHTED:
+        out.append(
+            Reason(
+                "shape",
+                f"The residuals are {found.weighted_chi2:.3g} times what sensors and a white error of the equations "
+                "explain: they follow the motion.",
+            )
+        )
+    if found.chi2 > _CHI2:
+        out.append(
+            Reason(
+                "chi2",
+                f"The residuals are {found.chi2:.3g} times what the sensors explain; standard errors are from their "
+                "scatter.",
+                alarm=False,
+            )
+        )
+    return out
+
+
+def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
+    """Inputs that a static law of the outputs explains as well as the model explains them."""
+    rows, functions = fit.rows, fit.rows.functions
+    grid = rows.record.grid
+    chi = functions.combine(0)
+
+    def sums(x: Float) -> Float:
+        halves = functions.half_sums(functions.halves(x))
+        return np.asarray((functions.joined(halves[:-1], halves[1:]) @ chi)[rows.numbers].reshape(-1))
+
+    outputs = [np.ones(grid.size)]
+    for one in model.signals:
+        if one.kind == "sensor" and not one.driven:
+            z = filtered(grid.raw[one.name], weights_of(grid.design, 0))[grid.places]
+            outputs.append(z)
+            if grid.design.rate_taps > 1 or grid.design.taps > 1:
+                outputs.append(filtered(grid.raw[one.name], weights_of(grid.design, 1))[grid.places])
+            if one.unit == "rad":
+                outputs += [np.sin(z), np.cos(z)]
+    basis = np.stack([sums(x) for x in outputs], axis=1)
+    basis = basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+    out = []
+    for one in model.signals:
+        if one.kind != "input" or one.name not in grid.raw:
+            continue
+        u = sums(grid.raw[one.name][grid.places])
+        total = float(u @ u)
+        if total == 0:
+            continue
+        rest = u - basis @ np.linalg.lstsq(basis, u, rcond=1e-10)[0]
+        left = float(rest @ rest) / total
+        model_leaves = unexplained(model, fit, one.jet, total)
+        if left < _LAW and (model_leaves is None or left < _NO_BETTER * model_leaves):
+            out.append(
+                Reason(
+                    "feedback",
+                    f"{one.name} is a law of the measured outputs ({100 * (1 - left):.4g} % explained): regression may "
+                    "have found the controller, not the mechanism. Add an excitation that does not depend on them.",
+                )
+            )
+    return out
+
+
+def unexplained(model: CompiledModel, fit: Fit, jet: Jet, total: float) -> float | None:
+    """Part of an input's sums that the row in which it is known leaves; None where there is no such row."""
+    parts = []
+    for row, columns, th in zip(model.rows, fit.rows.columns, fit.parameters.theta(fit.p), strict=True):
+        gain = sp.diff(sp.sympify(row.known.get(0, 0)), jet)
+        gain = model.with_knowns(gain) if gain != 0 else gain
+        if gain != 0 and gain.is_number:
+            e = columns[:, len(th)] - np.einsum("wjk,j->wk", columns[:, : len(th)], th)
+            parts.append(float(np.sum(e**2)) / float(gain) ** 2 / total)
+    return min(parts) if parts else None
+
+
+def of_range(model: CompiledModel, p: Float) -> list[Reason]:
+    """Values beyond what the model calls plausible."""
+    out = [
+        one.name
+        for one, value in zip(model.unknowns, p, strict=True)
+        if one.high > one.low and not one.low <= value <= one.high
+    ]
+    return [Reason("range", f"Outside the plausible range: {listed(out)}.", alarm=True)] if out else []
+
+
+def settled(fit: Fit) -> list[Reason]:
+    """The search did not come to rest."""
+    return [] if fit.settled else [Reason("not_settled", "The search for the parameters did not come to rest.")]
+
+
+def widened(se: Float, halves: Halves | None) -> Float:
+    """Standard errors that cover half the distance of the halves where that is beyond chance."""
+    if halves is None:
+        return se
+    apart = np.abs(halves.first - halves.second) / 2
+    return np.where(apart > 2 * se, apart, se)
+
+
+def named(reasons: Mapping[str, list[Reason]]) -> tuple[Reason, ...]:
+    """All reasons, alarms first."""
+    every = [one for group in reasons.values() for one in group]
+    return tuple(sorted(every, key=lambda one: not one.alarm))

@@ -1,0 +1,193 @@
+"""The rig file of a mechanism with a compiled model: what of it differs from the model's own description.
+
+    sample_rate = 1000        # Hz
+    [model]
+    name = "dc_motor"         # or the path of a model file
+    [known]
+    g = 9.81                  # constants of the model
+    [sensor.phi]
+    resolution = 0.0015       # in the unit of the signal; noise in resolutions
+    [sensor.V]
+    gain_sd = 0.005           # of any signal, an input too: relative standard deviation of its gain
+    [nominal]
+    R = 1.2                   # rough guesses: the start of the estimate
+
+A key that the model does not have becomes a PvidError that names it and lists those that it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.errors import PvidError
+from pvid.base.toml_text import toml_document
+from pvid.base.wording import listed, shown
+from pvid.model.compiled import CompiledModel
+
+_OF_A_SENSOR = ("resolution", "noise", "gain_sd")
+
+
+@dataclass(frozen=True)
+class MechanismRig:
+    """A rig of any mechanism.
+
+    Attributes
+    ----------
+    model : name of a shipped mechanism or path of a model file
+    sample_rate : [Hz]; None: that of the run
+    known : values of the model's constants
+    sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative]; of an input gain_sd alone
+    nominal : guesses of the unknowns
+    """
+
+    model: str
+    sample_rate: float | None = None
+    known: Mapping[str, float] = field(default_factory=dict)
+    sensor: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    nominal: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def parse(cls, text: str) -> MechanismRig:
+        """From TOML text.
+
+        Raises
+        ------
+        PvidError
+            Naming the key that is no key of such a file, or whose value is no number.
+        """
+        return cls.of_document(toml_document(text))
+
+    @classmethod
+    def of_document(cls, document: Mapping[str, Any]) -> MechanismRig:
+        """From the tables of a text; see `parse`."""
+        known_keys = ("sample_rate", "model", "known", "sensor", "nominal")
+        for key in document:
+            if key not in known_keys:
+                raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(known_keys)} are")
+        model = _table(document, "model").get("name")
+        if not isinstance(model, str):
+            raise PvidError('the mechanism is missing: [model] name = "dc_motor", or the path of a model file')
+        rate = document.get("sample_rate")
+        sensors = {
+            name: _numbers(_table(_table(document, "sensor"), name), f"sensor.{name}")
+            for name in document.get("sensor", {})
+        }
+        for name, keys in sensors.items():
+            for key in keys:
+                if key not in _OF_A_SENSOR:
+                    raise PvidError(f"sensor.{name}: {shown(key)} is not a key: {listed(_OF_A_SENSOR)} are")
+        return cls(
+            model,
+            None if rate is None else _numbers({"sample_rate": rate}, "")["sample_rate"],
+            _numbers(_table(document, "known"), "known"),
+            sensors,
+            _numbers(_table(document, "nominal"), "nominal"),
+        )
+
+    def text(self) -> str:
+        """TOML text; `parse` gives the same rig back."""
+        lines = [] if self.sample_rate is None else [f"sample_rate = {self.sample_rate!r}  # Hz"]
+        lines += ["", "[model]", f'name = "{self.model}"']
+        tables: dict[str, Mapping[str, float]] = {"known": self.known}
+        tables |= {f"sensor.{name}": keys for name, keys in self.sensor.items()}
+        tables["nominal"] = self.nominal
+        for name, keys in tables.items():
+            if keys:
+                lines += ["", f"[{name}]", *(f"{key} = {value!r}" for key, value in keys.items())]
+        return "\n".join(lines).lstrip("\n") + "\n"
+
+    def write(self, path: Path) -> None:
+        """Writes `text` to a file."""
+        try:
+            write_whole(path, self.text())
+        except OSError as error:
+            raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
+
+    def applied(self, model: CompiledModel) -> CompiledModel:
+        """The model with the values of this rig.
+
+        Raises
+        ------
+        PvidError
+            Naming a constant, signal or unknown that the model does not have, or a guess that the model excludes.
+        """
+        _refuse_unknown("known", self.known, [one.name for one in model.knowns])
+        _refuse_unknown("sensor", self.sensor, [one.name for one in model.signals])
+        for signal in model.signals:
+            if signal.kind == "input" and set(self.sensor.get(signal.name, {})) - {"gain_sd"}:
+                raise PvidError(f"sensor.{signal.name}: an input of the model has a gain_sd alone")
+        _refuse_unknown("nominal", self.nominal, list(model.p_names))
+        knowns = tuple(replace(one, value=self.known.get(one.name, one.value)) for one in model.knowns)
+        signals = []
+        for signal in model.signals:
+            given = self.sensor.get(signal.name, {})
+            resolution, noise = given.get("resolution", signal.resolution), given.get("noise", signal.noise)
+            gain_sd = given.get("gain_sd", signal.gain_sd)
+            signals.append(replace(signal, resolution=resolution, noise=noise, gain_sd=gain_sd))
+        unknowns = []
+        for one in model.unknowns:
+            guess = self.nominal.get(one.name, one.guess)
+            if one.positive and not guess > 0:
+                raise PvidError(f"nominal.{one.name} must be positive, not {guess:g}")
+            unknowns.append(replace(one, guess=guess, sd=2 * guess if one.positive else one.sd))
+        return replace(model, knowns=knowns, signals=tuple(signals), unknowns=tuple(unknowns))
+
+
+def with_settings(document: Mapping[str, Any], settings: Iterable[str]) -> dict[str, Any]:
+    """The tables of a rig file with `KEY=VALUE` in place of its own: known.g=9.7, sensor.phi.resolution=1e-3.
+
+    Raises
+    ------
+    PvidError
+        Where a setting is none.
+    """
+    changed = {key: _copied(value) for key, value in document.items()}
+    for setting in settings:
+        key, equals, text = (part.strip() for part in setting.partition("="))
+        if not equals or not key or not text:
+            raise PvidError(f"--set {shown(setting)} is not KEY=VALUE, as in --set known.g=9.81")
+        try:
+            value = toml_document(f"value = {text}")["value"]
+        except PvidError:
+            value = text
+        *tables, name = key.split(".")
+        place = changed
+        for table in tables:
+            place = place.setdefault(table, {})
+            if not isinstance(place, dict):
+                raise PvidError(f"--set {shown(setting)}: {table} is a number, not a table")
+        place[name] = value
+    return changed
+
+
+def _copied(value: Any) -> Any:
+    return {key: _copied(one) for key, one in value.items()} if isinstance(value, dict) else value
+
+
+def _table(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, Mapping):
+        raise PvidError(f"{name} must be a table, [{name}], not {shown(str(table))}")
+    return table
+
+
+def _numbers(table: Mapping[str, Any], place: str) -> dict[str, float]:
+    for key, value in table.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            name = f"{place}.{key}" if place else key
+            raise PvidError(f"{name} must be a number, not {shown(str(value))}")
+        if key in (*_OF_A_SENSOR, "sample_rate") and not value >= 0:
+            raise PvidError(f"{place}.{key} must not be negative".removeprefix("."))
+    return {key: float(value) for key, value in table.items()}
+
+
+def _refuse_unknown(table: str, given: Iterable[str], names: list[str]) -> None:
+    for name in given:
+        if name not in names:
+            of_model = f"it has {listed(names)}" if names else "it has none"
+            raise PvidError(f"{table}.{name}: the model has no {shown(name)}; {of_model}")

@@ -1,0 +1,54 @@
+"""C text made into a shared library by the host's compiler, once: it stays in the cache of builds."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from pvid.base.errors import PvidError
+from pvid.base.user_cache import built_under
+from pvid.core.sources import ROOT
+
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w")
+
+
+def loaded(code: str) -> ctypes.CDLL:
+    """The library of a C text.
+
+    Raises
+    ------
+    PvidError
+        When there is no compiler, or it refuses the text.
+    """
+    compiler = _compiler()
+    name = hashlib.sha256("\n".join((compiler, *_FLAGS, code)).encode()).hexdigest()[:24]
+    place = built_under(ROOT / "build") / "cache" / "plants" / f"{name}.so"
+    if not place.exists():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        _build(compiler, code, place)
+    return ctypes.CDLL(str(place))
+
+
+def _compiler() -> str:
+    for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
+        found = shutil.which(name) if name else None
+        if found:
+            return found
+    raise PvidError("a simulation needs a C compiler (cc, gcc or clang, or the one that CC names), and there is none")
+
+
+def _build(compiler: str, code: str, place: Path) -> None:
+    """Whole or not at all: several processes may build the same."""
+    with tempfile.TemporaryDirectory(dir=place.parent) as folder:
+        source, library = Path(folder) / "plant.c", Path(folder) / "plant.so"
+        source.write_text(code, encoding="utf-8")
+        command = [compiler, *_FLAGS, str(source), "-o", str(library), "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise PvidError(f"{compiler} refused the code of the simulation: {done.stderr.strip()[:300]}")
+        library.replace(place)

@@ -1,0 +1,91 @@
+"""What real rigs have and models do not, as options of a simulated run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+
+Float = npt.NDArray[np.float64]
+Law = Literal["soft", "sharp"]
+
+_NOTHING: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """Numbers are by name of the signal.
+
+    Attributes
+    ----------
+    friction
+        "soft": the sign of a friction is tanh(v / width) with the rig's width; "sharp": it switches, and sticks where
+        it exceeds the other forces.
+    breakaway
+        Sharp: the friction that holds at rest over the one that slides, >= 1 (stiction).
+    backlash
+        Width of the play between what turns and its sensor [resolutions].
+    eccentricity
+        Amplitude of an encoder's error that comes back every turn [resolutions].
+    skew
+        Delay of a sensor's sample behind those of the others [s]; a multiple of the integration's step.
+    gain
+        What acts over what is recorded, of a driven signal; what is recorded over what is true, of another sensor.
+    process
+        White disturbance of an equation by its number from 0 [its unit / sqrt(Hz)], held for a sample.
+    """
+
+    friction: Law = "soft"
+    breakaway: float = 1.0
+    backlash: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
+    eccentricity: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
+    skew: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
+    gain: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
+    process: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        if self.friction not in ("soft", "sharp"):
+            raise PvidError(f"friction is soft or sharp, not {self.friction}")
+        if self.breakaway != 1.0 and self.friction != "sharp":
+            raise PvidError("stiction (a breakaway other than 1) needs a sharp friction")
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What the motion depends on, for a cache."""
+        return (self.friction, self.breakaway, *(tuple(sorted(one.items())) for one in (self.gain, self.process)))
+
+
+def with_play(values: Float, width: float) -> Float:
+    """What a sensor behind a play shows [n]: it stays until one of the flanks, `width` apart, moves it."""
+    out = np.empty_like(values)
+    at = float(values[0])
+    half = width / 2.0
+    for place, value in enumerate(values.tolist()):
+        at = min(max(at, value - half), value + half)
+        out[place] = at
+    return out
+
+
+def eccentric(values: Float, amplitude: float, phase: float) -> Float:
+    """What an encoder [n, rad] shows whose disc turns about a point beside its centre."""
+    return values + amplitude * np.sin(values + phase)
+
+
+def disturbance(process: Mapping[int, float], equations: int, samples: int, rate: float, seed: int) -> Float | None:
+    """White noise of these densities [unit / sqrt(Hz)], [samples, equations]; None where there is none."""
+    if not process:
+        return None
+    rng = np.random.default_rng([seed, 1])
+    out = np.zeros((samples, equations))
+    for place, density in process.items():
+        if not 0 <= place < equations:
+            raise PvidError(f"there is no equation {place}: they are 0 to {equations - 1}")
+        out[:, place] = density * math.sqrt(rate / 2.0) * rng.standard_normal(samples)
+    return out

@@ -1,0 +1,201 @@
+"""A run of a mechanism's simulated rig: drives, motion, imperfections, sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.model.compiled import CompiledModel, Signal
+from pvid.models.mechanisms import compiled_of
+from pvid.models.model import Channel
+from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording, write_recording
+from pvid.sim.drives import drive_named
+from pvid.sim.imperfections import Imperfections, disturbance, eccentric, with_play
+from pvid.sim.plant import Control, Friction, Plant, Trajectory
+from pvid.sim.sensing import sensed
+
+Float = npt.NDArray[np.float64]
+
+_PHASE = 0.7  # of an eccentric encoder [rad]
+PERFECT = Imperfections()
+
+
+@dataclass(frozen=True, eq=False)
+class RigSimulation:
+    """A rig ready to run: its model, its plant, its numbers."""
+
+    model: CompiledModel
+    rig: SimulatedRig
+    plant: Plant
+    _motions: dict[Any, Trajectory] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, model: CompiledModel, rig: SimulatedRig) -> RigSimulation:
+        """PvidError where the rig does not give every unknown a value."""
+        missing = [name for name in model.p_names if name not in rig.truth]
+        if missing:
+            raise PvidError(f"the simulated rig of {model.name} gives no value of {', '.join(missing)}")
+        return cls(model, rig, Plant(model))
+
+    @property
+    def truth(self) -> Float:
+        """Values of the unknowns [n_p]."""
+        return np.array([self.rig.truth[name] for name in self.model.p_names])
+
+    @property
+    def samples(self) -> int:
+        """Number."""
+        return round(self.rig.duration * self.rig.sample_rate)
+
+    def friction(self, imperfections: Imperfections = PERFECT) -> Friction:
+        """The law of the plant."""
+        sharp = imperfections.friction == "sharp" or not self.rig.friction_width
+        return Friction(0.0, imperfections.breakaway) if sharp else Friction(self.rig.friction_width)
+
+    def motion(self, imperfections: Imperfections = PERFECT, *, seed: int = 0, every_step: bool = False) -> Trajectory:
+        """The true motion; the seed serves the disturbance alone. Remembered where there is none."""
+        key = (imperfections.key, every_step)
+        if imperfections.process:
+            return self._moved(imperfections, seed, every_step)
+        if key not in self._motions:
+            self._motions[key] = self._moved(imperfections, seed, every_step)
+        return self._motions[key]
+
+    def run(self, seed: int = 0, imperfections: Imperfections = PERFECT) -> dict[str, Float]:
+        """t [s] and every signal in its unit, as recorded, each [samples]."""
+        rig = self.rig
+        step = 1.0 / rig.sample_rate / rig.substeps
+        delays = {name: skew / step for name, skew in imperfections.skew.items()}
+        _check_names(self.model, (imperfections.backlash, imperfections.eccentricity, delays, imperfections.gain))
+        for name, delay in delays.items():
+            if abs(delay - round(delay)) > 1e-6 or delay < 0:
+                raise PvidError(f"the skew of {name} must be a multiple of the integration's step, {step:g} s")
+        fine = self.motion(imperfections, seed=seed, every_step=bool(delays))
+        rng = np.random.default_rng([seed, 0])
+        out = {"t": np.arange(self.samples) / rig.sample_rate}
+        for signal in self.model.signals:
+            values = self._quantity(signal, fine)
+            if delays:
+                at = np.maximum(np.arange(self.samples) * rig.substeps - round(delays.get(signal.name, 0.0)), 0)
+                values = values[at]
+            out[signal.name] = sensed(signal, self._imperfect(signal, values, imperfections), rng)
+        return out
+
+    def _quantity(self, signal: Signal, motion: Trajectory) -> Float:
+        """What a signal measures, at the times of the motion."""
+        drive = self.rig.drive.get(signal.name)
+        if drive is not None and not isinstance(drive, Servo):
+            return drive.values(motion.t)
+        try:
+            return motion[signal.name]
+        except KeyError as error:
+            raise PvidError(f"no equation of {self.model.name} contains {signal.name}") from error
+
+    def _imperfect(self, signal: Signal, values: Float, imperfections: Imperfections) -> Float:
+        name = signal.name
+        if name in imperfections.backlash:
+            values = with_play(values, imperfections.backlash[name] * signal.resolution)
+        if name in imperfections.eccentricity:
+            values = eccentric(values, imperfections.eccentricity[name] * signal.resolution, _PHASE)
+        if name in imperfections.gain and not signal.driven:
+            values = values * imperfections.gain[name]
+        return values
+
+    def _moved(self, imperfections: Imperfections, seed: int, every_step: bool) -> Trajectory:
+        plant, rig = self.plant, self.rig
+        constants = plant.constants(self.truth, rig.knowns)
+        servos = {name: one for name, one in rig.drive.items() if isinstance(one, Servo)}
+        noise = disturbance(imperfections.process, plant.shape[2], self.samples, rig.sample_rate, seed)
+        driven = {jet.of for jet in plant.motion.inputs}
+        given: dict[str, Any] = {
+            "substeps": rig.substeps,
+            "friction": self.friction(imperfections),
+            "disturbance": noise,
+            "every_step": every_step,
+            "gains": {name: gain for name, gain in imperfections.gain.items() if name in driven},
+        }
+        start = plant.start(rig.start)
+        if not servos:
+            drives = {name: one for name, one in rig.drive.items() if not isinstance(one, Servo)}
+            return plant.driven(constants, start, drives, rig.sample_rate, self.samples, **given)
+        return plant.controlled(constants, start, self._control(servos), rig.sample_rate, self.samples, **given)
+
+    def _control(self, servos: Mapping[str, Servo]) -> Control:
+        t = np.arange(self.samples) / self.rig.sample_rate
+        laws = []
+        for name, one in servos.items():
+            place = self.plant.motion.state(one.coordinate)
+            rate = self.plant.motion.state(f"{one.coordinate}_1") if one.kd else place
+            laws.append((name, one, place, rate, one.reference.values(t)))
+        rest = {name: one.values(t) for name, one in self.rig.drive.items() if not isinstance(one, Servo)}
+
+        def control(now: float, state: Float) -> dict[str, float]:
+            k = round(now * self.rig.sample_rate)
+            given: dict[str, Any] = {
+                name: one.kp * (reference[k] - state[place]) - one.kd * state[rate]
+                for name, one, place, rate, reference in laws
+            }
+            return given | {name: float(values[k]) for name, values in rest.items()}
+
+        return control
+
+
+def _check_names(model: CompiledModel, given: tuple[Mapping[str, float], ...]) -> None:
+    known = {one.name for one in model.signals}
+    for one in given:
+        for name in one:
+            if name not in known:
+                raise PvidError(f"{name} is no signal of {model.name}; signals are {', '.join(sorted(known))}")
+
+
+@cache
+def simulation_of(name: str) -> RigSimulation:
+    """The shipped rig of a mechanism; PvidError where there is none."""
+    return RigSimulation.of(compiled_of(name), simulated_rig(name))
+
+
+def rig_of_guess(
+    model: CompiledModel, drive: str, low_hz: float, high_hz: float, *, rate: float, duration: float, share: float = 0.5
+) -> SimulatedRig:
+    """A rig whose truth is the model's guess, at rest, with every driven signal on a drive of the list.
+
+    Parameters
+    ----------
+    drive, low_hz, high_hz
+        Name in `DRIVES`, and its band [Hz].
+    rate, duration
+        [Hz] and [s].
+    share
+        Largest value of each drive over the reach of its signal.
+    """
+    driven = [one for one in model.signals if one.driven or one.kind == "input"]
+    return SimulatedRig(
+        model=model.name,
+        truth={one.name: one.guess for one in model.unknowns},
+        drive={
+            one.name: drive_named(drive, share * one.reach, low_hz, high_hz, number)
+            for number, one in enumerate(driven)
+        },
+        sample_rate=rate,
+        duration=duration,
+    )
+
+
+def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSimulation) -> Path:
+    """Writes a run (the suffix gives the format) and beside it its rig file, whose path is returned."""
+    model, rate = simulation.model, simulation.rig.sample_rate
+    signals = {one.name: run[one.name] for one in model.signals}
+    channels = tuple(Channel(one.name, one.unit, one.name) for one in model.signals)
+    write_recording(path, Recording(run["t"], signals, rate), channels)
+    settings = path.with_name(f"{path.name.removesuffix('.gz').rpartition('.')[0]}.toml")
+    MechanismRig(model.name, rate, known=simulation.rig.knowns).write(settings)
+    return settings

@@ -1,0 +1,141 @@
+"""Mechanisms through the command line: check, simulate, identify, predict, build, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.models.mechanisms import names
+
+TRUTH = {"R": 1.2, "L": 3e-3, "k": 0.05, "J": 2e-4, "b": 1e-4, "Tc": 0.012, "i0": 0.03}
+HIDDEN = """
+from pvid.model import Model, sin
+model = Model("pendulum without a sensor")
+F, a = model.input("F", "N*m", hold="zoh"), model.unmeasured("a", "rad")
+J, G = model.unknown("J", "kg*m^2", 1.0), model.unknown("G", "N*m", 1.0)
+model.equation(J * a.d(2) + G * sin(a) - F)
+"""
+
+
+def pvid(*arguments: str | Path) -> Result:
+    """A command in this process; a refusal raises."""
+    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
+
+
+@pytest.fixture(scope="module")
+def motor(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated run of the motor with its rig file beside it."""
+    path = tmp_path_factory.mktemp("motor") / "motor.csv"
+    assert pvid("model", "simulate", "dc_motor", path, "--duration", "6", "--seed", "2").return_value == DONE
+    return path
+
+
+def test_a_simulated_run_is_identified_with_the_rig_file_beside_it(motor: Path, tmp_path: Path) -> None:
+    figure = tmp_path / "figure.svg"
+    answer = pvid("identify", motor, "--figure", figure)
+    assert answer.return_value == DONE and "status " in answer.stdout and figure.stat().st_size > 10_000
+    shown = json.loads(pvid("identify", motor, "--json").stdout)
+    assert shown["identified"] and shown["model"] == "dc_motor" and set(shown["parameters"]) == set(TRUTH)
+    for name, truth in TRUTH.items():
+        one = shown["parameters"][name]
+        # the law of friction of the simulation is soft, that of the model is sharp: 4 standard errors and a warning
+        assert abs(one["value"] - truth) < 4 * one["se"] or shown["warning"], name
+
+
+def test_columns_and_units_are_mapped(motor: Path, tmp_path: Path) -> None:
+    lines = motor.read_text().splitlines()
+    head, rows = lines[0].split(","), [line.split(",") for line in lines[1:]]
+    assert head == ["t", "V", "i", "phi"]
+    renamed = ["time,drive,current_mA,angle"]
+    renamed += [f"{t},{v},{1e3 * float(i)!r},{phi}" for t, v, i, phi in rows]
+    path = tmp_path / "other.csv"
+    path.write_text("\n".join(renamed) + "\n", encoding="utf-8")
+    columns = "t=time,V=drive,i=current_mA:mA,phi=angle"
+    same = json.loads(pvid("identify", path, "--model", "dc_motor", "--columns", columns, "--json").stdout)
+    first = json.loads(pvid("identify", motor, "--json").stdout)
+    for name in TRUTH:
+        assert same["parameters"][name]["value"] == pytest.approx(first["parameters"][name]["value"], rel=1e-6)
+    with pytest.raises(PvidError, match=r"no column t \(s\) and V \(V\) and .*: use --columns t=time:s"):
+        pvid("identify", path, "--model", "dc_motor")
+
+
+def test_settings_reach_the_model(motor: Path) -> None:
+    shown = json.loads(pvid("identify", motor, "--set", "sensor.i.resolution=0.5", "--json").stdout)
+    assert shown["chi2"] < json.loads(pvid("identify", motor, "--json").stdout)["chi2"]
+    with pytest.raises(PvidError, match="nominal.M: the model has no 'M'; it has R, L"):
+        pvid("identify", motor, "--set", "nominal.M=3")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--core", "q31"), "--core q31: dc_motor is identified in float64"),
+        (("--on", "cortex-m4f"), "--on cortex-m4f: dc_motor is identified in float64"),
+        (("--model", "dc_moter"), "dc_moter: no such model; give a .py file or one of battery_2rc"),
+    ],
+)
+def test_what_this_mechanism_cannot_do_is_refused(motor: Path, arguments: tuple[str, ...], sentence: str) -> None:
+    with pytest.raises(PvidError) as caught:
+        pvid("identify", motor, *arguments)
+    assert sentence in str(caught.value)
+
+
+def test_a_dead_sensor_is_named(motor: Path, tmp_path: Path) -> None:
+    lines = motor.read_text().splitlines()
+    dead = [lines[0], *(line.rsplit(",", 1)[0] + ",0.5" for line in lines[1:])]
+    (tmp_path / "dead.csv").write_text("\n".join(dead) + "\n", encoding="utf-8")
+    with pytest.raises(PvidError, match="phi has the same value in all 6000 samples: is the sensor connected?"):
+        pvid("identify", tmp_path / "dead.csv", "--model", "dc_motor")
+
+
+@pytest.mark.parametrize("name", names())
+def test_check_reports_rows_and_verdict(name: str) -> None:
+    answer = pvid("model", "check", name)
+    assert answer.return_value == DONE
+    assert "sum of theta * N = Y" in answer.stdout and "Identifiable: all" in answer.stdout
+
+
+def test_check_names_what_cannot_be_identified(tmp_path: Path) -> None:
+    text = Path(pvid.__code__.co_filename).parents[2] / "host/src/pvid/models/dc_motor/mechanism.py"
+    split = text.read_text(encoding="utf-8").replace(
+        'model.unknown("b", "N*m*s", 1e-4)', 'model.unknown("b", "N*m*s", 1e-4) + model.unknown("b2", "N*m*s", 1e-4)'
+    )
+    (tmp_path / "split.py").write_text(split, encoding="utf-8")
+    answer = pvid("model", "check", tmp_path / "split.py")
+    assert answer.return_value == NOTHING_IDENTIFIED
+    assert "b and b2: only b + b2 can be identified" in answer.stdout
+
+
+def test_a_hidden_coordinate_that_cannot_be_removed_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "hidden.py").write_text(HIDDEN, encoding="utf-8")
+    with pytest.raises(PvidError, match="hidden.py, line 6: a cannot be eliminated: 1 equation"):
+        pvid("model", "check", tmp_path / "hidden.py")
+
+
+def test_predict_compares_drives() -> None:
+    answer = json.loads(pvid("model", "predict", "dc_motor", "--drive", "steps", "--duration", "5", "--json").stdout)
+    assert set(answer["relative_se"]) == {"steps"} and answer["relative_se"]["steps"]["R"] < 0.01
+    assert answer["advice"].startswith("Best drive: steps. Its worst parameter is ")
+    with pytest.raises(PvidError, match="zigzag is no drive; known are constant, steps"):
+        pvid("model", "predict", "dc_motor", "--drive", "zigzag")
+
+
+def test_build_writes_what_check_accepts(tmp_path: Path) -> None:
+    assert pvid("model", "build", "furuta", "-o", tmp_path / "out").return_value == DONE
+    assert pvid("model", "build", "furuta", "-o", tmp_path / "out", "--check").return_value == DONE
+    header = tmp_path / "out" / "furuta.h"
+    header.write_text(header.read_text(encoding="utf-8").replace("J0", "J9"), encoding="utf-8")
+    assert pvid("model", "build", "furuta", "-o", tmp_path / "out", "--check").return_value == DIFFERENT
+
+
+def test_a_wrong_model_file_gives_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "wrong.py").write_text("from pvid.model import Model\nmodel = Model('x')\nmodel.sensor('y')\n", "utf-8")
+    done = CliRunner().invoke(commands, ["model", "check", str(tmp_path / "wrong.py")])
+    assert isinstance(done.exception, PvidError) and "wrong.py, line 3" in str(done.exception)
+    assert BAD_INPUT == 2

@@ -1,0 +1,189 @@
+"""Model files: ten lines; what is wrong in one is said in one sentence with file, line, symbol and cause."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.model import Integral, Model, cos, sgn, sin
+from pvid.model.corners import with_corners
+from pvid.model.signals import Jet
+from pvid.models.mechanisms import compiled_of, described, names
+
+SHIPPED = {  # theta of each row kind, unknowns: evidence/models.md 4
+    "kapitza": ([8], 4),
+    "dc_motor": ([4, 5], 7),
+    "cart_pendulum": ([5, 4], 7),
+    "furuta": ([4, 4], 6),
+    "two_link_arm": ([6, 4], 8),
+    "two_mass_drive": ([10], 8),
+    "battery_2rc": ([7], 7),
+    "rigid_body": ([5, 5, 5], 6),
+}
+
+
+@pytest.mark.parametrize("name", names())
+def test_shipped_mechanisms_have_few_theta_and_compile_in_no_time(name: str) -> None:
+    model = described(name)
+    began = time.process_time()
+    compiled = model.compiled(name)
+    assert time.process_time() - began < 2.0
+    thetas, unknowns = SHIPPED[name]
+    assert [len(row.theta) for row in compiled.rows] == thetas
+    assert len(compiled.p) == unknowns
+    assert compiled.name == name
+
+
+@pytest.mark.parametrize("name", names())
+def test_shipped_descriptions_are_short(name: str) -> None:
+    text = (Path(__file__).parents[2] / "host/src/pvid/models" / name / "mechanism.py").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if line and not line.startswith(("from", "import", '"""'))]
+    assert len(lines) <= 17
+    assert set(SHIPPED) == set(names())
+
+
+def written(folder: Path, text: str) -> str:
+    path = folder / "mine.py"
+    path.write_text("from pvid.model import *\nmodel = Model('mine')\n" + text, encoding="utf-8")
+    return str(path)
+
+
+FINE_LINES = """x = model.sensor("x", "m", resolution=1e-4)
+u = model.input("u", "N", hold="zoh")
+m, b = model.unknown("m", "kg", 1.0), model.unknown("b", "N*s/m", 1.0)
+"""
+
+
+def test_a_users_file_is_compiled_by_its_name(tmp_path: Path) -> None:
+    path = written(tmp_path, FINE_LINES + "model.equation(m * x.d(2) + b * x.d() - u)\n")
+    compiled = compiled_of(path)
+    assert compiled.name == "mine"
+    assert compiled_of(path) is compiled
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("model.equation(m * x.d(2) + b * x - u)", "mine.py, line 6: equation 1: the term b*x has the unit"),
+        ("model.equation(m * x.d(2) + c * x.d() - u)", "mine.py, line 6: NameError: name 'c' is not defined"),
+        ("model.equation(m * x.d(2) +)", "mine.py, line 6: invalid syntax"),
+        ("import sympy; model.equation(m * x.d(2) - u + sympy.Symbol('k') * x)", "line 6: k is not declared"),
+        ("model.unknown('m', 'kg', 1.0)", "line 6: m is declared twice"),
+        ("model.unknown('x_2', 'kg', 1.0)", "line 6: x_2 is declared twice, or is the name of a derivative"),
+        ("model.unknown('k', 'N/m', -1.0)", "line 6: k: the guess -1.0 is not positive"),
+        ("model.unknown('k', 'N/m', 0.0, positive=False)", "line 6: k: with a guess of 0, give sd"),
+        ("model.unknown('k', 'N/m', 'big')", "line 6: TypeError"),
+        ("model.unknown('2k', 'N/m', 1.0)", "line 6: '2k' is no name"),
+        ("model.unknown('t', 'N/m', 1.0)", "line 6: t is the time"),
+        ("model.sensor('y', 'm')", "line 6: y: give its resolution or its noise"),
+        ("model.input('v', 'V', hold='first')", 'line 6: v: hold is "first"'),
+        ("model.equation(m * b)", "line 6: equation 1 contains no signal"),
+        ("model.lagrange(m * x.d()**2 / 2, [x], [])", "line 6: lagrange: 1 coordinates but 0 generalised forces"),
+        ("model.output('z', 'm', x)", "line 6: the output z contains a signal"),
+        ("model.equation(m * x.d(9) - u)", "line 6: ValueError: x: derivative 9 is above 8"),
+        ("model = 3", "the file leaves no variable `model`"),
+        ("", "mine: the model has no equation"),
+        ("import sympy; model.equation(b * sympy.exp(x * b) - u)", "line 6: equation 1"),
+        ("raise SystemExit(3)", "line 6: SystemExit"),
+    ],
+)
+def test_errors_name_line_symbol_and_cause(tmp_path: Path, line: str, said: str) -> None:
+    with pytest.raises(PvidError) as caught:
+        compiled_of(written(tmp_path, FINE_LINES + line + "\n"))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_names_that_are_no_model_are_refused_with_the_list() -> None:
+    with pytest.raises(PvidError, match="no such model; give a .py file or one of battery_2rc, cart_pendulum"):
+        compiled_of("dc-motor")
+
+
+def small() -> tuple[Model, Jet, Jet]:
+    model = Model("small")
+    return model, model.sensor("x", "", noise=0.1), model.input("u", "", hold="zoh")
+
+
+def test_floats_become_the_decimal_fractions_that_they_are_written_as() -> None:
+    model, x, u = small()
+    a, b = model.unknown("a", "s^2", 1.0), model.unknown("b", "", 1.0)
+    model.equation(a * x.d(2) + 9.81 * b * sin(x) + 0.1 * b * x - u)
+    (row,) = model.compiled().rows
+    assert row.regressors[1] == {0: sp.Rational(981, 100) * sin(x) + x / 10}
+
+
+def test_an_offset_inside_a_sine_leaves_it() -> None:
+    model, x, u = small()
+    a, c = model.unknown("a", "", 1.0), model.unknown("c", "", 0.1, positive=False)
+    model.equation(a * sin(2 * x - c) - u)
+    (row,) = model.compiled().rows
+    found = dict(zip(row.theta, row.regressors, strict=True))
+    assert found == {a * cos(c): {0: sin(2 * x)}, a * sin(c): {0: -cos(2 * x)}}
+
+
+def test_rational_functions_absolute_values_and_signs() -> None:
+    model, x, u = small()
+    a, b, c = (model.unknown(name, unit, 1.0) for name, unit in (("a", "s^2"), ("b", "s^2"), ("c", "")))
+    model.equation(a * x.d(2) / (1 + x**2) + b * abs(x.d()) * x.d() + c * sgn(-2 * x.d()) - u)
+    (row,) = model.compiled().rows
+    found = dict(zip(row.theta, row.regressors, strict=True))
+    assert found[b] == {0: sp.Abs(x.d()) * x.d()}
+    assert found[c] == {0: -sgn(x.d())}
+    assert found[a][1] == x.d() / (1 + x**2)
+
+
+def test_an_unknown_beside_a_signal_in_a_denominator_is_multiplied_out() -> None:
+    model, x, u = small()
+    a, w = model.unknown("a", "", 1.0), model.unknown("w", "", 1.0)
+    model.equation(a * x / (w + u) - u)
+    (row,) = model.compiled().rows
+    assert dict(zip(row.theta, row.regressors, strict=True)) == {a: {0: x}, w: {0: -u}}
+    assert row.known == {0: u**2}
+
+
+def test_known_constants_share_a_coefficient_and_keep_their_names() -> None:
+    """The arm's h2 multiplies three channels by known lengths and gravity: one theta."""
+    compiled = compiled_of("two_link_arm")
+    h2 = next(one.symbol for one in compiled.unknowns if one.name == "h2")
+    part = dict(zip(compiled.rows[0].theta, compiled.rows[0].regressors, strict=True))[h2]
+    assert sorted(part) == [0, 1, 2]
+    assert {str(one) for one in compiled.with_knowns(part[0]).free_symbols} == {"q1", "q2"}
+
+
+def test_an_integral_since_the_start_is_a_signal_of_the_rows() -> None:
+    compiled = compiled_of("battery_2rc")
+    z, i = Jet("z"), Jet("i")
+    assert compiled.opaque == {z: Integral(i, 1)}
+    assert z.d() - i in compiled.equations
+    assert z in compiled.hidden
+    psis = [psi for part in compiled.rows[0].regressors for psi in part.values()]
+    assert not any(jet.of == "z" and jet.order for psi in psis for jet in psi.atoms(Jet))
+
+
+def test_variants_move_a_derivative_to_the_test_function() -> None:
+    model = Model("alternatives")
+    x, a, u = (model.sensor(name, "", noise=0.1) for name in ("x", "a", "u"))
+    b = model.unknown("b", "s", 1.0)
+    model.equation(b * cos(a) * x.d() - u)
+    variants = model.compiled_variants()
+    assert set(variants) == {"", "x"}
+    assert variants[""].rows[0].regressors == ({0: cos(a) * x.d()},)
+    assert variants["x"].rows[0].regressors == ({1: x * cos(a), 0: x * a.d() * sin(a)},)
+
+
+def test_corners_of_the_current_are_channels_of_the_motor_and_of_no_other() -> None:
+    for name in names():
+        model, jumps = with_corners(compiled_of(name))
+        assert jumps == ({"V_jump": "V"} if name == "dc_motor" else {})
+        if name != "dc_motor":
+            assert model is compiled_of(name)
+    motor, _ = with_corners(compiled_of("dc_motor"))
+    jump = Jet("V_jump")
+    first, second = (dict(zip(map(str, row.theta), row.regressors, strict=True)) for row in motor.rows)
+    assert first["R/L"] == {0: jump}
+    assert second["k/L"] == {0: -jump}
+    assert motor.rows[0].known == {0: Jet("V"), 1: -jump}

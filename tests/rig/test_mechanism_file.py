@@ -1,0 +1,106 @@
+"""The rig file of any mechanism: values reach the model, and every mistake is a sentence that names it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.model.compiled import CompiledModel, Known, Signal, Unknown
+from pvid.model.signals import Jet
+from pvid.rig.mechanism_file import MechanismRig, with_settings
+
+TEXT = """
+sample_rate = 500
+[model]
+name = "dc_motor"
+[known]
+g = 9.7
+[sensor.phi]
+resolution = 1e-3
+[nominal]
+R = 2
+"""
+
+
+def model() -> CompiledModel:
+    R, i0, g = sp.symbols("R i0 g", real=True)
+    return CompiledModel(
+        name="dc_motor",
+        title="",
+        signals=(Signal(Jet("V"), "V", "input"), Signal(Jet("phi"), "rad", "sensor", resolution=2e-3, noise=0.7)),
+        unknowns=(
+            Unknown(R, "ohm", 1.0, True, 0.0, math.inf, 2.0),
+            Unknown(i0, "A", 0.0, False, -math.inf, math.inf, 0.1),
+        ),
+        knowns=(Known(g, "m/s^2", 9.81),),
+        outputs=(),
+        rows=(),
+    )
+
+
+def test_values_of_the_file_replace_those_of_the_model() -> None:
+    rig = MechanismRig.parse(TEXT)
+    assert rig.sample_rate == 500.0 and rig.model == "dc_motor"
+    changed = rig.applied(model())
+    assert changed.knowns[0].value == 9.7
+    assert (changed.signal("phi").resolution, changed.signal("phi").noise) == (1e-3, 0.7)
+    assert (changed.unknowns[0].guess, changed.unknowns[0].sd) == (2.0, 4.0)
+    assert changed.unknowns[1].sd == 0.1
+
+
+def test_text_gives_the_same_rig_back() -> None:
+    rig = MechanismRig.parse(TEXT)
+    assert MechanismRig.parse(rig.text()) == rig
+
+
+def test_settings_come_before_the_file() -> None:
+    document = {"model": {"name": "dc_motor"}, "known": {"g": 9.7}}
+    changed = with_settings(document, ["known.g=9.6", "sensor.phi.resolution=0.5", "model.name=furuta"])
+    rig = MechanismRig.of_document(changed)
+    assert (rig.model, rig.known["g"], rig.sensor["phi"]["resolution"]) == ("furuta", 9.6, 0.5)
+    assert document["known"] == {"g": 9.7}
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("l1 = 0.3\n[model]\nname='x'", "'l1' is not a key of the rig file of a mechanism"),
+        ("sample_rate = 5", "the mechanism is missing"),
+        ("[model]\nname='x'\n[known]\ng='9'", "known.g must be a number, not '9'"),
+        ("[model]\nname='x'\n[known]\ng=nan", "known.g must be a number, not 'nan'"),
+        ("[model]\nname='x'\n[sensor]\nphi=3", "phi must be a table"),
+        ("[model]\nname='x'\n[sensor.phi]\nbits=3", "'bits' is not a key: resolution and noise are"),
+        ("[model]\nname='x'\n[sensor.phi]\nnoise=-3", "sensor.phi.noise must not be negative"),
+        ("model = 3", "model must be a table"),
+        ("[model", "is not TOML"),
+    ],
+)
+def test_a_mistake_is_named(text: str, sentence: str) -> None:
+    with pytest.raises(PvidError, match=".") as caught:
+        MechanismRig.parse(text)
+    assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "sentence"),
+    [
+        ({"known": {"h": 1.0}}, "known.h: the model has no 'h'; it has g"),
+        ({"sensor": {"V": {"noise": 1.0}}}, "sensor.V: the model has no 'V'; it has phi"),
+        ({"nominal": {"L": 1.0}}, "nominal.L: the model has no 'L'; it has R and i0"),
+        ({"nominal": {"R": -1.0}}, "nominal.R must be positive, not -1"),
+    ],
+)
+def test_what_the_model_does_not_have_is_named(table: dict[str, dict[str, float]], sentence: str) -> None:
+    rig = MechanismRig.of_document({"model": {"name": "dc_motor"}, **table})
+    with pytest.raises(PvidError) as caught:
+        rig.applied(model())
+    assert str(caught.value) == sentence
+
+
+@pytest.mark.parametrize(("setting", "sentence"), [("g", "is not KEY=VALUE"), ("sample_rate.x=3", "is a number")])
+def test_a_setting_that_is_none_is_refused(setting: str, sentence: str) -> None:
+    with pytest.raises(PvidError, match=sentence):
+        with_settings({"sample_rate": 5}, [setting])

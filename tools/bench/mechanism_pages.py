@@ -1,0 +1,127 @@
+"""The pages of the shipped mechanisms, host/docs/mechanisms/NAME.md: description, rows, verdict, a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from pvid.base.atomic_write import write_whole
+from pvid.base.figure_file import save
+from pvid.model.compiled import CompiledModel
+from pvid.model.report import check_report
+from pvid.models.mechanisms import compiled_of, path_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.identify import identify
+from pvid.sim.simulated_run import RigSimulation
+
+SEED = 1
+_SHOWN = 0.25  # of the run, in the picture
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A simulated run and the motion that the parameters identified from it give, by signal [n]."""
+
+    model: CompiledModel
+    t: Float
+    measured: dict[str, Float]
+    simulated: dict[str, Float]
+
+
+def example_of(name: str) -> Example:
+    """The shipped rig: run, identify, simulate again with the identified parameters."""
+    model = compiled_of(name)
+    rig = simulated_rig(name)
+    run = RigSimulation.of(model, rig).run(SEED)
+    t = run.pop("t")
+    found = identify(model, run, rig.sample_rate)
+    again = replace(rig, truth=dict(zip(found.names, map(float, found.p), strict=True)))
+    exact = replace(model, signals=tuple(replace(one, resolution=0.0, noise=0.0) for one in model.signals))
+    simulated = RigSimulation.of(exact, again).run(SEED)
+    return Example(model, t, run, simulated)
+
+
+def picture(example: Example, path: Path) -> None:
+    """Each sensor that is not driven: measured, simulated, and their difference in resolutions."""
+    sensors = [one for one in example.model.signals if one.kind == "sensor" and not one.driven]
+    figure, grid = plt.subplots(
+        2,
+        len(sensors),
+        sharex=True,
+        squeeze=False,
+        figsize=(4.6 * len(sensors), 4.2),
+        layout="constrained",
+        height_ratios=(2, 1),
+    )
+    some = slice(0, max(2, int(_SHOWN * len(example.t))))
+    for axes, one in zip(grid.T, sensors, strict=True):
+        measured, simulated = example.measured[one.name], example.simulated[one.name]
+        axes[0].plot(example.t[some], measured[some], color="C0", linewidth=2.0, label="measured")
+        axes[0].plot(
+            example.t[some], simulated[some], color="C1", linewidth=0.9, label="simulated with the identified p"
+        )
+        axes[0].set_ylabel(f"{one.name} [{one.unit}]")
+        axes[1].plot(example.t[some], (measured - simulated)[some] / one.resolution, color="C3", linewidth=0.6)
+        axes[1].set_ylabel("difference\n[resolutions]")
+        axes[1].set_xlabel("time [s]")
+        for axis in axes:
+            axis.grid(alpha=0.3)
+    grid[0, 0].legend(loc="upper right", fontsize="small")
+    try:
+        save(figure, path, dpi=80)
+    finally:
+        plt.close(figure)
+
+
+def fit_of(example: Example, name: str) -> float:
+    """R^2 of the simulated signal."""
+    measured, simulated = example.measured[name], example.simulated[name]
+    return 1.0 - float(np.sum((measured - simulated) ** 2) / np.sum((measured - measured.mean()) ** 2))
+
+
+def page(name: str, example: Example) -> str:
+    """The text of a page, without the table of errors."""
+    model, (_, path) = example.model, path_of(name)
+    sensors = [one for one in model.signals if one.kind == "sensor" and not one.driven]
+    fits = ", ".join(f"{one.name} {fit_of(example, one.name):.6f}" for one in sensors)
+    return "\n".join(
+        [
+            f"# {model.title}",
+            "",
+            "Written by `./tools/pvid bench pages`: do not edit. [All mechanisms](../benchmarks/mechanisms.md), "
+            "[how to describe your own](../models.md).",
+            "",
+            "```python",
+            path.read_text(encoding="utf-8").rstrip(),
+            "```",
+            "",
+            f"`./tools/pvid model check {name}` prints:",
+            "",
+            "```text",
+            check_report(model).rstrip(),
+            "```",
+            "",
+            f"A simulated run of its rig (seed {SEED}), and the motion that the parameters identified from it give, "
+            f"from the same start and drive; R^2 over the whole run: {fits}.",
+            "",
+            f"![Measured and simulated signals](../images/mechanisms/{name}.png)",
+            "",
+        ]
+    )
+
+
+def write_page(docs: Path, name: str) -> None:
+    """The page and the picture of a mechanism below a folder of documents."""
+    (docs / "mechanisms").mkdir(exist_ok=True)
+    (docs / "images" / "mechanisms").mkdir(parents=True, exist_ok=True)
+    example = example_of(name)
+    picture(example, docs / "images" / "mechanisms" / f"{name}.png")
+    write_whole(docs / "mechanisms" / f"{name}.md", page(name, example))

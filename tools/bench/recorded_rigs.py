@@ -1,0 +1,208 @@
+"""Recordings of real rigs: identified from one run, beside the published values, and another run predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.recordings import PIECES, SOURCES, Source
+from bench.replay import Match, Replay
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.errors import uncertainty
+from pvid.oracle.fourier.identify import identify, ready
+from pvid.oracle.fourier.rows import WeakRows
+from pvid.oracle.fourier.solve import batch
+from pvid.rig.run import Recording
+from pvid.sim.plant import SHARP, Friction
+
+Float = npt.NDArray[np.float64]
+
+HEADER = ("rig", "parameter", "identified on one run", "on the other", "published", "apart", "changes with the band")
+PREDICTIONS = (
+    "rig",
+    "sensor",
+    "R^2 of the second run from the first",
+    "of the first from the second",
+    "of the second, published",
+    "RMS error of the second",
+)
+VERDICTS = ("rig", "alarms of the first run", "of the second", "changes with the band", "differs between the runs")
+
+# Estimates differ by so many standard errors: their difference is not covered.
+CLASH = 4.0
+WIDER = 3  # times the functions, for the other band
+_SOFT = 0.02  # width of a soft friction [unit of the velocity]
+
+
+@dataclass(frozen=True)
+class Design:
+    """Windows of a rig.
+
+    Attributes
+    ----------
+    window_s : [s], about two periods of its slow motion
+    functions : as few as the motion needs; what lies above is friction and cogging that no equation has
+    rate_taps : of the velocity
+    decimation : raw samples a step
+    sensors_only : weights of the sensors' noise alone
+    """
+
+    window_s: float
+    functions: int
+    rate_taps: int = 15
+    decimation: int = 1
+    sensors_only: bool = False
+
+
+DESIGNS: Mapping[str, Design] = {
+    "double_pendulum_a": Design(2.0, 9),
+    "double_pendulum_c": Design(2.0, 9),
+    "simple_pendulum": Design(1.0, 5, rate_taps=11),
+    "free_pendulum": Design(1.0, 13, decimation=4),
+    "free_double_pendulum": Design(1.0, 13, decimation=4),
+    "cell_dmegc": Design(600.0, 12, sensors_only=True),
+}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """p and its standard errors [n_p]; the names of the verdict's alarms."""
+
+    p: Float
+    se: Float
+    alarms: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig's two runs.
+
+    Attributes
+    ----------
+    source : where they are from
+    model : its mechanism
+    runs : the two recordings
+    estimates : from each run
+    wide : from each run, with more functions
+    """
+
+    source: Source
+    model: CompiledModel
+    runs: tuple[Recording, Recording]
+    estimates: tuple[Estimate, Estimate]
+    wide: tuple[Estimate, Estimate]
+
+    @property
+    def published(self) -> Float | None:
+        """p [n_p] where every unknown but offsets is published: 0 where it is not. None: nothing is."""
+        if not self.source.published:
+            return None
+        return np.array([self.source.published.get(name, 0.0) for name in self.model.p_names])
+
+    def clash(self) -> Float:
+        """Distance of the two estimates in standard errors of it [n_p]."""
+        one, other = self.estimates
+        return np.asarray(np.abs(one.p - other.p) / np.hypot(one.se, other.se))
+
+    def drift(self) -> Float:
+        """Distance of narrow and wide band in the larger standard error, the larger of the two runs [n_p]."""
+        pairs = zip(self.estimates, self.wide, strict=True)
+        return np.max([np.abs(a.p - b.p) / np.maximum(a.se, b.se) for a, b in pairs], axis=0)
+
+    def replay(self, run: int, friction: Friction = SHARP) -> Replay:
+        """The plant under one run's inputs."""
+        return Replay(self.model, self.runs[run], friction=friction)
+
+    def predicted(self) -> Mapping[str, Match]:
+        """The second run, with the parameters of the first."""
+        return self.replay(1).matches(self.estimates[0].p)
+
+
+def identified(model: CompiledModel, run: Recording, design: Design) -> Estimate:
+    """From all windows of a run."""
+    windows = FourierDesign(
+        run.sample_rate,
+        design.window_s,
+        design.functions,
+        decimation=design.decimation,
+        rate_taps=design.rate_taps,
+    )
+    if design.sensors_only:
+        fit = batch(WeakRows.of(ready(model), run.signals, windows), equation_error=False)
+        return Estimate(fit.p, uncertainty(fit).se)
+    found = identify(model, run.signals, run.sample_rate, design=windows)
+    return Estimate(found.p, found.se, tuple(one.name for one in found.verdict.reasons if one.alarm))
+
+
+def rig_of(source: Source, runs: tuple[Recording, Recording], design: Design) -> Rig:
+    """Identifies both runs."""
+    model = source.model()
+    wider = replace(design, functions=WIDER * design.functions)
+    narrow, wide = ([identified(model, run, one) for run in runs] for one in (design, wider))
+    return Rig(source, model, runs, (narrow[0], narrow[1]), (wide[0], wide[1]))
+
+
+def rigs(folder: Path) -> Iterator[Rig]:
+    """Of the pieces that `bench recordings --cut` wrote."""
+    for source in SOURCES:
+        first, second = (source.load(folder, piece) for piece in PIECES)
+        yield rig_of(source, (first, second), DESIGNS[source.name])
+
+
+def value_rows(rig: Rig) -> list[tuple[str, ...]]:
+    """Rows of the table of values."""
+    rows = []
+    clash, drift = rig.clash(), rig.drift()
+    for k, (name, unknown) in enumerate(zip(rig.model.p_names, rig.model.unknowns, strict=True)):
+        cells = [f"{one.p[k]:.4g} +- {one.se[k]:.1g}" for one in rig.estimates]
+        published = rig.source.published.get(name)
+        shown = f"{name} {unknown.unit}".strip()
+        rows.append(
+            (
+                rig.source.name,
+                shown,
+                *cells,
+                "-" if published is None else f"{published:.4g}",
+                f"{clash[k]:.1f} s.e.",
+                f"{drift[k]:.1f} s.e.",
+            )
+        )
+    return rows
+
+
+def prediction_rows(rig: Rig) -> list[tuple[str, ...]]:
+    """Rows of the table of predictions: the second run from the first, the first from the second."""
+    forth = rig.predicted()
+    back = rig.replay(0).matches(rig.estimates[1].p)
+    published = rig.published
+    theirs = None if published is None else rig.replay(1, _friction(published, rig.model)).matches(published)
+    rows = []
+    for name, match in forth.items():
+        unit = rig.model.signal(name).unit
+        of_theirs = "-" if theirs is None else f"{theirs[name].r2:.4f}"
+        cells = (f"{match.r2:.4f}", f"{back[name].r2:.4f}", of_theirs, f"{match.rms:.3g} {unit}")
+        rows.append((rig.source.name, name, *cells))
+    return rows
+
+
+def verdict_rows(rig: Rig) -> list[tuple[str, ...]]:
+    """Rows of the table of alarms."""
+    drifting = listed([name for name, apart in zip(rig.model.p_names, rig.drift(), strict=True) if apart > CLASH])
+    differing = listed([name for name, apart in zip(rig.model.p_names, rig.clash(), strict=True) if apart > CLASH])
+    return [(rig.source.name, *(listed(list(one.alarms)) for one in rig.estimates), drifting, differing)]
+
+
+def listed(names: list[str]) -> str:
+    """In a cell."""
+    return ", ".join(names) or "-"
+
+
+def _friction(p: Float, model: CompiledModel) -> Friction:
+    """Sharp; soft where a friction is 0, which the simulation would look for at every reversal."""
+    none = any(name.startswith("c") and value == 0.0 for name, value in zip(model.p_names, p, strict=True))
+    return Friction(_SOFT) if none else SHARP

@@ -1,0 +1,314 @@
+"""Real hardware, recorded by other laboratories: where the recordings are, and how a short piece of each is cut.
+
+The recordings themselves are not in this repository. `./tools/pvid bench recordings FOLDER --cut CHECKOUTS`
+cuts two pieces of each from checkouts CHECKOUTS/OWNER/NAME of the public repositories: one to identify from, one to
+predict. The mechanisms are those of tests/data/recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.model.compiled import CompiledModel
+from pvid.models.mechanisms import compiled_of
+from pvid.models.model import Channel
+from pvid.rig.columns import Columns
+from pvid.rig.run import Recording, read_recording, write_recording
+
+Float = npt.NDArray[np.float64]
+
+MECHANISMS = Path(__file__).resolve().parents[2] / "tests" / "data" / "recordings"
+PIECES = ("identify", "predict")
+
+_SLACK = 1e-3  # of a sample: the last one counts, whatever its last bits are
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Part of a recorded run.
+
+    Attributes
+    ----------
+    path : in the repository
+    start, end : [s] of the run's own clock
+    part : which of the file's runs, where it has several
+    """
+
+    path: str
+    start: float = 0.0
+    end: float = float("inf")
+    part: int = 0
+
+
+@dataclass(frozen=True)
+class Source:
+    """Two recorded runs of one rig, and what its owners published about it.
+
+    Attributes
+    ----------
+    name : of the rig
+    file : of the mechanism
+    repository, commit : owner/name, and the commit the figures of the docs are from
+    licence : of the repository, with its copyright line
+    read : a file and a part of it -> t [s] and signals of the mechanism in SI, by name
+    identify, predict : the two pieces
+    rate : samples a second of the pieces [Hz]; the recording's own rate unless given
+    decimals : digits kept behind the point, by signal; beyond what the sensor resolves
+    published : parameters of the mechanism that follow from the owners' own
+    published_at : where these stand
+    knowns : constants of the mechanism that this rig has, where they differ from those of its file
+    """
+
+    name: str
+    file: str
+    repository: str
+    commit: str
+    licence: str
+    read: Callable[[Path, int], Mapping[str, Float]]
+    identify: Piece
+    predict: Piece
+    channels: tuple[Channel, ...]
+    rate: float | None = None
+    decimals: Mapping[str, int] = field(default_factory=dict)
+    published: Mapping[str, float] = field(default_factory=dict)
+    published_at: str = ""
+    knowns: Mapping[str, float] = field(default_factory=dict)
+
+    def model(self) -> CompiledModel:
+        """The compiled mechanism, with this rig's constants."""
+        model = compiled_of(MECHANISMS / self.file)
+        knowns = tuple(replace(one, value=self.knowns.get(one.name, one.value)) for one in model.knowns)
+        return replace(model, knowns=knowns)
+
+    def cut(self, checkouts: Path, piece: Piece) -> Recording:
+        """The piece, from a checkout of the repository at CHECKOUTS/OWNER/NAME.
+
+        Raises
+        ------
+        PvidError
+            When there is no such file.
+        """
+        path = checkouts / self.repository / piece.path
+        if not path.is_file():
+            raise PvidError(f"{path} does not exist: check out {self.repository} at {self.commit} there")
+        table = dict(self.read(path, piece.part))
+        t = table.pop("t")
+        later = np.append(True, np.diff(t) > 0)
+        used = later & (t >= piece.start) & (t < piece.end)
+        t, signals = t[used], {name: one[used] for name, one in table.items()}
+        rate = self.rate or 1.0 / float(np.median(np.diff(t)))
+        clock = np.arange(int((t[-1] - t[0]) * rate + _SLACK) + 1) / rate
+        even = {
+            name: np.round(np.interp(t[0] + clock, t, one), self.decimals.get(name, 6)) for name, one in signals.items()
+        }
+        return Recording(clock, even, rate)
+
+    def load(self, folder: Path, piece: str) -> Recording:
+        """A piece that was cut before: FOLDER/NAME/identify.csv.gz or predict.csv.gz."""
+        return read_recording(folder / self.name / f"{piece}.csv.gz", columns=Columns(channels=self.channels))
+
+
+def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
+    """Cuts both pieces of a source; gives the files."""
+    (folder / source.name).mkdir(parents=True, exist_ok=True)
+    paths = [folder / source.name / f"{name}.csv.gz" for name in PIECES]
+    for path, piece in zip(paths, (source.identify, source.predict), strict=True):
+        write_recording(path, source.cut(checkouts, piece), source.channels)
+    return paths
+
+
+# ---- formats
+
+
+def _columns(path: Path, names: Mapping[str, str]) -> dict[str, Float]:
+    """Columns of a text table with a header line, under new names."""
+    with path.open(encoding="utf-8") as file:
+        header = file.readline().strip().split(",")
+        table = np.loadtxt(file, delimiter=",", ndmin=2)
+    return {name: np.asarray(table[:, header.index(column)]) for name, column in names.items()}
+
+
+def _two_links(path: Path, part: int) -> dict[str, Float]:
+    del part
+    names = {"q1": "pos_meas1", "q2": "pos_meas2", "t1": "tau_meas1", "t2": "tau_meas2"}
+    return _columns(path, {"t": "time", **names})
+
+
+def _one_link(path: Path, part: int) -> dict[str, Float]:
+    del part
+    return _columns(path, {"t": "time", "q": "position", "tau": "torque"})
+
+
+def _free_swing(names: tuple[str, ...]) -> Callable[[Path, int], dict[str, Float]]:
+    """A file with pieces of one run: part 0 those of Y_id, part 1 those of Y_vad; angles, then velocities."""
+
+    def read(path: Path, part: int) -> dict[str, Float]:
+        from scipy.io import loadmat
+
+        content = loadmat(path, squeeze_me=True)
+        key = ("id", "vad")[part]
+        t = np.concatenate(list(content[f"Time_{key}"]))
+        motion = np.concatenate([np.asarray(one).T for one in content[f"Y_{key}"]])
+        return {"t": t, **{name: np.ascontiguousarray(motion[:, k]) for k, name in enumerate(names)}}
+
+    return read
+
+
+def _random_discharge(path: Path, part: int) -> dict[str, Float]:
+    """The discharge number `part` of random steps of the current; charge counted from its start [A s]."""
+    from scipy.io import loadmat
+
+    run = loadmat(path, squeeze_me=True)["rw_data"][part]
+    t, i, v = (np.asarray(run[name], dtype=np.float64) for name in ("t", "I", "V"))
+    charge = np.append(0.0, np.cumsum((i[1:] + i[:-1]) / 2 * np.diff(t)))
+    return {"t": t, "i": i, "q": charge, "v": v}
+
+
+# ---- sources
+
+_ANGLES = ("q1", "q2")
+_DFKI = "BSD 3-Clause, Copyright (c) {year}, DFKI RIC Underactuated Robotics Lab"
+_DOUBLE = "dfki-ric-underactuated-lab/double_pendulum"
+_DOUBLE_COMMIT = "1e8544e67f3da72a51ee52fbbb278e131ce2a43f"
+_SWINGS = "dynamicslab/MultiArm-Pendulum"
+_SWINGS_COMMIT = "e99a7e13fe2adc8fc647321a156b6cb59a48a698"
+_SINGLE = "dfki-ric-underactuated-lab/torque_limited_simple_pendulum"
+_SINGLE_COMMIT = "ed17ea2d32a35ad944944ca03ef57693e2986732"
+_CELL = "Silencefrog9305/Digital-Twins-for-Battery-Using-CTA-MTL"
+_CELL_COMMIT = "ec0fe7c0e6ceb8576086d3adc8232b7d14616deb"
+_TWO_LINK_CHANNELS = (
+    Channel("q1", "rad", "angle of the upper link"),
+    Channel("q2", "rad", "angle of the lower link to the upper"),
+    Channel("t1", "N*m", "torque of the upper motor"),
+    Channel("t2", "N*m", "torque of the lower motor"),
+)
+_ONE_LINK_CHANNELS = (Channel("q", "rad", "angle"), Channel("tau", "N*m", "torque"))
+_CELL_CHANNELS = (
+    Channel("i", "A", "current"),
+    Channel("q", "A*s", "charge drawn"),
+    Channel("v", "V", "voltage"),
+)
+
+
+def _links(
+    m1: float, r1: float, i1: float, m2: float, r2: float, i2: float, l1: float, rotor: float
+) -> dict[str, float]:
+    """Parameters of the mechanism of masses, distances, inertias about the joints and a rotor geared 6 : 1."""
+    return {
+        "J1": i1 + m2 * l1**2 + 36 * rotor,
+        "J2": i2,
+        "Jm": 36 * rotor,
+        "h1": m1 * r1 + m2 * l1,
+        "h2": m2 * r2,
+    }
+
+
+def _double(
+    name: str, design: str, day: str, runs: tuple[int, int], l1: float, published: dict[str, float], at: str
+) -> Source:
+    folder = f"data/experiment_records/{design}/{day}/sys_id"
+    return Source(
+        name=name,
+        file="double_pendulum.py",
+        repository=_DOUBLE,
+        commit=_DOUBLE_COMMIT,
+        licence=_DFKI.format(year=2022),
+        read=_two_links,
+        identify=Piece(f"{folder}/trajectory_{runs[0]:02d}.csv"),
+        predict=Piece(f"{folder}/trajectory_{runs[1]:02d}.csv"),
+        channels=_TWO_LINK_CHANNELS,
+        rate=500.0,
+        decimals={"t1": 4, "t2": 4},
+        published=published,
+        published_at=f"data/system_identification/identified_parameters/{design}/{at}/model_parameters.yml",
+        knowns={"l1": l1},
+    )
+
+
+SOURCES = (
+    _double(
+        "double_pendulum_a",
+        "design_A.0",
+        "20220815",
+        (5, 1),
+        0.3,
+        _links(0.55938, 0.3, 0.0534708, 0.6043459, 0.1837769, 0.0239237, 0.3, 7.6593e-5)
+        | {"b1": 0.001, "c1": 0.093, "b2": 0.001, "c2": 0.078},
+        "model_2.0",
+    ),
+    _double(
+        "double_pendulum_c",
+        "design_C.0",
+        "20220914",
+        (2, 1),
+        0.2,
+        _links(0.6416938, 0.2, 0.0267108, 0.5639360, 0.3212670, 0.0538781, 0.2, 9.9373e-5)
+        | {"b1": 0.001, "c1": 0.093, "b2": 0.001, "c2": 0.078},
+        "model_3.0",
+    ),
+    Source(
+        name="simple_pendulum",
+        file="simple_pendulum.py",
+        repository=_SINGLE,
+        commit=_SINGLE_COMMIT,
+        licence=_DFKI.format(year=2021),
+        read=_one_link,
+        identify=Piece("results/control_method_direct_collocation/data_measured.csv"),
+        predict=Piece("results/control_method_ddp/data_measured.csv"),
+        channels=_ONE_LINK_CHANNELS,
+        decimals={"tau": 4},
+        published={"J": 0.139625, "G": 0.6755 * 0.5 * 9.81, "b": 0.1},
+        published_at="data/parameters/sp_parameters_sac.yaml",
+    ),
+    Source(
+        name="free_pendulum",
+        file="free_pendulum.py",
+        repository=_SWINGS,
+        commit=_SWINGS_COMMIT,
+        licence="MIT, Copyright (c) 2022 dynamicslab",
+        read=_free_swing(("q",)),
+        identify=Piece("ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat", part=0),
+        predict=Piece("ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat", part=1),
+        channels=(Channel("q", "rad", "angle from upright"),),
+        # m a g/(m a^2 + I) and k/(m a^2 + I) of the five numbers of the file
+        published={"w2": 64.221, "k": 0.06723, "c": 0.0, "o": 0.0},
+        published_at="ParameterEstimation/SinglePendulum/EstimatedParameters_SinglePendulum.mat",
+    ),
+    Source(
+        name="free_double_pendulum",
+        file="free_double_pendulum.py",
+        repository=_SWINGS,
+        commit=_SWINGS_COMMIT,
+        licence="MIT, Copyright (c) 2022 dynamicslab",
+        read=_free_swing(_ANGLES),
+        identify=Piece(
+            "ParameterEstimation/DoublePendulum/DoublePendulumDataForParameterEstimation.mat", end=16.0, part=0
+        ),
+        predict=Piece(
+            "ParameterEstimation/DoublePendulum/DoublePendulumDataForParameterEstimation.mat", 16.0, 26.0, part=0
+        ),
+        channels=tuple(Channel(name, "rad", "angle from upright") for name in _ANGLES),
+        # of the ten numbers of the file, over m2 a2 L1
+        published={"A": 2.035, "B": 1.134, "G1": 120.0, "G2": 56.8, "k1": 0.0854, "k2": 0.0036},
+        published_at="ParameterEstimation/DoublePendulum/EstimatedParameters_DoublePendulum.mat",
+    ),
+    Source(
+        name="cell_dmegc",
+        file="cell_dmegc.py",
+        repository=_CELL,
+        commit=_CELL_COMMIT,
+        licence="MIT, Copyright (c) 2025 Silencefrog9305",
+        read=_random_discharge,
+        identify=Piece("Exp25_R1.mat", end=3000.0, part=25),
+        predict=Piece("Exp25_R1.mat", end=3000.0, part=26),
+        channels=_CELL_CHANNELS,
+        rate=0.1,
+        decimals={"i": 4, "q": 3, "v": 4},
+    ),
+)
