@@ -77,7 +77,7 @@ static inline void any_state(const pvid_model_q31 *model, pvid_estimator_q31 *se
         self->noise[i].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
         self->noise[i].e = any_i32(-2000, 2000);
     }
-    self->energy = any_i64(0, PVID_WIDE);
+    self->group_rss = any_i64(0, PVID_WIDE);
     self->group_weight = any_i64(0, PVID_WIDE);
     self->expected.m = any_i32(0, PVID_ONE_Q30);
     self->expected.e = any_i32(-2000, 2000);

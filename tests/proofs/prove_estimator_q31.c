@@ -54,7 +54,7 @@ static void any_row(const pvid_model_q31 *model)
         n[i] = any_i32(INT32_MIN, INT32_MAX);
     }
     (void)pvid_estimator_add_q31(&estimator, n, any_i32(INT32_MIN, INT32_MAX));
-    /*@ assert 0 <= estimator.energy <= 0x4000000000000000; */
+    /*@ assert 0 <= estimator.group_rss <= 0x4000000000000000; */
     /*@ assert 0 <= estimator.information.sums[estimator.information.n_sums - 2]; */
 }
 

@@ -58,7 +58,7 @@ static void any_state(void)
     finish.length.k = (uint8_t)any_u32(0, 30);
     finish.whitened = any_bool();
     finish.saturated = any_bool();
-    finish.energy = any_i64(0, PVID_WIDE);
+    finish.rss = any_i64(0, PVID_WIDE);
     finish.size = any_i64(0, PVID_WIDE);
     finish.expected = any_scaled(1);
     finish.fade_factor = any_i32(0, INT32_MAX);

@@ -305,7 +305,7 @@ static void a_row_at_its_limit_fits(void **state)
     }
     assert_int_equal(estimator.counters.rows, 2);
     assert_int_equal(estimator.counters.rejected_saturated, 4);
-    assert_int_equal(estimator.energy, (int64_t)2 << 56);
+    assert_int_equal(estimator.group_rss, (int64_t)2 << 56);
     /* what a row says that is already known may be as large, and one more */
     config.start[0] = P_ONE;
     assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
@@ -314,7 +314,7 @@ static void a_row_at_its_limit_fits(void **state)
     n[0] = 1;
     assert_int_equal(pvid_estimator_add_q31(&estimator, n, -PVID_ROW_LIMIT_Q31), PVID_REJECTED_SATURATED);
     assert_int_equal(pvid_estimator_add_q31(&estimator, n, PVID_ROW_LIMIT_Q31), PVID_ACCUMULATED);
-    assert_int_equal(estimator.energy, ((int64_t)PVID_ROW_LIMIT_Q31 - 1) * (PVID_ROW_LIMIT_Q31 - 1));
+    assert_int_equal(estimator.group_rss, ((int64_t)PVID_ROW_LIMIT_Q31 - 1) * (PVID_ROW_LIMIT_Q31 - 1));
 }
 
 static void a_place_is_held_within_the_bounds(void **state)

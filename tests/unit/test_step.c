@@ -44,7 +44,7 @@ static pvid_system_f32 known_system(void)
     const pvid_system_f32 system = {
         .s = {{8.0f, 4.0f}, {0.0f, 10.0f}},
         .force = {8.0f, -8.0f},
-        .residual = 4.0f,
+        .rss = 4.0f,
         .weight = 34.0f,
     };
     return system;
@@ -227,7 +227,7 @@ static void no_step_is_taken_in_the_dead_zone(void **state)
     assert_true(solution.in_dead_zone && (solution.reason == PVID_UPDATED) && (solution.size == 0.0f));
     assert_memory_equal(p, start, sizeof start);
     /* larger residuals widen the zone up to row_sd^2 alone: 26 <= zone 2 0.25 */
-    system.residual = 4000.0f;
+    system.rss = 4000.0f;
     settings.dead_zone = 51.0f;
     assert_false(solved(&system, &settings, p).in_dead_zone);
     settings.dead_zone = 53.0f;
@@ -241,9 +241,9 @@ static void the_covariance_is_the_inverse_of_the_information(void **state)
 {
     (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
-    const pvid_system_f32 system = known_system();
+    pvid_system_f32 system = known_system();
     pvid_estimate_f32 estimate;
-    pvid_assess_f32(&system, &settings, start, &estimate);
+    pvid_assess_f32(&system, &settings, &estimate);
     const double det = (33.0 * 40.0625) - 256.0;
     assert_float_equal(estimate.covariance[0][0], 40.0625 / det, 1.0e-8);
     assert_float_equal(estimate.covariance[1][1], 33.0 / det, 1.0e-8);
@@ -254,7 +254,7 @@ static void the_covariance_is_the_inverse_of_the_information(void **state)
     assert_float_equal(estimate.kappa, 0.8f, 1.0e-6f);
     assert_float_equal(estimate.least_pivot, 0.8f, 1.0e-6f);
     assert_float_equal(estimate.residual_sd, sqrt(0.125), 1.0e-7);
-    assert_true((estimate.weight == 34.0f) && (estimate.p[0] == 2.0f) && (estimate.p[1] == -1.0f));
+    assert_true(estimate.weight == 34.0f);
 }
 
 static void without_information_the_errors_are_those_of_the_start(void **state)
@@ -268,7 +268,7 @@ static void without_information_the_errors_are_those_of_the_start(void **state)
         system.s[0][1] = 0.0f;
         system.s[1][1] = bad[k];
         pvid_estimate_f32 estimate;
-        pvid_assess_f32(&system, &settings, start, &estimate);
+        pvid_assess_f32(&system, &settings, &estimate);
         assert_float_equal(estimate.se[0], 1.0f, 1.0e-6f);
         assert_float_equal(estimate.se[1], 4.0f, 4.0e-6f);
         assert_float_equal(estimate.covariance[1][1], 16.0f, 1.6e-5f);
@@ -301,7 +301,7 @@ static void the_variance_has_its_limits(void **state)
     assert_true(pvid_assess_variance_f32(&system, &settings) == 0.25f);
     system.floor = 16.0f;
     assert_true(pvid_assess_variance_f32(&system, &settings) == 0.5f);
-    system.residual = NOT_A_NUMBER;
+    system.rss = NOT_A_NUMBER;
     assert_true(pvid_assess_variance_f32(&system, &settings) == (PVID_RESIDUAL_MAX / 32.0f));
     system.weight = 2.5f; /* no whole degree of freedom: row_sd^2 */
     assert_true(pvid_assess_variance_f32(&system, &settings) == 0.25f);
@@ -316,9 +316,9 @@ static void the_misfit_compares_the_residual_with_its_floor(void **state)
     system.floor = 2.0f;
     system.rounding = 100.0f; /* no part of it */
     assert_true(pvid_assess_misfit_f32(&system, &settings) == 2.0f);
-    system.residual = INFINITE;
+    system.rss = INFINITE;
     assert_true(pvid_assess_misfit_f32(&system, &settings) == PVID_RESIDUAL_MAX);
-    system.residual = NOT_A_NUMBER;
+    system.rss = NOT_A_NUMBER;
     assert_true(pvid_assess_misfit_f32(&system, &settings) == 0.0f);
     system = known_system();
     system.floor = 2.0f;

@@ -65,9 +65,9 @@ pvid_reason pvid_kapitza_solve_in_zone_f32(pvid_estimator_f32 *self, const float
     pvid_system_f32 system;
     float sums[PVID_MAX_SUMS];
     pvid_kapitza_accumulate_f32(n, y, information->high, information->low, sums);
-    const float explained =
+    const float rss_minus_yy =
         pvid_kapitza_project_f32(self->p, sums, &sums[PVID_KAPITZA_STRONG_MOMENTS], system.s, system.force);
-    pvid_direct_residual_f32(self, sums, explained, &system);
+    pvid_direct_residual_f32(self, sums, rss_minus_yy, &system);
     return pvid_direct_move_f32(self, self->settings.gain, &system);
 }
 

@@ -4,6 +4,7 @@
 #include "solve/direct_f32.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
@@ -15,11 +16,11 @@
 
 /* ---- the solve ---- */
 
-void pvid_direct_residual_f32(const pvid_estimator_f32 *self, const float sums[], float explained,
+void pvid_direct_residual_f32(const pvid_estimator_f32 *self, const float sums[], float rss_minus_yy,
                               pvid_system_f32 *system)
 {
     const float *tail = &sums[self->model->n_moments + self->model->n_theta]; /* yy, weight */
-    system->residual = tail[0] + explained;
+    system->rss = tail[0] + rss_minus_yy;
     system->rounding = self->information.rounding;
     system->floor = RESIDUAL_FLOOR * tail[0];
     system->weight = tail[1];
@@ -29,8 +30,8 @@ void pvid_direct_residual_f32(const pvid_estimator_f32 *self, const float sums[]
 static void gather(const pvid_estimator_f32 *self, const float sums[], pvid_system_f32 *system)
 {
     const pvid_model_f32 *model = self->model;
-    const float explained = model->project(self->p, sums, &sums[model->n_moments], system->s, system->force);
-    pvid_direct_residual_f32(self, sums, explained, system);
+    const float rss_minus_yy = model->project(self->p, sums, &sums[model->n_moments], system->s, system->force);
+    pvid_direct_residual_f32(self, sums, rss_minus_yy, system);
 }
 
 pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, pvid_system_f32 *system)
@@ -110,5 +111,7 @@ void pvid_direct_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *e
     pvid_system_f32 system;
     pvid_information_read_f32(&self->information, sums);
     gather(self, sums, &system);
-    pvid_assess_f32(&system, &self->settings, self->p, estimate);
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
+    pvid_assess_f32(&system, &self->settings, estimate);
 }

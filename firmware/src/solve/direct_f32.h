@@ -14,8 +14,8 @@ void pvid_direct_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *e
 /* A solve of the present sums: at the end of a group, or a further Gauss-Newton step. */
 pvid_reason pvid_direct_solve_f32(pvid_estimator_f32 *self, bool ends_group);
 
-/* Writes the residuals of the normal equations. explained: what `project` (model.h) returns for these sums. */
-void pvid_direct_residual_f32(const pvid_estimator_f32 *self, const float sums[], float explained,
+/* Writes the residuals of the normal equations. rss_minus_yy: what `project` (model.h) returns for these sums. */
+void pvid_direct_residual_f32(const pvid_estimator_f32 *self, const float sums[], float rss_minus_yy,
                               pvid_system_f32 *system);
 
 /* One step of p from the normal equations; `gain` is g of estimator.h. Adds H0 to S. */

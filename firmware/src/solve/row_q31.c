@@ -50,7 +50,7 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
 
 void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
 {
-    self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
+    self->group_rss = pvid_clamp_q31(self->group_rss + square, PVID_WIDE);
     self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
     pvid_information_add_q31(&self->information, n, e, (self->settings.gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);

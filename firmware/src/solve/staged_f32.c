@@ -73,7 +73,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float
     if (self->settings.gain < 1.0f) {
         pvid_row_accumulate_innovation_f32(self, self->model->n_p, gradient, e);
     }
-    self->energy += e * e;
+    self->group_rss += e * e;
     self->group_weight += self->information.row_weight;
     pvid_information_add_f32(&self->information, self->model, n, e, NULL);
     pvid_count_up(&self->counters.rows);
@@ -105,7 +105,7 @@ static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 
     pvid_information_read_f32(&self->information, solve->sums);
     self->model->jacobian(self->p, solve->c);
     const float *tail = &solve->sums[self->model->n_moments + self->model->n_theta]; /* rr, weight */
-    solve->system.residual = tail[0];
+    solve->system.rss = tail[0];
     solve->system.rounding = self->information.rounding;
     solve->system.floor = self->expected * (tail[1] - (float)self->model->n_p);
     solve->system.weight = tail[1];
@@ -285,8 +285,8 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
     if (self->settings.engine == PVID_ENGINE_DIRECT) {
         solve->stage = STAGE_DIRECT;
     } else if (ends_group) {
-        solve->energy = self->energy;
-        self->energy = 0.0f;
+        solve->group_rss = self->group_rss;
+        self->group_rss = 0.0f;
         self->group_weight = 0.0f;
         solve->gain = self->settings.gain;
         solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_READ : STAGE_FOLD);
@@ -386,8 +386,9 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
         kappa_stage(self, solve);
         break;
     case STAGE_WIDEN:
+        pvid_assess_widen_f32(&solve->system, &self->settings, wide);
         solve->solvable =
-            pvid_assess_factor_f32(&solve->system, &self->settings, wide, solve->estimate->covariance, &solve->factor);
+            pvid_cholesky_factor_f32(&solve->factor, self->settings.n_p, (const float (*)[PVID_MAX_P])solve->system.s);
         break;
     case STAGE_INVERT:
         if (solve->solvable) {

@@ -346,8 +346,8 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
     reset_solve(self, solve);
     solve->ends_group = ends_group;
     if (ends_group) {
-        solve->energy = self->energy;
-        self->energy = 0;
+        solve->group_rss = self->group_rss;
+        self->group_rss = 0;
         self->group_weight = 0;
         solve->gain = self->settings.gain;
         solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_MATRIX : STAGE_FOLD);

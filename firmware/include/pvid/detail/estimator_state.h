@@ -33,9 +33,9 @@ typedef struct {
 typedef struct {
     float s[PVID_MAX_P][PVID_MAX_P]; /* S [n_p][n_p], for a step S + H0; upper triangle */
     float force[PVID_MAX_P];         /* F [n_p] */
-    float residual;                  /* sum of squared residuals of the rows in the sums [units of Y^2] */
+    float rss;                       /* residual sum of squares of the rows in the sums [units of Y^2] */
     float rounding;                  /* bound of its rounding error [units of Y^2] */
-    float floor;                     /* lower limit of residual + rounding [units of Y^2] */
+    float floor;                     /* lower limit of rss + rounding [units of Y^2] */
     float weight;                    /* rows in the sums */
 } pvid_system_f32;
 
@@ -48,8 +48,8 @@ struct pvid_estimator_f32 {
     float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
     pvid_solve_settings_f32 settings;
     float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; the weak form writes it */
-    float energy;                   /* sum of e^2 of the rows of the current group, each at the p of its tick */
-    float group_weight; /* their weight; energy and group_weight only for models without their own project */
+    float group_rss;                /* sum of e^2 of the rows of the current group, each at the p of its tick */
+    float group_weight; /* their weight; group_rss and group_weight only for models without their own project */
     float expected;     /* mean over the rows in the sums of their variance by the sensors' noise [units of Y^2]: lower
                            limit of the residual variance. 0: unknown */
     uint16_t divider;
@@ -66,14 +66,14 @@ typedef struct {
     float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
 } pvid_cholesky_f32;
 
-/* A solve or an assessment in progress; the caller owns it. Read reason, size, energy and above_noise when it is
+/* A solve or an assessment in progress; the caller owns it. Read reason, size, group_rss and above_noise when it is
  * complete. The caller may set fallback after begin. */
 struct pvid_estimator_solve_f32 {
     pvid_reason reason;
     const float *fallback;       /* [n_p] value of p if no step is allowed; NULL: p is unchanged */
     pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
     float size;                  /* largest |dp/p| of the step before step_limit; 0 if p is held */
-    float energy;                /* sum of e^2 of the group's rows, each at the p of its tick */
+    float group_rss;             /* sum of e^2 of the group's rows, each at the p of its tick */
     float variance;              /* of a row: row_sd^2 in a solve, s^2 of the residuals in an assessment */
     bool above_noise;            /* S contains more information than noise alone */
     bool solvable;               /* of an assessment: S could be factored */

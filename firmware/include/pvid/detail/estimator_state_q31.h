@@ -62,7 +62,7 @@ struct pvid_estimator_q31 {
     int16_t c_exponent[PVID_MAX_C_Q31]; /* C_k 2^c_exponent: units of Y per N and p */
     pvid_solve_settings_q31 settings;
     pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; the weak form writes it */
-    int64_t energy; /* sum of e^2 of the rows of the current group, each at the p of its tick, at most PVID_WIDE */
+    int64_t group_rss; /* sum of e^2 of the rows of the current group, each at the p of its tick, at most PVID_WIDE */
     int64_t group_weight;     /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them
                                  [units of Y's integer squared]: residual variances are at least this. 0: not set */
@@ -105,7 +105,7 @@ typedef struct {
     pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
 } pvid_inverse_q31;
 
-/* A solve or an assessment in progress; the caller owns it. Read reason, size, energy and above_noise when it is
+/* A solve or an assessment in progress; the caller owns it. Read reason, size, group_rss and above_noise when it is
  * complete. The caller may set fallback after begin. */
 struct pvid_estimator_solve_q31 {
     pvid_reason reason;
@@ -119,7 +119,7 @@ struct pvid_estimator_solve_q31 {
     bool in_dead_zone;            /* within the dead zone: no step is taken */
     int32_t fallback[PVID_MAX_P]; /* value of p if no step is allowed */
     int64_t size;                 /* largest |dp/p| of the step before step_limit, Q22; 0 if p is held */
-    int64_t energy;               /* sum of e^2 of the group's rows, each at the p of its tick */
+    int64_t group_rss;            /* sum of e^2 of the group's rows, each at the p of its tick */
     pvid_scaled_q31 variance;     /* of a row, divided by 4^exponent as the sums are */
     pvid_inverse_q31 inverse;
     int32_t gain;

@@ -237,7 +237,9 @@ class Model:
         used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
         for one in self.unknowns:
             if one.symbol not in used:
-                raise ModelError(f"no row contains the unknown {one.name}: nothing tells it")
+                raise ModelError(
+                    f"no row contains the unknown {one.name}, so that it cannot be identified: declare it as known"
+                )
         plain = {jet: value for jet, value in self.defined.items() if jet not in integrals}
         simulated = [_inserted(one.expression, plain) for one in self.equations]
         simulated += [jet.d() - rates[jet.of] for jet in integrals]

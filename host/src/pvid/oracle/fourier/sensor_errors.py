@@ -29,7 +29,7 @@ Kind = Literal["delay", "play", "eccentric", "gain"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
-_MOVES = 2.0
+_MOVES = 1.0
 
 # An encoder shows an eccentricity only where it turns by this much [rad].
 _TURNS = 2.0
