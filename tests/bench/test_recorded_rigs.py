@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from bench import recorded_rigs
 from bench.recordings import PIECES, SOURCES, Source
 from pvid.models.drive import Sines
 from pvid.models.simulated_rig import SimulatedRig
-from pvid.rig.run import Recording
+from pvid.rig.run import Recording, write_recording
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
 
@@ -84,6 +85,28 @@ def test_real_rig_is_identified_and_its_other_run_predicted(source: Source) -> N
         assert all(predicted[name].r2 > theirs[name].r2 for name in predicted)
     apart = {name for name, clash in zip(found.model.p_names, found.clash(), strict=True) if clash > 4.0}
     assert apart <= {"o1", "o2", "o"} or any(one.alarms for one in found.estimates)
+
+
+def test_run_that_does_not_show_the_mechanism_raises_its_alarm() -> None:
+    if not (RECORDINGS / SINGLE.name).is_dir():
+        pytest.skip("the recordings are not part of this repository: see tests/data/recordings/README.md")
+    rows = recorded_rigs.trap_rows(SINGLE, RECORDINGS)
+    assert [row[1] for row in rows] == ["attenuation", "feedback"]
+    assert all(row[1] in row[2].split(", ") for row in rows)
+
+
+def test_torque_that_is_a_law_of_the_angle_is_taken_for_feedback(tmp_path: Path) -> None:
+    """Held weight: the torque is that of gravity at the measured angle, and the angle is moved by hand."""
+    t = np.arange(3750) / 250.0
+    q = 1.2 * np.sin(2 * np.pi * 0.3 * t) + 0.4 * np.sin(2 * np.pi * 0.7 * t)
+    noisy = q + np.random.default_rng(1).normal(0.0, 2e-4, q.size)
+    held = Recording(t, {"q": noisy, "tau": 3.3 * np.sin(noisy)}, 250.0)
+    for trap in SINGLE.traps:
+        path = tmp_path / SINGLE.name / f"{trap}.csv.gz"
+        path.parent.mkdir(exist_ok=True)
+        write_recording(path, held, SINGLE.channels)
+    for row in recorded_rigs.trap_rows(SINGLE, tmp_path):
+        assert "feedback" in row[2].split(", ")
 
 
 def test_every_source_has_a_design() -> None:

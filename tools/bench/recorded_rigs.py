@@ -33,6 +33,8 @@ PREDICTIONS = (
 )
 VERDICTS = ("rig", "alarms of the first run", "of the second", "beyond 4 s.e. between the runs")
 
+TRAPS = ("rig", "run that must raise", "alarms", "R^2 of the rows", "first parameter")
+
 # Estimates differ by so many standard errors: their difference is not covered.
 CLASH = 4.0
 _SOFT = 0.02  # width of a soft friction [unit of the velocity]
@@ -115,15 +117,20 @@ class Rig:
         return self.replay(1).matches(self.estimates[0].p)
 
 
-def identified(model: CompiledModel, run: Recording, design: Design) -> Estimate:
-    """From all windows of a run."""
-    windows = FourierDesign(
+def windows_of(run: Recording, design: Design) -> FourierDesign:
+    """At a run's rate."""
+    return FourierDesign(
         run.sample_rate,
         design.window_s,
         design.functions,
         decimation=design.decimation,
         rate_taps=design.rate_taps,
     )
+
+
+def identified(model: CompiledModel, run: Recording, design: Design) -> Estimate:
+    """From all windows of a run."""
+    windows = windows_of(run, design)
     if design.sensors_only:
         fit = batch(WeakRows.of(ready(model), run.signals, windows), equation_error=False)
         return Estimate(fit.p, uncertainty(fit).se)
@@ -177,6 +184,20 @@ def verdict_rows(rig: Rig) -> list[tuple[str, ...]]:
     """Rows of the table of alarms."""
     differing = listed([name for name, apart in zip(rig.model.p_names, rig.clash(), strict=True) if apart > CLASH])
     return [(rig.source.name, *(listed(list(one.alarms)) for one in rig.estimates), differing)]
+
+
+def trap_rows(source: Source, folder: Path) -> list[tuple[str, ...]]:
+    """Rows of the table of runs that do not show the mechanism."""
+    rows: list[tuple[str, ...]] = []
+    for trap in source.traps:
+        run = source.load(folder, trap)
+        windows = windows_of(run, DESIGNS[source.name])
+        found = identify(source.model(), run.signals, run.sample_rate, design=windows)
+        alarms: list[str] = [one.name for one in found.verdict.reasons if one.alarm]
+        name, (value, error) = next(iter(found.values.items()))
+        r2 = listed([f"{one:.4f}" for one in found.r2.values()])
+        rows.append((source.name, trap, listed(alarms), r2, f"{name} {value:.3g} +- {error:.1g}"))
+    return rows
 
 
 def listed(names: list[str]) -> str:
