@@ -77,7 +77,7 @@ def in_stages(program: str) -> tuple[str, ...]:
         "-eva-slevel-function",
         "main:200,checks_noise:5,eliminate_part:30,above_noise_stage:30,factor_stage:60,advance_shared:60,solve_stage:30,"
         "pvid_estimator_advance_q31:100,pvid_estimator_assess_advance_q31:100,kappa_stage:60,widen_stage:60,"
-        f"pvid_estimator_invert_q31:20,pvid_cholesky_eliminate_q31:20,{program}:5000",
+        f"pvid_assess_invert_q31:20,pvid_cholesky_eliminate_q31:20,{program}:5000",
     )
 
 

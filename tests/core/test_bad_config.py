@@ -248,7 +248,7 @@ def test_feedback_is_a_rate(shared: dict[str, Subject]) -> None:
     ):
         given = {"feedback_hz": hz, "divider": divider, "law": int(law), "update_rate_hz": 4.0}
         assert subject.status_with({f"estimator.{name}": value for name, value in given.items()}) is Status.OK
-        assert subject.identifier.estimator.gain == gain
+        assert subject.identifier.estimator.settings.gain == gain
 
 
 @pytest.mark.parametrize(("name", "feedback"), (("weak", {"feedback_hz": 0.01}), ("weak q31", {"gain": 2**30 - 1})))
@@ -298,7 +298,7 @@ def test_settings_of_the_weak_form_in_its_units(shared: dict[str, Subject]) -> N
     assert state.pivot_noise == pytest.approx(16.0 / (design.lag * dt) ** 4, rel=1e-6)
     information = state.estimator.information
     assert information.row_weight == pytest.approx((design.functions - 2) / design.functions, rel=1e-6)
-    assert state.estimator.correlation == design.overlap
+    assert state.estimator.settings.correlation == design.overlap
     # groups that long-term trust remembers: those of the forgetting, by its own roundings within a factor 1.5
     assert 64.0 * windows_hz / 1.5 <= state.trust.long_memory <= 64.0 * windows_hz * 1.5
     assert (state.finish.gate.memory, state.finish.gate.floor) == (4.0, 1.0)

@@ -62,7 +62,8 @@ static void check_p_f32(const pvid_estimator_f32 *estimator)
 {
     for (size_t i = 0; i < estimator->model->n_p; i++) {
         const float p = estimator->p[i];
-        require(isfinite(p) && (p >= estimator->lower[i]) && (p <= estimator->upper[i]), "p within its bounds");
+        require(isfinite(p) && (p >= estimator->settings.lower[i]) && (p <= estimator->settings.upper[i]),
+                "p within its bounds");
     }
 }
 
@@ -81,7 +82,7 @@ static void check_estimate_f32(const pvid_estimate_f32 *estimate, size_t n_p)
 static void check_p_q31(const pvid_estimator_q31 *estimator)
 {
     for (size_t i = 0; i < estimator->model->n_p; i++) {
-        require((estimator->p[i] >= estimator->lower[i]) && (estimator->p[i] <= estimator->upper[i]),
+        require((estimator->p[i] >= estimator->settings.lower[i]) && (estimator->p[i] <= estimator->settings.upper[i]),
                 "q31 p within its bounds");
     }
 }

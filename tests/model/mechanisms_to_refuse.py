@@ -103,3 +103,14 @@ def linear_in_nothing() -> Model:
     k, b = unknowns(model, "k:1 b:1/s")
     model.equation(x.d() - b * sin(k * x))
     return model
+
+
+def two_sensors() -> Model:
+    """A second sensor measures k times the first one, so that two frictions look alike: b1 + k b2."""
+    model = Model("two sensors")
+    x, y = (model.sensor(name, "m", resolution=FINE) for name in ("x", "y"))
+    u = model.input("u", "N", hold="zoh")
+    k, b1, b2, m = unknowns(model, "k:1 b1:N*s/m b2:N*s/m m:kg")
+    model.equation(y - k * x)
+    model.equation(m * x.d(2) + b1 * x.d() + b2 * y.d() - u)
+    return model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mechanisms_to_refuse import arm, cart, cell, free_pendulum, motor, squares, two_sums
+from mechanisms_to_refuse import arm, cart, cell, free_pendulum, motor, squares, two_sensors, two_sums
 
 from pvid.model import Model
 from pvid.model.identifiability import Identifiability, identifiable
@@ -63,6 +63,14 @@ def test_sin_squared_plus_cos_squared_is_one() -> None:
     assert (found.rank, found.unknowns) == (2, 3)
     assert len(squares().compiled().rows[0].theta) == 2
     assert {str(one) for one in found.shifts[0].combinations} == {"a + c", "b + c"}
+
+
+def test_a_relation_between_rows_is_found() -> None:
+    """d theta / d p has full rank, but along solutions y' is k x'."""
+    found = judged(two_sensors())
+    assert (found.rank, found.unknowns) == (3, 4)
+    assert set(found.unidentifiable) == {"b1", "b2"}
+    assert "b1 and b2 change together" in verdict(found)
 
 
 def test_a_cart_without_sensor_is_identifiable() -> None:

@@ -35,11 +35,11 @@ static inline void any_parameters(pvid_estimator_q31 *self)
     for (size_t a = 0; a < self->model->n_p; a++) {
         const int32_t least = (((self->model->positive >> a) & 1u) != 0u) ? 1 : -INT32_MAX;
         self->p[a] = any_i32(least, INT32_MAX);
-        self->lower[a] = any_i32(least, INT32_MAX);
-        self->upper[a] = any_i32(least, INT32_MAX);
-        self->start_sd[a] = any_i32(1, INT32_MAX);
-        self->prior[a] = any_i32(0, INT32_MAX);
-        self->prior_exponent[a] = (int16_t)any_i32(-200, 200);
+        self->settings.lower[a] = any_i32(least, INT32_MAX);
+        self->settings.upper[a] = any_i32(least, INT32_MAX);
+        self->settings.start_sd[a] = any_i32(1, INT32_MAX);
+        self->settings.prior[a] = any_i32(0, INT32_MAX);
+        self->settings.prior_exponent[a] = (int16_t)any_i32(-200, 200);
     }
 }
 
@@ -64,18 +64,20 @@ static inline void any_state(const pvid_model_q31 *model, pvid_estimator_q31 *se
     any_sums(model, &self->information);
     any_parameters(self);
     any_formats(self);
-    self->row_sd = any_i32(1, INT32_MAX);
-    self->gain = any_i32(0, PVID_ONE_Q30);
-    self->correlation = any_u32((uint32_t)1 << 16, (uint32_t)1 << 31);
-    self->step_limit = any_u32(1, 58982);
-    self->kappa_min = any_i32(0, PVID_ONE_Q30);
-    self->noise_margin = any_u32(0, (uint32_t)1 << 30);
-    self->dead_zone = any_u32(0, (uint32_t)100 << 16);
+    self->settings.n_p = model->n_p;
+    self->settings.positive = (uint8_t)model->positive;
+    self->settings.row_sd = any_i32(1, INT32_MAX);
+    self->settings.gain = any_i32(0, PVID_ONE_Q30);
+    self->settings.correlation = any_u32((uint32_t)1 << 16, (uint32_t)1 << 31);
+    self->settings.step_limit = any_u32(1, 58982);
+    self->settings.kappa_min = any_i32(0, PVID_ONE_Q30);
+    self->settings.noise_margin = any_u32(0, (uint32_t)1 << 30);
+    self->settings.dead_zone = any_u32(0, (uint32_t)100 << 16);
     for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
         self->noise[i].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
         self->noise[i].e = any_i32(-2000, 2000);
     }
-    self->energy = any_i64(0, PVID_WIDE);
+    self->group_rss = any_i64(0, PVID_WIDE);
     self->group_weight = any_i64(0, PVID_WIDE);
     self->expected.m = any_i32(0, PVID_ONE_Q30);
     self->expected.e = any_i32(-2000, 2000);

@@ -2,7 +2,6 @@
 #ifndef ESTIMATOR_CONTRACTS_H
 #define ESTIMATOR_CONTRACTS_H
 
-#include "solve/assess_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "pvid/gate_q31.h"
@@ -33,8 +32,8 @@ void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t 
 int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self);
 
 /*@ requires \valid(self) && \valid(solve);
-    assigns solve->energy \from \nothing;
-    ensures 0 <= solve->energy <= 0x4000000000000000; */
+    assigns solve->group_rss \from \nothing;
+    ensures 0 <= solve->group_rss <= 0x4000000000000000; */
 void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group);
 
 /*@ requires \valid(self) && \valid(solve);

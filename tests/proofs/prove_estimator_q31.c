@@ -18,11 +18,11 @@ static void any_configuration(const pvid_model_q31 *model, uint8_t placed)
     for (size_t a = 0; a < model->n_p; a++) {
         /*@ assert -0x7FFFFFFF <= estimator.p[a]; */
         if (((model->positive >> a) & 1u) != 0u) {
-            /*@ assert 1 <= estimator.lower[a] && 1 <= estimator.p[a]; */
+            /*@ assert 1 <= estimator.settings.lower[a] && 1 <= estimator.p[a]; */
         }
-        /*@ assert 1 <= estimator.start_sd[a]; */
-        /*@ assert 0 <= estimator.prior[a]; */
-        /*@ assert -200 <= estimator.prior_exponent[a] <= 200; */
+        /*@ assert 1 <= estimator.settings.start_sd[a]; */
+        /*@ assert 0 <= estimator.settings.prior[a]; */
+        /*@ assert -200 <= estimator.settings.prior_exponent[a] <= 200; */
     }
     for (size_t i = 0; i < model->n_theta; i++) {
         /*@ assert -EXPONENT_BOUND <= estimator.theta_bits[i] <= EXPONENT_BOUND; */
@@ -34,13 +34,13 @@ static void any_configuration(const pvid_model_q31 *model, uint8_t placed)
     for (size_t k = 0; k < model->n_c; k++) {
         /*@ assert -EXPONENT_BOUND <= estimator.c_exponent[k] <= EXPONENT_BOUND; */
     }
-    /*@ assert 1 <= estimator.row_sd; */
-    /*@ assert 0 <= estimator.gain <= 0x40000000; */
-    /*@ assert 0x10000 <= estimator.correlation <= 0x80000000; */
-    /*@ assert 1 <= estimator.step_limit <= 58982; */
-    /*@ assert 0 <= estimator.kappa_min <= 0x40000000; */
-    /*@ assert estimator.noise_margin <= 0x40000000; */
-    /*@ assert estimator.dead_zone <= 0x640000; */
+    /*@ assert 1 <= estimator.settings.row_sd; */
+    /*@ assert 0 <= estimator.settings.gain <= 0x40000000; */
+    /*@ assert 0x10000 <= estimator.settings.correlation <= 0x80000000; */
+    /*@ assert 1 <= estimator.settings.step_limit <= 58982; */
+    /*@ assert 0 <= estimator.settings.kappa_min <= 0x40000000; */
+    /*@ assert estimator.settings.noise_margin <= 0x40000000; */
+    /*@ assert estimator.settings.dead_zone <= 0x640000; */
     /*@ assert 1 <= estimator.divider; */
     /*@ assert 1 <= estimator.information.block <= 64 && 1 <= estimator.information.retention; */
 }
@@ -54,7 +54,7 @@ static void any_row(const pvid_model_q31 *model)
         n[i] = any_i32(INT32_MIN, INT32_MAX);
     }
     (void)pvid_estimator_add_q31(&estimator, n, any_i32(INT32_MIN, INT32_MAX));
-    /*@ assert 0 <= estimator.energy <= 0x4000000000000000; */
+    /*@ assert 0 <= estimator.group_rss <= 0x4000000000000000; */
     /*@ assert 0 <= estimator.information.sums[estimator.information.n_sums - 2]; */
 }
 

@@ -24,20 +24,20 @@ static void any_row(uint16_t left)
     /*@ assert 1 <= misfit.block && 1 <= misfit.left; */
     /*@ assert 0 <= misfit.growth.m <= 0x40000000; */
     const int64_t rows = (int64_t)PVID_MISFIT_FEW - 1 - (left - 1u) % PVID_MISFIT_FEW; /* not yet added up */
-    misfit.few_energy = any_i64(0, rows * SQUARE_MAX);
+    misfit.few_rss = any_i64(0, rows * SQUARE_MAX);
     misfit.few_signal = any_i64(0, rows * SQUARE_MAX);
-    misfit.energy = any_sum();
+    misfit.rss = any_sum();
     misfit.signal = any_sum();
-    misfit.least_energy = any_sum();
+    misfit.least_rss = any_sum();
     misfit.least_part = any_sum();
     misfit.left = left;
     if (pvid_misfit_add_q31(&misfit, any_i64(0, SQUARE_MAX), any_i64(-INT64_MAX, INT64_MAX - 1))) {
-        misfit.energy = any_sum();
+        misfit.rss = any_sum();
         misfit.signal = any_sum();
         (void)pvid_misfit_judge_q31(&misfit);
-        /*@ assert misfit.few_energy == 0 && misfit.few_signal == 0; */
+        /*@ assert misfit.few_rss == 0 && misfit.few_signal == 0; */
     } else {
-        /*@ assert 0 <= misfit.few_energy <= (rows + 1) * SQUARE_MAX; */
+        /*@ assert 0 <= misfit.few_rss <= (rows + 1) * SQUARE_MAX; */
         /*@ assert 0 <= misfit.few_signal <= (rows + 1) * SQUARE_MAX; */
     }
     /*@ assert 1 <= misfit.left; */

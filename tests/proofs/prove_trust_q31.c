@@ -17,7 +17,7 @@ static void any_estimator(const pvid_model_q31 *model)
     estimator.information.retention = any_i32(1, INT32_MAX);
     for (size_t a = 0; a < PVID_MAX_P; a++) {
         estimator.p[a] = any_i32(-INT32_MAX, INT32_MAX);
-        estimator.start_sd[a] = any_i32(1, INT32_MAX);
+        estimator.settings.start_sd[a] = any_i32(1, INT32_MAX);
     }
     Frama_C_make_unknown((char *)&estimator.counters, sizeof estimator.counters);
 }

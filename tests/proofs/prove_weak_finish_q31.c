@@ -29,7 +29,7 @@ static void any_estimator(void)
         estimator.align[i] = (int16_t)any_i32(-1000, 1000);
     }
     estimator.model = any_bool() ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;
-    estimator.row_sd = any_i32(1, INT32_MAX);
+    estimator.settings.row_sd = any_i32(1, INT32_MAX);
     estimator.counters.rejected_outlier = any_u32(0, UINT32_MAX);
 }
 
@@ -58,7 +58,7 @@ static void any_state(void)
     finish.length.k = (uint8_t)any_u32(0, 30);
     finish.whitened = any_bool();
     finish.saturated = any_bool();
-    finish.energy = any_i64(0, PVID_WIDE);
+    finish.rss = any_i64(0, PVID_WIDE);
     finish.size = any_i64(0, PVID_WIDE);
     finish.expected = any_scaled(1);
     finish.fade_factor = any_i32(0, INT32_MAX);

@@ -39,7 +39,7 @@ pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pv
     ensures 0 <= \result <= 100;
     ensures \result == 0 || \result >= 1;
     ensures \result == 0 ==> \initialized(&self->information.exponent) && self->information.exponent == 0;
-    ensures \result == 0 ==> \initialized(&self->row_sd) && 1 <= self->row_sd; */
+    ensures \result == 0 ==> \initialized(&self->settings.row_sd) && 1 <= self->settings.row_sd; */
 pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config);
 
 /*@ requires -0x10000000 <= e <= 0x10000000 && 0 <= square <= 0x100000000000000;
@@ -60,7 +60,7 @@ bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitiv
 bool pvid_misfit_judge_q31(pvid_misfit_q31 *self);
 
 /* Any state that prove_estimator_solve_q31.c takes. */
-/*@ assigns \result, *self \from self->row_sd; */
+/*@ assigns \result, *self \from self->settings.row_sd; */
 pvid_reason pvid_estimator_update_q31(pvid_estimator_q31 *self);
 
 #endif

@@ -87,5 +87,15 @@ def test_estimator_contains_nothing_of_the_mechanism() -> None:
         assert "kapitza" not in path.read_text(encoding="utf-8").lower(), path.name
 
 
+def test_step_and_assessment_are_pure() -> None:
+    """They take normal equations and settings alone: no estimator, no model, no counter, no memory of their own."""
+    for path in [*SRC.glob("solve/step_*.[ch]"), *SRC.glob("solve/assess_*.[ch]")]:
+        text = path.read_text(encoding="utf-8")
+        found = re.findall(
+            r"pvid_estimator_\w+|pvid_model_\w+|pvid_counters|pvid_count_\w+|^static (?!inline)\w+ \w+ =", text, re.M
+        )
+        assert found == [], path.name
+
+
 def test_a_circle_is_found() -> None:
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [["b", "c"], ["b", "c"]]

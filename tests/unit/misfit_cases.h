@@ -44,8 +44,8 @@ static void three_times_the_quietest_in_both_is_a_misfit(void **state)
     assert_true(block(0.01733, 1.0));  /* 3.003 times */
     assert_true(block(0.0176, 1.0));
     assert_true(block(0.0176, 1.0));  /* the quietest stays the quietest */
-    assert_false(block(0.0176, 1.1)); /* 3.1 times the energy, 2.6 times the part */
-    assert_false(block(0.0170, 0.5)); /* 2.9 times the energy, 11.6 times the part */
+    assert_false(block(0.0176, 1.1)); /* 3.1 times the residual, 2.6 times the part */
+    assert_false(block(0.0170, 0.5)); /* 2.9 times the residual, 11.6 times the part */
     assert_false(block(0.1, 10.0));   /* a larger drive: the part is the same */
 }
 
@@ -74,7 +74,7 @@ static void no_signal_gives_no_verdict(void **state)
     assert_false(block(1.0, 0.0));
     assert_false(block(0.01, 1.0)); /* still the first that teaches */
     assert_false(block(0.0, 0.0));
-    assert_false(block(0.01, 0.4)); /* the quietest is not silence: 1 times the energy */
+    assert_false(block(0.01, 0.4)); /* the quietest is not silence: 1 times the residual */
 }
 
 /* Of a verdict whose measure grows by 1.1 a block. */

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "solve/assess_f32.h"
+#include "solve/staged_f32.h"
 #include "solve/state_f32.h"
 #include "pvid/pvid.h"
 

@@ -59,20 +59,20 @@ static void accumulate_of(const float row[], float y, const float high[], float 
 static float project_of(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[])
 {
     size_t at = 0;
-    float energy = 0.0f;
+    float rss_minus_yy = 0.0f;
     for (size_t i = 0; i < n; i++) {
         f[i] = b[i];
-        energy -= 2.0f * (p[i] * b[i]);
+        rss_minus_yy -= 2.0f * (p[i] * b[i]);
     }
     for (size_t i = 0; i < n; i++) {
         for (size_t j = i; j < n; j++) {
             s[i][j] = m[at++];
             f[i] -= s[i][j] * p[j];
             f[j] -= (i == j) ? 0.0f : (s[i][j] * p[i]);
-            energy += ((i == j) ? 1.0f : 2.0f) * (p[i] * (s[i][j] * p[j]));
+            rss_minus_yy += ((i == j) ? 1.0f : 2.0f) * (p[i] * (s[i][j] * p[j]));
         }
     }
-    return energy;
+    return rss_minus_yy;
 }
 
 static float innovate_of(const float p[], const float row[], float y, float gradient[])

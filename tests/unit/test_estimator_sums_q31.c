@@ -13,6 +13,7 @@
 
 #include "number/count.h"
 #include "solve/assess_q31.h"
+#include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
@@ -201,6 +202,11 @@ static void the_start_weighs_the_same_beside_sums_of_any_size(void **state)
     }
 }
 
+static pvid_scaled_q31 variance_of(const pvid_estimator_q31 *estimator)
+{
+    return pvid_assess_variance_q31(&estimator->information, &estimator->settings, estimator->expected);
+}
+
 /* What is expected of the noise, before there are rows to tell, is in the sums' unit as well. */
 static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
 {
@@ -209,9 +215,9 @@ static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
     assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
     for (uint8_t exponent = 0; exponent < 4u; exponent++) {
         estimator.information.exponent = exponent;
-        const pvid_scaled_q31 expected = pvid_estimator_expected_variance_q31(&estimator);
+        const pvid_scaled_q31 expected = pvid_assess_row_variance_q31(&estimator.settings, exponent);
         assert_true(ldexp((double)expected.m, expected.e) == ldexp(4096.0, -2 * exponent));
-        const pvid_scaled_q31 without_rows = pvid_estimator_variance_q31(&estimator);
+        const pvid_scaled_q31 without_rows = variance_of(&estimator);
         assert_memory_equal(&expected, &without_rows, sizeof expected);
     }
     /* one degree of freedom is enough, less is not: five rows of weight one for four parameters */
@@ -219,10 +225,10 @@ static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
     int64_t *tail = &estimator.information.sums[estimator.information.n_sums - 2u];
     tail[0] = 1000000;
     tail[1] = (int64_t)(PVID_MAX_P + 1) << 16;
-    const pvid_scaled_q31 found = pvid_estimator_variance_q31(&estimator);
+    const pvid_scaled_q31 found = variance_of(&estimator);
     assert_true(ldexp((double)found.m, found.e) == 1000000.0);
     tail[1]--;
-    const pvid_scaled_q31 not_found = pvid_estimator_variance_q31(&estimator);
+    const pvid_scaled_q31 not_found = variance_of(&estimator);
     assert_true(ldexp((double)not_found.m, not_found.e) == 4096.0);
 }
 
@@ -299,7 +305,7 @@ static void a_row_at_its_limit_fits(void **state)
     }
     assert_int_equal(estimator.counters.rows, 2);
     assert_int_equal(estimator.counters.rejected_saturated, 4);
-    assert_int_equal(estimator.energy, (int64_t)2 << 56);
+    assert_int_equal(estimator.group_rss, (int64_t)2 << 56);
     /* what a row says that is already known may be as large, and one more */
     config.start[0] = P_ONE;
     assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
@@ -308,7 +314,7 @@ static void a_row_at_its_limit_fits(void **state)
     n[0] = 1;
     assert_int_equal(pvid_estimator_add_q31(&estimator, n, -PVID_ROW_LIMIT_Q31), PVID_REJECTED_SATURATED);
     assert_int_equal(pvid_estimator_add_q31(&estimator, n, PVID_ROW_LIMIT_Q31), PVID_ACCUMULATED);
-    assert_int_equal(estimator.energy, ((int64_t)PVID_ROW_LIMIT_Q31 - 1) * (PVID_ROW_LIMIT_Q31 - 1));
+    assert_int_equal(estimator.group_rss, ((int64_t)PVID_ROW_LIMIT_Q31 - 1) * (PVID_ROW_LIMIT_Q31 - 1));
 }
 
 static void a_place_is_held_within_the_bounds(void **state)

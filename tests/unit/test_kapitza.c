@@ -157,21 +157,21 @@ static void projection_by_shifts_is_the_dense_product(void **state)
     }
     float s[PVID_MAX_P][PVID_MAX_P];
     float f[PVID_MAX_P];
-    const float energy = model->project(p, sums, &sums[45], s, f);
+    const float rss_minus_yy = model->project(p, sums, &sums[45], s, f);
     paper_theta(t);
     paper_c(c);
     /* ROWS additions, about 30 more roundings to the end: 100 ulp of the sum of absolute terms */
     const double relative = 100.0 * 0x1p-24;
-    double expected_energy = 0.0, largest_energy = 0.0;
+    double expected = 0.0, all_terms = 0.0;
     for (int i = 0; i < N; i++) {
-        expected_energy -= 2.0 * t[i] * b[i];
-        largest_energy += 2.0 * t[i] * b_abs[i];
+        expected -= 2.0 * t[i] * b[i];
+        all_terms += 2.0 * t[i] * b_abs[i];
         for (int j = 0; j < N; j++) {
-            expected_energy += t[i] * m[i][j] * t[j];
-            largest_energy += t[i] * m_abs[i][j] * t[j];
+            expected += t[i] * m[i][j] * t[j];
+            all_terms += t[i] * m_abs[i][j] * t[j];
         }
     }
-    close_to((double)energy, expected_energy, largest_energy, relative);
+    close_to((double)rss_minus_yy, expected, all_terms, relative);
     for (int a = 0; a < 3; a++) {
         double force = 0.0, largest = 0.0;
         for (int i = 0; i < N; i++) {

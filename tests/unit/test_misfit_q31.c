@@ -49,16 +49,16 @@ static void the_squares_of_a_block_add_up(void **state)
     for (int i = 1; i < 200; i++) {
         assert_false(pvid_misfit_add_q31(&misfit, 9, 80));
     }
-    assert_int_equal(pvid_scaled_fixed_q31(misfit.energy, 0), 9 * 136); /* the first eight, and 64 twice */
-    assert_int_equal(misfit.few_energy, 9 * 63);
+    assert_int_equal(pvid_scaled_fixed_q31(misfit.rss, 0), 9 * 136); /* the first eight, and 64 twice */
+    assert_int_equal(misfit.few_rss, 9 * 63);
     assert_true(pvid_misfit_add_q31(&misfit, 9, -80));
-    assert_int_equal(pvid_scaled_fixed_q31(misfit.energy, 0), 9 * 200);
+    assert_int_equal(pvid_scaled_fixed_q31(misfit.rss, 0), 9 * 200);
     assert_int_equal(pvid_scaled_fixed_q31(misfit.signal, 0), 6400 * 200);
     (void)pvid_misfit_judge_q31(&misfit);
     assert_int_equal(misfit.left, 200);
-    assert_int_equal(pvid_scaled_fixed_q31(misfit.least_energy, 0), 9 * 200);
-    assert_int_equal(misfit.energy.m, 0);
-    assert_int_equal(misfit.few_energy, 0);
+    assert_int_equal(pvid_scaled_fixed_q31(misfit.least_rss, 0), 9 * 200);
+    assert_int_equal(misfit.rss.m, 0);
+    assert_int_equal(misfit.few_rss, 0);
     assert_int_equal(misfit.few_signal, 0);
 }
 
@@ -82,9 +82,9 @@ static void growing_scale_stays_in_range(void **state)
     for (int i = 0; i < 400; i++) {
         (void)block(200.0, 0.01);
     }
-    assert_false(pvid_scaled_exceeds_q31(misfit.least_energy, pvid_scaled_of_q31(1, 120)));
-    misfit.least_energy = pvid_scaled_of_q31(1, 120);
-    misfit.least_part = misfit.least_energy;
+    assert_false(pvid_scaled_exceeds_q31(misfit.least_rss, pvid_scaled_of_q31(1, 120)));
+    misfit.least_rss = pvid_scaled_of_q31(1, 120);
+    misfit.least_part = misfit.least_rss;
     assert_false(block(200.0, 0.01)); /* there is no measure yet */
     assert_true(block(200.0, 0.01));
 }
@@ -100,10 +100,10 @@ static void the_largest_rows_do_not_overflow(void **state)
             pvid_misfit_add_q31(&misfit, row_max * row_max, ((rows % 2) == 0) ? INT64_MAX / 2 : -(INT64_MAX / 2)));
     }
     assert_true(pvid_misfit_add_q31(&misfit, row_max * row_max, (int64_t)1 << 31));
-    const pvid_scaled_q31 energy = pvid_scaled_of_q31(65535, 56);
-    assert_int_equal(misfit.energy.e, energy.e);
-    assert_in_range(misfit.energy.m, energy.m - 1200, energy.m); /* 1024 sums, each rounded */
-    assert_int_equal(misfit.signal.e, energy.e + 6);             /* 8^2 of it: held at 2^31 */
+    const pvid_scaled_q31 rss = pvid_scaled_of_q31(65535, 56);
+    assert_int_equal(misfit.rss.e, rss.e);
+    assert_in_range(misfit.rss.m, rss.m - 1200, rss.m); /* 1024 sums, each rounded */
+    assert_int_equal(misfit.signal.e, rss.e + 6);       /* 8^2 of it: held at 2^31 */
     assert_false(pvid_misfit_judge_q31(&misfit));
 }
 

@@ -98,6 +98,29 @@ def bench_tune(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="mechanisms")
+@click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@click.option("--imperfect", default=5, show_default=True, type=click.IntRange(min=0), help="Of each imperfection.")
+@UPDATE
+def bench_mechanisms(chosen: tuple[str, ...], seeds: int, imperfect: int, update: Path | None) -> int:
+    """The shipped mechanisms on simulated rigs, beside the Cramer-Rao bound, and on imperfect rigs."""
+    from bench import mechanisms
+    from pvid.models.mechanisms import names
+
+    unknown = set(chosen) - set(names())
+    if unknown:
+        raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
+    some = chosen or names()
+    cases = sum(mechanisms.number_of_cases(name) for name in some) if imperfect else 0
+    with progress_bar("mechanisms", 2 * seeds * len(some) + imperfect * cases) as advance:
+        tables = mechanisms.tables(some, seeds, imperfect, advance)
+    for marker, header, rows in tables:
+        if rows:
+            put_table(update, marker, markdown(header, rows))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:
@@ -143,6 +166,18 @@ def bench_cell(folder: Path | None, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="compare-methods")
+@UPDATE
+def bench_compare_methods(update: Path | None) -> int:
+    """Weak form, strong form, output error and pysindy's weak form on the shipped mechanisms (needs pysindy)."""
+    from bench import methods
+
+    with progress_bar("methods", len(methods.MECHANISMS) * len(methods.METHODS)) as advance:
+        rows = list(methods.rows(progress=lambda: advance(1)))
+    put_table(update, "compare-methods", markdown(methods.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="recordings")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False))
@@ -166,6 +201,8 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
         ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
     ):
         put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
+    traps = [row for rig in rigs for row in recorded_rigs.trap_rows(rig.source, folder)]
+    put_table(update, "traps", markdown(recorded_rigs.TRAPS, traps))
     return DONE
 
 
@@ -419,3 +456,19 @@ def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
     rows = long.long_table(only)
     put_table(update, "long", markdown(long.HEADER, rows))
     return DONE if all(row[-1] == "passed" for row in rows) else DIFFERENT
+
+
+@bench.command(name="random-models")
+@UPDATE
+@click.option("--count", default=10_000, show_default=True, help="Of models.")
+@click.option("--first", default=0, show_default=True, help="Seed of the first one.")
+def bench_random_models(update: Path | None, count: int, first: int) -> int:
+    """`pvid model check` of random descriptions: a report or one sentence, never a traceback."""
+    from bench import random_models
+
+    with progress_bar("models", count) as advance:
+        tally = random_models.run(range(first, first + count), advance)
+    put_table(update, "random-models", markdown(random_models.HEADER, [tally.row()]))
+    for seed, error in tally.tracebacks[:20]:
+        click.echo(f"pvid: seed {seed}: {error}", err=True)
+    return DIFFERENT if tally.tracebacks else DONE

@@ -7,12 +7,13 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.model.compiled import Signal
+from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.identify import Identified, identify
 from pvid.sim.bound import bound
@@ -20,7 +21,7 @@ from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
-Progress = Callable[[], object]
+Progress = Callable[[int], object]
 
 SEEDS = 20
 OFF = 0.5  # of a start: within +-50 % of the truth
@@ -52,10 +53,18 @@ SHARP = Imperfections("sharp")
 
 @dataclass(frozen=True)
 class Imperfection:
-    """A case of the table of imperfections: its name, and what it is on a rig; None where the rig cannot have it."""
+    """A case of the table of imperfections.
+
+    Attributes
+    ----------
+    name : in words
+    of : what it is on a rig; None where the rig cannot have it
+    gain_sd : that the model declares of what is driven
+    """
 
     name: str
     of: Callable[[RigSimulation], Imperfections | None]
+    gain_sd: float = 0.0
 
 
 def law_of(simulation: RigSimulation) -> Imperfections:
@@ -90,7 +99,9 @@ def _stiction(simulation: RigSimulation) -> Imperfections | None:
 def _on_encoder(key: str, size: float) -> Callable[[RigSimulation], Imperfections | None]:
     def of(simulation: RigSimulation) -> Imperfections | None:
         name = _encoder(simulation)
-        return replace(law_of(simulation), **{key: {name: size}}) if name else None
+        turns = bool(name) and np.ptp(simulation.motion()[name]) > 2.0  # else an eccentricity is part of its zero
+        given: dict[str, Any] = {key: {name: size}}
+        return replace(law_of(simulation), **given) if name and (turns or key == "backlash") else None
 
     return of
 
@@ -102,6 +113,7 @@ CASES = (
     Imperfection("eccentric encoder, 3 LSB", _on_encoder("eccentricity", 3.0)),
     Imperfection("one sensor a sample late", _skew),
     Imperfection("input 1 % larger than recorded", _gain),
+    Imperfection("the same, gain_sd = 1 % declared", _gain, gain_sd=0.01),
 )
 
 
@@ -159,7 +171,8 @@ class Outcome:
     @property
     def warnings(self) -> str:
         """Names of the alarms, with how many of the runs had them."""
-        counts = Counter(reason.name for one in self.found for reason in one.verdict.reasons if reason.alarm)
+        alarms = ({reason.name for reason in one.verdict.reasons if reason.alarm} for one in self.found)
+        counts = Counter(name for names in alarms for name in names)
         return ", ".join(f"{name} {count}/{len(self.found)}" for name, count in counts.most_common()) or "-"
 
     @property
@@ -180,7 +193,13 @@ class Outcome:
 
 
 def identified(
-    name: str, seeds: int, imperfections: Imperfections, *, own_design: bool = False, progress: Progress = int
+    name: str,
+    seeds: int,
+    imperfections: Imperfections,
+    *,
+    own_design: bool = False,
+    gain_sd: float = 0.0,
+    progress: Progress = int,
 ) -> Outcome:
     """Runs 0 to `seeds` - 1 of a mechanism.
 
@@ -188,19 +207,28 @@ def identified(
     ----------
     own_design
         The rig's own design; else the one that the identification chooses on each run.
+    gain_sd
+        That the model declares of what is driven.
     """
     outcome = Outcome(simulation_of(name))
     simulation = outcome.simulation
+    model = declared(name, gain_sd)
     for seed in range(seeds):
         run = simulation.run(seed, imperfections)
         design = design_of(simulation, imperfections) if own_design else None
         begun = time.perf_counter()
-        outcome.found.append(
-            identify(simulation.model, run, simulation.rig.sample_rate, start_of(simulation, seed), design)
-        )
+        outcome.found.append(identify(model, run, simulation.rig.sample_rate, start_of(simulation, seed), design))
         outcome.seconds.append(time.perf_counter() - begun)
-        progress()
+        progress(1)
     return outcome
+
+
+@cache
+def declared(name: str, gain_sd: float) -> CompiledModel:
+    """The model with this error of the gains of what is driven."""
+    model = simulation_of(name).model
+    signals = (replace(one, gain_sd=gain_sd) if one.driven else one for one in model.signals)
+    return replace(model, signals=tuple(signals)) if gain_sd else model
 
 
 def smooth(name: str, seeds: int, progress: Progress = int) -> Outcome:
@@ -249,7 +277,7 @@ def imperfection_rows(name: str, seeds: int, progress: Progress = int) -> Iterat
         imperfections = case.of(simulation)
         if imperfections is None:
             continue
-        outcome = identified(name, seeds, imperfections, progress=progress)
+        outcome = identified(name, seeds, imperfections, gain_sd=case.gain_sd, progress=progress)
         ratio = np.median(np.abs(outcome.errors) / outcome.se, axis=0)
         worst = int(np.argmax(ratio))
         yield (
@@ -262,3 +290,35 @@ def imperfection_rows(name: str, seeds: int, progress: Progress = int) -> Iterat
             outcome.warnings,
             f"{outcome.confident_wrong}/{seeds}",
         )
+
+
+def number_of_cases(name: str) -> int:
+    """Imperfections that a mechanism can have."""
+    simulation = simulation_of(name)
+    return sum(case.of(simulation) is not None for case in CASES)
+
+
+Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
+
+
+def tables(names: tuple[str, ...], seeds: int, imperfect: int, progress: Progress = int) -> list[Table]:
+    """Marker, header and rows of each table of the page."""
+    accuracy, sharp, summary, cases = [], [], [], []
+    for name in names:
+        soft = smooth(name, seeds, progress)
+        accuracy += list(accuracy_rows(name, soft))
+        law = law_of(soft.simulation)
+        chosen = identified(name, seeds, law, progress=progress)
+        sharp += list(accuracy_rows(name, chosen))
+        summary += [
+            summary_row(name, "soft, of known width" if law is SHARP else "none", soft),
+            summary_row(name, "sharp; design chosen" if law is SHARP else "none; design chosen", chosen),
+        ]
+        if imperfect:
+            cases += list(imperfection_rows(name, imperfect, progress))
+    return [
+        ("mechanisms", ACCURACY, accuracy),
+        ("mechanisms-chosen", ACCURACY, sharp),
+        ("mechanisms-summary", SUMMARY, summary),
+        ("imperfections", IMPERFECT, cases),
+    ]

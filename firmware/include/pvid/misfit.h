@@ -1,15 +1,15 @@
 /* pvid/misfit.h - alarm of the strong form: the residuals of the rows are larger than they were.
  *
  * Sums that contain a jolt, or a mechanism that changed under sums without forgetting, give a wrong estimate with
- * small standard errors. The residuals e = Y - N^T theta of later rows show it. They are judged in blocks by their
- * energy and by
+ * small standard errors. The residuals e = Y - N^T theta of later rows show it. They are judged in blocks by
+ * their sum of squares and by
  *
  *   q = sum e^2 / sum (p[0] dY/dp[0])^2
  *
  * Noise in the regressors biases p[0] by about -q (more if other parameters can compensate). A block is a misfit
  * iff
  *   - q > PVID_MISFIT_MOST, or
- *   - both energy and q exceed PVID_MISFIT_TIMES their values in the quietest block (a different drive changes
+ *   - both sum e^2 and q exceed PVID_MISFIT_TIMES their values in the quietest block (a different drive changes
  *     only one of them) and q > PVID_MISFIT_LEAST, the size of the filters' bias, or
  *   - a residual is not finite.
  * The first block only sets the reference; blocks without motion are not judged.

@@ -53,7 +53,7 @@ void pvid_weak_angle_begin_f32(pvid_weak_angle_f32 *self, const float p[])
     for (size_t i = 0; i < PVID_KAPITZA_P; i++) {
         self->p[i] = p[i];
     }
-    self->zero = p[PVID_KAPITZA_C];
+    self->offset = p[PVID_KAPITZA_C];
     self->friction[0] = friction ? p[PVID_KAPITZA_C1] : 0.0f;
     self->friction[1] = friction ? p[PVID_KAPITZA_C2] : 0.0f;
     self->l2 = (p[PVID_KAPITZA_D1] - p[PVID_KAPITZA_D2]) - 1.0f;
@@ -154,7 +154,7 @@ static moment moment_of(pvid_weak_angle_f32 *self)
     const float before = first ? phi : self->ring[place_before(self, place)][PHI];
     const float rate = (after - before) / (first ? self->dt : (2.0f * self->dt));
     const float g = self->p[PVID_KAPITZA_W] + self->ring[place][U];
-    const float angle = phi - self->zero;
+    const float angle = phi - self->offset;
     const float force = g * angle;
     const float t = self->dt * ((float)self->index - (0.5f * (float)(self->window - 1u)));
     const float i2 = integrate(&self->motion, self->dt, first, force);

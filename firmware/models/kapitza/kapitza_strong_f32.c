@@ -10,7 +10,7 @@
 #include "kapitza_sums_f32.h"
 #include "number/unroll.h"
 #include "solve/row_f32.h"
-#include "solve/step_f32.h"
+#include "solve/commit.h"
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
@@ -103,11 +103,11 @@ pvid_reason pvid_kapitza_take_row_f32(pvid_estimator_f32 *self, const float n[],
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
-    if (self->gain < 1.0f) {
+    if (self->settings.gain < 1.0f) {
         pvid_row_accumulate_innovation_f32(self, PVID_KAPITZA_P, gradient, e);
     }
     pvid_count_up(&self->counters.rows);
-    if (ends_group && pvid_estimator_is_due_f32(self)) {
+    if (ends_group && pvid_solve_is_due(&self->phase, self->divider)) {
         reason = pvid_kapitza_solve_f32(self, n, y);
     } else {
         pvid_kapitza_add_f32(n, y, self->information.high, self->information.low);

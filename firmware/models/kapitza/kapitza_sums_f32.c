@@ -115,7 +115,7 @@ static inline void add_linear(const float n[], float y, const float high[], floa
     sums[1] = plus(&high[B + PVID_N_E], &low[B + PVID_N_E], y * n[PVID_N_E]);
 }
 
-static inline void add_energy(float y, float low[])
+static inline void add_yy_and_weight(float y, float low[])
 {
     low[YY] += y * y;
     low[WEIGHT] += 1.0f;
@@ -134,7 +134,7 @@ void pvid_kapitza_accumulate_f32(const float n[], float y, const float high[], f
     add_linear(n, y, high, low, &sums[B]);
     add_to_phi2(B + PVID_N_PHI2, y, n, high, low, &sums[B + PVID_N_PHI2]);
     add_to_phi0(B + PVID_N_PHI0, y, n, high, low, &sums[B + PVID_N_PHI0]);
-    add_energy(y, low);
+    add_yy_and_weight(y, low);
     sums[YY] = high[YY] + low[YY];
     sums[WEIGHT] = high[WEIGHT] + low[WEIGHT];
 }
@@ -208,7 +208,7 @@ PVID_ALWAYS_INLINE void add_and_shift(float w, const float n[], float y, const f
     add_linear(n, y, high, low, l);
     out->y_a = l[0];
     out->y_e = l[1];
-    add_energy(y, low);
+    add_yy_and_weight(y, low);
     float a2[4];
     add_to_phi2(A_PHI2, n[PVID_N_A], n, high, low, a2);
     out->a2 = shift_2(a2, c.r2, w);
@@ -229,7 +229,7 @@ PVID_ALWAYS_INLINE void add_and_shift(float w, const float n[], float y, const f
     out->y0 = shift_3(y0, c.r3, w);
 }
 
-/* S, F and the energy of model.h from the shifted sums. */
+/* S, F and the returned number of model.h from the shifted sums. */
 PVID_ALWAYS_INLINE float combine(const float p[], const shifted_sums *m, float s[][PVID_MAX_P], float f[])
 {
     const float w = p[W];

@@ -13,7 +13,7 @@ float pvid_kapitza_project_f32(const float p[], const float m[], const float b[]
 /* `accumulate`, whatever the sums are then. */
 void pvid_kapitza_add_f32(const float n[], float y, const float high[], float low[]);
 
-/* Both in one, without the energy, with the same bits: no sum is written out and read again. */
+/* Both in one, without the returned number, with the same bits: no sum is written out and read again. */
 void pvid_kapitza_absorb_f32(const float p[restrict], const float n[restrict], float y, const float high[restrict],
                              float low[restrict], float s[restrict][PVID_MAX_P], float f[restrict]);
 

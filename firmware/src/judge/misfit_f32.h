@@ -17,7 +17,7 @@ bool pvid_misfit_judge_f32(pvid_misfit_f32 *self);
  * which must then be judged. */
 static inline bool pvid_misfit_add_f32(pvid_misfit_f32 *self, float e, float sensitivity)
 {
-    self->energy += e * e;
+    self->rss += e * e;
     self->signal += sensitivity * sensitivity;
     self->left--;
     return self->left == 0u;

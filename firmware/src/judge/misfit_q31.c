@@ -23,7 +23,7 @@ static const pvid_scaled_q31 growth_max = {(int32_t)1 << 29, -28};
 static void begin_block(pvid_misfit_q31 *self)
 {
     const pvid_scaled_q31 nothing = {0, 0};
-    self->energy = nothing;
+    self->rss = nothing;
     self->signal = nothing;
     self->left = self->block;
 }
@@ -40,9 +40,9 @@ void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t 
         const pvid_scaled_q31 growth = pvid_scaled_plus_q31(self->growth, part);
         self->growth = pvid_scaled_exceeds_q31(growth, growth_max) ? growth_max : growth;
     }
-    self->few_energy = 0;
+    self->few_rss = 0;
     self->few_signal = 0;
-    self->least_energy = unknown;
+    self->least_rss = unknown;
     self->least_part = unknown;
     self->block = (uint16_t)((drive_ticks <= (ROWS_MAX / BLOCK_S)) ? (BLOCK_S * drive_ticks) : ROWS_MAX);
     begin_block(self);
@@ -52,14 +52,14 @@ bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitiv
 {
     const int32_t clamped =
         (int32_t)pvid_clamp_q31(pvid_round_shift_q31(sensitivity, SENSITIVITY_SHIFT), SENSITIVITY_LIMIT);
-    self->few_energy += square;
+    self->few_rss += square;
     self->few_signal += pvid_square_q31(clamped);
     self->left--;
     if ((self->left % PVID_MISFIT_FEW) == 0u) {
-        self->energy = pvid_scaled_plus_q31(self->energy, pvid_scaled_of_q31(self->few_energy, 0));
+        self->rss = pvid_scaled_plus_q31(self->rss, pvid_scaled_of_q31(self->few_rss, 0));
         self->signal =
             pvid_scaled_plus_q31(self->signal, pvid_scaled_of_q31(self->few_signal, 2 * (int32_t)SENSITIVITY_SHIFT));
-        self->few_energy = 0;
+        self->few_rss = 0;
         self->few_signal = 0;
     }
     return self->left == 0u;
@@ -75,7 +75,7 @@ static pvid_scaled_q31 least_of(pvid_scaled_q31 so_far, pvid_scaled_q31 growth, 
 
 static bool is_larger(const pvid_misfit_q31 *self, pvid_scaled_q31 part)
 {
-    return pvid_scaled_exceeds_q31(self->energy, pvid_scaled_times_q31(times, self->least_energy)) &&
+    return pvid_scaled_exceeds_q31(self->rss, pvid_scaled_times_q31(times, self->least_rss)) &&
            pvid_scaled_exceeds_q31(part, pvid_scaled_times_q31(times, self->least_part)) &&
            pvid_scaled_exceeds_q31(part, least);
 }
@@ -85,10 +85,10 @@ bool pvid_misfit_judge_q31(pvid_misfit_q31 *self)
     PVID_ASSERT(self != NULL);
     bool misfit = false;
     if (self->signal.m > 0) {
-        const pvid_scaled_q31 part = pvid_scaled_over_q31(self->energy, self->signal);
+        const pvid_scaled_q31 part = pvid_scaled_over_q31(self->rss, self->signal);
         const bool has_reference = pvid_scaled_exceeds_q31(unknown, self->least_part);
         misfit = has_reference && (is_larger(self, part) || pvid_scaled_exceeds_q31(part, most));
-        self->least_energy = least_of(self->least_energy, self->growth, self->energy);
+        self->least_rss = least_of(self->least_rss, self->growth, self->rss);
         self->least_part = least_of(self->least_part, self->growth, part);
     }
     begin_block(self);

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "number/count.h"
-#include "solve/assess_f32.h"
+#include "solve/staged_f32.h"
 #include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
@@ -63,8 +63,8 @@ static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 
 {
     memcpy(estimate->p, estimator->p, sizeof estimate->p);
     for (size_t a = 0; a < estimator->model->n_p; a++) {
-        estimate->se[a] = estimator->start_sd[a];
-        estimate->covariance[a][a] = estimator->start_sd[a] * estimator->start_sd[a];
+        estimate->se[a] = estimator->settings.start_sd[a];
+        estimate->covariance[a][a] = estimator->settings.start_sd[a] * estimator->settings.start_sd[a];
     }
 }
 

@@ -77,7 +77,7 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
     self->long_memory = (uint16_t)((clamped < PVID_TRUST_LONG) ? PVID_TRUST_LONG : clamped);
     pvid_trust_place_q31(self, estimator);
     for (size_t a = 0; a < estimator->model->n_p; a++) {
-        self->estimate.se[a] = estimator->start_sd[a];
+        self->estimate.se[a] = estimator->settings.start_sd[a];
         self->estimate.correlation[a][a] = PVID_ONE_Q30;
     }
     self->copy = self->estimate;

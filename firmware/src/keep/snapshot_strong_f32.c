@@ -22,7 +22,7 @@ static const uint32_t layout[] = {
     PLACE(estimator.information.low),
     PLACE(estimator.p),
     PLACE(estimator.innovation),
-    PLACE(estimator.gain),
+    PLACE(estimator.settings.gain),
     PLACE(estimator.counters),
     PVID_MAX_WINDOW,
     PVID_MAX_P,

@@ -1,56 +1,50 @@
-/* Accuracy of p from S and the residuals, for both engines. Private to the core. */
+/* Accuracy of p from the normal equations: residual variance, kappa, standard errors. Pure: the results depend on the
+ * arguments alone. Private to the core.
+ *
+ *   pvid_assess_f32(&system, &settings, &estimate);     at once; the parts below serve an engine that works in
+ * stages
+ */
 #ifndef PVID_ASSESS_F32_H
 #define PVID_ASSESS_F32_H
 
+#include <stdbool.h>
+#include <stddef.h>
+
 #include "solve/cholesky_f32.h"
-#include "solve/state_f32.h"
-
-/* Returns whether S contains more information than noise: S - noise_margin Sn is positive definite, where Sn is the
- * information of noise of the given variance alone. True if the model has no `noise`. s: upper triangle of C^T M C
- * [n_p][n_p]. Cost: a factorisation. */
-bool pvid_estimator_is_above_noise_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P], float variance,
-                                       float weight);
-
-/* Whether p is within the dead zone of estimator.h; force: F [n_p]; factor: of S + H0; variance: of the residuals.
- * False for NaN. Cost: a solve. */
-bool pvid_estimator_is_in_dead_zone_f32(const pvid_estimator_f32 *self, const pvid_cholesky_f32 *factor,
-                                        const float force[], float variance);
+#include "pvid/estimator.h"
 
 /* Upper limit of a residual sum, which may overflow far from the solution: standard errors from it are finite. */
 #define PVID_RESIDUAL_MAX 1.0e30f
 
-/* s^2 of a row: the residual sum of squares, at least `floor`, over the degrees of freedom; row_sd^2 if there are none.
- * The residual sum of squares is yy + energy, with energy = theta^T M theta - 2 theta^T B from `project` (model.h), or
- * rr with energy 0. */
-float pvid_estimator_variance_f32(const pvid_estimator_f32 *self, const float sums[], float energy, float floor);
+/* s^2 of a row [units of Y^2]: the residual sum of squares with its rounding, at least `floor`, over the degrees of
+ * freedom; row_sd^2 if there is none. Cost: a division. */
+float pvid_assess_variance_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings);
 
-/* Degrees of freedom of the residuals in these sums. */
-static inline float pvid_estimator_freedom_f32(const pvid_estimator_f32 *self, const float sums[])
-{
-    return sums[self->model->n_moments + self->model->n_theta + 1u] - (float)self->model->n_p;
-}
+/* Residual variance over its expectation, which is `floor` over the degrees of freedom; 0 without degrees of freedom,
+ * residuals or expectation. Cost: a division. */
+float pvid_assess_misfit_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings);
 
-/* Sets the variance of the current group's rows by the sensors' noise. Call it when the group is complete, before its
- * solve begins. This function and the next two are for models without their own `project`. */
-void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance);
+/* Returns whether S contains more information than noise: S - noise_margin Sn is positive definite, where Sn is the
+ * information of noise of this variance in so many rows. noise: that of unit variance and one row, upper triangle;
+ * overwritten. Cost: a factorisation. */
+bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float variance,
+                                 float noise[][PVID_MAX_P]);
 
-/* Residual variance of all rows in these sums over its expectation; 0 without degrees of freedom, or if rounding
- * dominates the residuals. */
-float pvid_estimator_misfit_f32(const pvid_estimator_f32 *self, const float sums[]);
+/* Writes estimate->kappa and least_pivot of S; 0 if S cannot be factored. Cost: a factorisation. */
+void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                           pvid_estimate_f32 *estimate);
 
-/* Returns whether rounding may dominate rr, because p has moved far since the rows were added. */
-bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self);
+/* S += wide / start_sd^2, with wide = correlation s^2. Cost: n_p divisions. */
+void pvid_assess_widen_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float wide);
 
-/* estimate->kappa and least_pivot from S, the upper triangle s. */
-void pvid_estimator_find_kappa_f32(const pvid_estimator_f32 *self, const float s[][PVID_MAX_P],
-                                   pvid_estimate_f32 *estimate);
+/* Multiplies estimate->covariance, the inverse of that S, by `wide` and writes the standard errors. Writes those
+ * of the start if `known` is false or a result is not finite. Cost: n_p square roots. */
+void pvid_assess_scale_f32(const pvid_solve_settings_f32 *settings, float wide, bool known,
+                           pvid_estimate_f32 *estimate);
 
-/* Factors S + wide / start_sd^2, where wide = correlation s^2; overwrites s. Returns false if this is not possible. */
-bool pvid_estimator_factor_wide_f32(const pvid_estimator_f32 *self, float s[][PVID_MAX_P], float wide,
-                                    pvid_cholesky_f32 *factor);
-
-/* Multiplies estimate->covariance, the inverse of the factored matrix, by `wide` and writes the standard errors. If
- * `known` is false or a result is not finite, writes the start's standard deviations. */
-void pvid_estimator_scale_f32(const pvid_estimator_f32 *self, float wide, bool known, pvid_estimate_f32 *estimate);
+/* Writes se, covariance, kappa, least_pivot, residual_sd and weight of the estimate; its other fields are the caller's.
+ * All are finite, whatever S, which is overwritten. The covariance is (S / (correlation s^2) + 1 / start_sd^2)^-1.
+ * Cost: two factorisations and n_p solves. Source: theory.md 4, equation (7). */
+void pvid_assess_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, pvid_estimate_f32 *estimate);
 
 #endif

@@ -1,32 +1,39 @@
-/* Accuracy of p from S and the residuals, in integers. Private to the core. */
+/* Accuracy of p from the normal equations, in integers: residual variance, standard errors. Pure: the results depend on
+ * the arguments alone. Private to the core. */
 #ifndef PVID_SOLVE_ASSESS_Q31_H
 #define PVID_SOLVE_ASSESS_Q31_H
 
-#include "solve/state_q31.h"
+#include <stddef.h>
+#include <stdint.h>
 
-/* s^2 of a row: residual sum of squares over degrees of freedom, at least the variance by the sensors' noise; row_sd^2
- * if there are none. Divided by 4^exponent as the sums are. */
-pvid_scaled_q31 pvid_estimator_variance_q31(const pvid_estimator_q31 *self);
+#include "number/scaled_q31.h"
+#include "solve/cholesky_q31.h"
+#include "solve/system_q31.h"
 
-/* Sets the variance >= 0 of the current group's rows by the sensors' noise [units of Y's integer squared]. Call it when
- * the group is complete, before its solve begins. */
-void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
+/* row_sd^2, divided by 4^exponent as the sums are. */
+pvid_scaled_q31 pvid_assess_row_variance_q31(const pvid_solve_settings_q31 *settings, int32_t exponent);
 
-/* row_sd^2 as that. */
-pvid_scaled_q31 pvid_estimator_expected_variance_q31(const pvid_estimator_q31 *self);
+/* s^2 of a row: residual sum of squares over degrees of freedom, at least `expected`; row_sd^2 if there is none.
+ * Divided by 4^exponent as the sums are. expected: variance of a row by the sensors' noise [units of Y's integer
+ * squared]; 0: unknown. Cost: a division of 64 bits. */
+pvid_scaled_q31 pvid_assess_variance_q31(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings,
+                                         pvid_scaled_q31 expected);
 
-/* Weight, residual and the variances they give. */
-void pvid_estimator_residual_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
-                                 pvid_estimate_q31 *estimate);
+/* Writes weight, misfit and residual_sd of the estimate, *variance = s^2, and *wide = root of correlation s^2. Cost:
+ * two square roots, two divisions of 64 bits. */
+void pvid_assess_residual_q31(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings,
+                              pvid_scaled_q31 expected, pvid_scaled_q31 *variance, pvid_root_q31 *wide,
+                              pvid_estimate_q31 *estimate);
 
-/* s += wide^2 / start_sd^2. */
-void pvid_estimator_widen_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve);
+/* S += wide^2 / start_sd^2. Cost: n_p divisions. */
+void pvid_assess_widen_q31(pvid_system_q31 *system, const pvid_solve_settings_q31 *settings, pvid_root_q31 wide);
 
-/* Column a of U^-1 and its length. */
-void pvid_estimator_invert_q31(pvid_estimator_solve_q31 *solve, size_t a);
+/* Column a of U^-1 and its length. Does nothing iff the matrix could not be factored. Cost: half a solve, a root. */
+void pvid_assess_invert_q31(const pvid_cholesky_q31 *factor, size_t a, pvid_inverse_q31 *inverse);
 
-/* Standard error of p[a] and its correlation with those before it, from wide^2 (S + H)^-1. */
-void pvid_estimator_errors_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, size_t a,
-                               pvid_estimate_q31 *estimate);
+/* Standard error of p[a] and its correlation with those before it, from wide^2 (S + H)^-1; start_sd and 0 iff the
+ * matrix could not be factored. Cost: 2 a divisions. Source: theory.md 4, equation (7). */
+void pvid_assess_errors_q31(const pvid_system_q31 *system, const pvid_solve_settings_q31 *settings,
+                            const pvid_inverse_q31 *inverse, size_t a, pvid_estimate_q31 *estimate);
 
 #endif

@@ -3,12 +3,11 @@
 /* The engine for models with their own `project`: the sums are B = sum N Y and yy, and a solve is one call. */
 #include "solve/direct_f32.h"
 
-#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-#include "number/finite_f32.h"
 #include "solve/assess_f32.h"
+#include "solve/commit.h"
 #include "solve/row_f32.h"
 #include "solve/step_f32.h"
 
@@ -17,50 +16,52 @@
 
 /* ---- the solve ---- */
 
-/* s^2 of a row. */
-static float variance_of(const pvid_estimator_f32 *self, const float sums[], float energy)
+void pvid_direct_residual_f32(const pvid_estimator_f32 *self, const float sums[], float rss_minus_yy,
+                              pvid_system_f32 *system)
 {
-    const float yy = sums[self->model->n_moments + self->model->n_theta];
-    return pvid_estimator_variance_f32(self, sums, energy, RESIDUAL_FLOOR * yy);
+    const float *tail = &sums[self->model->n_moments + self->model->n_theta]; /* yy, weight */
+    system->rss = tail[0] + rss_minus_yy;
+    system->rounding = self->information.rounding;
+    system->floor = RESIDUAL_FLOOR * tail[0];
+    system->weight = tail[1];
 }
 
-pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, const float sums[], float energy,
-                                 float s[][PVID_MAX_P], const float force[])
+/* The normal equations of these sums. */
+static void gather(const pvid_estimator_f32 *self, const float sums[], pvid_system_f32 *system)
 {
-    const uint8_t n_p = self->model->n_p;
+    const pvid_model_f32 *model = self->model;
+    const float rss_minus_yy = model->project(self->p, sums, &sums[model->n_moments], system->s, system->force);
+    pvid_direct_residual_f32(self, sums, rss_minus_yy, system);
+}
+
+pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, pvid_system_f32 *system)
+{
+    const pvid_solve_settings_f32 *settings = &self->settings;
     float rhs[PVID_MAX_P];
-    float dp[PVID_MAX_P];
     pvid_cholesky_f32 factor;
-    for (size_t a = 0; a < n_p; a++) {
-        rhs[a] = force[a];
-        pvid_direct_complete_f32(self, a, gain, s, rhs);
+    pvid_solution_f32 solution = {.p = self->p};
+    for (size_t a = 0; a < settings->n_p; a++) {
+        rhs[a] = system->force[a];
+        pvid_direct_complete_f32(self, a, gain, system->s, rhs);
     }
-    if (!pvid_cholesky_factor_f32(&factor, n_p, (const float (*)[PVID_MAX_P])s)) {
-        return pvid_direct_hold_f32(&self->counters.held_pivot, PVID_HELD_PIVOT);
+    const pvid_reason reason = pvid_step_factor_f32(system, settings, &factor);
+    if (reason != PVID_UPDATED) {
+        return pvid_count_held(&self->counters, reason);
     }
-    if (!pvid_estimator_is_excited_f32(self, factor.first_pivot, s[0][0])) {
-        return pvid_direct_hold_f32(&self->counters.held_not_excited, PVID_HELD_NOT_EXCITED);
+    pvid_step_take_f32(system, settings, &factor, self->p, rhs, &solution);
+    if (solution.reason != PVID_UPDATED) {
+        return pvid_count_held(&self->counters, solution.reason);
     }
-    if ((self->dead_zone > 0.0f) &&
-        pvid_estimator_is_in_dead_zone_f32(self, &factor, force, variance_of(self, sums, energy))) {
-        return pvid_direct_hold_f32(&self->counters.at_rest, PVID_UPDATED);
-    }
-    pvid_cholesky_solve_f32(&factor, rhs, dp);
-    const float size = pvid_estimator_step_size_f32(self, dp);
-    if (!pvid_finite_f32(size)) {
-        return pvid_direct_hold_f32(&self->counters.held_pivot, PVID_HELD_PIVOT);
-    }
-    pvid_estimator_apply_step_f32(self, dp, size, self->p);
-    pvid_count_up(&self->counters.updates);
+    pvid_count_step(&self->counters, solution.limited, solution.bounded);
+    pvid_count_up(solution.in_dead_zone ? &self->counters.at_rest : &self->counters.updates);
     return PVID_UPDATED;
 }
 
 static pvid_reason solve_at_once(pvid_estimator_f32 *self, float gain, const float sums[])
 {
-    float s[PVID_MAX_P][PVID_MAX_P];
-    float force[PVID_MAX_P];
-    const float energy = self->model->project(self->p, sums, &sums[self->model->n_moments], s, force);
-    return pvid_direct_move_f32(self, gain, sums, energy, s, force);
+    pvid_system_f32 system;
+    gather(self, sums, &system);
+    return pvid_direct_move_f32(self, gain, &system);
 }
 
 pvid_reason pvid_direct_solve_f32(pvid_estimator_f32 *self, bool ends_group)
@@ -68,10 +69,11 @@ pvid_reason pvid_direct_solve_f32(pvid_estimator_f32 *self, bool ends_group)
     float sums[PVID_MAX_SUMS];
     pvid_information_read_f32(&self->information, sums);
     if (!ends_group) {
-        return (self->gain < 1.0f) ? PVID_ACCUMULATED : solve_at_once(self, 1.0f, sums);
+        return (self->settings.gain < 1.0f) ? PVID_ACCUMULATED : solve_at_once(self, 1.0f, sums);
     }
-    const pvid_reason reason =
-        pvid_estimator_is_due_f32(self) ? solve_at_once(self, self->gain, sums) : PVID_ACCUMULATED;
+    const pvid_reason reason = pvid_solve_is_due(&self->phase, self->divider)
+                                   ? solve_at_once(self, self->settings.gain, sums)
+                                   : PVID_ACCUMULATED;
     pvid_information_end_group_f32(&self->information);
     return reason;
 }
@@ -86,15 +88,15 @@ pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], 
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
-    if (self->gain < 1.0f) {
+    if (self->settings.gain < 1.0f) {
         pvid_row_accumulate_innovation_f32(self, self->model->n_p, gradient, e);
     }
     pvid_count_up(&self->counters.rows);
     float sums[PVID_MAX_SUMS];
     pvid_information_add_f32(&self->information, self->model, n, y, sums);
     if (ends_group) {
-        if (pvid_estimator_is_due_f32(self)) {
-            reason = solve_at_once(self, self->gain, sums);
+        if (pvid_solve_is_due(&self->phase, self->divider)) {
+            reason = solve_at_once(self, self->settings.gain, sums);
         }
         pvid_information_end_group_f32(&self->information);
     }
@@ -105,23 +107,11 @@ pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], 
 
 void pvid_direct_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate)
 {
-    const pvid_model_f32 *model = self->model;
     float sums[PVID_MAX_SUMS];
-    float s[PVID_MAX_P][PVID_MAX_P];
-    float f[PVID_MAX_P];
+    pvid_system_f32 system;
+    pvid_information_read_f32(&self->information, sums);
+    gather(self, sums, &system);
     memset(estimate, 0, sizeof *estimate);
     memcpy(estimate->p, self->p, sizeof estimate->p);
-    pvid_information_read_f32(&self->information, sums);
-    estimate->weight = sums[model->n_moments + model->n_theta + 1u];
-    const float energy = model->project(self->p, sums, &sums[model->n_moments], s, f);
-    const float variance = variance_of(self, sums, energy);
-    const float wide = variance * self->correlation;
-    estimate->residual_sd = sqrtf(variance);
-    pvid_estimator_find_kappa_f32(self, (const float (*)[PVID_MAX_P])s, estimate);
-    pvid_cholesky_f32 factor;
-    const bool known = pvid_estimator_factor_wide_f32(self, s, wide, &factor);
-    if (known) {
-        pvid_cholesky_inverse_f32(&factor, estimate->covariance);
-    }
-    pvid_estimator_scale_f32(self, wide, known, estimate);
+    pvid_assess_f32(&system, &self->settings, estimate);
 }

@@ -2,7 +2,6 @@
 #ifndef PVID_DIRECT_F32_H
 #define PVID_DIRECT_F32_H
 
-#include "number/count.h"
 #include "solve/state_f32.h"
 
 /* `take_row` of model.h, for a model without one. */
@@ -15,24 +14,20 @@ void pvid_direct_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *e
 /* A solve of the present sums: at the end of a group, or a further Gauss-Newton step. */
 pvid_reason pvid_direct_solve_f32(pvid_estimator_f32 *self, bool ends_group);
 
-/* One step of p from S, F = force and energy, the results of `project` (model.h) on these sums; overwrites s. */
-pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, const float sums[], float energy,
-                                 float s[][PVID_MAX_P], const float force[]);
+/* Writes the residuals of the normal equations. rss_minus_yy: what `project` (model.h) returns for these sums. */
+void pvid_direct_residual_f32(const pvid_estimator_f32 *self, const float sums[], float rss_minus_yy,
+                              pvid_system_f32 *system);
+
+/* One step of p from the normal equations; `gain` is g of estimator.h. Adds H0 to S. */
+pvid_reason pvid_direct_move_f32(pvid_estimator_f32 *self, float gain, pvid_system_f32 *system);
 
 /* ---- inlined ---- */
-
-/* Counts and returns the reason why p is held. */
-static inline pvid_reason pvid_direct_hold_f32(uint32_t *counter, pvid_reason reason)
-{
-    pvid_count_up(counter);
-    return reason;
-}
 
 /* Adds the prior and turns F into the right-hand side, for parameter a; `gain` is g of estimator.h. */
 static inline void pvid_direct_complete_f32(pvid_estimator_f32 *self, size_t a, float gain, float s[][PVID_MAX_P],
                                             float rhs[])
 {
-    s[a][a] += self->prior[a];
+    s[a][a] += self->settings.prior[a];
     rhs[a] = (gain * rhs[a]) + ((1.0f - gain) * self->innovation[a]);
     self->innovation[a] = 0.0f;
 }

@@ -129,25 +129,28 @@ static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config
     }
     memset(self, 0, sizeof *self);
     self->model = config->model;
-    self->engine = engine_of(config->model);
     pvid_information_init_f32(&self->information, config->model, config->forgetting_s * config->update_rate_hz);
     self->information.row_weight = config->row_weight;
     for (size_t i = 0; i < config->model->n_p; i++) {
         const float ratio = config->row_sd / config->start_sd[i];
         self->p[i] = config->start[i];
-        self->prior[i] = ratio * ratio;
-        self->start_sd[i] = config->start_sd[i];
-        self->lower[i] = config->lower[i];
-        self->upper[i] = config->upper[i];
+        self->settings.prior[i] = ratio * ratio;
+        self->settings.start_sd[i] = config->start_sd[i];
+        self->settings.lower[i] = config->lower[i];
+        self->settings.upper[i] = config->upper[i];
     }
     config->model->theta(self->p, self->theta);
-    self->row_variance = config->row_sd * config->row_sd;
-    self->gain = feedback_gain(config);
-    self->correlation = config->correlation;
-    self->step_limit = config->step_limit;
-    self->kappa_min = config->kappa_min;
-    self->noise_margin = config->noise_margin;
-    self->dead_zone = config->dead_zone * config->dead_zone;
+    self->settings.row_variance = config->row_sd * config->row_sd;
+    self->settings.gain = feedback_gain(config);
+    self->settings.correlation = config->correlation;
+    self->settings.step_limit = config->step_limit;
+    self->settings.kappa_min = config->kappa_min;
+    self->settings.noise_margin = config->noise_margin;
+    self->settings.dead_zone = config->dead_zone * config->dead_zone;
+    self->settings.n_p = config->model->n_p;
+    self->settings.n_excited = (config->model->n_gated > 0u) ? config->model->n_gated : config->model->n_p;
+    self->settings.positive = (uint8_t)(config->model->positive & 0xFFu);
+    self->settings.engine = engine_of(config->model);
     self->divider = config->divider;
     return PVID_OK;
 }
@@ -165,8 +168,8 @@ void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
     }
     for (size_t a = 0; a < self->model->n_p; a++) {
         if (pvid_finite_f32(p[a])) {
-            const float x = (p[a] < self->lower[a]) ? self->lower[a] : p[a];
-            self->p[a] = (x > self->upper[a]) ? self->upper[a] : x;
+            const float x = (p[a] < self->settings.lower[a]) ? self->settings.lower[a] : p[a];
+            self->p[a] = (x > self->settings.upper[a]) ? self->settings.upper[a] : x;
         }
     }
     self->model->theta(self->p, self->theta);
@@ -179,7 +182,7 @@ PVID_ALWAYS_INLINE pvid_reason take_row(pvid_estimator_f32 *self, const float n[
 {
     const pvid_model_f32 *model = self->model;
     float gradient[PVID_MAX_P] = {0};
-    const float e = (self->gain < 1.0f) ? model->innovate(self->p, n, y, gradient) : 0.0f;
+    const float e = (self->settings.gain < 1.0f) ? model->innovate(self->p, n, y, gradient) : 0.0f;
     return (model->take_row != NULL) ? model->take_row(self, n, y, e, gradient, ends_group)
                                      : pvid_direct_take_row_f32(self, n, y, e, gradient, ends_group);
 }
@@ -189,7 +192,8 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    return (self->engine == PVID_ENGINE_DIRECT) ? take_row(self, n, y, false) : pvid_staged_add_f32(self, n, y);
+    return (self->settings.engine == PVID_ENGINE_DIRECT) ? take_row(self, n, y, false)
+                                                         : pvid_staged_add_f32(self, n, y);
 }
 
 /* All stages of a solve. */
@@ -222,7 +226,7 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    if (self->engine == PVID_ENGINE_DIRECT) {
+    if (self->settings.engine == PVID_ENGINE_DIRECT) {
         return take_row(self, n, y, true);
     }
     const pvid_reason added = pvid_staged_add_f32(self, n, y);
@@ -248,7 +252,7 @@ void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32
         memset(estimate, 0, sizeof *estimate);
         return;
     }
-    if (self->engine == PVID_ENGINE_DIRECT) {
+    if (self->settings.engine == PVID_ENGINE_DIRECT) {
         pvid_direct_assess_f32(self, estimate);
     } else {
         assess_in_stages(self, estimate);

@@ -131,22 +131,24 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
     init_formats(self, config);
     for (size_t i = 0; i < config->model->n_p; i++) {
         self->p[i] = config->start[i];
-        self->start_sd[i] = config->start_sd[i];
-        self->lower[i] = config->lower[i];
-        self->upper[i] = config->upper[i];
-        self->prior_exponent[i] =
-            (int16_t)pvid_square_ratio_q31(config->row_sd, -PVID_ROW_SD_BITS, config->start_sd[i], &self->prior[i]);
+        self->settings.start_sd[i] = config->start_sd[i];
+        self->settings.lower[i] = config->lower[i];
+        self->settings.upper[i] = config->upper[i];
+        self->settings.prior_exponent[i] = (int16_t)pvid_square_ratio_q31(
+            config->row_sd, -PVID_ROW_SD_BITS, config->start_sd[i], &self->settings.prior[i]);
     }
     int64_t theta[PVID_MAX_THETA_Q31];
     config->model->theta(self->p, theta);
     pvid_estimator_set_theta_q31(self, theta);
-    self->row_sd = config->row_sd;
-    self->gain = config->gain;
-    self->correlation = config->correlation;
-    self->step_limit = config->step_limit;
-    self->kappa_min = config->kappa_min;
-    self->noise_margin = config->noise_margin;
-    self->dead_zone = config->dead_zone;
+    self->settings.row_sd = config->row_sd;
+    self->settings.gain = config->gain;
+    self->settings.correlation = config->correlation;
+    self->settings.step_limit = config->step_limit;
+    self->settings.kappa_min = config->kappa_min;
+    self->settings.noise_margin = config->noise_margin;
+    self->settings.dead_zone = config->dead_zone;
+    self->settings.n_p = config->model->n_p;
+    self->settings.positive = (uint8_t)(config->model->positive & 0xFFu);
     self->divider = config->divider;
     return PVID_OK;
 }
@@ -163,8 +165,8 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
         return;
     }
     int64_t theta[PVID_MAX_THETA_Q31];
-    const int64_t above = (value < self->lower[index]) ? self->lower[index] : value;
-    self->p[index] = (int32_t)((above > self->upper[index]) ? self->upper[index] : above);
+    const int64_t above = (value < self->settings.lower[index]) ? self->settings.lower[index] : value;
+    self->p[index] = (int32_t)((above > self->settings.upper[index]) ? self->settings.upper[index] : above);
     self->model->theta(self->p, theta);
     pvid_estimator_set_theta_q31(self, theta);
 }

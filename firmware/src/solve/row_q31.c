@@ -50,8 +50,22 @@ bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t
 
 void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
 {
-    self->energy = pvid_clamp_q31(self->energy + square, PVID_WIDE);
+    self->group_rss = pvid_clamp_q31(self->group_rss + square, PVID_WIDE);
     self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
-    pvid_information_add_q31(&self->information, n, e, (self->gain < PVID_ONE_Q30) ? self->fresh : NULL);
+    pvid_information_add_q31(&self->information, n, e, (self->settings.gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);
+}
+
+void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance)
+{
+    const int64_t weight = self->information.sums[self->information.n_sums - 1u];
+    if ((self->group_weight <= 0) || (weight < self->group_weight)) {
+        return;
+    }
+    const pvid_scaled_q31 share =
+        pvid_scaled_over_q31(pvid_scaled_of_q31(self->group_weight, 0), pvid_scaled_of_q31(weight, 0));
+    const pvid_scaled_q31 change = pvid_scaled_times_q31(share, pvid_scaled_minus_q31(variance, self->expected));
+    const pvid_scaled_q31 mean = pvid_scaled_plus_q31(self->expected, change);
+    self->expected.m = (mean.m > 0) ? mean.m : 0;
+    self->expected.e = mean.e;
 }

@@ -13,6 +13,10 @@ bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[],
 /* Adds a row that fits, with its innovation e and e^2. */
 void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
 
+/* Sets the variance >= 0 of the current group's rows by the sensors' noise [units of Y's integer squared]. Call it when
+ * the group is complete, before its solve begins. */
+void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
+
 /* Sets theta = f(p) and its mantissas and shifts for the innovation of rows. */
 void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
 

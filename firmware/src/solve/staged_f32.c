@@ -11,6 +11,7 @@
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "solve/assess_f32.h"
+#include "solve/commit.h"
 #include "solve/direct_f32.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
@@ -45,7 +46,7 @@ enum {
 static inline float innovate(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
 {
     const pvid_model_f32 *model = self->model;
-    if (self->gain < 1.0f) {
+    if (self->settings.gain < 1.0f) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         model->jacobian(self->p, c);
         pvid_pattern_transpose_times_f32(model, c, n, gradient);
@@ -69,28 +70,45 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
-    if (self->gain < 1.0f) {
+    if (self->settings.gain < 1.0f) {
         pvid_row_accumulate_innovation_f32(self, self->model->n_p, gradient, e);
     }
-    self->energy += e * e;
+    self->group_rss += e * e;
     self->group_weight += self->information.row_weight;
     pvid_information_add_f32(&self->information, self->model, n, e, NULL);
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;
 }
 
-/* ---- the solve ---- */
-
-static void hold_solve(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, pvid_reason reason)
+void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance)
 {
-    pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
-    solve->reason = reason;
+    float tail[2];
+    pvid_information_tail_f32(&self->information, tail);
+    const float share = (self->group_weight < tail[1]) ? (self->group_weight / tail[1]) : 1.0f;
+    const float clamped = (variance <= PVID_RESIDUAL_MAX) ? variance : PVID_RESIDUAL_MAX;
+    if (self->group_weight > 0.0f) {
+        self->expected += (clamped - self->expected) * share;
+    }
 }
+
+bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self)
+{
+    float tail[2];
+    pvid_information_tail_f32(&self->information, tail);
+    return self->information.rounding > tail[0];
+}
+
+/* ---- the solve ---- */
 
 static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     pvid_information_read_f32(&self->information, solve->sums);
     self->model->jacobian(self->p, solve->c);
+    const float *tail = &solve->sums[self->model->n_moments + self->model->n_theta]; /* rr, weight */
+    solve->system.rss = tail[0];
+    solve->system.rounding = self->information.rounding;
+    solve->system.floor = self->expected * (tail[1] - (float)self->model->n_p);
+    solve->system.weight = tail[1];
 }
 
 /* Adds a part of M c_a; when M c_a is complete, computes row a of S and F. Returns whether the stage is to be repeated.
@@ -102,63 +120,63 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
     const size_t next = solve->next;
     const size_t end = pvid_pattern_end_f32(model, solve->start);
     if (next == solve->start) {
-        memset(solve->column, 0, sizeof solve->column);
+        memset(solve->product, 0, sizeof solve->product);
     }
     if (next < end) {
         const size_t last = ((end - next) > COLUMNS_PER_STAGE) ? (next + COLUMNS_PER_STAGE) : end;
-        pvid_pattern_add_columns_f32(model, solve->c, next, last, solve->sums, solve->column);
+        pvid_pattern_add_columns_f32(model, solve->c, next, last, solve->sums, solve->product);
         solve->next = (uint8_t)last;
         return true;
     }
-    pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->column, solve->s[a]);
-    solve->force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
+    pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->product, solve->system.s[a]);
+    solve->system.force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
     solve->start = (uint8_t)end;
     solve->index++;
     return solve->index < model->n_p;
-}
-
-/* s^2 of a row. */
-static float variance_of(const pvid_estimator_f32 *self, const float sums[])
-{
-    return pvid_estimator_variance_f32(self, sums, 0.0f, self->expected * pvid_estimator_freedom_f32(self, sums));
 }
 
 /* The noise has row_sd^2 in a solve, because the residuals are larger while p is far from the solution, and the
  * variance of the residuals in an assessment. */
 static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    const float weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
+    const pvid_solve_settings_f32 *settings = &self->settings;
     const bool judging = solve->estimate != NULL;
-    solve->variance = judging ? variance_of(self, solve->sums) : self->row_variance;
-    solve->above_noise =
-        pvid_estimator_is_above_noise_f32(self, (const float (*)[PVID_MAX_P])solve->s, solve->variance, weight);
+    solve->variance = judging ? pvid_assess_variance_f32(&solve->system, settings) : settings->row_variance;
+    solve->above_noise = true;
+    if ((self->model->noise != NULL) && (settings->noise_margin > 0.0f)) {
+        float noise[PVID_MAX_P][PVID_MAX_P];
+        self->model->noise(self->p, self->noise, noise);
+        solve->above_noise = pvid_assess_above_noise_f32(&solve->system, settings, solve->variance, noise);
+    }
 }
 
 static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    const pvid_model_f32 *model = self->model;
-    const uint8_t gated = pvid_excited_parameters_f32(model);
-    const float (*s)[PVID_MAX_P] = (const float (*)[PVID_MAX_P])solve->s;
-    for (size_t a = 0; a < model->n_p; a++) {
-        solve->s[a][a] += self->prior[a];
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        solve->system.s[a][a] += self->settings.prior[a];
     }
-    solve->reason = PVID_UPDATED;
-    bool solvable = pvid_cholesky_factor_f32(&solve->factor, gated, s);
-    const float kappa = solve->factor.first_pivot;
-    if (gated < model->n_p) {
-        solvable = pvid_cholesky_factor_f32(&solve->factor, model->n_p, s) && solvable;
-    }
-    if (!solvable) {
-        hold_solve(self, solve, PVID_HELD_PIVOT);
-    } else if (!solve->above_noise || !pvid_estimator_is_excited_f32(self, kappa, solve->s[0][0])) {
-        hold_solve(self, solve, PVID_HELD_NOT_EXCITED);
+    const pvid_reason reason = pvid_step_factor_f32(&solve->system, &self->settings, &solve->factor);
+    const bool noise = (reason == PVID_UPDATED) && !solve->above_noise;
+    solve->reason = noise ? PVID_HELD_NOT_EXCITED : reason;
+    if (solve->reason != PVID_UPDATED) {
+        (void)pvid_count_held(&self->counters, solve->reason);
     }
 }
 
-static bool solve_in_dead_zone(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
+/* The step of an allowed solve, as a part of `solve`. */
+static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, const float rhs[])
 {
-    return (self->dead_zone > 0.0f) &&
-           pvid_estimator_is_in_dead_zone_f32(self, &solve->factor, solve->force, variance_of(self, solve->sums));
+    pvid_solution_f32 solution = {.p = solve->p};
+    pvid_step_take_f32(&solve->system, &self->settings, &solve->factor, self->p, rhs, &solution);
+    if (solution.reason != PVID_UPDATED) {
+        solve->reason = pvid_count_held(&self->counters, solution.reason);
+    }
+    if (solution.in_dead_zone) {
+        pvid_count_up(&self->counters.at_rest);
+    }
+    pvid_count_step(&self->counters, solution.limited, solution.bounded);
+    solve->in_dead_zone = solution.in_dead_zone;
+    solve->size = solution.size;
 }
 
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
@@ -166,23 +184,12 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
     const pvid_model_f32 *model = self->model;
     float rhs[PVID_MAX_P];
     for (size_t a = 0; a < model->n_p; a++) {
-        rhs[a] = (solve->gain * solve->force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
+        rhs[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
         self->innovation[a] = 0.0f;
     }
     memcpy(solve->p, self->p, sizeof solve->p);
-    if ((solve->reason == PVID_UPDATED) && solve_in_dead_zone(self, solve)) {
-        pvid_count_up(&self->counters.at_rest);
-        solve->in_dead_zone = true;
-    } else if (solve->reason == PVID_UPDATED) {
-        float dp[PVID_MAX_P];
-        pvid_cholesky_solve_f32(&solve->factor, rhs, dp);
-        const float size = pvid_estimator_step_size_f32(self, dp);
-        if (pvid_finite_f32(size)) {
-            solve->size = size;
-            pvid_estimator_apply_step_f32(self, dp, size, solve->p);
-        } else {
-            hold_solve(self, solve, PVID_HELD_PIVOT);
-        }
+    if (solve->reason == PVID_UPDATED) {
+        take_step(self, solve, rhs);
     }
     if ((solve->reason != PVID_UPDATED) && (solve->fallback != NULL)) {
         memcpy(solve->p, solve->fallback, sizeof solve->p);
@@ -203,7 +210,7 @@ static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
     const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
     for (size_t i = first; i < last; i++) {
         const float moved = pvid_pattern_times_f32(n, solve->sums, i, solve->theta_step);
-        solve->moved[i] = moved;
+        solve->product[i] = moved;
         solve->fall += solve->theta_step[i] * (b[i] + (b[i] - moved));
         solve->scale += solve->sums[pvid_pattern_diagonal_f32(n, i)] * (solve->theta_step[i] * solve->theta_step[i]);
     }
@@ -222,12 +229,12 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     float *low = &self->information.low[self->model->n_moments];
     if (!pvid_finite_f32(solve->fall) || !pvid_finite_f32(low[n] - solve->fall)) {
         if (steps) {
-            hold_solve(self, solve, PVID_HELD_PIVOT);
+            solve->reason = pvid_count_held(&self->counters, PVID_HELD_PIVOT);
         }
         return;
     }
     for (size_t i = 0; i < n; i++) {
-        low[i] -= solve->moved[i];
+        low[i] -= solve->product[i];
         self->theta[i] = solve->theta[i];
     }
     low[n] -= solve->fall;
@@ -275,15 +282,15 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
 {
     reset_solve(solve);
     solve->ends_group = ends_group;
-    if (self->engine == PVID_ENGINE_DIRECT) {
+    if (self->settings.engine == PVID_ENGINE_DIRECT) {
         solve->stage = STAGE_DIRECT;
     } else if (ends_group) {
-        solve->energy = self->energy;
-        self->energy = 0.0f;
+        solve->group_rss = self->group_rss;
+        self->group_rss = 0.0f;
         self->group_weight = 0.0f;
-        solve->gain = self->gain;
-        solve->stage = (uint8_t)(pvid_estimator_is_due_f32(self) ? STAGE_READ : STAGE_FOLD);
-    } else if (self->gain < 1.0f) {
+        solve->gain = self->settings.gain;
+        solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_READ : STAGE_FOLD);
+    } else if (self->settings.gain < 1.0f) {
         solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
     }
 }
@@ -300,10 +307,10 @@ void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_es
 static void kappa_stage(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
 {
     pvid_estimate_f32 *estimate = solve->estimate;
-    estimate->weight = solve->sums[self->model->n_moments + self->model->n_theta + 1u];
+    estimate->weight = solve->system.weight;
     estimate->residual_sd = sqrtf(solve->variance);
-    estimate->misfit = pvid_estimator_misfit_f32(self, solve->sums);
-    pvid_estimator_find_kappa_f32(self, (const float (*)[PVID_MAX_P])solve->s, estimate);
+    estimate->misfit = pvid_assess_misfit_f32(&solve->system, &self->settings);
+    pvid_assess_kappa_f32(&solve->system, &self->settings, estimate);
 }
 
 /* The stages that a solve and an assessment share; returns whether the stage is to be repeated. */
@@ -367,7 +374,7 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
 
 bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    const float wide = solve->variance * self->correlation;
+    const float wide = solve->variance * self->settings.correlation;
     bool repeat = false;
     switch (solve->stage) {
     case STAGE_READ:
@@ -379,7 +386,9 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
         kappa_stage(self, solve);
         break;
     case STAGE_WIDEN:
-        solve->solvable = pvid_estimator_factor_wide_f32(self, solve->s, wide, &solve->factor);
+        pvid_assess_widen_f32(&solve->system, &self->settings, wide);
+        solve->solvable =
+            pvid_cholesky_factor_f32(&solve->factor, self->settings.n_p, (const float (*)[PVID_MAX_P])solve->system.s);
         break;
     case STAGE_INVERT:
         if (solve->solvable) {
@@ -389,7 +398,7 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
         repeat = solve->index < self->model->n_p;
         break;
     case STAGE_SCALE:
-        pvid_estimator_scale_f32(self, wide, solve->solvable, solve->estimate);
+        pvid_assess_scale_f32(&self->settings, wide, solve->solvable, solve->estimate);
         break;
     default:
         return true;
@@ -414,7 +423,7 @@ static size_t projection_stages(const pvid_model_f32 *model)
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
 {
     const pvid_model_f32 *model = self->model;
-    if (self->engine == PVID_ENGINE_DIRECT) {
+    if (self->settings.engine == PVID_ENGINE_DIRECT) {
         return 1;
     }
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;

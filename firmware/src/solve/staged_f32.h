@@ -7,4 +7,11 @@
 /* pvid_estimator_add_f32 for b = B - M theta and rr. */
 pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float y);
 
+/* Sets the variance of the current group's rows by the sensors' noise. Call it when the group is complete, before its
+ * solve begins. */
+void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance);
+
+/* Returns whether rounding may dominate rr, because p has moved far since the rows were added. */
+bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self);
+
 #endif

@@ -1,9 +1,11 @@
 /* The solve and the assessment in stages. */
 #include <string.h>
 
-#include "number/count.h"
+#include "number/unroll.h"
 #include "solve/assess_q31.h"
+#include "solve/commit.h"
 #include "solve/row_q31.h"
+#include "solve/step_q31.h"
 #include "solve/system_q31.h"
 #include "number/scaled_q31.h"
 
@@ -31,12 +33,6 @@ enum {
 #define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
 #define PIVOTS_PER_STAGE 2u
 #define REST_BITS 28 /* of F: products with a solution of 30 bits add up in 62 */
-
-static void hold_solve(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_reason reason)
-{
-    pvid_count_up((reason == PVID_HELD_PIVOT) ? &self->counters.held_pivot : &self->counters.held_not_excited);
-    solve->reason = reason;
-}
 
 /* Returns the next row. */
 static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t row)
@@ -69,15 +65,15 @@ static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solv
 
 static void project_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    int64_t *row = solve->s[solve->index];
+    int64_t *row = solve->system.s[solve->index];
     solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->c, solve->start, row);
 }
 
 /* S as it is to be factored. */
 static void begin_factor(pvid_estimator_solve_q31 *solve, uint8_t n_p, const int64_t s[][PVID_MAX_P])
 {
-    pvid_system_equilibrate_q31(n_p, s, solve->g, solve->q);
-    pvid_cholesky_begin_q31(&solve->factor, n_p);
+    pvid_system_equilibrate_q31(n_p, s, solve->system.g, solve->system.q);
+    pvid_cholesky_begin_q31(&solve->system.factor, n_p);
 }
 
 /* Parts of a stage that factors: one prepares the matrix, then the parameters are eliminated, from the last, a few at a
@@ -92,13 +88,14 @@ static void eliminate_part(pvid_estimator_solve_q31 *solve, size_t n_p, size_t p
     const size_t first = (part - 1u) * PIVOTS_PER_STAGE;
     const size_t end = ((n_p - first) > PIVOTS_PER_STAGE) ? (first + PIVOTS_PER_STAGE) : n_p;
     for (size_t eliminated = first; eliminated < end; eliminated++) {
-        pvid_cholesky_eliminate_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q, (n_p - 1u) - eliminated);
+        pvid_cholesky_eliminate_q31(&solve->system.factor, (const int32_t (*)[PVID_MAX_P])solve->system.q,
+                                    (n_p - 1u) - eliminated);
     }
 }
 
 static bool checks_noise(const pvid_estimator_q31 *self)
 {
-    return (self->noise_margin > 0u) && (self->model->noisy[1] > 0u);
+    return (self->settings.noise_margin > 0u) && (self->model->noisy[1] > 0u);
 }
 
 static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
@@ -115,27 +112,17 @@ static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_sol
         return;
     }
     eliminate_part(solve, n_p, part);
-    solve->above_noise = solve->factor.positive;
+    solve->above_noise = solve->system.factor.positive;
 }
 
 static void add_prior(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     for (size_t a = 0; a < self->model->n_p; a++) {
-        const int32_t exponent = (int32_t)self->prior_exponent[a] + (2 * (int32_t)self->information.exponent);
-        const int64_t prior = pvid_system_prior_q31(self->prior[a], exponent, solve->f[a]);
-        solve->s[a][a] += prior;
-        solve->first_prior = (a == 0u) ? prior : solve->first_prior;
+        const int32_t exponent = (int32_t)self->settings.prior_exponent[a] + (2 * (int32_t)self->information.exponent);
+        const int64_t prior = pvid_system_prior_q31(self->settings.prior[a], exponent, solve->system.f[a]);
+        solve->system.s[a][a] += prior;
+        solve->system.first_prior = (a == 0u) ? prior : solve->system.first_prior;
     }
-}
-
-/* Sufficient excitation of p[0]: the share kappa of its diagonal entry that no other parameter can explain is
- * large enough, and exceeds the prior information. */
-static bool is_excited(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
-{
-    const int32_t kappa = solve->factor.first_pivot;
-    const int64_t prior = pvid_scale_q31(solve->first_prior, 2 * solve->g[0]);
-    const bool own = pvid_round_shift_q31((int64_t)kappa * solve->q[0][0], 31) >= prior;
-    return (kappa >= self->kappa_min) && (own || (self->kappa_min == 0));
 }
 
 static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
@@ -143,7 +130,7 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
         add_prior(self, solve);
-        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
         return;
     }
     eliminate_part(solve, n_p, part);
@@ -151,10 +138,12 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
         return;
     }
     solve->reason = PVID_UPDATED;
-    if (!solve->factor.positive) {
-        hold_solve(self, solve, PVID_HELD_PIVOT);
-    } else if (!solve->above_noise || !is_excited(self, solve)) {
-        hold_solve(self, solve, PVID_HELD_NOT_EXCITED);
+    if (!solve->system.factor.positive) {
+        solve->reason = pvid_count_held(&self->counters, PVID_HELD_PIVOT);
+    } else if (!solve->above_noise || !pvid_step_is_excited_q31(&solve->system, &self->settings)) {
+        solve->reason = pvid_count_held(&self->counters, PVID_HELD_NOT_EXCITED);
+    } else {
+        /* a step is allowed */
     }
 }
 
@@ -167,9 +156,9 @@ static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve
         rhs[model->c_column[k]] += pvid_product_q31(solve->c[k], force[model->c_row[k]]);
     }
     for (size_t a = 0; a < model->n_p; a++) {
-        rhs[a] = pvid_scale_q31(rhs[a], solve->g[a]);
+        rhs[a] = pvid_scale_q31(rhs[a], solve->system.g[a]);
     }
-    return pvid_cholesky_solve_q31(&solve->factor, rhs, x);
+    return pvid_cholesky_solve_q31(&solve->system.factor, rhs, x);
 }
 
 /* F^T (S + H0)^-1 F, F of all data, in the unit of the sums of squares. */
@@ -195,21 +184,17 @@ static pvid_scaled_q31 newton_decrement_square(const pvid_estimator_q31 *self, c
     return pvid_scaled_of_q31(sum, ((of_x + of_f + (2 * down)) - PVID_S_BITS) - 30);
 }
 
-/* Whether p is within the dead zone of estimator.h. */
 static bool solve_in_dead_zone(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
 {
-    if (self->dead_zone == 0u) {
+    if (self->settings.dead_zone == 0u) {
         return false;
     }
-    const pvid_scaled_q31 found = pvid_estimator_variance_q31(self);
-    const pvid_scaled_q31 expected = pvid_estimator_expected_variance_q31(self);
-    const pvid_scaled_q31 noise = pvid_scaled_exceeds_q31(found, expected) ? expected : found;
-    const pvid_scaled_q31 wide = pvid_scaled_times_q31(noise, pvid_scaled_of_q31(self->correlation, -16));
-    const pvid_scaled_q31 zone = pvid_scaled_of_q31((int64_t)self->dead_zone * self->dead_zone, -32);
-    return !pvid_scaled_exceeds_q31(newton_decrement_square(self, solve), pvid_scaled_times_q31(zone, wide));
+    return pvid_step_is_in_dead_zone_q31(&self->information, &self->settings, self->expected,
+                                         newton_decrement_square(self, solve));
 }
 
-static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+/* Inlined, so that its arrays share the stack of the other stages. */
+PVID_ALWAYS_INLINE void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const pvid_model_q31 *model = self->model;
     if (solve->reason != PVID_UPDATED) {
@@ -220,48 +205,18 @@ static void solve_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     int32_t x[PVID_MAX_P];
     const int32_t exponent = solve_for(model, solve, solve->force, rhs, x) + solve->force_exponent;
     for (size_t a = 0; a < model->n_p; a++) {
-        const int32_t shift = ((solve->f[a] + solve->g[a]) - exponent) + PVID_S_BITS + 30;
+        const int32_t shift = ((solve->system.f[a] + solve->system.g[a]) - exponent) + PVID_S_BITS + 30;
         solve->dp[a] = pvid_clamp_q31(pvid_scale_q31(x[a], shift), STEP_MAX);
     }
 }
 
-/* Relative size of the step dp: over p for positive parameters, else over start_sd. */
-static int64_t size_of(const pvid_estimator_q31 *self, const int64_t dp[])
+/* The step of an allowed solve, as a part of `solve`. */
+static void take_step(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    int64_t size = 0;
-    for (size_t a = 0; a < self->model->n_p; a++) {
-        const int32_t reference = pvid_is_positive_q31(self->model, a) ? self->p[a] : self->start_sd[a];
-        const int64_t own = (int64_t)(pvid_magnitude_q31(dp[a]) << PVID_SIZE_BITS) / reference;
-        size = (own > size) ? own : size;
-    }
-    return size;
-}
-
-/* p[n_p] = the estimator's p after the step, shortened to the step limit, within the bounds. */
-static void take_step(pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int64_t size, int32_t p[])
-{
-    const int64_t limit = (int64_t)self->step_limit << (PVID_SIZE_BITS - 16);
-    const bool limited = size > limit;
-    const int32_t factor = (size > limit) ? (int32_t)pvid_clamp_q31((limit << 31) / size, INT32_MAX) : 0;
-    bool bounded = false;
-    for (size_t a = 0; a < self->model->n_p; a++) {
-        int64_t x = self->p[a] + (limited ? pvid_times_q31(solve->dp[a], factor) : solve->dp[a]);
-        if (x > self->upper[a]) {
-            x = self->upper[a];
-            bounded = true;
-        }
-        if (x < self->lower[a]) {
-            x = self->lower[a];
-            bounded = true;
-        }
-        p[a] = (int32_t)x;
-    }
-    if (limited) {
-        pvid_count_up(&self->counters.limited);
-    }
-    if (bounded) {
-        pvid_count_up(&self->counters.bounded);
-    }
+    pvid_solution_q31 solution = {.p = solve->p};
+    pvid_step_take_q31(&self->settings, self->p, solve->dp, &solution);
+    pvid_count_step(&self->counters, solution.limited, solution.bounded);
+    solve->size = solution.size;
 }
 
 /* theta_step and its exponent: dtheta scaled as the columns of m. */
@@ -288,8 +243,7 @@ static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve
     if (solve->in_dead_zone) {
         pvid_count_up(&self->counters.at_rest);
     } else if (solve->reason == PVID_UPDATED) {
-        solve->size = size_of(self, solve->dp);
-        take_step(self, solve, solve->size, solve->p);
+        take_step(self, solve);
     } else if (solve->has_fallback) {
         memcpy(solve->p, solve->fallback, sizeof solve->p);
     }
@@ -355,7 +309,7 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     const int64_t residual = sums[n] - fall_of(self, solve);
     if (!fits || (residual > PVID_CLAMP_LIMIT)) {
         if (steps) {
-            hold_solve(self, solve, PVID_HELD_PIVOT);
+            solve->reason = pvid_count_held(&self->counters, PVID_HELD_PIVOT);
         }
         return;
     }
@@ -368,17 +322,6 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     if (steps) {
         pvid_count_up(&self->counters.updates);
     }
-}
-
-/* Counts a group. Returns whether a solve is due. */
-static bool is_due(pvid_estimator_q31 *self)
-{
-    self->phase++;
-    if (self->phase < self->divider) {
-        return false;
-    }
-    self->phase = 0;
-    return true;
 }
 
 static void reset_solve(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
@@ -394,7 +337,8 @@ static void reset_solve(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     solve->in_dead_zone = false;
     solve->gain = PVID_ONE_Q30;
     solve->size = 0;
-    solve->variance = pvid_estimator_expected_variance_q31(self); /* while p may still be far off */
+    solve->variance =
+        pvid_assess_row_variance_q31(&self->settings, self->information.exponent); /* while p may still be far off */
 }
 
 void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, bool ends_group)
@@ -402,12 +346,12 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
     reset_solve(self, solve);
     solve->ends_group = ends_group;
     if (ends_group) {
-        solve->energy = self->energy;
-        self->energy = 0;
+        solve->group_rss = self->group_rss;
+        self->group_rss = 0;
         self->group_weight = 0;
-        solve->gain = self->gain;
-        solve->stage = (uint8_t)(is_due(self) ? STAGE_MATRIX : STAGE_FOLD);
-    } else if (self->gain < PVID_ONE_Q30) {
+        solve->gain = self->settings.gain;
+        solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_MATRIX : STAGE_FOLD);
+    } else if (self->settings.gain < PVID_ONE_Q30) {
         solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
     }
 }
@@ -465,7 +409,7 @@ static bool advance_shared(const pvid_estimator_q31 *self, pvid_estimator_solve_
         all = self->model->n_theta;
         break;
     case STAGE_JACOBIAN:
-        pvid_system_jacobian_q31(self, solve->h, solve->c, solve->f);
+        pvid_system_jacobian_q31(self, solve->h, solve->c, solve->system.f);
         break;
     case STAGE_PROJECT:
         project_stage(self, solve);
@@ -520,14 +464,15 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
 static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
 {
     if (part == 0u) {
-        begin_factor(solve, (uint8_t)n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
+        begin_factor(solve, (uint8_t)n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
         return;
     }
     if (part < factor_parts(n_p)) {
         eliminate_part(solve, n_p, part);
-    } else if (solve->factor.positive) {
-        estimate->kappa = solve->factor.first_pivot;
-        estimate->least_pivot = pvid_cholesky_least_pivot_q31(&solve->factor, (const int32_t (*)[PVID_MAX_P])solve->q);
+    } else if (solve->system.factor.positive) {
+        estimate->kappa = solve->system.factor.first_pivot;
+        estimate->least_pivot =
+            pvid_cholesky_least_pivot_q31(&solve->system.factor, (const int32_t (*)[PVID_MAX_P])solve->system.q);
     }
 }
 
@@ -535,8 +480,8 @@ static void widen_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
 {
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
-        pvid_estimator_widen_q31(self, solve);
-        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->s);
+        pvid_assess_widen_q31(&solve->system, &self->settings, solve->inverse.wide);
+        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
     } else {
         eliminate_part(solve, n_p, part);
     }
@@ -550,7 +495,8 @@ bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_esti
     size_t all = n_p;
     switch (solve->stage) {
     case STAGE_RESIDUAL:
-        pvid_estimator_residual_q31(self, solve, estimate);
+        pvid_assess_residual_q31(&self->information, &self->settings, self->expected, &solve->variance,
+                                 &solve->inverse.wide, estimate);
         all = 1;
         break;
     case STAGE_KAPPA:
@@ -562,10 +508,10 @@ bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_esti
         all = factor_parts(n_p);
         break;
     case STAGE_INVERT:
-        pvid_estimator_invert_q31(solve, index);
+        pvid_assess_invert_q31(&solve->system.factor, index, &solve->inverse);
         break;
     case STAGE_ERRORS:
-        pvid_estimator_errors_q31(self, solve, index, estimate);
+        pvid_assess_errors_q31(&solve->system, &self->settings, &solve->inverse, index, estimate);
         break;
     case STAGE_DONE:
         return true;

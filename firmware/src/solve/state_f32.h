@@ -13,12 +13,6 @@ static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
     return ((model->positive >> i) & 1u) != 0u;
 }
 
-/* Number of leading parameters that are checked for excitation. */
-static inline uint8_t pvid_excited_parameters_f32(const pvid_model_f32 *model)
-{
-    return (model->n_gated > 0u) ? model->n_gated : model->n_p;
-}
-
 /* Returns whether init has accepted a configuration. */
 static inline bool pvid_estimator_is_ready_f32(const pvid_estimator_f32 *self)
 {

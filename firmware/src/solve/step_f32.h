@@ -1,86 +1,145 @@
-/* A step of p from the solution of (S + H0) dp = rhs: its size, its limits, and whether it is allowed. Private to the
- * core, inlined. */
+/* A step of p from the normal equations: whether it is allowed, its size, its limits. Pure: the results depend on the
+ * arguments alone. Private to the core, inlined.
+ *
+ *   reason = pvid_step_factor_f32(&system, &settings, &factor);
+ *   if (reason == PVID_UPDATED) pvid_step_take_f32(&system, &settings, &factor, p, rhs, &solution);
+ */
 #ifndef PVID_STEP_F32_H
 #define PVID_STEP_F32_H
 
-#include "number/count.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
 #include "number/finite_f32.h"
-#include "solve/state_f32.h"
+#include "solve/assess_f32.h"
+#include "solve/cholesky_f32.h"
+#include "pvid/estimator.h"
+
+/* A step. The caller sets p, which may be the p of the equations; it is written only if a step is taken. */
+typedef struct {
+    float *p;           /* [n_p] p after the step, within its bounds */
+    float size;         /* largest |dp/p| before step_limit; 0 if there is no step */
+    pvid_reason reason; /* PVID_UPDATED, or PVID_HELD_PIVOT if dp is not finite */
+    bool in_dead_zone;  /* p is within the dead zone: no step */
+    bool limited;       /* shortened to step_limit */
+    bool bounded;       /* a parameter was stopped at its bound */
+} pvid_solution_f32;
 
 /* Relative size of a step in parameter a: relative to p if it is a positive parameter, else to start_sd. Returns the
  * bits of the float: the bits of |x| are ordered like |x|, infinity and NaN last. */
-static inline uint32_t pvid_estimator_relative_step_f32(const pvid_estimator_f32 *self, size_t a, float step)
+static inline uint32_t pvid_step_relative_f32(const pvid_solve_settings_f32 *settings, const float p[], size_t a,
+                                              float step)
 {
-    const float *reference = pvid_is_positive_f32(self->model, a) ? self->p : self->start_sd;
+    const bool positive = (((uint32_t)settings->positive >> a) & 1u) != 0u;
+    const float *reference = positive ? p : settings->start_sd;
     return pvid_bits_f32(step / reference[a]) & 0x7FFFFFFFu;
 }
 
 /* The largest relative step of all parameters; not finite if dp is not. */
-static inline float pvid_estimator_step_size_f32(const pvid_estimator_f32 *self, const float dp[])
+static inline float pvid_step_size_f32(const pvid_solve_settings_f32 *settings, const float p[], const float dp[])
 {
     uint32_t largest = 0;
-    for (size_t a = 0; a < self->model->n_p; a++) {
-        const uint32_t relative_step = pvid_estimator_relative_step_f32(self, a, dp[a]);
+    for (size_t a = 0; a < settings->n_p; a++) {
+        const uint32_t relative_step = pvid_step_relative_f32(settings, p, a, dp[a]);
         largest = (relative_step > largest) ? relative_step : largest;
     }
     return pvid_from_bits_f32(largest);
 }
 
-/* Parameter a after a step, within its bounds. */
-static inline float pvid_estimator_bounded_f32(const pvid_estimator_f32 *self, size_t a, float step, bool *bounded)
+/* Parameter a after a step, within its bounds; sets *bounded if it is stopped there. */
+static inline float pvid_step_bounded_f32(const pvid_solve_settings_f32 *settings, const float p[], size_t a,
+                                          float step, bool *bounded)
 {
-    float x = self->p[a] + step;
-    if (x > self->upper[a]) {
-        x = self->upper[a];
+    float x = p[a] + step;
+    if (x > settings->upper[a]) {
+        x = settings->upper[a];
         *bounded = true;
     }
-    if (x < self->lower[a]) {
-        x = self->lower[a];
+    if (x < settings->lower[a]) {
+        x = settings->lower[a];
         *bounded = true;
     }
     return x;
 }
 
-/* Factor that shortens a step of this relative size to the step limit. */
-static inline float pvid_estimator_step_factor_f32(pvid_estimator_f32 *self, float size)
+/* Factor that shortens a step of this relative size to the step limit; sets *limited. */
+static inline float pvid_step_shortening_f32(const pvid_solve_settings_f32 *settings, float size, bool *limited)
 {
-    if (size > self->step_limit) {
-        pvid_count_up(&self->counters.limited);
-        return self->step_limit / size;
-    }
-    return 1.0f;
+    *limited = size > settings->step_limit;
+    return *limited ? (settings->step_limit / size) : 1.0f;
 }
 
-/* p[n_p] = the estimator's p after the step dp, shortened to the step limit, within the bounds. */
-static inline void pvid_estimator_apply_step_f32(pvid_estimator_f32 *self, const float dp[], float size, float p[])
-{
-    const float part = pvid_estimator_step_factor_f32(self, size);
-    bool bounded = false;
-    for (size_t a = 0; a < self->model->n_p; a++) {
-        p[a] = pvid_estimator_bounded_f32(self, a, part * dp[a], &bounded);
-    }
-    if (bounded) {
-        pvid_count_up(&self->counters.bounded);
-    }
-}
-
-/* Sufficient excitation of p[0]: the share kappa of its diagonal entry that no other parameter can explain is
+/* Sufficient excitation of p[0]: the share kappa of its diagonal entry of S + H0 that no other parameter can explain is
  * large enough, and exceeds the prior information. */
-static inline bool pvid_estimator_is_excited_f32(const pvid_estimator_f32 *self, float kappa, float diagonal)
+static inline bool pvid_step_is_excited_f32(const pvid_solve_settings_f32 *settings, float kappa, float diagonal)
 {
-    const bool own = (kappa * diagonal) >= (2.0f * self->prior[0]);
-    return (kappa >= self->kappa_min) && (own || !(self->kappa_min > 0.0f));
+    const bool own = (kappa * diagonal) >= (2.0f * settings->prior[0]);
+    return (kappa >= settings->kappa_min) && (own || !(settings->kappa_min > 0.0f));
 }
 
-/* Counts a group. Returns whether a solve is due. */
-static inline bool pvid_estimator_is_due_f32(pvid_estimator_f32 *self)
+/* Whether p is within the dead zone of estimator.h: F^T (S + H0)^-1 F <= dead_zone^2 correlation s^2. False for NaN.
+ * Cost: a solve. */
+static inline bool pvid_step_is_in_dead_zone_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                                                 const pvid_cholesky_f32 *factor)
 {
-    self->phase++;
-    if (self->phase < self->divider) {
-        return false;
+    float x[PVID_MAX_P];
+    float square = 0.0f;
+    pvid_cholesky_solve_f32(factor, system->force, x);
+    for (size_t a = 0; a < settings->n_p; a++) {
+        square += system->force[a] * x[a];
     }
-    self->phase = 0;
-    return true;
+    const float variance = pvid_assess_variance_f32(system, settings);
+    const float noise = (variance < settings->row_variance) ? variance : settings->row_variance;
+    return square <= (settings->dead_zone * (settings->correlation * noise));
+}
+
+/* Factors S + H0. Returns PVID_UPDATED if a step is allowed. Fails iff
+ *   - a diagonal entry of S + H0 is not a positive normal number or a relative pivot is below PVID_PIVOT_MIN:
+ *     PVID_HELD_PIVOT, or
+ *   - p[0] is not sufficiently excited: PVID_HELD_NOT_EXCITED.
+ * Cost: a factorisation, two if n_excited < n_p. */
+static inline pvid_reason pvid_step_factor_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                                               pvid_cholesky_f32 *factor)
+{
+    bool solvable = pvid_cholesky_factor_f32(factor, settings->n_excited, system->s);
+    const float kappa = factor->first_pivot;
+    if (settings->n_excited < settings->n_p) {
+        solvable = pvid_cholesky_factor_f32(factor, settings->n_p, system->s) && solvable;
+    }
+    if (!solvable) {
+        return PVID_HELD_PIVOT;
+    }
+    return pvid_step_is_excited_f32(settings, kappa, system->s[0][0]) ? PVID_UPDATED : PVID_HELD_NOT_EXCITED;
+}
+
+/* dp = (S + H0)^-1 rhs, shortened to the step limit, and p + dp within the bounds. No step in the dead zone. Fails iff
+ * dp is not finite: solution->reason is PVID_HELD_PIVOT. Cost: a solve, two with a dead zone, n_p
+ * + 1 divisions. Source: theory.md 4, equation (6). */
+static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                                      const pvid_cholesky_f32 *factor, const float p[], const float rhs[],
+                                      pvid_solution_f32 *solution)
+{
+    float dp[PVID_MAX_P];
+    solution->reason = PVID_UPDATED;
+    solution->size = 0.0f;
+    solution->limited = false;
+    solution->bounded = false;
+    solution->in_dead_zone = (settings->dead_zone > 0.0f) && pvid_step_is_in_dead_zone_f32(system, settings, factor);
+    if (solution->in_dead_zone) {
+        return;
+    }
+    pvid_cholesky_solve_f32(factor, rhs, dp);
+    const float size = pvid_step_size_f32(settings, p, dp);
+    if (!pvid_finite_f32(size)) {
+        solution->reason = PVID_HELD_PIVOT;
+        return;
+    }
+    solution->size = size;
+    const float part = pvid_step_shortening_f32(settings, size, &solution->limited);
+    for (size_t a = 0; a < settings->n_p; a++) {
+        solution->p[a] = pvid_step_bounded_f32(settings, p, a, part * dp[a], &solution->bounded);
+    }
 }
 
 #endif

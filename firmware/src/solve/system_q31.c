@@ -139,7 +139,7 @@ static void scale_noise(const pvid_estimator_q31 *self, const pvid_estimator_sol
     const uint8_t *noisy = self->model->noisy;
     const int64_t weight = self->information.sums[self->information.n_sums - 1u];
     const pvid_scaled_q31 rows = pvid_scaled_times_q31(pvid_scaled_of_q31(weight, -16), solve->variance);
-    const pvid_scaled_q31 much = pvid_scaled_times_q31(pvid_scaled_of_q31(self->noise_margin, -16), rows);
+    const pvid_scaled_q31 much = pvid_scaled_times_q31(pvid_scaled_of_q31(self->settings.noise_margin, -16), rows);
     for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
         const int32_t h = solve->h[noisy[i / 2u]] + solve->h[noisy[(i + 1u) / 2u]];
         const pvid_scaled_q31 own = pvid_scaled_times_q31(much, self->noise[i]);
@@ -168,7 +168,7 @@ void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_es
             t[i] = pvid_round_shift_q31(sum, PVID_S_BITS);
         }
         for (size_t b = a; b < model->n_p; b++) {
-            rest[a][b] = solve->s[a][b] - ((c[b][0] * t[0]) + (c[b][1] * t[1]));
+            rest[a][b] = solve->system.s[a][b] - ((c[b][0] * t[0]) + (c[b][1] * t[1]));
         }
     }
 }

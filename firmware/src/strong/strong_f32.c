@@ -55,7 +55,8 @@ static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *
     }
     pvid_misfit_init_f32(&self->misfit, config->sample_rate_hz, config->estimator.forgetting_s);
     return pvid_gate_init_f32(&self->gate, &config->gate, config->sample_rate_hz,
-                              GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
+                              GATE_MEMORY_S * config->sample_rate_hz,
+                              GATE_FLOOR * self->estimator.settings.row_variance);
 }
 
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)

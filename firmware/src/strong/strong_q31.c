@@ -26,7 +26,9 @@ static pvid_scaled_q31 gate_floor(const pvid_estimator_q31 *estimator)
 {
     const pvid_scaled_q31 rounding = pvid_scaled_of_q31(1, 0);
     return pvid_scaled_plus_q31(
-        pvid_scaled_shifted_q31(pvid_estimator_expected_variance_q31(estimator), -GATE_FLOOR_BITS), rounding);
+        pvid_scaled_shifted_q31(pvid_assess_row_variance_q31(&estimator->settings, estimator->information.exponent),
+                                -GATE_FLOOR_BITS),
+        rounding);
 }
 
 static bool shifts_are_valid(const uint8_t shift[], size_t n)

@@ -8,7 +8,7 @@
 
 #include "solve/cholesky_f32.h"
 #include "number/count.h"
-#include "solve/assess_f32.h"
+#include "solve/staged_f32.h"
 #include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
@@ -135,12 +135,12 @@ void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self, const pvid_estimator
     self->stage = STAGE_COMBINE;
 }
 
-/* energy += e^2 of the rows first..last-1 at the present p. */
+/* rss += e^2 of the rows first..last-1 at the present p. */
 static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *estimator, size_t first, size_t last,
                           const float columns[][PVID_WEAK_TERMS])
 {
     if (first == 0u) {
-        self->energy = 0.0f;
+        self->rss = 0.0f;
     }
     for (size_t k = first; k < last; k++) {
         float e = columns[k][PVID_WEAK_COLUMN_Y];
@@ -149,7 +149,7 @@ static void add_residuals(pvid_weak_finish_f32 *self, const pvid_estimator_f32 *
             const size_t column = (i < linear) ? i : ((i - linear) + (size_t)PVID_WEAK_COLUMN_C1);
             e -= columns[k][column] * estimator->theta[i];
         }
-        self->energy += e * e;
+        self->rss += e * e;
     }
 }
 
@@ -200,7 +200,7 @@ static bool advance_solve(pvid_weak_finish_f32 *self, uint8_t iterations, pvid_e
     return false;
 }
 
-/* A stage of the assessment. Returns true when the estimate has been judged. self->solve.energy is still that of the
+/* A stage of the assessment. Returns true when the estimate has been judged. self->solve.group_rss is still that of the
  * window's first solve. */
 static bool advance_assessment(pvid_weak_finish_f32 *self, const pvid_weak_design_f32 *design,
                                pvid_estimator_f32 *estimator, pvid_trust_f32 *trust)
@@ -209,7 +209,7 @@ static bool advance_assessment(pvid_weak_finish_f32 *self, const pvid_weak_desig
         return false;
     }
     const float freedom = (float)design->functions - 2.0f;
-    const float variance_ratio = self->solve.energy / (freedom * self->expected);
+    const float variance_ratio = self->solve.group_rss / (freedom * self->expected);
     const bool stepped = self->reason == PVID_UPDATED;
     self->reason = pvid_trust_judge_f32(trust, estimator, self->reason, self->size, self->solve.above_noise,
                                         variance_ratio, &self->candidate);
@@ -308,7 +308,7 @@ void pvid_weak_finish_step_f32(pvid_weak_finish_f32 *self, const pvid_weak_desig
         self->stage++;
         if (self->stage == STAGE_ADD) {
             const float freedom = (float)functions - 2.0f;
-            if (pvid_gate_passes_f32(&self->gate, self->energy / (freedom * self->expected))) {
+            if (pvid_gate_passes_f32(&self->gate, self->rss / (freedom * self->expected))) {
                 begin_rows(self, estimator, trust);
             } else {
                 pvid_count_up(&estimator->counters.rejected_outlier);

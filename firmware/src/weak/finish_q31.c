@@ -5,7 +5,6 @@
 
 #include "solve/cholesky_q31.h"
 #include "number/count.h"
-#include "solve/assess_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "number/integer_q31.h"
@@ -96,14 +95,14 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_desi
 {
     const pvid_scaled_q31 none = {0, 0};
     const factor_of_table two = reduced(estimator->theta[1], estimator->theta_bits[1], 30);
-    const factor_of_table zero = reduced(estimator->theta[4], estimator->theta_bits[4], 30);
+    const factor_of_table offset = reduced(estimator->theta[4], estimator->theta_bits[4], 30);
     const factor_of_table table[PVID_WEAK_GRAMS] = {
         {1, 0},
         two,
-        zero,
+        offset,
         {two.m * two.m, 2 * two.bits},
-        {two.m * zero.m, two.bits + zero.bits},
-        {zero.m * zero.m, 2 * zero.bits},
+        {two.m * offset.m, two.bits + offset.bits},
+        {offset.m * offset.m, 2 * offset.bits},
     };
     factor_of_table part[PVID_WEAK_GRAMS];
     int32_t common = INT32_MAX;
@@ -122,7 +121,7 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_desi
         self->trace[i] = none;
     }
     /* in units of Y, independent of the sums' exponent */
-    const int64_t square = (int64_t)estimator->row_sd * estimator->row_sd;
+    const int64_t square = (int64_t)estimator->settings.row_sd * estimator->settings.row_sd;
     self->expected = pvid_scaled_plus_q31(pvid_scaled_of_q31(square, -2 * PVID_ROW_SD_BITS), pivot);
     self->whitened = true;
     self->saturated = false;
@@ -416,13 +415,13 @@ static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *
                           int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
     if (first == 0u) {
-        self->energy = 0;
+        self->rss = 0;
     }
     for (size_t k = first; k < last; k++) {
         int64_t e;
         (void)pvid_estimator_innovation_q31(estimator, &sums[k][COLUMN_N], sums[k][COLUMN_Y], &e);
         const int64_t within = pvid_clamp_q31(e, COLUMN_LIMIT);
-        self->energy = pvid_clamp_q31(self->energy + (within * within), PVID_WIDE);
+        self->rss = pvid_clamp_q31(self->rss + (within * within), PVID_WIDE);
     }
 }
 
@@ -430,7 +429,7 @@ static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *
 static pvid_scaled_q31 variance_ratio_of(const pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
 {
     const pvid_scaled_q31 freedom = pvid_scaled_of_q31((int64_t)design->functions - 2, 0);
-    return pvid_scaled_over_q31(pvid_scaled_of_q31(self->energy, 0), pvid_scaled_times_q31(freedom, self->expected));
+    return pvid_scaled_over_q31(pvid_scaled_of_q31(self->rss, 0), pvid_scaled_times_q31(freedom, self->expected));
 }
 
 /* Returns whether the gate accepts the window. Saturated rows pass; the estimator rejects them. */
@@ -476,7 +475,7 @@ static void begin_solves(pvid_weak_finish_q31 *self, pvid_estimator_q31 *estimat
     const int32_t *fallback = pvid_trust_fallback_q31(trust);
     pvid_estimator_set_expected_q31(estimator, self->expected);
     pvid_estimator_begin_q31(estimator, &self->solve, true);
-    self->energy = self->solve.energy;
+    self->rss = self->solve.group_rss;
     if (fallback != NULL) {
         self->solve.has_fallback = true;
         memcpy(self->solve.fallback, fallback, sizeof self->solve.fallback);

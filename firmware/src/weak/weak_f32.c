@@ -166,7 +166,7 @@ static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *conf
     self->pivot_noise = config->pivot_noise / ((lag * lag) * (lag * lag));
     self->angle_limit = config->angle_limit;
     self->functions_per_tick = pvid_weak_functions_per_tick(design->decimation, design->functions);
-    self->iterations = (uint8_t)((self->estimator.gain < 1.0f) ? 1u : config->iterations);
+    self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     self->angle = (config->full_angle || config->friction) ? config->angle : NULL;
     if (pvid_angle_correction_enabled_f32(self->angle)) {
         pvid_weak_angle_init_f32(self->angle, config);

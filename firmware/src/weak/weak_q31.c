@@ -198,7 +198,7 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     const int64_t drive_min = (int64_t)config->drive_min * (design->window - 1);
     self->drive_min = drive_min * drive_min;
     self->functions_per_tick = pvid_weak_functions_per_tick(design->decimation, design->functions);
-    self->iterations = (uint8_t)((self->estimator.gain < PVID_ONE_Q30) ? 1u : config->iterations);
+    self->iterations = (uint8_t)((self->estimator.settings.gain < PVID_ONE_Q30) ? 1u : config->iterations);
     const uint32_t stages = pvid_weak_finish_stages_q31(design->functions, self->iterations, &self->estimator);
     self->stages_per_tick = pvid_weak_stages_per_tick(stages, design->window, design->decimation, design->functions);
     if (self->stages_per_tick == 0u) {

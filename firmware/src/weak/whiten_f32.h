@@ -26,7 +26,7 @@ void pvid_weak_whiten_row_f32(const pvid_weak_whiten_f32 *self, size_t row, floa
 void pvid_weak_whiten_inverse_f32(const pvid_weak_whiten_f32 *self, size_t row, float inverse[]);
 
 /* Adds a row's part of trace number `which`: trace(R0^-1 G22), trace(R0^-1 G20), trace(R0^-1 G00). These are the
- * energy that noise of unit variance adds to the columns of chi'' phi and chi phi. The first row starts the sum, the
+ * square that noise of unit variance adds to the columns of chi'' phi and chi phi. The first row starts the sum, the
  * last one divides it by K: self->trace is then the argument of the model's `noise` (pvid/model.h). */
 void pvid_weak_whiten_trace_f32(pvid_weak_whiten_f32 *self, const pvid_weak_design_f32 *design, size_t row,
                                 const float inverse[], size_t which);

@@ -8,6 +8,37 @@
  * (src/solve/direct_f32.c). */
 enum { PVID_ENGINE_STAGED = 1, PVID_ENGINE_DIRECT = 2 };
 
+/* What the step and the assessment need beside the normal equations; written by init alone. */
+typedef struct {
+    float prior[PVID_MAX_P];    /* diagonal of H0 [units of S] */
+    float start_sd[PVID_MAX_P]; /* as in the configuration, with the fields below */
+    float lower[PVID_MAX_P];
+    float upper[PVID_MAX_P];
+    float row_variance; /* row_sd^2 [units of Y^2] */
+    float gain;         /* g */
+    float correlation;
+    float step_limit;
+    float kappa_min;
+    float noise_margin;
+    float dead_zone;   /* square of the configured one */
+    uint8_t n_p;       /* parameters */
+    uint8_t n_excited; /* the first ones, which are checked for excitation */
+    uint8_t positive;  /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a] */
+    uint8_t engine;    /* PVID_ENGINE_ */
+} pvid_solve_settings_f32;
+
+/* The normal equations of a solve and the residuals at p, which an engine gathers from the sums (estimator.h):
+ *
+ *   (S + H0) dp = g F + (1 - g) sum C^T N e,   S = C^T M C,   F = C^T (B - M theta) */
+typedef struct {
+    float s[PVID_MAX_P][PVID_MAX_P]; /* S [n_p][n_p], for a step S + H0; upper triangle */
+    float force[PVID_MAX_P];         /* F [n_p] */
+    float rss;                       /* residual sum of squares of the rows in the sums [units of Y^2] */
+    float rounding;                  /* bound of its rounding error [units of Y^2] */
+    float floor;                     /* lower limit of rss + rounding [units of Y^2] */
+    float weight;                    /* rows in the sums */
+} pvid_system_f32;
+
 /* Only the functions of estimator.h write to it. */
 struct pvid_estimator_f32 {
     const pvid_model_f32 *model;
@@ -15,25 +46,14 @@ struct pvid_estimator_f32 {
     float p[PVID_MAX_P];
     float theta[PVID_MAX_THETA];  /* f(p); only for models without their own project */
     float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
-    float prior[PVID_MAX_P];      /* diagonal of H0 */
-    float start_sd[PVID_MAX_P];
-    float lower[PVID_MAX_P];
-    float upper[PVID_MAX_P];
-    float row_variance;
-    float gain; /* g */
-    float correlation;
-    float step_limit;
-    float kappa_min;
-    float noise_margin;
-    float dead_zone;                /* square of the configured one */
+    pvid_solve_settings_f32 settings;
     float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; the weak form writes it */
-    float energy;                   /* sum of e^2 of the rows of the current group, each at the p of its tick */
-    float group_weight; /* their weight; energy and group_weight only for models without their own project */
+    float group_rss;                /* sum of e^2 of the rows of the current group, each at the p of its tick */
+    float group_weight; /* their weight; group_rss and group_weight only for models without their own project */
     float expected;     /* mean over the rows in the sums of their variance by the sensors' noise [units of Y^2]: lower
                            limit of the residual variance. 0: unknown */
     uint16_t divider;
     uint16_t phase; /* groups since the last solve */
-    uint8_t engine; /* PVID_ENGINE_; set by init */
     pvid_counters counters;
 };
 
@@ -46,14 +66,14 @@ typedef struct {
     float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
 } pvid_cholesky_f32;
 
-/* A solve or an assessment in progress; the caller owns it. Read reason, size, energy and above_noise when it is
+/* A solve or an assessment in progress; the caller owns it. Read reason, size, group_rss and above_noise when it is
  * complete. The caller may set fallback after begin. */
 struct pvid_estimator_solve_f32 {
     pvid_reason reason;
     const float *fallback;       /* [n_p] value of p if no step is allowed; NULL: p is unchanged */
     pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
     float size;                  /* largest |dp/p| of the step before step_limit; 0 if p is held */
-    float energy;                /* sum of e^2 of the group's rows, each at the p of its tick */
+    float group_rss;             /* sum of e^2 of the group's rows, each at the p of its tick */
     float variance;              /* of a row: row_sd^2 in a solve, s^2 of the residuals in an assessment */
     bool above_noise;            /* S contains more information than noise alone */
     bool solvable;               /* of an assessment: S could be factored */
@@ -68,13 +88,11 @@ struct pvid_estimator_solve_f32 {
     float scale;       /* sum of M_ii dtheta_i^2: size of the terms that cancel in `fall` */
     float sums[PVID_MAX_SUMS];
     float c[PVID_MAX_THETA * PVID_MAX_P];
-    float column[PVID_MAX_THETA];    /* M times a column of C */
-    float s[PVID_MAX_P][PVID_MAX_P]; /* S, then S + H0; upper triangle */
-    float force[PVID_MAX_P];         /* F */
-    float p[PVID_MAX_P];             /* p and theta after the step */
+    pvid_system_f32 system;
+    float p[PVID_MAX_P]; /* p and theta after the step */
     float theta[PVID_MAX_THETA];
     float theta_step[PVID_MAX_THETA]; /* dtheta */
-    float moved[PVID_MAX_THETA];      /* M dtheta: b -= moved */
+    float product[PVID_MAX_THETA];    /* M times a column of C, then M dtheta: b -= product */
     pvid_cholesky_f32 factor;
 };
 

@@ -29,6 +29,25 @@ typedef struct {
     int64_t sums[PVID_MAX_SUMS_Q31];
 } pvid_information_q31;
 
+/* What the step and the assessment need beside the normal equations, in the formats of the configuration; written by
+ * init alone. */
+typedef struct {
+    int32_t prior[PVID_MAX_P]; /* H0 = prior 2^-prior_exponent */
+    int16_t prior_exponent[PVID_MAX_P];
+    int32_t start_sd[PVID_MAX_P];
+    int32_t lower[PVID_MAX_P];
+    int32_t upper[PVID_MAX_P];
+    int32_t row_sd;
+    int32_t gain; /* g */
+    uint32_t correlation;
+    uint32_t step_limit;
+    int32_t kappa_min;
+    uint32_t noise_margin;
+    uint32_t dead_zone;
+    uint8_t n_p;      /* parameters */
+    uint8_t positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a] */
+} pvid_solve_settings_q31;
+
 /* Only the functions of estimator_q31.h write to it. */
 struct pvid_estimator_q31 {
     const pvid_model_q31 *model;
@@ -41,20 +60,9 @@ struct pvid_estimator_q31 {
     int16_t align[PVID_MAX_THETA_Q31];    /* N_i theta_i 2^-align is in units of Y */
     int16_t theta_bits[PVID_MAX_THETA_Q31];
     int16_t c_exponent[PVID_MAX_C_Q31]; /* C_k 2^c_exponent: units of Y per N and p */
-    int32_t prior[PVID_MAX_P];          /* H0 = prior 2^-prior_exponent */
-    int16_t prior_exponent[PVID_MAX_P];
-    int32_t start_sd[PVID_MAX_P];
-    int32_t lower[PVID_MAX_P];
-    int32_t upper[PVID_MAX_P];
-    int32_t row_sd;
-    int32_t gain;
-    uint32_t correlation;
-    uint32_t step_limit;
-    int32_t kappa_min;
-    uint32_t noise_margin;
-    uint32_t dead_zone;
+    pvid_solve_settings_q31 settings;
     pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; the weak form writes it */
-    int64_t energy; /* sum of e^2 of the rows of the current group, each at the p of its tick, at most PVID_WIDE */
+    int64_t group_rss; /* sum of e^2 of the rows of the current group, each at the p of its tick, at most PVID_WIDE */
     int64_t group_weight;     /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them
                                  [units of Y's integer squared]: residual variances are at least this. 0: not set */
@@ -80,7 +88,24 @@ typedef struct {
     int64_t pivot[PVID_MAX_P];               /* Q60 */
 } pvid_cholesky_q31;
 
-/* A solve or an assessment in progress; the caller owns it. Read reason, size, energy and above_noise when it is
+/* The normal equations of a solve (estimator.h), their scaling and factor. The residuals at p are in the sums. */
+typedef struct {
+    int64_t s[PVID_MAX_P][PVID_MAX_P]; /* S, for a step S + H0, in units of 2^(f_a + f_b + 32); upper triangle */
+    int64_t first_prior;               /* H0 of p[0], in the units of s; only for a step */
+    int16_t f[PVID_MAX_P];
+    int16_t g[PVID_MAX_P];
+    int32_t q[PVID_MAX_P][PVID_MAX_P]; /* s_ab 2^-(g_a + g_b), which is factored */
+    pvid_cholesky_q31 factor;
+} pvid_system_q31;
+
+/* Of an assessment: the inverse of a factor, and the variance that standard errors are made of. */
+typedef struct {
+    pvid_root_q31 wide;                     /* root of correlation s^2 */
+    int32_t column[PVID_MAX_P][PVID_MAX_P]; /* columns of U^-1 */
+    pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
+} pvid_inverse_q31;
+
+/* A solve or an assessment in progress; the caller owns it. Read reason, size, group_rss and above_noise when it is
  * complete. The caller may set fallback after begin. */
 struct pvid_estimator_solve_q31 {
     pvid_reason reason;
@@ -91,26 +116,19 @@ struct pvid_estimator_solve_q31 {
     bool judging;     /* an assessment */
     bool above_noise; /* S contains more information than noise alone */
     bool has_fallback;
-    bool in_dead_zone;                      /* within the dead zone: no step is taken */
-    int32_t fallback[PVID_MAX_P];           /* value of p if no step is allowed */
-    int64_t size;                           /* largest |dp/p| of the step before step_limit, Q22; 0 if p is held */
-    int64_t energy;                         /* sum of e^2 of the group's rows, each at the p of its tick */
-    pvid_scaled_q31 variance;               /* of a row, divided by 4^exponent as the sums are */
-    pvid_root_q31 wide;                     /* root of the variance that standard errors are made of */
-    int32_t column[PVID_MAX_P][PVID_MAX_P]; /* of an inverted factor, and */
-    pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
+    bool in_dead_zone;            /* within the dead zone: no step is taken */
+    int32_t fallback[PVID_MAX_P]; /* value of p if no step is allowed */
+    int64_t size;                 /* largest |dp/p| of the step before step_limit, Q22; 0 if p is held */
+    int64_t group_rss;            /* sum of e^2 of the group's rows, each at the p of its tick */
+    pvid_scaled_q31 variance;     /* of a row, divided by 4^exponent as the sums are */
+    pvid_inverse_q31 inverse;
     int32_t gain;
     int32_t m[PVID_MAX_MOMENTS_Q31]; /* M_ij = m_ij 2^(h_i + h_j) */
     int16_t h[PVID_MAX_THETA_Q31];
-    int32_t c[PVID_MAX_C_Q31]; /* C_k = c_k 2^(f_column - h_row) */
-    int16_t f[PVID_MAX_P];
+    int32_t c[PVID_MAX_C_Q31];         /* C_k = c_k 2^(f_column - h_row), f of the system */
     int32_t force[PVID_MAX_THETA_Q31]; /* right-hand side by rows: 2^(force_exponent + h_row) */
     int32_t force_exponent;
-    int64_t s[PVID_MAX_P][PVID_MAX_P]; /* C^T M C + H0, in units of 2^(f_a + f_b + 32) */
-    int64_t first_prior;               /* H0 of p[0], in the units of s */
-    int16_t g[PVID_MAX_P];
-    int32_t q[PVID_MAX_P][PVID_MAX_P]; /* s_ab 2^-(g_a + g_b), which is factored */
-    pvid_cholesky_q31 factor;
+    pvid_system_q31 system;
     int64_t dp[PVID_MAX_P];
     int32_t p[PVID_MAX_P]; /* p after the step; likewise theta and b: b -= moved */
     int64_t theta[PVID_MAX_THETA_Q31];

@@ -83,7 +83,7 @@ typedef struct {
     pvid_reason reason; /* of the last solve, then of the window */
     float size;         /* of the last step, relative */
     float expected;     /* variance of a row by the sensors' noise */
-    float energy;       /* sum of e^2 of the window's rows before its steps; only if the gate is enabled */
+    float rss;          /* sum of e^2 of the window's rows before its steps; only if the gate is enabled */
     pvid_gate_f32 gate;
     pvid_weak_angle_f32 *angle;          /* NULL: linear rows */
     float direction[PVID_MAX_FUNCTIONS]; /* unit vector that is projected out, first a, then b; or 0 */

@@ -62,8 +62,7 @@ typedef struct {
     int64_t along[PVID_WEAK_COLUMNS_Q31];         /* components of the columns along it, Q30 */
     pvid_reason reason;                           /* of the last solve, then of the window */
     int64_t size;                                 /* of the last step, relative, Q22 */
-    int64_t
-        energy; /* sum of e^2 of the window's rows: before they are added (only if the gate is enabled), then since */
+    int64_t rss; /* sum of e^2 of the window's rows: before they are added (only if the gate is enabled), then since */
     pvid_gate_q31 gate;
     pvid_scaled_q31 expected; /* variance of a row by the sensors' noise */
     int32_t fade_factor;      /* factor on the sums before this window's rows, Q31; 0: none */

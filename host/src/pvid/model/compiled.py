@@ -29,6 +29,7 @@ class Signal:
     reach : largest absolute value
     hold : "zoh": the value set at t_k holds until t_(k+1); "sampled": the value at t_k
     driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
+    gain_sd : relative standard deviation of its gain; part of the standard errors, because a run seldom shows it
     """
 
     jet: Jet
@@ -39,6 +40,7 @@ class Signal:
     reach: float = 1.0
     hold: Literal["zoh", "sampled"] = "sampled"
     driven: bool = False
+    gain_sd: float = 0.0
 
     @property
     def name(self) -> str:

@@ -49,6 +49,7 @@ class Model:
         noise: float | None = None,
         reach: float = 1.0,
         driven: bool = False,
+        gain_sd: float = 0.0,
     ) -> Jet:
         """A measured signal.
 
@@ -58,6 +59,7 @@ class Model:
         noise : standard deviation of its white noise, in resolutions (0.5); in its unit where there is no resolution
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
+        gain_sd : relative standard deviation of its gain, which most runs do not show
         """
         if resolution < 0 or not math.isfinite(resolution):
             raise self._refused(f"{name}: resolution must not be negative")
@@ -65,17 +67,36 @@ class Model:
             raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
         level = 0.5 if noise is None else noise
         jet = self._signal(name, unit, reach)
-        self.signals.append(Signal(jet, unit, "sensor", float(resolution), float(level), float(reach), driven=driven))
+        self._gain(name, gain_sd)
+        self.signals.append(
+            Signal(
+                jet,
+                unit,
+                "sensor",
+                float(resolution),
+                float(level),
+                float(reach),
+                driven=driven,
+                gain_sd=float(gain_sd),
+            )
+        )
         return jet
 
-    def input(self, name: str, unit: str, hold: Literal["zoh", "sampled"], reach: float = 1.0) -> Jet:
-        """A signal that is known exactly; hold "zoh": the value set at t_k holds until t_(k+1), "sampled": it is a
-        value at t_k."""
+    def input(
+        self, name: str, unit: str, hold: Literal["zoh", "sampled"], reach: float = 1.0, gain_sd: float = 0.0
+    ) -> Jet:
+        """A signal that is known exactly but for its gain (relative standard deviation gain_sd); hold "zoh": the value
+        set at t_k holds until t_(k+1), "sampled": it is a value at t_k."""
         if hold not in ("zoh", "sampled"):
             raise self._refused(f'{name}: hold is "{hold}", it must be "zoh" or "sampled"')
         jet = self._signal(name, unit, reach)
-        self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, driven=True))
+        self._gain(name, gain_sd)
+        self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, True, float(gain_sd)))
         return jet
+
+    def _gain(self, name: str, gain_sd: float) -> None:
+        if not 0 <= gain_sd < 1:
+            raise self._refused(f"{name}: gain_sd is a relative standard deviation, from 0 to below 1")
 
     def unmeasured(self, name: str, unit: str) -> Jet:
         """A coordinate that no sensor measures; the compiler eliminates it."""
@@ -216,7 +237,9 @@ class Model:
         used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
         for one in self.unknowns:
             if one.symbol not in used:
-                raise ModelError(f"no row contains the unknown {one.name}: nothing tells it")
+                raise ModelError(
+                    f"no row contains the unknown {one.name}, so that it cannot be identified: declare it as known"
+                )
         plain = {jet: value for jet, value in self.defined.items() if jet not in integrals}
         simulated = [_inserted(one.expression, plain) for one in self.equations]
         simulated += [jet.d() - rates[jet.of] for jet in integrals]

@@ -1,4 +1,4 @@
-"""Which unknowns the rows determine, whatever the drive: the rank of d theta / d p over the rationals.
+"""Which unknowns the rows determine, whatever the drive: a rank over the rationals, along solutions of the rows.
 
 Where it is deficient, the null vectors name the unknowns that shift together, and what of them is identifiable: sums
 where the shift is a translation, products where it is a change of scale, else the theta that contain them.
@@ -16,6 +16,7 @@ from sympy.polys.matrices import DomainMatrix
 
 from pvid.model.compiled import CompiledModel, Unknown
 from pvid.model.gradient import jacobian_at, null_space, rank
+from pvid.model.solutions import Solutions
 from pvid.model.terms import matchings
 from pvid.model.units import dimension_of_unit
 from pvid.model.zero import RationalPoint
@@ -67,7 +68,7 @@ class Identifiability:
 
     Attributes
     ----------
-    rank : of d theta / d p
+    rank : number of functions of the unknowns that the rows determine
     unknowns : how many
     shifts : groups of unknowns that are not identifiable; none: all are, near the truth
     symmetries : finite ones
@@ -93,8 +94,13 @@ def identifiable(compiled: CompiledModel) -> Identifiability:
     """Of a compiled model, for any drive; local, so that finite symmetries are listed apart."""
     theta = list(dict.fromkeys(theta for row in compiled.rows for theta in row.theta))
     p = list(compiled.p)
-    found = max(rank(jacobian_at(theta, p, seed)[0]) for seed in _SEEDS)
-    shifts = () if found == len(p) else tuple(_shifts(theta, p))
+    along = [Solutions(compiled, seed) for seed in _SEEDS]
+    found = max(one.rank(seed) for one, seed in zip(along, _SEEDS, strict=True))
+    shifts: tuple[Shift, ...] = ()
+    if found < len(p):
+        by_theta = max(rank(jacobian_at(theta, p, seed)[0]) for seed in _SEEDS)
+        spaces = _of_theta(theta, p) if by_theta == found else _of_solutions(along)
+        shifts = tuple(_shifts(*spaces, theta, p))
     groups = [set(one.unknowns) for one in shifts]
     finite = [one for one in _symmetries(theta, compiled.unknowns) if not any(one.names <= group for group in groups)]
     return Identifiability(found, len(p), shifts, tuple(finite))
@@ -103,14 +109,33 @@ def identifiable(compiled: CompiledModel) -> Identifiability:
 # ---- shifts
 
 
-def _shifts(theta: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -> list[Shift]:
+_Space = list[list[sp.Expr]]
+
+
+def _of_theta(theta: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -> tuple[list[_Space], list[_Space]]:
+    """Null spaces of d theta / d p and of d theta / d log p at two points; known constants stay symbols."""
     constants = sorted({one for value in theta for one in value.free_symbols} - set(p), key=str)
+    found = [jacobian_at(theta, p, seed, constants) for seed in _SEEDS[:2]]
+    return (
+        [_canonical(null_space(matrix)) for matrix, _ in found],
+        [_canonical(null_space(matrix * sp.diag(*at))) for matrix, at in found],
+    )
+
+
+def _of_solutions(along: Sequence[Solutions]) -> tuple[list[_Space], list[_Space]]:
+    """The same of the columns along solutions, where a relation between rows makes the space larger."""
     spaces, scaled = [], []
-    for seed in _SEEDS[:2]:
-        matrix, at = jacobian_at(theta, p, seed, constants)
-        spaces.append(_canonical(null_space(matrix)))
-        in_logarithms = matrix * sp.diag(*at)
-        scaled.append(_canonical(null_space(in_logarithms)))
+    for one, seed in zip(along[:2], _SEEDS, strict=False):
+        n = len(one.at)
+        whole = [vector[:n] for vector in null_space(one.columns(seed)) if any(value != 0 for value in vector[:n])]
+        spaces.append(_canonical(whole))
+        scaled.append(_canonical([[value / at for value, at in zip(v, one.at, strict=True)] for v in whole]))
+    return spaces, scaled
+
+
+def _shifts(
+    spaces: Sequence[_Space], scaled: Sequence[_Space], theta: Sequence[sp.Expr], p: Sequence[sp.Symbol]
+) -> list[Shift]:
     out = []
     for block in _blocks(spaces[0]):
         names = [k for k in range(len(p)) if any(vector[k] != 0 for vector in block)]
@@ -122,7 +147,8 @@ def _shifts(theta: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -> list[Shift]:
             kind, combinations = "product", [_product(vector, p, names) for vector in _complement(scales[0])]
         else:
             own = {p[k] for k in names}
-            kind, combinations = "coefficients", [value for value in theta if value.free_symbols & own]
+            shared = [value for value in theta if value.free_symbols & own and value not in own]
+            kind, combinations = "coefficients", shared
         out.append(Shift(tuple(str(p[k]) for k in names), tuple(combinations), kind))
     return out
 

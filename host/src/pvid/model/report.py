@@ -19,7 +19,7 @@ def check_report(compiled: CompiledModel) -> str:
     """The whole text, in lines of at most about 120 characters where terms allow it."""
     found = identifiable(compiled)
     blocks = [_head(compiled), *(_row(row) for row in compiled.rows), verdict(found), *_advice(compiled)]
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    return "\n\n".join(block for block in blocks if block)
 
 
 def verdict(found: Identifiability) -> str:
@@ -37,6 +37,8 @@ def verdict(found: Identifiability) -> str:
 def _shift(one: Shift) -> str:
     names = listed(one.unknowns)
     shown = ", ".join(_in_order(value, one.unknowns) for value in one.combinations)
+    if not one.combinations and one.kind == "coefficients":
+        return f"  {names} change together without a trace: declare one of them as known, or add a sensor."
     if not one.combinations:
         return f"  {names}: not determined at all."
     only = f"only {shown}" if one.kind != "coefficients" else f"only what follows from {shown}"

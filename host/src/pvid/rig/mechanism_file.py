@@ -7,6 +7,8 @@
     g = 9.81                  # constants of the model
     [sensor.phi]
     resolution = 0.0015       # in the unit of the signal; noise in resolutions
+    [sensor.V]
+    gain_sd = 0.005           # of any signal, an input too: relative standard deviation of its gain
     [nominal]
     R = 1.2                   # rough guesses: the start of the estimate
 
@@ -27,7 +29,7 @@ from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed, shown
 from pvid.model.compiled import CompiledModel
 
-_OF_A_SENSOR = ("resolution", "noise")
+_OF_A_SENSOR = ("resolution", "noise", "gain_sd")
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class MechanismRig:
     model : name of a shipped mechanism or path of a model file
     sample_rate : [Hz]; None: that of the run
     known : values of the model's constants
-    sensor : by signal: resolution [its unit], noise [resolutions]
+    sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative]; of an input gain_sd alone
     nominal : guesses of the unknowns
     """
 
@@ -115,14 +117,18 @@ class MechanismRig:
             Naming a constant, signal or unknown that the model does not have, or a guess that the model excludes.
         """
         _refuse_unknown("known", self.known, [one.name for one in model.knowns])
-        _refuse_unknown("sensor", self.sensor, [one.name for one in model.signals if one.kind == "sensor"])
+        _refuse_unknown("sensor", self.sensor, [one.name for one in model.signals])
+        for signal in model.signals:
+            if signal.kind == "input" and set(self.sensor.get(signal.name, {})) - {"gain_sd"}:
+                raise PvidError(f"sensor.{signal.name}: an input of the model has a gain_sd alone")
         _refuse_unknown("nominal", self.nominal, list(model.p_names))
         knowns = tuple(replace(one, value=self.known.get(one.name, one.value)) for one in model.knowns)
         signals = []
         for signal in model.signals:
             given = self.sensor.get(signal.name, {})
             resolution, noise = given.get("resolution", signal.resolution), given.get("noise", signal.noise)
-            signals.append(replace(signal, resolution=resolution, noise=noise))
+            gain_sd = given.get("gain_sd", signal.gain_sd)
+            signals.append(replace(signal, resolution=resolution, noise=noise, gain_sd=gain_sd))
         unknowns = []
         for one in model.unknowns:
             guess = self.nominal.get(one.name, one.guess)

@@ -27,6 +27,7 @@ class FourierDesign:
         how sgn(v) is summed: "located" finds when v changes sign and gives the samples around it the weights of the
         exact integral; "averaged" takes the mean of sgn over a step, v linear there; "soft" is tanh(v / soft)
     soft : width of the soft sign [unit of the velocity]
+    joint : whiten all row kinds together; noise that they share then counts once
     """
 
     sample_rate: float
@@ -40,6 +41,7 @@ class FourierDesign:
     rate_degree: int = 3
     reversals: Literal["located", "averaged", "soft"] = "located"
     soft: float = 0.0
+    joint: bool = False
 
     def __post_init__(self) -> None:
         for name, taps, degree in (("taps", self.taps, self.degree), ("rate_taps", self.rate_taps, self.rate_degree)):

@@ -44,8 +44,8 @@ def uncertainty(fit: Fit) -> Uncertainty:
     s_inverse = inverse(information)
     neighbours = np.zeros_like(information)
     theta = fit.parameters.theta(fit.p)
-    for kind, (d, white) in enumerate(zip(designs, fit.white, strict=True)):
-        r1 = fit.rows.with_next(kind, theta[kind], fit.errors[kind])[:-1]
+    for d, white in zip(designs, fit.white, strict=True):
+        r1 = fit.rows.with_next(white.kinds, theta, fit.errors)[:-1]
         shared = white.whitener[:-1] @ r1 @ white.whitener[1:].transpose(0, 2, 1)
         neighbours += np.einsum("wkp,wkq->pq", d[:-1], shared @ d[1:])
     middle = information + neighbours + neighbours.T
@@ -92,20 +92,22 @@ def chi2_of_sensors(fit: Fit) -> float:
     """Mean square of the residuals in the metric of the sensors' noise alone."""
     theta = fit.parameters.theta(fit.p)
     total, free = 0.0, -len(fit.p)
-    for kind, th in enumerate(theta):
-        plain = fit.white[kind] if not fit.errors[kind].variance else fit.rows.white(kind, th, EquationError())
-        e = plain.known - np.einsum("wjk,j->wk", plain.regressors, th)
-        total += float(np.sum(e**2))
+    for white in fit.white:
+        exact = not any(fit.errors[kind].variance for kind in white.kinds)
+        plain = white if exact else fit.rows.white(white.kinds, theta, [EquationError()] * fit.rows.kinds)
+        total += float(np.sum(plain.residuals(theta) ** 2))
         free += plain.free
     return total / max(free, 1)
 
 
 def explained(fit: Fit) -> list[float]:
-    """R^2 of each row kind, in whitened rows."""
+    """R^2 of each row kind, in rows whitened by themselves."""
     out = []
-    for e, one, th in zip(fit.residuals(), fit.white, fit.parameters.theta(fit.p), strict=True):
-        reference = float(np.sum(one.known**2))
+    theta = fit.parameters.theta(fit.p)
+    for kind, th in enumerate(theta):
+        white = fit.alone(kind)
+        reference = float(np.sum(white.known**2))
         if reference == 0:
-            reference = max(float(np.sum((one.regressors[:, j] * th[j]) ** 2)) for j in range(len(th)))
-        out.append(1 - float(np.sum(e**2)) / max(reference, 1e-300))
+            reference = max(float(np.sum((white.regressors[:, j] * th[j]) ** 2)) for j in range(len(th)))
+        out.append(1 - float(np.sum(white.residuals(theta) ** 2)) / max(reference, 1e-300))
     return out

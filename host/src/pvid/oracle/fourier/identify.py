@@ -11,11 +11,13 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.fourier import verdict
+from pvid.oracle.fourier.attenuation import other_line
 from pvid.oracle.fourier.choice import chosen
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.fourier.sensor_errors import SensorErrors, of_scale, of_sensors
 from pvid.oracle.fourier.solve import Fit, batch, online
 from pvid.oracle.fourier.verdict import Halves, Verdict
 
@@ -28,7 +30,8 @@ class Identified:
     ----------
     names, units : of the parameters
     p : [n_p]
-    se : published standard errors [n_p]
+    se : published standard errors, those of gains included [n_p]
+    by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
     verdict : whether to trust it
@@ -55,6 +58,7 @@ class Identified:
     equation_errors: dict[str, EquationError]
     halves: Halves | None
     fit: Fit
+    by_gain: dict[str, Float]
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
@@ -94,7 +98,7 @@ def identify(
     sample_rate: float,
     start: Mapping[str, float] | npt.ArrayLike | None = None,
     design: FourierDesign | None = None,
-    compensate: bool = False,
+    compensate: bool = True,
 ) -> Identified:
     """Parameters of a mechanism from a run.
 
@@ -117,6 +121,7 @@ def identify(
         "not_identified": verdict.not_identified(compiled, fit, found),
         "not_settled": verdict.settled(fit),
         "halves": verdict.of_halves(compiled, fit, halves),
+        "attenuation": verdict.of_attenuation(compiled, fit, found, other_line(fit)),
         "feedback": verdict.of_feedback(compiled, fit),
         "residuals": verdict.of_residuals(found),
         "range": verdict.of_range(compiled, fit.p),
@@ -124,12 +129,17 @@ def identify(
     other = other_length(model, run, used, fit.p)
     if other is not None:
         reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
+    sensors = SensorErrors(run, used, fit)
+    by_gain = {one.name: sensors.by_gain(one) for one in compiled.signals if one.gain_sd > 0 or one.unit != "rad"}
+    reasons["sensors"] = of_sensors(compiled, sensors.found(found.se), found.se)
+    reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
+    gains = [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
     history = online(rows, begun)
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
         p=fit.p,
-        se=verdict.widened(found.se, halves),
+        se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains]), axis=0)),
         predicted=found.predicted,
         clustered=found.clustered,
         chi2=found.chi2,
@@ -141,6 +151,7 @@ def identify(
         equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
         halves=halves,
         fit=fit,
+        by_gain=by_gain,
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -86,38 +88,44 @@ def slope_of(g: Float, reach: int, dt: float) -> Float:
 
 
 class NoiseModel:
-    """Covariances of the rows of a window, R0(p), and of neighbours, R1(p), for each row kind.
+    """Covariances of the rows of a window, R0(p), and of neighbours, R1(p), of each pair of row kinds.
 
     With gains averaged over the run, R0 = sum over pairs of orders P_mn(theta) gram(m, n), gram from the harmonics.
     """
 
     def __init__(self, filters: NoiseFilters, record: Record) -> None:
         self.functions = record.grid.design.test_functions
-        self.model = filters.channels.model
-        self._pairs: list[list[tuple[Float, list[tuple[int, int]]]]] = []
-        for sensors in filters.gains(record):
-            of_row = []
-            for sensor, gains in sensors.items():
-                stack = np.array([one.values for one in gains])
-                stack = stack[:, np.isfinite(stack).all(axis=0)]
-                variance = density(self.model.signal(sensor), record.grid.design)
-                of_row.append((variance * (stack @ stack.T) / stack.shape[1], [(g.column, g.order) for g in gains]))
-            self._pairs.append(of_row)
+        of_kinds = filters.gains(record)
+        self._columns = max(row.thetas + 1 for row in filters.channels.rows)
+        self._sensors: list[_SensorGains] = []
+        for sensor in sorted(set().union(*of_kinds)):
+            own = [(kind, gain) for kind, row in enumerate(of_kinds) for gain in row.get(sensor, [])]
+            stack = np.array([gain.values for _, gain in own])
+            stack = stack[:, np.isfinite(stack).all(axis=0)]
+            variance = density(filters.channels.model.signal(sensor), record.grid.design)
+            self._sensors.append(
+                _SensorGains(
+                    variance * (stack @ stack.T) / stack.shape[1],
+                    np.array([kind for kind, _ in own]),
+                    np.array([gain.column for _, gain in own]),
+                    np.array([gain.order for _, gain in own]),
+                )
+            )
         self._gram: dict[tuple[int, int], Float] = {}
         self._overlap: dict[tuple[int, int], Float] = {}
 
-    def _of_orders(self, kind: int, theta: Float, other: Float | None = None) -> dict[tuple[int, int], float]:
-        """Weights P of the pairs of orders at theta, with Y's factor -1 behind; `other` stands for it on one side."""
-        left = np.append(theta, -1.0)
-        right = left if other is None else other
+    def _of_orders(self, a: int, left: Float, b: int, right: Float) -> dict[tuple[int, int], float]:
+        """Weights P of the pairs of orders of two kinds, for factors of their columns."""
         out: dict[tuple[int, int], float] = {}
-        for products, places in self._pairs[kind]:
-            a = np.array([left[column] for column, _ in places])
-            b = np.array([right[column] for column, _ in places])
-            weights = a[:, np.newaxis] * products * b
-            for i, (_, m) in enumerate(places):
-                for j, (_, n) in enumerate(places):
-                    out[m, n] = out.get((m, n), 0.0) + float(weights[i, j])
+        for one in self._sensors:
+            i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
+            weights = left[one.columns[i]][:, np.newaxis] * one.products[np.ix_(i, j)] * right[one.columns[j]]
+            top = 1 + int(np.max(one.orders))
+            places = one.orders[i][:, np.newaxis] * top + one.orders[j]
+            sums = np.bincount(places.reshape(-1), weights.reshape(-1), top * top)
+            for place in np.flatnonzero(sums):
+                mn = divmod(int(place), top)
+                out[mn] = out.get(mn, 0.0) + float(sums[place])
         return out
 
     def gram(self, m: int, n: int) -> Float:
@@ -132,26 +140,49 @@ class NoiseModel:
             self._overlap[m, n] = self.functions.overlap(m, n)
         return self._overlap[m, n]
 
-    def covariance(self, kind: int, theta: Float) -> Float:
-        """R0 [K, K] of a row kind."""
-        k = self.functions.count
-        return sum((w * self.gram(*mn) for mn, w in self._of_orders(kind, theta).items()), np.zeros((k, k)))
+    def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """R0 [K, K] of two row kinds in one window."""
+        weights = self._of_orders(a, np.append(theta_a, -1.0), b, np.append(theta_b, -1.0))
+        return sum((w * self.gram(*mn) for mn, w in weights.items()), self._nothing())
 
-    def with_next(self, kind: int, theta: Float) -> Float:
-        """R1 [K, K]: of a window's rows with the next one's."""
-        k = self.functions.count
-        return sum((w * self.overlap(*mn) for mn, w in self._of_orders(kind, theta).items()), np.zeros((k, k)))
+    def with_next(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """R1 [K, K]: of the rows of a kind with those of another in the next window."""
+        weights = self._of_orders(a, np.append(theta_a, -1.0), b, np.append(theta_b, -1.0))
+        return sum((w * self.overlap(*mn) for mn, w in weights.items()), self._nothing())
 
-    def slope(self, kind: int, theta: Float, entry: int) -> Float:
-        """Half of dR0 / d theta_entry [K, K], up to its antisymmetric part."""
-        unit = np.zeros(len(theta) + 1)
-        unit[entry] = 1.0
-        k = self.functions.count
-        return sum((w * self.gram(*mn) for mn, w in self._of_orders(kind, theta, unit).items()), np.zeros((k, k)))
+    def pull(self, a: int, b: int, theta_b: Float, weight: Float) -> Float:
+        """1/2 tr(weight dR0/d theta) with the thetas of kind a; weight [K, K] stands at the rows of a and b."""
+        right = np.append(theta_b, -1.0)
+        out = np.zeros(self._columns)
+        traces = np.einsum("mnkl,kl->mn", self._grams, weight, optimize=True)
+        for one in self._sensors:
+            i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
+            shares = one.products[np.ix_(i, j)] * right[one.columns[j]] * traces[np.ix_(one.orders[i], one.orders[j])]
+            out += np.bincount(one.columns[i], shares.sum(axis=1), self._columns)
+        return out
+
+    @cached_property
+    def _grams(self) -> Float:
+        """Of all pairs of orders [orders, orders, K, K]."""
+        orders = range(1 + max((int(np.max(one.orders)) for one in self._sensors), default=0))
+        return np.array([[self.gram(m, n) for n in orders] for m in orders])
+
+    def _nothing(self) -> Float:
+        return np.zeros((self.functions.count, self.functions.count))
+
+
+@dataclass(frozen=True)
+class _SensorGains:
+    """Mean products of the gains of one sensor [gains, gains] times its noise, and where each gain belongs."""
+
+    products: Float
+    kinds: npt.NDArray[np.int64]
+    columns: npt.NDArray[np.int64]
+    orders: npt.NDArray[np.int64]
 
 
 class ReversalNoise:
-    """The errors of the located times of reversals in the rows of one kind.
+    """The errors of the located times of reversals in the rows.
 
     A time that is off by dt moves the sum of a test function times sgn(v) by 2 chi dt: one direction in the rows of
     each window that holds the reversal.
@@ -160,24 +191,19 @@ class ReversalNoise:
     ----------
     windows : of each entry, rising [entries]
     events : reversal of each entry [entries]
-    shapes : 2 sd chi^(order) of the columns that hold sgn [entries, columns, K]
+    shapes : of each row kind, 2 sd chi^(order) of the columns that hold sgn [entries, columns, K]
     """
 
-    def __init__(self, channels: Channels, record: Record, kind: int) -> None:
-        row, functions = channels.rows[kind], record.grid.design.test_functions
+    def __init__(self, channels: Channels, record: Record) -> None:
+        functions = record.grid.design.test_functions
         auxiliary = dict(channels.opaque)
-        count = row.thetas + 1
-        windows, events, shapes = (
-            [np.zeros(0, np.int64)],
-            [np.zeros(0, np.int64)],
-            [np.zeros((0, count, functions.count))],
-        )
+        full = [one.gain.xreplace(auxiliary).xreplace(channels.sign_marks) for one in channels.channels]
+        windows, events = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        shapes = [[np.zeros((0, row.thetas + 1, functions.count))] for row in channels.rows]
         first = 0
         for mark, signs in zip(channels.sign_marks.values(), record.signs, strict=True):
-            full = [one.gain.xreplace(auxiliary).xreplace(channels.sign_marks) for one in channels.channels]
             holders = {k: sp.diff(one, mark) for k, one in enumerate(full) if one.has(mark)}
-            terms = [term for term in row.terms if term.channel in holders and term.column <= row.thetas]
-            if not len(signs.times) or not terms:
+            if not len(signs.times) or not holders:
                 continue
             slopes = sp.lambdify(channels.plain, list(holders.values()), "numpy", cse=True)(*record.arguments)
             at = np.clip(np.round(signs.times).astype(np.int64), 0, record.grid.size - 1)
@@ -188,43 +214,63 @@ class ReversalNoise:
                 inside = (window >= 0) & (window < record.grid.size // functions.hop - 1)
                 t = functions.dt * (signs.times - functions.hop * window)[inside]
                 turns = np.exp(1j * np.outer(t, functions.rates))
-                shape = np.zeros((len(t), count, functions.count))
-                for term in terms:
-                    rates = ((1j * functions.rates) ** term.order)[:, np.newaxis]
-                    chi = np.real(turns @ (functions.coefficients * rates))
-                    factor = (-1.0) ** term.order * term.factor * weight[term.channel][inside]
-                    shape[:, term.column] += factor[:, np.newaxis] * chi
+                scale = 2 * np.sqrt(signs.variances[inside])
+                for row, own in zip(channels.rows, shapes, strict=True):
+                    shape = np.zeros((len(t), row.thetas + 1, functions.count))
+                    for term in row.terms:
+                        if term.channel not in holders or term.column > row.thetas:
+                            continue
+                        rates = ((1j * functions.rates) ** term.order)[:, np.newaxis]
+                        chi = np.real(turns @ (functions.coefficients * rates))
+                        factor = (-1.0) ** term.order * term.factor * weight[term.channel][inside] * scale
+                        shape[:, term.column] += factor[:, np.newaxis] * chi
+                    own.append(shape)
                 windows.append(window[inside])
                 events.append(first + np.flatnonzero(inside))
-                shapes.append(2 * np.sqrt(signs.variances[inside])[:, np.newaxis, np.newaxis] * shape)
             first += len(signs.times)
         order = np.argsort(np.concatenate(windows), kind="stable")
         self.windows, self.events = np.concatenate(windows)[order], np.concatenate(events)[order]
-        self.shapes = np.concatenate(shapes)[order]
+        self.shapes = [np.concatenate(own)[order] for own in shapes]
 
-    def directions(self, theta: Float) -> Float:
-        """In the rows, one standard deviation long [entries, K]."""
-        return np.asarray(np.einsum("ejk,j->ek", self.shapes, np.append(theta, -1.0)))
+    def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
+        """In the rows of some kinds, one standard deviation long [entries, K of each kind]."""
+        return np.concatenate(
+            [np.einsum("ejk,j->ek", self.shapes[kind], np.append(theta[kind], -1.0)) for kind in kinds], axis=1
+        )
 
-    def covariance(self, theta: Float, windows: npt.NDArray[np.int64]) -> Float:
-        """Of each of some windows, by their numbers [windows, K, K]."""
-        u = self.directions(theta)
-        out = np.zeros((len(windows), u.shape[1], u.shape[1]))
+    def covariance(self, directions: Float, windows: npt.NDArray[np.int64]) -> Float:
+        """Of each of some windows, by their numbers [windows, rows, rows]."""
+        out = np.zeros((len(windows), directions.shape[1], directions.shape[1]))
         for k, window in enumerate(windows):
-            own = u[self._of(window)]
+            own = directions[self._of(window)]
             if len(own):
                 out[k] = own.T @ own
         return out
 
-    def with_next(self, theta: Float, windows: npt.NDArray[np.int64]) -> Float:
-        """Of each of some windows with the one after it [windows, K, K]."""
-        u = self.directions(theta)
-        out = np.zeros((len(windows), u.shape[1], u.shape[1]))
+    def slopes(
+        self, kinds: Sequence[int], theta: Sequence[Float], weight: Float, windows: npt.NDArray[np.int64]
+    ) -> Float:
+        """1/2 tr(weight d covariance / d theta) over some windows [thetas of the kinds]; weight [windows, R, R]."""
+        directions = self.directions(kinds, theta)
+        k = self.shapes[0].shape[2]
+        pulled = np.zeros(directions.shape)
+        for one, window in zip(weight, windows, strict=True):
+            pulled[self._of(window)] += directions[self._of(window)] @ one
+        return np.concatenate(
+            [
+                np.einsum("ejk,ek->j", self.shapes[kind][:, :-1], pulled[:, place * k : (place + 1) * k])
+                for place, kind in enumerate(kinds)
+            ]
+        )
+
+    def with_next(self, directions: Float, windows: npt.NDArray[np.int64]) -> Float:
+        """Of each of some windows with the one after it [windows, rows, rows]."""
+        out = np.zeros((len(windows), directions.shape[1], directions.shape[1]))
         for k, window in enumerate(windows):
-            here, next_ = self._of(window), self._of(window + 1)
-            _, a, b = np.intersect1d(self.events[here], self.events[next_], return_indices=True)
+            here, after = self._of(window), self._of(window + 1)
+            _, a, b = np.intersect1d(self.events[here], self.events[after], return_indices=True)
             if len(a):
-                out[k] = u[here][a].T @ u[next_][b]
+                out[k] = directions[here][a].T @ directions[after][b]
         return out
 
     def _of(self, window: int) -> slice:

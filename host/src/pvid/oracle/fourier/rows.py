@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,16 +53,18 @@ class EquationError:
 
 @dataclass(frozen=True)
 class WhiteRows:
-    """Rows of one kind with unit covariance, nuisances projected out.
+    """Rows of a group of kinds with unit covariance, nuisances projected out; R is the number of rows of a window.
 
     Attributes
     ----------
-    regressors : [windows, thetas, K]
-    known : [windows, K]
-    whitener : L^-1 with R = L L^T [windows, K, K]
+    kinds : of the group
+    regressors : of all thetas of the group [windows, thetas, R]
+    known : [windows, R]
+    whitener : L^-1 with covariance L L^T [windows, R, R]
     free : rows less nuisances, of all windows
     """
 
+    kinds: tuple[int, ...]
     regressors: Float
     known: Float
     whitener: Float
@@ -72,13 +74,22 @@ class WhiteRows:
         """Some of the windows."""
         n = self.regressors[windows]
         free = round(self.free * len(n) / len(self.regressors))
-        return WhiteRows(n, self.known[windows], self.whitener[windows], free)
+        return WhiteRows(self.kinds, n, self.known[windows], self.whitener[windows], free)
 
-    def moments(self, windows: slice | npt.NDArray[np.bool_] = slice(None)) -> tuple[Float, Float]:
-        """M [thetas, thetas] and B [thetas] of some windows."""
-        n, y = self.regressors[windows], self.known[windows]
-        flat = n.transpose(1, 0, 2).reshape(n.shape[1], -1)
-        return flat @ flat.T, flat @ y.reshape(-1)
+    def moments(self) -> tuple[Float, Float]:
+        """M [thetas, thetas] and B [thetas]."""
+        flat = self.regressors.transpose(1, 0, 2).reshape(self.regressors.shape[1], -1)
+        return flat @ flat.T, flat @ self.known.reshape(-1)
+
+    def residuals(self, theta: Sequence[Float]) -> Float:
+        """At the thetas of all kinds [windows, R]."""
+        own = np.concatenate([theta[kind] for kind in self.kinds])
+        return np.asarray(self.known - np.einsum("wjk,j->wk", self.regressors, own))
+
+    def slopes(self, jacobian: Sequence[Float]) -> Float:
+        """d rows / d step, from d theta / d step of all kinds [windows, R, n_p]."""
+        own = np.concatenate([jacobian[kind] for kind in self.kinds])
+        return np.asarray(np.einsum("wjk,jp->wkp", self.regressors, own, optimize=True))
 
 
 class WeakRows:
@@ -90,7 +101,8 @@ class WeakRows:
     record : channels at every step
     columns : of each row kind [windows, columns, K]; theta's, then Y, then the nuisances
     numbers : of the windows in the run; those with a missing sample are left out
-    noise : covariances
+    noise, reversals : covariances
+    groups : of kinds that are whitened together
     """
 
     def __init__(self, compiled: Compiled, record: Record) -> None:
@@ -103,7 +115,9 @@ class WeakRows:
         self.numbers = np.flatnonzero(whole)
         self.columns = [one[whole] for one in columns]
         self.noise = NoiseModel(compiled.filters, record)
-        self.reversals = [ReversalNoise(compiled.channels, record, kind) for kind in range(len(columns))]
+        self.reversals = ReversalNoise(compiled.channels, record)
+        alone = [(kind,) for kind in range(len(columns))]
+        self.groups: list[tuple[int, ...]] = [tuple(range(len(columns)))] if record.grid.design.joint else [*alone]
 
     @classmethod
     def of(cls, compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign) -> WeakRows:
@@ -122,7 +136,7 @@ class WeakRows:
         """Row kinds."""
         return len(self.columns)
 
-    def only(self, windows: slice) -> WeakRows:
+    def only(self, windows: slice | npt.NDArray[np.bool_]) -> WeakRows:
         """Some of the windows; the noise stays that of the run."""
         out = copy.copy(self)
         out.columns = [one[windows] for one in self.columns]
@@ -135,40 +149,68 @@ class WeakRows:
         first = grid.places[0] / grid.design.sample_rate
         return np.asarray(first + self.functions.dt * self.functions.hop * (2 + self.numbers))
 
-    def covariance(self, kind: int, theta: Float, error: EquationError) -> Float:
-        """R0(p), the equation's error and that of located reversals [windows, K, K]."""
-        run = self.noise.covariance(kind, theta) + error.variance * self.noise.gram(error.order, error.order)
-        return run + self.reversals[kind].covariance(theta, self.numbers)
+    def covariance(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
+        """R0(p), the equations' errors and those of located reversals [windows, R, R]."""
+        blocks = [[self.noise.covariance(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
+        for place, kind in enumerate(kinds):
+            error = errors[kind]
+            blocks[place][place] = blocks[place][place] + error.variance * self.noise.gram(error.order, error.order)
+        directions = self.reversals.directions(kinds, theta)
+        return np.block(blocks) + self.reversals.covariance(directions, self.numbers)
 
-    def with_next(self, kind: int, theta: Float, error: EquationError) -> Float:
-        """The same between each window and the next one [windows, K, K]; the last one is of no use."""
-        run = self.noise.with_next(kind, theta) + error.variance * self.noise.overlap(error.order, error.order)
-        return run + self.reversals[kind].with_next(theta, self.numbers)
+    def with_next(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
+        """The same between each window and the next one [windows, R, R]; the last one is of no use."""
+        blocks = [[self.noise.with_next(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
+        for place, kind in enumerate(kinds):
+            error = errors[kind]
+            blocks[place][place] = blocks[place][place] + error.variance * self.noise.overlap(error.order, error.order)
+        directions = self.reversals.directions(kinds, theta)
+        return np.block(blocks) + self.reversals.with_next(directions, self.numbers)
 
-    def whitener(self, kind: int, theta: Float, error: EquationError) -> Float:
-        """L^-1 [windows, K, K] of the covariance; rows of a model without noise are scaled to their size."""
-        r = self.covariance(kind, theta, error)
-        mean = float(np.mean(np.einsum("wkk->wk", r)))
-        if mean == 0.0:
-            r = r + float(np.mean(self.columns[kind][:, :-1] ** 2)) * 1e-12 * self.noise.gram(0, 0)
-            mean = float(np.mean(np.einsum("wkk->wk", r)))
-        r = r + _RIDGE * mean * np.eye(r.shape[1])
+    def whitener(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
+        """L^-1 [windows, R, R] of the covariance; rows of a model without noise are scaled to their size."""
+        r = self.covariance(kinds, theta, errors)
+        k = self.functions.count
+        diagonal = np.mean(np.einsum("wkk->wk", r), axis=0).reshape(len(kinds), k).mean(axis=1)
+        ridge = np.zeros(len(kinds))
+        for place, kind in enumerate(kinds):
+            if diagonal[place] == 0.0:
+                size = float(np.mean(self.columns[kind][:, :-1] ** 2)) * 1e-12
+                own = slice(place * k, (place + 1) * k)
+                r[:, own, own] += size * self.noise.gram(0, 0)
+                diagonal[place] = size
+            ridge[place] = _RIDGE * diagonal[place]
+        r = r + np.diag(np.repeat(ridge, k))
         return np.asarray(np.linalg.inv(np.linalg.cholesky(r)))
 
-    def white(self, kind: int, theta: Float, error: EquationError) -> WhiteRows:
-        """Whitened rows at theta."""
-        row = self.compiled.channels.rows[kind]
-        whitener = self.whitener(kind, theta, error)
-        x = self.columns[kind] @ whitener.transpose(0, 2, 1)
-        kept = x[:, : row.thetas + 1]
-        if row.nuisances:
-            q, r = np.linalg.qr(x[:, row.thetas + 1 :].transpose(0, 2, 1))
+    def white(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> WhiteRows:
+        """Whitened rows of a group at the thetas of all kinds."""
+        whitener = self.whitener(kinds, theta, errors)
+        k, plans = self.functions.count, [self.compiled.channels.rows[kind] for kind in kinds]
+        parts = self._whitened(kinds, whitener)
+        regressors = np.concatenate([x[:, : row.thetas] for x, row in zip(parts, plans, strict=True)], axis=1)
+        known = sum((x[:, row.thetas] for x, row in zip(parts, plans, strict=True)), np.zeros(regressors[:, 0].shape))
+        nuisances = self.white_nuisances(kinds, whitener)
+        gone = 0
+        if nuisances.shape[1]:
+            q, r = np.linalg.qr(nuisances.transpose(0, 2, 1))
             live = np.abs(np.diagonal(r, axis1=1, axis2=2)) > 1e-12 * np.max(np.abs(r), axis=(1, 2))[:, np.newaxis]
             q = q * live[:, np.newaxis]
-            kept = kept - (kept @ q) @ q.transpose(0, 2, 1)
+            regressors = regressors - (regressors @ q) @ q.transpose(0, 2, 1)
+            known = known - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, known))
             gone = int(live.sum())
-        else:
-            gone = 0
-        return WhiteRows(
-            kept[:, : row.thetas], kept[:, row.thetas], whitener, self.windows * self.functions.count - gone
-        )
+        return WhiteRows(tuple(kinds), regressors, known, whitener, self.windows * len(kinds) * k - gone)
+
+    def white_nuisances(self, kinds: Sequence[int], whitener: Float) -> Float:
+        """Nuisance columns of a group [windows, nuisances, R]."""
+        parts = self._whitened(kinds, whitener)
+        plans = [self.compiled.channels.rows[kind] for kind in kinds]
+        return np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
+
+    def _whitened(self, kinds: Sequence[int], whitener: Float) -> list[Float]:
+        """Columns of each kind [windows, columns, R]: they fill the kind's own rows, of the whitener those count."""
+        k = self.functions.count
+        return [
+            self.columns[kind] @ whitener[:, :, place * k : (place + 1) * k].transpose(0, 2, 1)
+            for place, kind in enumerate(kinds)
+        ]

@@ -1,9 +1,9 @@
 """Would a systematic error of one sensor explain the residuals, and how far would it move the estimate?
 
 An error a f(t) in a recorded signal z moves the residuals by a c, c = (e(z + step f) - e(z))/step. Residuals e are then
-fitted by J dp + a c: a and its standard error tell whether the error is there, dp how far p moves with it. Errors that
-are tried: a delay, a play (backlash), an eccentric encoder. A gain cannot be told from p in most mechanisms: its effect
-on p is what a gain of 1 would do.
+fitted by J dp + a c: a and its standard error show whether the error is there, dp how far p moves with it. Errors that
+are tried: a delay, a play (backlash), an eccentric encoder, the gain of an input. Where a gain only scales p no data
+show it: p is then off by what `by_gain` gives, and that belongs to its standard errors.
 """
 
 from __future__ import annotations
@@ -20,18 +20,28 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import clustered_variance
 from pvid.oracle.fourier.front import filtered, polynomial_weights
 from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.rows import WeakRows
+from pvid.oracle.fourier.rows import WeakRows, WhiteRows
 from pvid.oracle.fourier.solve import Fit, inverse
+from pvid.oracle.fourier.verdict import Reason, listed
 from pvid.sim.imperfections import with_play
 
-Kind = Literal["delay", "play", "eccentric"]
+Kind = Literal["delay", "play", "eccentric", "gain"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
-_MOVES = 2.0
+_MOVES = 1.0
+
+# An encoder shows an eccentricity only where it turns by this much [rad].
+_TURNS = 2.0
 
 # A column that the parameters explain but for this part of its square is theirs: no data show it.
 _OWN = 1e-6
+
+_A_GAIN = 0.01  # that a note on scale supposes
+# Beyond these sizes a column is the residuals themselves: where p explains a gain, what is left of it is their noise.
+_LARGEST_GAIN = 0.2
+_LARGEST = 100.0  # play or eccentricity [resolutions]
+_LONGEST = 0.25  # delay [windows]
 
 _SMOOTHED = 21  # samples, for the direction of a play
 _PLAY = 3.0  # width of the play that is tried [resolutions]
@@ -46,9 +56,9 @@ class SensorError:
     ----------
     signal : name
     kind : what it is
-    size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal]
+    size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal], gain less 1
     certainty : size over its standard error
-    shift : by how much p moves with it [n_p]
+    shift : by how much p moves when the error is taken off [n_p]
     """
 
     signal: str
@@ -63,6 +73,9 @@ class SensorError:
         if self.kind == "delay":
             late = "late" if self.size > 0 else "early"
             return f"{self.signal} seems to be sampled {abs(self.size):.2g} s {late}"
+        if self.kind == "gain":
+            than = "larger" if self.size < 0 else "smaller"
+            return f"{self.signal} seems to be {100 * abs(self.size):.2g} % {than} than recorded"
         what = "a play of" if self.kind == "play" else "an eccentric encoder, amplitude"
         return f"{self.signal} seems to have {what} {abs(self.size):.2g}"
 
@@ -88,10 +101,10 @@ class SensorErrors:
         self.unit = fit.parameters.unit(fit.p)
         self._bare = self._raw(fit.rows)
 
-    def found(self, se: Float) -> list[SensorError]:
-        """The errors that are there and move p by more than its standard errors [n_p] allow; the surest first."""
+    def found(self, se: Float) -> SensorError | None:
+        """The surest of the errors that are there and move p by more than its standard errors [n_p] allow."""
         out = [one for one in self.tried() if one.certainty > _CERTAIN and np.any(np.abs(one.shift) > _MOVES * se)]
-        return sorted(out, key=lambda one: -one.certainty)
+        return max(out, key=lambda one: one.certainty, default=None)
 
     def tried(self) -> Iterator[SensorError]:
         """All tests."""
@@ -99,16 +112,20 @@ class SensorErrors:
             if signal.name not in self.run:
                 continue
             yield self._test(signal, "delay", [self._delay(signal)])
+            if signal.kind == "input":
+                yield self._test(signal, "gain", [self._gain(signal)])
             if signal.kind == "sensor" and not signal.driven and signal.resolution:
                 yield self._test(signal, "play", [self._play(signal)])
-                if signal.unit == "rad":
+                if signal.unit == "rad" and np.ptp(self.run[signal.name]) > _TURNS:
                     yield self._test(signal, "eccentric", self._eccentric(signal))
 
     def by_gain(self, signal: Signal) -> Float:
-        """What p is off by if what a signal measures is (1 + g) times what is recorded, over g [n_p]."""
-        step = _PART
-        column = self._column({signal.name: self.run[signal.name] * (1 + step)}, step)
-        return -self.unit * (self.inverse @ np.einsum("wkp,wk->p", self.designs, column))
+        """What p is off by if a signal is recorded (1 + g) times as large as it is, over g [n_p]."""
+        return np.asarray(self.unit * (self.inverse @ np.einsum("wkp,wk->p", self.designs, self._gain(signal))))
+
+    def _gain(self, signal: Signal) -> Float:
+        """Column of a gain less 1."""
+        return self._column({signal.name: self.run[signal.name] * (1 + _PART)}, _PART)
 
     def _test(self, signal: Signal, kind: Kind, columns: list[Float]) -> SensorError:
         c = np.stack(columns, axis=-1)
@@ -124,7 +141,15 @@ class SensorErrors:
         variance = clustered_variance(np.einsum("wkc,wk->wc", rest, left), back)
         shift = -self.unit * (self.inverse @ (mixed @ size))
         amount = float(size[0]) if len(size) == 1 else float(np.hypot(*size))
-        return SensorError(signal.name, kind, amount, float(np.max(np.abs(size) / np.sqrt(variance))), shift)
+        certainty = (
+            float(np.max(np.abs(size) / np.sqrt(variance))) if abs(amount) < self._largest(signal, kind) else 0.0
+        )
+        return SensorError(signal.name, kind, amount, certainty, shift)
+
+    def _largest(self, signal: Signal, kind: Kind) -> float:
+        if kind == "gain":
+            return _LARGEST_GAIN
+        return _LONGEST * self.design.window_s if kind == "delay" else _LARGEST * signal.resolution
 
     def _delay(self, signal: Signal) -> Float:
         """Column of a delay [s]."""
@@ -151,11 +176,11 @@ class SensorErrors:
         """How the whitened residuals move [windows, rows of all kinds] per unit of an error."""
         rows = WeakRows.of(self.fit.rows.compiled, {**self.run, **changed}, self.design)
         moved = self._raw(rows.only(np.isin(rows.numbers, self.fit.rows.numbers)))
+        change = [(now - before) / step for now, before in zip(moved, self._bare, strict=True)]
         out = []
-        for kind, (now, before) in enumerate(zip(moved, self._bare, strict=True)):
-            white = self.fit.white[kind].whitener
-            change = np.einsum("wjk,wk->wj", white, (now - before) / step)
-            out.append(self._without_nuisances(kind, change))
+        for white in self.fit.white:
+            own = np.concatenate([change[kind] for kind in white.kinds], axis=1)
+            out.append(self._without_nuisances(white, np.einsum("wjk,wk->wj", white.whitener, own)))
         return np.concatenate(out, axis=1)
 
     def _raw(self, rows: WeakRows) -> list[Float]:
@@ -165,10 +190,33 @@ class SensorErrors:
             for columns, th in zip(rows.columns, self.theta, strict=True)
         ]
 
-    def _without_nuisances(self, kind: int, rows: Float) -> Float:
-        columns = self.fit.rows.columns[kind][:, len(self.theta[kind]) + 1 :]
-        if not columns.shape[1]:
+    def _without_nuisances(self, white: WhiteRows, rows: Float) -> Float:
+        nuisances = self.fit.rows.white_nuisances(white.kinds, white.whitener)
+        if not nuisances.shape[1]:
             return rows
-        white = columns @ self.fit.white[kind].whitener.transpose(0, 2, 1)
-        q = np.linalg.qr(white.transpose(0, 2, 1))[0]
-        return rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows))
+        q = np.linalg.qr(nuisances.transpose(0, 2, 1))[0]
+        return np.asarray(rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows)))
+
+
+def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> list[Reason]:
+    """A sensor's error explains the residuals."""
+    if error is None:
+        return []
+    names = [model.p_names[k] for k in np.argsort(-np.abs(error.shift) / se) if abs(error.shift[k]) > _MOVES * se[k]]
+    text = f"{error.text} ({error.certainty:.0f} standard errors from none), which moves {listed(names)}."
+    return [Reason("sensor", text)]
+
+
+def of_scale(model: CompiledModel, by_gain: Mapping[str, Float], p: Float, se: Float) -> list[Reason]:
+    """Gains that scale p and of which the description gives no error."""
+    scales = []
+    for signal in model.signals:
+        moved = np.abs(by_gain.get(signal.name, np.zeros(len(p)))) * _A_GAIN
+        if signal.gain_sd == 0 and np.any(moved > 2 * se):
+            k = int(np.argmax(moved / np.maximum(np.abs(p), 1e-300) * (moved > 2 * se)))
+            scales.append(f"{signal.name} ({100 * moved[k] / abs(p[k]):.2g} % of {model.p_names[k]})")
+    if not scales:
+        return []
+    text = "The standard errors contain no error of gains (gain_sd); one of 1 % moves the estimate: "
+    text += ", ".join(scales) + "."
+    return [Reason("scale", text, alarm=False)]

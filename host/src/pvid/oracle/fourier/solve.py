@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,30 +19,40 @@ _SETTLED = 1e-8  # a step below this ends the search
 # An error of the equation is taken for real if it raises twice the logarithm of the likelihood by this much.
 _EVIDENCE = 10.0
 
+_SEARCHES = 8  # passes after which an error that was found is only improved
+_SHARPENING = 3  # steps of a variance at a time
+
 
 @dataclass(frozen=True)
 class Moments:
-    """Normal equations of all row kinds: M and B of each."""
+    """Normal equations of all groups of row kinds: M and B of each."""
 
+    kinds: list[tuple[int, ...]]
     m: list[Float]
     b: list[Float]
 
     @classmethod
-    def of(cls, white: list[WhiteRows], windows: slice | Float = slice(None)) -> Moments:
-        pairs = [one.moments(windows) for one in white]  # type: ignore[arg-type]
-        return cls([m for m, _ in pairs], [b for _, b in pairs])
+    def of(cls, white: list[WhiteRows]) -> Moments:
+        """Of whitened rows."""
+        pairs = [one.moments() for one in white]
+        return cls([one.kinds for one in white], [m for m, _ in pairs], [b for _, b in pairs])
 
     def plus(self, other: Moments) -> Moments:
         """Of the windows of both."""
         return Moments(
+            self.kinds,
             [a + b for a, b in zip(self.m, other.m, strict=True)],
             [a + b for a, b in zip(self.b, other.b, strict=True)],
         )
 
+    def grouped(self, of_kinds: Sequence[Float]) -> list[Float]:
+        """What each kind has, by group."""
+        return [np.concatenate([of_kinds[kind] for kind in group]) for group in self.kinds]
+
 
 def normal(parameters: Parameters, moments: Moments, p: Float) -> tuple[Float, Float]:
     """S [n_p, n_p] and F [n_p] at p, in units of a step."""
-    theta, jacobian = parameters.theta(p), parameters.jacobian(p)
+    theta, jacobian = moments.grouped(parameters.theta(p)), moments.grouped(parameters.jacobian(p))
     n = len(p)
     s, f = np.zeros((n, n)), np.zeros(n)
     for m, b, th, c in zip(moments.m, moments.b, theta, jacobian, strict=True):
@@ -53,7 +64,7 @@ def normal(parameters: Parameters, moments: Moments, p: Float) -> tuple[Float, F
 def misfit(parameters: Parameters, moments: Moments, p: Float) -> float:
     """Sum of squared residuals but for a constant."""
     total = 0.0
-    for m, b, th in zip(moments.m, moments.b, parameters.theta(p), strict=True):
+    for m, b, th in zip(moments.m, moments.b, moments.grouped(parameters.theta(p)), strict=True):
         total += float(th @ m @ th - 2 * th @ b)
     return total
 
@@ -127,22 +138,23 @@ class Fit:
         """Another estimate from the same weights."""
         return replace(self, p=p)
 
+    def alone(self, kind: int) -> WhiteRows:
+        """Rows of one kind, whitened by themselves."""
+        own = [one for one in self.white if one.kinds == (kind,)]
+        return own[0] if own else self.rows.white((kind,), self.parameters.theta(self.p), self.errors)
+
     def designs(self) -> list[Float]:
-        """d rows / d step of each kind [windows, K, n_p]."""
-        return [
-            np.einsum("wjk,jp->wkp", one.regressors, c)
-            for one, c in zip(self.white, self.parameters.jacobian(self.p), strict=True)
-        ]
+        """d rows / d step of each group [windows, R, n_p]."""
+        jacobian = self.parameters.jacobian(self.p)
+        return [one.slopes(jacobian) for one in self.white]
 
     def residuals(self) -> list[Float]:
-        """Whitened, of each kind [windows, K]."""
-        return [
-            one.known - np.einsum("wjk,j->wk", one.regressors, th)
-            for one, th in zip(self.white, self.parameters.theta(self.p), strict=True)
-        ]
+        """Whitened, of each group [windows, R]."""
+        theta = self.parameters.theta(self.p)
+        return [one.residuals(theta) for one in self.white]
 
 
-def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = True, compensate: bool = False) -> Fit:
+def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = True, compensate: bool = True) -> Fit:
     """All windows at once: whiten at p, step, and again until p stays.
 
     Parameters
@@ -150,27 +162,24 @@ def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = Tru
     rows : windows of a run
     start : of p; None: the guesses
     equation_error : estimate the error of each equation from its residuals and weight with it
-    compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R0 / d theta
+    compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R / d theta
     """
     parameters = rows.compiled.parameters
     p = begun = parameters.checked(start)
     prior = parameters.prior(begun)
     errors = [EquationError()] * rows.kinds
     settled = False
-    white: list[WhiteRows] = []
     for turn in range(_PASSES):
         theta = parameters.theta(p)
-        white = [rows.white(kind, theta[kind], errors[kind]) for kind in range(rows.kinds)]
-        moments = Moments.of(white)
-        if compensate:
-            for kind, one in enumerate(white):
-                inverse_r = np.einsum("wij,wik->jk", one.whitener, one.whitener)
-                bias = [np.sum(inverse_r * rows.noise.slope(kind, theta[kind], j)) for j in range(len(theta[kind]))]
-                moments.b[kind] += np.array(bias)
+        white = [rows.white(group, theta, errors) for group in rows.groups]
+        moments = compensated(rows, white, theta) if compensate else Moments.of(white)
         p, size = gauss_newton(parameters, moments, p, prior, 3 if turn < 4 else _STEPS)
         changed = False
         if equation_error and turn >= 2:
-            found = [error_of(rows, kind, th) for kind, th in enumerate(parameters.theta(p))]
+            now = parameters.theta(p)
+            found = [
+                error_of(rows, kind, now, errors[kind] if turn >= _SEARCHES else None) for kind in range(rows.kinds)
+            ]
             changed = any(differs(a, b) for a, b in zip(errors, found, strict=True))
             errors = found
         if size < _SETTLED and turn >= 3 and not changed:
@@ -178,8 +187,31 @@ def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = Tru
             break
         settled = size < 1e-4
     theta = parameters.theta(p)
-    white = [rows.white(kind, theta[kind], errors[kind]) for kind in range(rows.kinds)]
+    white = [rows.white(group, theta, errors) for group in rows.groups]
     return Fit(p, rows, white, errors, begun, settled)
+
+
+def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) -> Moments:
+    """Moments with what noise in the regressors takes from B put back: 1/2 d log det R / d theta, of all windows.
+
+    Without it a row with Y = 0 pulls its own scale towards 0 by one for each of its rows, since a smaller theta leaves
+    smaller residuals at the weights of the theta before.
+    """
+    moments = Moments.of(white)
+    k = rows.functions.count
+    for place, one in enumerate(white):
+        weight = one.whitener.transpose(0, 2, 1) @ one.whitener
+        total = weight.sum(axis=0)
+        pulls = []
+        for a, kind in enumerate(one.kinds):
+            blocks = [total[a * k : (a + 1) * k, b * k : (b + 1) * k] for b in range(len(one.kinds))]
+            own = [
+                rows.noise.pull(kind, other, theta[other], block)
+                for other, block in zip(one.kinds, blocks, strict=True)
+            ]
+            pulls.append(np.sum(own, axis=0)[: len(theta[kind])])
+        moments.b[place] += np.concatenate(pulls) + rows.reversals.slopes(one.kinds, theta, weight, rows.numbers)
+    return moments
 
 
 def differs(a: EquationError, b: EquationError) -> bool:
@@ -187,14 +219,18 @@ def differs(a: EquationError, b: EquationError) -> bool:
     return a.order != b.order or abs(a.variance - b.variance) > 1e-3 * max(a.variance, b.variance)
 
 
-def error_of(rows: WeakRows, kind: int, theta: Float) -> EquationError:
+def error_of(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationError | None = None) -> EquationError:
     """The equation's error of most likelihood: white noise of order 0.. in the row, beside that of the sensors.
+
+    One found `last` time is improved; the orders are not compared again.
 
     With R0 = L L^T, L^-1 Q L^-T = U diag(q) U^T and z = U^T L^-1 e the likelihood of the variance v is that of
     independent z_i of variances 1 + v q_i.
     """
-    plain = rows.white(kind, theta, EquationError())
-    e = plain.known - np.einsum("wjk,j->wk", plain.regressors, theta)
+    if last is not None and last.variance:
+        return sharpened(rows, kind, theta, last)
+    plain = rows.white((kind,), theta, [EquationError()] * rows.kinds)
+    e = plain.residuals(theta)
     best, gain = EquationError(), _EVIDENCE
     # What the projection on the complement of the nuisances took out of the residuals.
     share = plain.free / (rows.windows * rows.functions.count)
@@ -209,7 +245,27 @@ def error_of(rows: WeakRows, kind: int, theta: Float) -> EquationError:
         rise *= len(e) * share / 2
         if rise > gain:
             best, gain = EquationError(v, order), rise
-    return best
+    return sharpened(rows, kind, theta, best) if best.variance else best
+
+
+def sharpened(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError) -> EquationError:
+    """The variance with the weights of each window in place of their mean.
+
+    Where the likelihood is at its maximum, sum e^T R^-1 Q R^-1 e = sum tr(R^-1 Q): v is scaled by their ratio.
+    """
+    q = rows.noise.gram(error.order, error.order)
+    for _ in range(_SHARPENING):
+        errors = [error] * rows.kinds
+        white = rows.white((kind,), theta, errors)
+        e = white.residuals(theta)
+        turned = white.whitener @ q @ white.whitener.transpose(0, 2, 1)
+        share = white.free / e.size
+        expected = share * float(np.einsum("wkk->", turned))
+        ratio = float(np.einsum("wk,wkl,wl->", e, turned, e, optimize=True)) / expected
+        error = EquationError(error.variance * ratio, error.order)
+        if abs(ratio - 1) < 1e-3:
+            break
+    return error
 
 
 def most_likely(q: Float, z: Float) -> tuple[float, float]:
@@ -247,16 +303,16 @@ def online(rows: WeakRows, start: Float | None = None, equation_error: bool = Tr
     p = parameters.checked(start)
     prior = parameters.prior(p)
     errors = [EquationError()] * rows.kinds
-    moments = Moments([], [])
+    moments = Moments([], [], [])
     history = np.empty((rows.windows, len(p)))
     for w in range(rows.windows):
         theta = parameters.theta(p)
         anew = w & (w + 1) == 0
         if anew and equation_error and w >= 3:
             past = rows.only(slice(0, w))
-            errors = [error_of(past, kind, theta[kind]) for kind in range(rows.kinds)]
+            errors = [error_of(past, kind, theta) for kind in range(rows.kinds)]
         own = rows.only(slice(0 if anew else w, w + 1))
-        new = Moments.of([own.white(kind, theta[kind], errors[kind]) for kind in range(rows.kinds)])
+        new = compensated(own, [own.white(group, theta, errors) for group in rows.groups], theta)
         moments = new if anew else moments.plus(new)
         p, _ = gauss_newton(parameters, moments, p, prior, 3)
         history[w] = p

@@ -216,9 +216,9 @@ class Estimator:
 
     def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
         """S [n_p, n_p, lanes] and the sum of squared residuals [lanes], not below its rounding."""
-        s, _, energy = model.project(self.p, sums)
+        s, _, rss_minus_yy = model.project(self.p, sums)
         floor = RESIDUAL_FLOOR * sums[-2]
-        residual = _capped(sums[-2] + energy)
+        residual = _capped(sums[-2] + rss_minus_yy)
         return s, np.where(residual > floor, residual, floor)
 
     def assess(self) -> npt.NDArray[np.void]:
@@ -289,8 +289,8 @@ class RelativeEstimator(Estimator):
         self.row_weight = _lanes([c.row_weight for c in configs])
         self.noise_margin = _lanes([c.noise_margin for c in configs])
         self.noise = np.zeros((3, len(configs)), np.float32)
-        self.energy = np.zeros(len(configs), np.float32)
-        self.group_energy = self.energy
+        self.rss = np.zeros(len(configs), np.float32)
+        self.group_rss = self.rss
         self.group_weight = np.zeros(len(configs), np.float32)
         self.expected = np.zeros(len(configs), np.float32)
         self.everywhere = np.ones(len(configs), np.bool_)
@@ -313,7 +313,7 @@ class RelativeEstimator(Estimator):
             if self.is_rate:
                 gradient = self.model.transpose_times(self.model.jacobian(self.p), n)
                 self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
-            self.energy = np.where(fits, self.energy + e * e, self.energy)
+            self.rss = np.where(fits, self.rss + e * e, self.rss)
             self.group_weight = np.where(fits, self.group_weight + self.row_weight, self.group_weight)
             self.sums = self.information.add(self.model.terms(n, e, self.row_weight), fits)
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
@@ -335,8 +335,8 @@ class RelativeEstimator(Estimator):
         self.was_due = True
         self.size = np.zeros(len(reason), np.float32)
         if ends_group:
-            self.group_energy = self.energy
-            self.energy = np.zeros_like(self.energy)
+            self.group_rss = self.rss
+            self.rss = np.zeros_like(self.rss)
             self.group_weight = np.zeros_like(self.group_weight)
             self.phase += 1
             self.was_due = bool(self.phase[0] >= self.divider[0])

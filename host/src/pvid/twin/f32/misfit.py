@@ -22,9 +22,9 @@ class Misfit:
             growth = np.float32(1) + BLOCK_S / (_SLOWER * forgetting_s)
         growth = np.where(forgetting_s > 0, growth, np.float32(1))
         self.growth = np.where(growth < _GROWTH_MAX, growth, _GROWTH_MAX)
-        self.energy = np.zeros(lanes, np.float32)
+        self.rss = np.zeros(lanes, np.float32)
         self.signal = np.zeros(lanes, np.float32)
-        self.least_energy = np.full(lanes, _UNKNOWN)
+        self.least_rss = np.full(lanes, _UNKNOWN)
         self.least_part = np.full(lanes, _UNKNOWN)
         self.block = int(np.clip(BLOCK_S * rate, np.float32(1), _ROWS_MAX))
         self.left = self.block
@@ -32,22 +32,22 @@ class Misfit:
 
     def take(self, e: Float32, sensitivity: Float32) -> None:
         """A row of every lane: its residual and p[0] times its gradient in p[0], [lanes]."""
-        self.energy = self.energy + e * e
+        self.rss = self.rss + e * e
         self.signal = self.signal + sensitivity * sensitivity
         self.left -= 1
         if self.left == 0:
             self._judge()
 
     def _judge(self) -> None:
-        part = self.energy / self.signal
+        part = self.rss / self.signal
         has_reference = self.least_part < _UNKNOWN
-        larger = (self.energy > TIMES * self.least_energy) & (part > TIMES * self.least_part) & (part > LEAST)
-        numbers = np.isfinite(self.energy) & np.isfinite(self.signal)
+        larger = (self.rss > TIMES * self.least_rss) & (part > TIMES * self.least_part) & (part > LEAST)
+        numbers = np.isfinite(self.rss) & np.isfinite(self.signal)
         moves = numbers & (self.signal > 0)
         self.alarm = ~numbers | (moves & has_reference & (larger | (part > MOST)))
-        self.least_energy = np.where(moves, self._least(self.least_energy, self.energy), self.least_energy)
+        self.least_rss = np.where(moves, self._least(self.least_rss, self.rss), self.least_rss)
         self.least_part = np.where(moves, self._least(self.least_part, part), self.least_part)
-        self.energy = np.zeros_like(self.energy)
+        self.rss = np.zeros_like(self.rss)
         self.signal = np.zeros_like(self.signal)
         self.left = self.block
 

@@ -81,13 +81,13 @@ def number_of_stages(design: WeakTables, iterations: int, estimator: RelativeEst
 def _passes(gate: Gate, x: Float32, design: WeakTables, estimator: RelativeEstimator, expected: Float32) -> bool:
     """Whether the gate accepts the window; all lanes must agree."""
     with np.errstate(all="ignore"):
-        energy = np.zeros(x.shape[2], np.float32)
+        rss = np.zeros(x.shape[2], np.float32)
         for k in range(design.functions):
             e = x[_Y, k]
             for i, place in enumerate(_PLACES[: estimator.model.n_theta]):
                 e = e - x[place, k] * estimator.theta[i]
-            energy = energy + e * e
-        return of_all_lanes(gate.passes(energy / ((np.float32(design.functions) - np.float32(2)) * expected)))
+            rss = rss + e * e
+        return of_all_lanes(gate.passes(rss / ((np.float32(design.functions) - np.float32(2)) * expected)))
 
 
 def stages(
@@ -133,7 +133,7 @@ def stages(
         yield None
     with np.errstate(all="ignore"):
         candidate, above_noise = estimator.judged()
-        variance_ratio = estimator.group_energy / ((np.float32(design.functions) - np.float32(2)) * expected)
+        variance_ratio = estimator.group_rss / ((np.float32(design.functions) - np.float32(2)) * expected)
     stepped = reason == Reason.UPDATED
     reported = trust.judge(reason, size, above_noise, variance_ratio, candidate)
     if angle is not None:

@@ -152,8 +152,8 @@ def project(p: Float32, sums: Float32) -> tuple[Float32, Float32, Float32]:
     q_q = w * q_a + w2 * q_e
     q_b = w * b_a + w2 * b_e
     along = (q_n + t) - f(2) * y_high
-    energy = (q_q - f(2) * q_b) + (d1 * along[0] + d2 * along[1])
-    return s, force, energy
+    rss_minus_yy = (q_q - f(2) * q_b) + (d1 * along[0] + d2 * along[1])
+    return s, force, rss_minus_yy
 
 
 def innovate(p: Float32, n: Float32, y: Float32) -> tuple[Float32, Float32]:

@@ -104,11 +104,11 @@ class EstimatorQ31:
         self.noise_margin = lane("noise_margin")
         self.dead_zone = lane("dead_zone")
         self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
-        self.energy = np.zeros(lanes, np.int64)
+        self.rss = np.zeros(lanes, np.int64)
         self.group_weight = np.zeros(lanes, np.int64)
         self.expected = scaled(np.zeros(lanes, np.int64), 0)
-        self.group_energy = self.energy
-        self.size = self.energy
+        self.group_rss = self.rss
+        self.size = self.rss
         self.gain = lane("gain")
         self.is_rate = first.gain < ONE  # a law that does not iterate
         self.divider = first.divider
@@ -189,7 +189,7 @@ class EstimatorQ31:
     def take_row(self, n: Int, innovation: Int, fits: Mask) -> Reasons:
         """As `add`, given the results of `innovation`."""
         e = np.where(fits, innovation, 0)
-        self.energy = clamp(self.energy + e * e, WIDE)
+        self.rss = clamp(self.rss + e * e, WIDE)
         e = round_shift(e, self.exponent)
         row = round_shift(np.where(fits, n, 0), self.exponent)
         upper, column = self._upper
@@ -213,8 +213,8 @@ class EstimatorQ31:
         self.was_due = True
         self.size = np.zeros(self.lanes, np.int64)
         if ends_group:
-            self.group_energy = self.energy
-            self.energy = np.zeros(self.lanes, np.int64)
+            self.group_rss = self.rss
+            self.rss = np.zeros(self.lanes, np.int64)
             self.group_weight = np.zeros(self.lanes, np.int64)
             self.phase += 1
             self.was_due = self.phase >= self.divider

@@ -32,11 +32,11 @@ class MisfitQ31:
         growth = never.plus(part)
         growth = pick(growth.exceeds(_GROWTH_MAX), _GROWTH_MAX, growth)
         self.growth = pick(groups > 0, growth, never)
-        self.few_energy = np.zeros_like(groups)
+        self.few_rss = np.zeros_like(groups)
         self.few_signal = np.zeros_like(groups)
-        self.energy = self._nothing
+        self.rss = self._nothing
         self.signal = self._nothing
-        self.least_energy = self._nothing.plus(_UNKNOWN)
+        self.least_rss = self._nothing.plus(_UNKNOWN)
         self.least_part = self._nothing.plus(_UNKNOWN)
         self.block = min(_BLOCK_S * drive_ticks, _ROWS_MAX)
         self.left = self.block
@@ -45,26 +45,26 @@ class MisfitQ31:
     def take(self, square: Int, sensitivity: Int) -> None:
         """A row of every lane: the square of its residual and p[0] times its gradient in p[0], [lanes]."""
         held = clamp(round_shift(sensitivity, _SENSITIVITY_SHIFT), _SENSITIVITY_LIMIT)
-        self.few_energy = self.few_energy + square
+        self.few_rss = self.few_rss + square
         self.few_signal = self.few_signal + held * held
         self.left -= 1
         if self.left % _FEW == 0:
-            self.energy = self.energy.plus(scaled(self.few_energy, 0))
+            self.rss = self.rss.plus(scaled(self.few_rss, 0))
             self.signal = self.signal.plus(scaled(self.few_signal, 2 * _SENSITIVITY_SHIFT))
-            self.few_energy = np.zeros_like(self.few_energy)
+            self.few_rss = np.zeros_like(self.few_rss)
             self.few_signal = np.zeros_like(self.few_signal)
         if self.left == 0:
             self._judge()
 
     def _judge(self) -> None:
         moves = self.signal.m > 0
-        part = self.energy.over(Scaled(np.where(moves, self.signal.m, 1), self.signal.e))
+        part = self.rss.over(Scaled(np.where(moves, self.signal.m, 1), self.signal.e))
         has_reference = _UNKNOWN.exceeds(self.least_part)
-        larger = self.energy.exceeds(_TIMES.times(self.least_energy)) & part.exceeds(_TIMES.times(self.least_part))
+        larger = self.rss.exceeds(_TIMES.times(self.least_rss)) & part.exceeds(_TIMES.times(self.least_part))
         self.alarm = moves & has_reference & ((larger & part.exceeds(_LEAST)) | part.exceeds(_MOST))
-        self.least_energy = pick(moves, self._least(self.least_energy, self.energy), self.least_energy)
+        self.least_rss = pick(moves, self._least(self.least_rss, self.rss), self.least_rss)
         self.least_part = pick(moves, self._least(self.least_part, part), self.least_part)
-        self.energy = self._nothing
+        self.rss = self._nothing
         self.signal = self._nothing
         self.left = self.block
 

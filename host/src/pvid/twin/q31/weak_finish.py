@@ -224,20 +224,20 @@ def number_of_stages(design: WeakTablesQ31, iterations: int, estimator: Estimato
     return rows + solves + estimator.assessment_stages + 1
 
 
-def _variance_ratio(energy: Int, design: WeakTablesQ31, expected: Scaled) -> Scaled:
+def _variance_ratio(rss: Int, design: WeakTablesQ31, expected: Scaled) -> Scaled:
     """Residual variance of a window over its expectation [lanes]."""
-    return scaled(energy, 0).over(scaled(design.functions - 2, 0).times(expected))
+    return scaled(rss, 0).over(scaled(design.functions - 2, 0).times(expected))
 
 
 def _passes(
     gate: GateQ31, x: Int, saturated: Mask, design: WeakTablesQ31, estimator: EstimatorQ31, expected: Scaled
 ) -> bool:
     """Whether the gate accepts the window; all lanes must agree."""
-    energy = np.zeros(estimator.lanes, np.int64)
+    rss = np.zeros(estimator.lanes, np.int64)
     for k in range(design.functions):
         e = clamp(estimator.innovation(x[: estimator.model.n_theta, k], x[_Y, k])[0], COLUMN_LIMIT)
-        energy = clamp(energy + e * e, WIDE)
-    return of_all_lanes(gate.passes(_variance_ratio(energy, design, expected), ~saturated))
+        rss = clamp(rss + e * e, WIDE)
+    return of_all_lanes(gate.passes(_variance_ratio(rss, design, expected), ~saturated))
 
 
 def stages(
@@ -285,5 +285,5 @@ def stages(
     for _ in range(estimator.assessment_stages):
         yield None
     candidate, above_noise = estimator.judged()
-    variance_ratio = _variance_ratio(estimator.group_energy, design, expected)
+    variance_ratio = _variance_ratio(estimator.group_rss, design, expected)
     yield trust.judge(reason, size, above_noise, variance_ratio.fixed(VARIANCE_RATIO_BITS), candidate)

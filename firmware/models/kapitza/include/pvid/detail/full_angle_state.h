@@ -33,7 +33,7 @@ struct pvid_weak_angle_f32 {
     float dt;
     float inverse_l1_square; /* of rod 1 [1/m^2] */
     float p[PVID_KAPITZA_P];
-    float zero;        /* c */
+    float offset;      /* c */
     float friction[2]; /* c1, c2 */
     float l1;          /* L1 and L2 of p (theory.md 1), not lengths */
     float l2;

@@ -1,0 +1,73 @@
+"""Systematic errors of a sensor are found in the residuals, with their size; a perfect rig has none."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bench.mechanisms import design_of, law_of, start_of
+from pvid.models.mechanisms import names
+from pvid.oracle.fourier.identify import Identified, identify
+from pvid.oracle.fourier.sensor_errors import SensorError, SensorErrors
+from pvid.sim.imperfections import Imperfections
+from pvid.sim.simulated_run import simulation_of
+
+
+@cache
+def answer(name: str, key: str = "", signal: str = "", size: float = 0.0) -> tuple[Identified, SensorError | None]:
+    """What a run with sharp friction and one imperfection gives, and the error that is found in it."""
+    simulation = simulation_of(name)
+    imperfections = Imperfections(law_of(simulation).friction, **({key: {signal: size}} if key else {}))  # type: ignore[arg-type]
+    run, design = simulation.run(3, imperfections), design_of(simulation, imperfections)
+    found = identify(simulation.model, run, simulation.rig.sample_rate, start_of(simulation, 3), design)
+    return found, SensorErrors(run, design, found.fit).found(found.se)
+
+
+@pytest.mark.parametrize("name", names())
+def test_perfect_rig_has_no_sensor_in_error(name: str) -> None:
+    found, error = answer(name)
+    assert error is None
+    assert found.verdict.status == "good"
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "signal", "size", "kind", "expected"),
+    [
+        ("dc_motor", "skew", "phi", 1e-3, "delay", 1e-3),
+        ("cart_pendulum", "skew", "a", 2e-3, "delay", 2e-3),
+        ("cart_pendulum", "backlash", "a", 3.0, "play", 3.0 * 2 * np.pi / 2**12),
+        ("furuta", "backlash", "th", 3.0, "play", 3.0 * 2 * np.pi / 2**12),
+        ("cart_pendulum", "eccentricity", "a", 3.0, "eccentric", 3.0 * 2 * np.pi / 2**12),
+        ("rigid_body", "gain", "m0", 1.01, "gain", -0.01),
+    ],
+)
+def test_error_of_a_sensor_is_named_with_its_size(
+    name: str, key: str, signal: str, size: float, kind: str, expected: float
+) -> None:
+    """To 10 %: the test is of first order, and the play acts on smoothed samples."""
+    found, error = answer(name, key, signal, size)
+    assert error is not None and (error.signal, error.kind) == (signal, kind)
+    assert error.size == pytest.approx(expected, rel=0.1)
+    assert found.verdict.status != "good"
+    assert any(one.name == "sensor" and signal in one.text for one in found.verdict.reasons)
+
+
+def test_shift_of_an_error_leads_back_to_the_truth() -> None:
+    """The motor's angle a sample late: errors fall from 1 % to below a twentieth of that."""
+    found, error = answer("dc_motor", "skew", "phi", 1e-3)
+    truth = simulation_of("dc_motor").truth
+    assert error is not None
+    before, after = np.abs(found.p - truth), np.abs(found.p + error.shift - truth)
+    worst = int(np.argmax(before / found.se))
+    assert before[worst] > 100 * found.se[worst]
+    assert after[worst] < 0.05 * before[worst]
+
+
+def test_gain_of_a_voltage_scales_the_motor_and_is_said() -> None:
+    """R, L and k in proportion to V; J, b and Tc with the torque constant."""
+    found, _ = answer("dc_motor")
+    by_gain = dict(zip(found.names, found.by_gain["V"] / found.p, strict=True))
+    for name in ("R", "L", "k", "J", "b", "Tc"):
+        assert by_gain[name] == pytest.approx(1.0, abs=0.01), name
+    scale = next(one for one in found.verdict.reasons if one.name == "scale")
+    assert not scale.alarm and "V (1 % of" in scale.text
