@@ -241,9 +241,9 @@ static void the_covariance_is_the_inverse_of_the_information(void **state)
 {
     (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
-    const pvid_system_f32 system = known_system();
+    pvid_system_f32 system = known_system();
     pvid_estimate_f32 estimate;
-    pvid_assess_f32(&system, &settings, start, &estimate);
+    pvid_assess_f32(&system, &settings, &estimate);
     const double det = (33.0 * 40.0625) - 256.0;
     assert_float_equal(estimate.covariance[0][0], 40.0625 / det, 1.0e-8);
     assert_float_equal(estimate.covariance[1][1], 33.0 / det, 1.0e-8);
@@ -254,7 +254,7 @@ static void the_covariance_is_the_inverse_of_the_information(void **state)
     assert_float_equal(estimate.kappa, 0.8f, 1.0e-6f);
     assert_float_equal(estimate.least_pivot, 0.8f, 1.0e-6f);
     assert_float_equal(estimate.residual_sd, sqrt(0.125), 1.0e-7);
-    assert_true((estimate.weight == 34.0f) && (estimate.p[0] == 2.0f) && (estimate.p[1] == -1.0f));
+    assert_true(estimate.weight == 34.0f);
 }
 
 static void without_information_the_errors_are_those_of_the_start(void **state)
@@ -268,7 +268,7 @@ static void without_information_the_errors_are_those_of_the_start(void **state)
         system.s[0][1] = 0.0f;
         system.s[1][1] = bad[k];
         pvid_estimate_f32 estimate;
-        pvid_assess_f32(&system, &settings, start, &estimate);
+        pvid_assess_f32(&system, &settings, &estimate);
         assert_float_equal(estimate.se[0], 1.0f, 1.0e-6f);
         assert_float_equal(estimate.se[1], 4.0f, 4.0e-6f);
         assert_float_equal(estimate.covariance[1][1], 16.0f, 1.6e-5f);

@@ -3,7 +3,6 @@
 #include "solve/assess_f32.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "number/finite_f32.h"
 
@@ -69,17 +68,11 @@ void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_setti
     estimate->least_pivot = 1.0f / most;
 }
 
-bool pvid_assess_factor_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float wide,
-                            float matrix[][PVID_MAX_P], pvid_cholesky_f32 *factor)
+void pvid_assess_widen_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float wide)
 {
-    const uint8_t n_p = settings->n_p;
-    for (size_t a = 0; a < n_p; a++) {
-        for (size_t b = a; b < n_p; b++) {
-            matrix[a][b] = system->s[a][b];
-        }
-        matrix[a][a] += wide / (settings->start_sd[a] * settings->start_sd[a]);
+    for (size_t a = 0; a < settings->n_p; a++) {
+        system->s[a][a] += wide / (settings->start_sd[a] * settings->start_sd[a]);
     }
-    return pvid_cholesky_factor_f32(factor, n_p, (const float (*)[PVID_MAX_P])matrix);
 }
 
 static void assess_as_start(const pvid_solve_settings_f32 *settings, pvid_estimate_f32 *estimate)
@@ -109,18 +102,16 @@ void pvid_assess_scale_f32(const pvid_solve_settings_f32 *settings, float wide, 
     }
 }
 
-void pvid_assess_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, const float p[],
-                     pvid_estimate_f32 *estimate)
+void pvid_assess_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, pvid_estimate_f32 *estimate)
 {
     const float variance = pvid_assess_variance_f32(system, settings);
     const float wide = variance * settings->correlation;
-    memset(estimate, 0, sizeof *estimate);
-    memcpy(estimate->p, p, settings->n_p * sizeof estimate->p[0]);
     estimate->weight = system->weight;
     estimate->residual_sd = sqrtf(variance);
     pvid_assess_kappa_f32(system, settings, estimate);
     pvid_cholesky_f32 factor;
-    const bool known = pvid_assess_factor_f32(system, settings, wide, estimate->covariance, &factor);
+    pvid_assess_widen_f32(system, settings, wide);
+    const bool known = pvid_cholesky_factor_f32(&factor, settings->n_p, (const float (*)[PVID_MAX_P])system->s);
     if (known) {
         pvid_cholesky_inverse_f32(&factor, estimate->covariance);
     }

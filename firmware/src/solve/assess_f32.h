@@ -1,7 +1,7 @@
 /* Accuracy of p from the normal equations: residual variance, kappa, standard errors. Pure: the results depend on the
  * arguments alone. Private to the core.
  *
- *   pvid_assess_f32(&system, &settings, p, &estimate);     at once; the parts below serve an engine that works in
+ *   pvid_assess_f32(&system, &settings, &estimate);     at once; the parts below serve an engine that works in
  * stages
  */
 #ifndef PVID_ASSESS_F32_H
@@ -34,20 +34,17 @@ bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve
 void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
                            pvid_estimate_f32 *estimate);
 
-/* Factors S + wide / start_sd^2, with wide = correlation s^2; overwrites matrix[n_p][n_p]. Fails (returns false) iff a
- * pivot is not significant (cholesky_f32.h). Cost: a factorisation, n_p divisions. */
-bool pvid_assess_factor_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float wide,
-                            float matrix[][PVID_MAX_P], pvid_cholesky_f32 *factor);
+/* S += wide / start_sd^2, with wide = correlation s^2. Cost: n_p divisions. */
+void pvid_assess_widen_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float wide);
 
-/* Multiplies estimate->covariance, the inverse of that matrix, by `wide` and writes the standard errors. Writes those
+/* Multiplies estimate->covariance, the inverse of that S, by `wide` and writes the standard errors. Writes those
  * of the start if `known` is false or a result is not finite. Cost: n_p square roots. */
 void pvid_assess_scale_f32(const pvid_solve_settings_f32 *settings, float wide, bool known,
                            pvid_estimate_f32 *estimate);
 
-/* Writes p, se, covariance, kappa, least_pivot, residual_sd and weight of the estimate; its other fields are 0. All are
- * finite, whatever S. The covariance is (S / (correlation s^2) + 1 / start_sd^2)^-1. Cost: two factorisations and n_p
- * solves. Source: theory.md 4, standard errors and kappa. */
-void pvid_assess_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, const float p[],
-                     pvid_estimate_f32 *estimate);
+/* Writes se, covariance, kappa, least_pivot, residual_sd and weight of the estimate; its other fields are the caller's.
+ * All are finite, whatever S, which is overwritten. The covariance is (S / (correlation s^2) + 1 / start_sd^2)^-1.
+ * Cost: two factorisations and n_p solves. Source: theory.md 4, equation (7). */
+void pvid_assess_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, pvid_estimate_f32 *estimate);
 
 #endif

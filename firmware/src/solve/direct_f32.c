@@ -4,6 +4,7 @@
 #include "solve/direct_f32.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
@@ -110,5 +111,7 @@ void pvid_direct_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *e
     pvid_system_f32 system;
     pvid_information_read_f32(&self->information, sums);
     gather(self, sums, &system);
-    pvid_assess_f32(&system, &self->settings, self->p, estimate);
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
+    pvid_assess_f32(&system, &self->settings, estimate);
 }

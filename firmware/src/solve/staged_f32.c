@@ -386,8 +386,9 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
         kappa_stage(self, solve);
         break;
     case STAGE_WIDEN:
+        pvid_assess_widen_f32(&solve->system, &self->settings, wide);
         solve->solvable =
-            pvid_assess_factor_f32(&solve->system, &self->settings, wide, solve->estimate->covariance, &solve->factor);
+            pvid_cholesky_factor_f32(&solve->factor, self->settings.n_p, (const float (*)[PVID_MAX_P])solve->system.s);
         break;
     case STAGE_INVERT:
         if (solve->solvable) {

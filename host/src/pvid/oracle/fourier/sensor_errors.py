@@ -29,7 +29,7 @@ Kind = Literal["delay", "play", "eccentric", "gain"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
-_MOVES = 2.0
+_MOVES = 1.0
 
 # An encoder shows an eccentricity only where it turns by this much [rad].
 _TURNS = 2.0
@@ -180,7 +180,7 @@ class SensorErrors:
         out = []
         for white in self.fit.white:
             own = np.concatenate([change[kind] for kind in white.kinds], axis=1)
-            out.append(self._without_nuisances(white, np.einsum("wjk,wk->wj", white.whitener, own)))
+            out.append(self._without_nuisances(white, white.whitener.of(own[:, np.newaxis, :])[:, 0]))
         return np.concatenate(out, axis=1)
 
     def _raw(self, rows: WeakRows) -> list[Float]:
