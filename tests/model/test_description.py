@@ -88,6 +88,8 @@ def test_a_users_file_is_compiled_by_its_name(tmp_path: Path) -> None:
         ("model = 3", "the file leaves no variable `model`"),
         ("", "mine: the model has no equation"),
         ("import sympy; model.equation(b * sympy.exp(x * b) - u)", "line 6: equation 1"),
+        ("model.equation(m * sgn(b) * x.d(2) - u)", "line 6: sgn(b) is not supported: make it the unknown itself"),
+        ("model.equation(m * x.d(2) - u * (b / b) ** 0.5 - u * abs(x) ** 0.5)", "line 6: equation 1"),
         ("raise SystemExit(3)", "line 6: SystemExit"),
     ],
 )

@@ -166,6 +166,18 @@ def bench_cell(folder: Path | None, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="compare-methods")
+@UPDATE
+def bench_compare_methods(update: Path | None) -> int:
+    """Weak form, strong form, output error and pysindy's weak form on the shipped mechanisms (needs pysindy)."""
+    from bench import methods
+
+    with progress_bar("methods", len(methods.MECHANISMS) * len(methods.METHODS)) as advance:
+        rows = list(methods.rows(progress=lambda: advance(1)))
+    put_table(update, "compare-methods", markdown(methods.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="recordings")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False))
@@ -189,6 +201,8 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
         ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
     ):
         put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
+    traps = [row for rig in rigs for row in recorded_rigs.trap_rows(rig.source, folder)]
+    put_table(update, "traps", markdown(recorded_rigs.TRAPS, traps))
     return DONE
 
 

@@ -171,7 +171,8 @@ class Outcome:
     @property
     def warnings(self) -> str:
         """Names of the alarms, with how many of the runs had them."""
-        counts = Counter(reason.name for one in self.found for reason in one.verdict.reasons if reason.alarm)
+        alarms = ({reason.name for reason in one.verdict.reasons if reason.alarm} for one in self.found)
+        counts = Counter(name for names in alarms for name in names)
         return ", ".join(f"{name} {count}/{len(self.found)}" for name, count in counts.most_common()) or "-"
 
     @property

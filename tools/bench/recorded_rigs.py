@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from pvid.sim.plant import SHARP, Friction
 
 Float = npt.NDArray[np.float64]
 
-HEADER = ("rig", "parameter", "identified on one run", "on the other", "published", "apart", "changes with the band")
+HEADER = ("rig", "parameter", "identified on one run", "on the other", "published", "the two apart")
 PREDICTIONS = (
     "rig",
     "sensor",
@@ -31,11 +31,12 @@ PREDICTIONS = (
     "of the second, published",
     "RMS error of the second",
 )
-VERDICTS = ("rig", "alarms of the first run", "of the second", "changes with the band", "differs between the runs")
+VERDICTS = ("rig", "alarms of the first run", "of the second", "beyond 4 s.e. between the runs")
+
+TRAPS = ("rig", "run that must raise", "alarms", "R^2 of the rows", "first parameter")
 
 # Estimates differ by so many standard errors: their difference is not covered.
 CLASH = 4.0
-WIDER = 3  # times the functions, for the other band
 _SOFT = 0.02  # width of a soft friction [unit of the velocity]
 
 
@@ -88,14 +89,12 @@ class Rig:
     model : its mechanism
     runs : the two recordings
     estimates : from each run
-    wide : from each run, with more functions
     """
 
     source: Source
     model: CompiledModel
     runs: tuple[Recording, Recording]
     estimates: tuple[Estimate, Estimate]
-    wide: tuple[Estimate, Estimate]
 
     @property
     def published(self) -> Float | None:
@@ -109,11 +108,6 @@ class Rig:
         one, other = self.estimates
         return np.asarray(np.abs(one.p - other.p) / np.hypot(one.se, other.se))
 
-    def drift(self) -> Float:
-        """Distance of narrow and wide band in the larger standard error, the larger of the two runs [n_p]."""
-        pairs = zip(self.estimates, self.wide, strict=True)
-        return np.max([np.abs(a.p - b.p) / np.maximum(a.se, b.se) for a, b in pairs], axis=0)
-
     def replay(self, run: int, friction: Friction = SHARP) -> Replay:
         """The plant under one run's inputs."""
         return Replay(self.model, self.runs[run], friction=friction)
@@ -123,15 +117,20 @@ class Rig:
         return self.replay(1).matches(self.estimates[0].p)
 
 
-def identified(model: CompiledModel, run: Recording, design: Design) -> Estimate:
-    """From all windows of a run."""
-    windows = FourierDesign(
+def windows_of(run: Recording, design: Design) -> FourierDesign:
+    """At a run's rate."""
+    return FourierDesign(
         run.sample_rate,
         design.window_s,
         design.functions,
         decimation=design.decimation,
         rate_taps=design.rate_taps,
     )
+
+
+def identified(model: CompiledModel, run: Recording, design: Design) -> Estimate:
+    """From all windows of a run."""
+    windows = windows_of(run, design)
     if design.sensors_only:
         fit = batch(WeakRows.of(ready(model), run.signals, windows), equation_error=False)
         return Estimate(fit.p, uncertainty(fit).se)
@@ -142,9 +141,8 @@ def identified(model: CompiledModel, run: Recording, design: Design) -> Estimate
 def rig_of(source: Source, runs: tuple[Recording, Recording], design: Design) -> Rig:
     """Identifies both runs."""
     model = source.model()
-    wider = replace(design, functions=WIDER * design.functions)
-    narrow, wide = ([identified(model, run, one) for run in runs] for one in (design, wider))
-    return Rig(source, model, runs, (narrow[0], narrow[1]), (wide[0], wide[1]))
+    first, second = (identified(model, run, design) for run in runs)
+    return Rig(source, model, runs, (first, second))
 
 
 def rigs(folder: Path) -> Iterator[Rig]:
@@ -156,22 +154,14 @@ def rigs(folder: Path) -> Iterator[Rig]:
 
 def value_rows(rig: Rig) -> list[tuple[str, ...]]:
     """Rows of the table of values."""
-    rows = []
-    clash, drift = rig.clash(), rig.drift()
+    rows: list[tuple[str, ...]] = []
+    clash = rig.clash()
     for k, (name, unknown) in enumerate(zip(rig.model.p_names, rig.model.unknowns, strict=True)):
-        cells = [f"{one.p[k]:.4g} +- {one.se[k]:.1g}" for one in rig.estimates]
+        values = [f"{one.p[k]:.4g} +- {one.se[k]:.1g}" for one in rig.estimates]
         published = rig.source.published.get(name)
+        theirs = "-" if published is None else f"{published:.4g}"
         shown = f"{name} {unknown.unit}".strip()
-        rows.append(
-            (
-                rig.source.name,
-                shown,
-                *cells,
-                "-" if published is None else f"{published:.4g}",
-                f"{clash[k]:.1f} s.e.",
-                f"{drift[k]:.1f} s.e.",
-            )
-        )
+        rows.append((rig.source.name, shown, *values, theirs, f"{clash[k]:.1f} s.e."))
     return rows
 
 
@@ -180,8 +170,8 @@ def prediction_rows(rig: Rig) -> list[tuple[str, ...]]:
     forth = rig.predicted()
     back = rig.replay(0).matches(rig.estimates[1].p)
     published = rig.published
-    theirs = None if published is None else rig.replay(1, _friction(published, rig.model)).matches(published)
-    rows = []
+    theirs = None if published is None else rig.replay(1, friction_of(published, rig.model)).matches(published)
+    rows: list[tuple[str, ...]] = []
     for name, match in forth.items():
         unit = rig.model.signal(name).unit
         of_theirs = "-" if theirs is None else f"{theirs[name].r2:.4f}"
@@ -192,9 +182,22 @@ def prediction_rows(rig: Rig) -> list[tuple[str, ...]]:
 
 def verdict_rows(rig: Rig) -> list[tuple[str, ...]]:
     """Rows of the table of alarms."""
-    drifting = listed([name for name, apart in zip(rig.model.p_names, rig.drift(), strict=True) if apart > CLASH])
     differing = listed([name for name, apart in zip(rig.model.p_names, rig.clash(), strict=True) if apart > CLASH])
-    return [(rig.source.name, *(listed(list(one.alarms)) for one in rig.estimates), drifting, differing)]
+    return [(rig.source.name, *(listed(list(one.alarms)) for one in rig.estimates), differing)]
+
+
+def trap_rows(source: Source, folder: Path) -> list[tuple[str, ...]]:
+    """Rows of the table of runs that do not show the mechanism."""
+    rows: list[tuple[str, ...]] = []
+    for trap in source.traps:
+        run = source.load(folder, trap)
+        windows = windows_of(run, DESIGNS[source.name])
+        found = identify(source.model(), run.signals, run.sample_rate, design=windows)
+        alarms: list[str] = [one.name for one in found.verdict.reasons if one.alarm]
+        name, (value, error) = next(iter(found.values.items()))
+        r2 = listed([f"{one:.4f}" for one in found.r2.values()])
+        rows.append((source.name, trap, listed(alarms), r2, f"{name} {value:.3g} +- {error:.1g}"))
+    return rows
 
 
 def listed(names: list[str]) -> str:
@@ -202,7 +205,7 @@ def listed(names: list[str]) -> str:
     return ", ".join(names) or "-"
 
 
-def _friction(p: Float, model: CompiledModel) -> Friction:
+def friction_of(p: Float, model: CompiledModel) -> Friction:
     """Sharp; soft where a friction is 0, which the simulation would look for at every reversal."""
     none = any(name.startswith("c") and value == 0.0 for name, value in zip(model.p_names, p, strict=True))
     return Friction(_SOFT) if none else SHARP

@@ -63,6 +63,7 @@ class Source:
     published : parameters of the mechanism that follow from the owners' own
     published_at : where these stand
     knowns : constants of the mechanism that this rig has, where they differ from those of its file
+    traps : further runs of the rig, by the alarm that they must raise: the mechanism cannot be identified from them
     """
 
     name: str
@@ -79,6 +80,7 @@ class Source:
     published: Mapping[str, float] = field(default_factory=dict)
     published_at: str = ""
     knowns: Mapping[str, float] = field(default_factory=dict)
+    traps: Mapping[str, Piece] = field(default_factory=dict)
 
     def model(self) -> CompiledModel:
         """The compiled mechanism, with this rig's constants."""
@@ -110,16 +112,18 @@ class Source:
         return Recording(clock, even, rate)
 
     def load(self, folder: Path, piece: str) -> Recording:
-        """A piece that was cut before: FOLDER/NAME/identify.csv.gz or predict.csv.gz."""
+        """A piece that was cut before, in FOLDER/NAME: "identify", "predict" or the name of a trap."""
         return read_recording(folder / self.name / f"{piece}.csv.gz", columns=Columns(channels=self.channels))
 
 
 def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
-    """Cuts both pieces of a source; gives the files."""
+    """Cuts the pieces of a source; gives the files."""
     (folder / source.name).mkdir(parents=True, exist_ok=True)
-    paths = [folder / source.name / f"{name}.csv.gz" for name in PIECES]
-    for path, piece in zip(paths, (source.identify, source.predict), strict=True):
-        write_recording(path, source.cut(checkouts, piece), source.channels)
+    pieces = dict(zip(PIECES, (source.identify, source.predict), strict=True)) | dict(source.traps)
+    paths = []
+    for name, piece in pieces.items():
+        paths.append(folder / source.name / f"{name}.csv.gz")
+        write_recording(paths[-1], source.cut(checkouts, piece), source.channels)
     return paths
 
 
@@ -265,6 +269,12 @@ SOURCES = (
         decimals={"tau": 4},
         published={"J": 0.139625, "G": 0.6755 * 0.5 * 9.81, "b": 0.1},
         published_at="data/parameters/sp_parameters_sac.yaml",
+        traps={
+            # a swing-up by small pushes: most of the motion is not the torque's work
+            "attenuation": Piece("results/control_method_energy_shaping/data_measured.csv"),
+            # the torque is that which holds the weight
+            "feedback": Piece("results/control_method_gravity_compensation/data_measured.csv", end=15.0),
+        },
     ),
     Source(
         name="free_pendulum",
@@ -305,8 +315,9 @@ SOURCES = (
         commit=_CELL_COMMIT,
         licence="MIT, Copyright (c) 2025 Silencefrog9305",
         read=_random_discharge,
-        identify=Piece("Exp25_R1.mat", end=3000.0, part=25),
-        predict=Piece("Exp25_R1.mat", end=3000.0, part=26),
+        # both to 1.9 A h: a polynomial of the charge must not be extrapolated
+        identify=Piece("Exp25_R1.mat", end=3500.0, part=25),
+        predict=Piece("Exp25_R1.mat", end=2800.0, part=26),
         channels=_CELL_CHANNELS,
         rate=0.1,
         decimals={"i": 4, "q": 3, "v": 4},

@@ -89,9 +89,9 @@ def _middle(held: Float) -> Float:
 
 
 def _motor(simulation: RigSimulation, run: Recording) -> Form:
-    """States i and the velocity; terms V and the soft sign that the rig has."""
+    """States i and the velocity; terms V and the sign of the velocity."""
     velocity = savgol_filter(run.signals["phi"], _TAPS, _DEGREE, deriv=1, delta=1 / run.sample_rate)
-    sign = np.tanh(velocity / simulation.rig.friction_width)
+    sign = np.sign(velocity)
 
     def parameters(c: Float) -> Float:
         electric, mechanical = c

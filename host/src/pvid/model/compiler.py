@@ -23,7 +23,7 @@ def reduced(
     equations: Sequence[Equation], hidden: Sequence[str], p: Sequence[sp.Symbol]
 ) -> tuple[list[Reduced], Opaque]:
     """The equations in measured signals; sgn and |..| stand as auxiliary signals in them."""
-    opaque = Opaque(hidden)
+    opaque = Opaque(hidden, p)
     ready = []
     for one in equations:
         try:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
+from fractions import Fraction
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
+from pvid.model.modular import echelon, residue
 from pvid.model.zero import RationalPoint
 
 
@@ -23,9 +25,12 @@ def jacobian_at(
 
 
 def rank(matrix: sp.Matrix) -> int:
-    """Exact."""
+    """Over the rationals."""
     if 0 in matrix.shape:
         return 0
+    if all(one.is_Rational for one in matrix):
+        rows = [[residue(Fraction(int(one.p), int(one.q))) for one in matrix.row(k)] for k in range(matrix.rows)]
+        return len(echelon(rows)[1])
     return int(DomainMatrix.from_Matrix(matrix).to_field().rank())
 
 

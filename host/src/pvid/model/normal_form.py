@@ -31,15 +31,15 @@ def normal_form(expression: sp.Expr, p: Collection[sp.Symbol]) -> sp.Expr:
     """
     whole = rational(expression)
     whole = whole.replace(sp.sign, sgn).replace(sp.tan, lambda x: sp.sin(x) / sp.cos(x))
-    _check_functions(whole)
+    _check_functions(whole, p)
     whole = whole.replace(lambda one: isinstance(one, sp.sin | sp.cos), lambda one: _without_offset(one, set(p)))
     whole = sp.expand(whole)
     if any(_mixed(one, p) for one in whole.atoms(sp.Pow)):
         numerator, _ = sp.fraction(sp.together(whole))
         whole = sp.expand(numerator)
     for one in whole.atoms(sp.Pow):
-        if varies(one.base) and not one.exp.is_Integer:
-            raise ModelError(f"{readable(one)} is no whole power of a signal: only those are supported")
+        if one.base.free_symbols and not one.exp.is_Integer:
+            raise ModelError(f"{readable(one)} is no whole power: only those of signals and unknowns are supported")
     return whole
 
 
@@ -48,10 +48,12 @@ def _mixed(power: sp.Pow, p: Collection[sp.Symbol]) -> bool:
     return below and varies(power.base) and bool(power.base.free_symbols & set(p))
 
 
-def _check_functions(whole: sp.Expr) -> None:
+def _check_functions(whole: sp.Expr, p: Collection[sp.Symbol]) -> None:
     for one in whole.atoms(sp.Function):
         if isinstance(one, sp.core.function.AppliedUndef):
             raise ModelError(f"{one} is no signal of the model: use what model.sensor(..) returned and its .d()")
+        if one.free_symbols & set(p) and not varies(one) and not isinstance(one, sp.sin | sp.cos):
+            raise ModelError(f"{readable(one)} is not supported: make it the unknown itself, or declare it as known")
         if varies(one) and not isinstance(one, _FUNCTIONS):
             raise ModelError(
                 f"{type(one).__name__}(..) of a signal is not supported: sin, cos, sgn, abs and rational functions are"

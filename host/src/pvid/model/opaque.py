@@ -18,8 +18,8 @@ from pvid.model.terms import added, product, terms_of
 class Opaque:
     """Auxiliary signals and what they stand for."""
 
-    def __init__(self, hidden: Collection[str]) -> None:
-        self.hidden = set(hidden)
+    def __init__(self, hidden: Collection[str], p: Collection[sp.Symbol]) -> None:
+        self.hidden, self.p = set(hidden), set(p)
         self.stands_for: dict[Jet, sp.Expr] = {}
 
     def hide(self, expression: sp.Expr) -> sp.Expr:
@@ -58,7 +58,7 @@ class Opaque:
                     f"{names} cannot be eliminated: {readable(factor)} is not linear in it; a sensor for "
                     f"{names} would help"
                 )
-            (inside if own and not unmeasured and not _has_unknown(factor) else outside).append(factor)
+            (inside if own and not unmeasured and not factor.free_symbols & self.p else outside).append(factor)
         if not any(factor.has(sgn, sp.Abs) for factor in inside):
             return term
         return product(outside) * self._jet(product(inside))
@@ -70,7 +70,3 @@ class Opaque:
         jet = Jet(f"{OPAQUE}{len(self.stands_for)}")
         self.stands_for[jet] = expression
         return jet
-
-
-def _has_unknown(factor: sp.Expr) -> bool:
-    return any(not isinstance(one, Jet) for one in factor.free_symbols)

@@ -15,7 +15,7 @@ import sympy as sp
 from pvid.model.compiled import CompiledModel, Part, Row
 from pvid.model.gradient import rank
 from pvid.model.signals import TIME, Integral, Jet, jets, sgn, total_derivative
-from pvid.model.zero import RationalPoint
+from pvid.model.zero import RationalPoint, Sampler
 
 _ROUNDS = 20  # of insertion: a derivative of what is inserted may contain a jet that follows again
 
@@ -44,13 +44,15 @@ class Solutions:
         free = [self._inserted(_rate(one)) for row in rows for one in row.nuisances]
         owners = [k for k, row in enumerate(rows) for _ in row.nuisances]
         slopes = [[self._slope(row, one) for one in p] for row in rows]
+        flat = []
+        for k, row in enumerate(slopes):
+            own = [one if owner == k else sp.Integer(0) for one, owner in zip(free, owners, strict=True)]
+            flat += [*row, *own]
+        sampler, source, width = Sampler(flat), random.Random(seed), len(p) + len(free)
         out = []
-        source = random.Random(seed)
-        for _ in range(len(p) + len(free) + 2):
-            point = RationalPoint(source)
-            for k, row in enumerate(slopes):
-                own = [one if owner == k else sp.Integer(0) for one, owner in zip(free, owners, strict=True)]
-                out.append([point.of(one) for one in (*row, *own)])
+        for _ in range(width + 2):
+            values = [sp.Rational(one.numerator, one.denominator) for one in sampler.at_random(source)]
+            out += [values[k : k + width] for k in range(0, len(values), width)]
         return sp.Matrix(out)
 
     def rank(self, seed: int) -> int:

@@ -9,9 +9,12 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 
 import sympy as sp
+from sympy.printing.pycode import PythonCodePrinter
 
+from pvid.model.modular import echelon, rational, residue
 from pvid.model.signals import Integral
 
 
@@ -71,22 +74,61 @@ def is_zero(expression: sp.Expr) -> bool:
     return bool(sp.expand(numerator) == 0)
 
 
+class _FractionPrinter(PythonCodePrinter):  # type: ignore[misc]
+    def _print_Rational(self, number: sp.Rational) -> str:
+        return f"Fraction({number.p}, {number.q})"
+
+
+class Sampler:
+    """Many functions at once at random rational points; fast, and exact."""
+
+    def __init__(self, functions: Sequence[sp.Expr]) -> None:
+        apart = [_angles_apart(one) for one in functions]
+        whole = sp.Tuple(*apart)
+        self.integrals = sorted(whole.atoms(Integral), key=str)
+        marks: dict[sp.Expr, sp.Symbol] = {one: sp.Dummy() for one in self.integrals}
+        apart = [one.xreplace(marks) for one in apart]
+        whole = sp.Tuple(*apart)
+        self.sines = sorted(whole.atoms(sp.sin, sp.cos), key=str)
+        sine_marks = {one: sp.Dummy() for one in self.sines}
+        apart = [one.xreplace(sine_marks) for one in apart]
+        self.plain = sorted(sp.Tuple(*apart).free_symbols - set(sine_marks.values()), key=lambda one: one.sort_key())
+        names = {one: sp.Dummy() for one in self.plain}
+        printer = _FractionPrinter({"fully_qualified_modules": False})
+        self.function = sp.lambdify(
+            [*names.values(), *sine_marks.values()],
+            [one.xreplace(names) for one in apart],
+            modules=[{"Fraction": Fraction}],
+            printer=printer,
+            cse=True,
+        )
+
+    def at_random(self, source: random.Random) -> list[Fraction]:
+        """Values at a new point."""
+        numbers = [_fraction(source) for _ in self.plain]
+        slopes: dict[sp.Expr, Fraction] = {}
+        values = []
+        for one in self.sines:
+            angle, sign = _base_angle(one.args[0])
+            r = slopes.setdefault(angle, _fraction(source))
+            values.append(sign * 2 * r / (1 + r**2) if isinstance(one, sp.sin) else (1 - r**2) / (1 + r**2))
+        return [Fraction(one) for one in self.function(*numbers, *values)]
+
+
+def _fraction(source: random.Random) -> Fraction:
+    return Fraction(source.randint(2, 97), source.randint(2, 97))
+
+
 def dependent(functions: Sequence[sp.Expr], seed: int = 1) -> dict[int, Mapping[int, sp.Rational]]:
     """Functions that are linear combinations of earlier ones, with the coefficients of those, over the rationals."""
     if len(functions) == 0:
         return {}
-    source = random.Random(seed)
-    rows = []
-    for _ in range(len(functions) + 2):
-        point = RationalPoint(source)
-        rows.append([point.of(one) for one in functions])
-    matrix = sp.Matrix(rows)
-    if not all(one.is_Rational for one in matrix):
-        return {}
-    reduced, pivots = sp.polys.matrices.DomainMatrix.from_Matrix(matrix).to_field().rref()
-    reduced = reduced.to_Matrix()
+    sampler, source = Sampler(functions), random.Random(seed)
+    rows = [sampler.at_random(source) for _ in range(len(functions) + 2)]
+    found, pivots = echelon([list(map(residue, row)) for row in rows])
     out: dict[int, Mapping[int, sp.Rational]] = {}
     for j in range(len(functions)):
         if j not in pivots:
-            out[j] = {pivot: reduced[i, j] for i, pivot in enumerate(pivots) if reduced[i, j] != 0}
+            shares = {pivot: rational(row[j]) for row, pivot in zip(found, pivots, strict=True) if row[j]}
+            out[j] = {pivot: sp.Rational(one.numerator, one.denominator) for pivot, one in shares.items()}
     return out

@@ -10,5 +10,5 @@ RIG = SimulatedRig(
     start={"a": 0.15},
     friction_width=0.1,
     window_s=1.0,
-    design=dict(functions=12, decimation=8, taps=61, rate_taps=61, rate_degree=6),
+    design=dict(functions=12, decimation=8, taps=61, rate_taps=61, rate_degree=6, joint=True),
 )

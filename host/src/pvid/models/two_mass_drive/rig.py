@@ -12,5 +12,5 @@ RIG = SimulatedRig(
     drive={"i": Sines(((1.0, 0.35, 0.0), *((0.5, hz, phase) for hz, phase in zip(_HZ, _PHASES, strict=True))), 0.04)},
     friction_width=1.0,
     window_s=0.5,
-    design=dict(functions=16, power=8, decimation=2, taps=15, rate_taps=15, rate_degree=6),
+    design=dict(functions=24, power=8, rate_taps=15, rate_degree=6),
 )

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.oracle.fourier.attenuation import other_line
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.front import samples_of
@@ -25,6 +26,7 @@ _FEWEST_WINDOWS = 18
 _SHORTEST_STEPS = 40  # of a window
 _LENGTHS = 6
 _FUNCTIONS = (12, 24, 40)
+_FEW_FUNCTIONS = (5, 8)  # of runs with motion that the equations do not explain: it is above the drive's frequencies
 _RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
 
 # Above this the equations' own errors are estimated when designs are compared.
@@ -54,7 +56,9 @@ def score_of(
     except (PvidError, np.linalg.LinAlgError):
         return None
     size = np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd)
-    relative = found.predicted / size
+    other = other_line(fit)
+    apart = np.zeros(len(fit.p)) if other is None else other - fit.p
+    relative = np.hypot(found.predicted, apart) / size
     if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
         return None
     return Scored(design, float(np.exp(np.mean(np.log(relative)))), fit.p, found.chi2)
@@ -119,7 +123,7 @@ def ranked(
     attempt(
         made(best.design, window_s=length, functions=count)
         for length in near
-        for count in _FUNCTIONS
+        for count in ((*_FEW_FUNCTIONS, *_FUNCTIONS) if errors else _FUNCTIONS)
         if (length, count) != (best.design.window_s, best.design.functions)
     )
     if len(model.model.rows) > 1:

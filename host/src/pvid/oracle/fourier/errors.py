@@ -105,7 +105,7 @@ def explained(fit: Fit) -> list[float]:
     out = []
     theta = fit.parameters.theta(fit.p)
     for kind, th in enumerate(theta):
-        white = fit.rows.white((kind,), theta, fit.errors) if fit.rows.groups != [(kind,)] else fit.white[0]
+        white = fit.alone(kind)
         reference = float(np.sum(white.known**2))
         if reference == 0:
             reference = max(float(np.sum((white.regressors[:, j] * th[j]) ** 2)) for j in range(len(th)))

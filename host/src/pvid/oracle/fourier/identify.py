@@ -11,6 +11,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.fourier import verdict
+from pvid.oracle.fourier.attenuation import other_line
 from pvid.oracle.fourier.choice import chosen
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
@@ -120,6 +121,7 @@ def identify(
         "not_identified": verdict.not_identified(compiled, fit, found),
         "not_settled": verdict.settled(fit),
         "halves": verdict.of_halves(compiled, fit, halves),
+        "attenuation": verdict.of_attenuation(compiled, fit, found, other_line(fit)),
         "feedback": verdict.of_feedback(compiled, fit),
         "residuals": verdict.of_residuals(found),
         "range": verdict.of_range(compiled, fit.p),

@@ -187,14 +187,10 @@ class WeakRows:
         """Whitened rows of a group at the thetas of all kinds."""
         whitener = self.whitener(kinds, theta, errors)
         k, plans = self.functions.count, [self.compiled.channels.rows[kind] for kind in kinds]
-        # A kind's columns fill its own rows: of the whitener only those of its columns count.
-        parts = [
-            self.columns[kind] @ whitener[:, :, place * k : (place + 1) * k].transpose(0, 2, 1)
-            for place, kind in enumerate(kinds)
-        ]
+        parts = self._whitened(kinds, whitener)
         regressors = np.concatenate([x[:, : row.thetas] for x, row in zip(parts, plans, strict=True)], axis=1)
         known = sum((x[:, row.thetas] for x, row in zip(parts, plans, strict=True)), np.zeros(regressors[:, 0].shape))
-        nuisances = np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
+        nuisances = self.white_nuisances(kinds, whitener)
         gone = 0
         if nuisances.shape[1]:
             q, r = np.linalg.qr(nuisances.transpose(0, 2, 1))
@@ -204,3 +200,17 @@ class WeakRows:
             known = known - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, known))
             gone = int(live.sum())
         return WhiteRows(tuple(kinds), regressors, known, whitener, self.windows * len(kinds) * k - gone)
+
+    def white_nuisances(self, kinds: Sequence[int], whitener: Float) -> Float:
+        """Nuisance columns of a group [windows, nuisances, R]."""
+        parts = self._whitened(kinds, whitener)
+        plans = [self.compiled.channels.rows[kind] for kind in kinds]
+        return np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
+
+    def _whitened(self, kinds: Sequence[int], whitener: Float) -> list[Float]:
+        """Columns of each kind [windows, columns, R]: they fill the kind's own rows, of the whitener those count."""
+        k = self.functions.count
+        return [
+            self.columns[kind] @ whitener[:, :, place * k : (place + 1) * k].transpose(0, 2, 1)
+            for place, kind in enumerate(kinds)
+        ]

@@ -20,7 +20,7 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import clustered_variance
 from pvid.oracle.fourier.front import filtered, polynomial_weights
 from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.rows import WeakRows
+from pvid.oracle.fourier.rows import WeakRows, WhiteRows
 from pvid.oracle.fourier.solve import Fit, inverse
 from pvid.oracle.fourier.verdict import Reason, listed
 from pvid.sim.imperfections import with_play
@@ -29,7 +29,7 @@ Kind = Literal["delay", "play", "eccentric", "gain"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
-_MOVES = 2.0
+_MOVES = 1.0
 
 # An encoder shows an eccentricity only where it turns by this much [rad].
 _TURNS = 2.0
@@ -176,11 +176,11 @@ class SensorErrors:
         """How the whitened residuals move [windows, rows of all kinds] per unit of an error."""
         rows = WeakRows.of(self.fit.rows.compiled, {**self.run, **changed}, self.design)
         moved = self._raw(rows.only(np.isin(rows.numbers, self.fit.rows.numbers)))
+        change = [(now - before) / step for now, before in zip(moved, self._bare, strict=True)]
         out = []
-        for kind, (now, before) in enumerate(zip(moved, self._bare, strict=True)):
-            white = self.fit.white[kind].whitener
-            change = np.einsum("wjk,wk->wj", white, (now - before) / step)
-            out.append(self._without_nuisances(kind, change))
+        for white in self.fit.white:
+            own = np.concatenate([change[kind] for kind in white.kinds], axis=1)
+            out.append(self._without_nuisances(white, np.einsum("wjk,wk->wj", white.whitener, own)))
         return np.concatenate(out, axis=1)
 
     def _raw(self, rows: WeakRows) -> list[Float]:
@@ -190,12 +190,11 @@ class SensorErrors:
             for columns, th in zip(rows.columns, self.theta, strict=True)
         ]
 
-    def _without_nuisances(self, kind: int, rows: Float) -> Float:
-        columns = self.fit.rows.columns[kind][:, len(self.theta[kind]) + 1 :]
-        if not columns.shape[1]:
+    def _without_nuisances(self, white: WhiteRows, rows: Float) -> Float:
+        nuisances = self.fit.rows.white_nuisances(white.kinds, white.whitener)
+        if not nuisances.shape[1]:
             return rows
-        white = columns @ self.fit.white[kind].whitener.transpose(0, 2, 1)
-        q = np.linalg.qr(white.transpose(0, 2, 1))[0]
+        q = np.linalg.qr(nuisances.transpose(0, 2, 1))[0]
         return np.asarray(rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows)))
 
 

@@ -138,6 +138,11 @@ class Fit:
         """Another estimate from the same weights."""
         return replace(self, p=p)
 
+    def alone(self, kind: int) -> WhiteRows:
+        """Rows of one kind, whitened by themselves."""
+        own = [one for one in self.white if one.kinds == (kind,)]
+        return own[0] if own else self.rows.white((kind,), self.parameters.theta(self.p), self.errors)
+
     def designs(self) -> list[Float]:
         """d rows / d step of each group [windows, R, n_p]."""
         jacobian = self.parameters.jacobian(self.p)

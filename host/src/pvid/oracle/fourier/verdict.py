@@ -24,6 +24,7 @@ Name = Literal[
     "shape",
     "halves",
     "windows",
+    "attenuation",
     "feedback",
     "short",
     "range",
@@ -194,6 +195,25 @@ def of_windows(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, o
             "windows",
             f"Windows of {lengths[0]:.3g} s and {lengths[1]:.3g} s disagree on {listed(names)} ({names[0]}: "
             f"{fit.p[k]:.4g} and {other.p[k]:.4g}): noise inside the motion or a missing term bends the estimate.",
+        )
+    ]
+
+
+def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Float | None) -> list[Reason]:
+    """The same rows with the highest derivative as the dependent signal disagree."""
+    if other is None:
+        return []
+    clash = np.abs(fit.p - other) / found.se
+    names = differing(fit.parameters, model.p_names, fit.p, other, clash)
+    if not names:
+        return []
+    k = model.p_names.index(names[0])
+    return [
+        Reason(
+            "attenuation",
+            f"Motion that the equations do not explain bends {listed(names)} ({names[0]} is {fit.p[k]:.4g}, and "
+            f"{other[k]:.4g} with the highest derivative as the dependent signal): excite more strongly, or take "
+            "longer windows and fewer functions.",
         )
     ]
 

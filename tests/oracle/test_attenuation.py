@@ -1,0 +1,94 @@
+"""Force noise shrinks an inertia where the band is wide; the other line and its alarm show it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from pvid.models.drive import Sines
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import SimulatedRig
+from pvid.oracle.fourier import verdict
+from pvid.oracle.fourier.attenuation import other_line
+from pvid.oracle.fourier.choice import chosen
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.errors import uncertainty
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.rows import WeakRows
+from pvid.oracle.fourier.solve import Fit, batch
+from pvid.sim.imperfections import Imperfections
+from pvid.sim.simulated_run import RigSimulation
+
+MODEL = compiled_of(ROOT / "tests" / "data" / "recordings" / "simple_pendulum.py")
+RATE = 250.0
+J = 0.18  # kg m^2
+RIG = SimulatedRig(
+    model=MODEL.name,
+    truth={"J": J, "G": 3.6, "b": 0.05, "c": 0.1, "o": 0.02},
+    drive={"tau": Sines(((1.0, 0.45, 0.0), (0.8, 0.8, 1.0)))},
+    sample_rate=RATE,
+    duration=20.0,
+    substeps=4,
+    friction_width=0.3,
+)
+NARROW = FourierDesign(RATE, window_s=2.0, functions=5, rate_taps=15)  # to 1 Hz
+WIDE = FourierDesign(RATE, window_s=1.0, functions=25, rate_taps=15)  # to 12 Hz: the drive has nothing there
+FORCE_NOISE = 0.1  # N m / sqrt(Hz): the motion at 12 Hz is its work alone
+
+
+@lru_cache
+def run(noise: float, seed: int) -> dict[str, np.ndarray]:
+    imperfections = Imperfections(process={0: noise} if noise else {})
+    return RigSimulation.of(MODEL, RIG).run(seed, imperfections)
+
+
+def fitted(noise: float, seed: int, design: FourierDesign) -> Fit:
+    return batch(WeakRows.of(ready(MODEL), run(noise, seed), design))
+
+
+def alarms(fit: Fit) -> list[verdict.Reason]:
+    return verdict.of_attenuation(MODEL, fit, uncertainty(fit), other_line(fit))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_wide_band_shrinks_the_inertia_and_the_other_line_does_not(seed: int) -> None:
+    fit = fitted(FORCE_NOISE, seed, WIDE)
+    other = other_line(fit)
+    assert other is not None
+    se = uncertainty(fit).se[0]
+    assert fit.p[0] < J - 3 * se  # a sixth too small
+    assert abs(other[0] - J) < 3 * se
+    (reason,) = alarms(fit)
+    assert reason.name == "attenuation" and reason.alarm
+    assert "J" in reason.text
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_narrow_band_covers_the_truth_without_an_alarm(seed: int) -> None:
+    fit = fitted(FORCE_NOISE, seed, NARROW)
+    assert abs(fit.p[0] - J) < 3 * uncertainty(fit).se[0]
+    assert alarms(fit) == []
+
+
+@pytest.mark.parametrize("design", [NARROW, WIDE], ids=["narrow", "wide"])
+def test_without_force_noise_both_lines_are_one(design: FourierDesign) -> None:
+    fit = fitted(0.0, 0, design)
+    other = other_line(fit)
+    assert alarms(fit) == []
+    if other is not None:
+        np.testing.assert_allclose(other[:2], fit.p[:2], rtol=1e-3)
+
+
+def test_design_is_chosen_where_the_lines_agree() -> None:
+    design = chosen(ready(MODEL), run(FORCE_NOISE, 0), RATE)
+    assert alarms(fitted(FORCE_NOISE, 0, design)) == []
+
+
+def test_rows_whose_known_side_is_the_highest_derivative_have_no_other_line() -> None:
+    model = compiled_of(ROOT / "tests" / "data" / "recordings" / "free_pendulum.py")
+    t = np.arange(2000) / RATE
+    q = np.pi + 0.5 * np.exp(-0.02 * t) * np.cos(8.0 * t)
+    assert other_line(batch(WeakRows.of(ready(model), {"q": q}, NARROW))) is None
