@@ -31,6 +31,8 @@ def test_an_unknown_mass_at_the_elbow_shifts_three_base_parameters() -> None:
     assert shift.kind == "sum"
     assert "only I1 + m2*l1², h1 + l1*m2 can be identified" in verdict(found).replace("l1²*m2", "m2*l1²")
     assert judged(arm(elbow_known=True)).identifiable
+    first, _ = arm(elbow_known=False).compiled().rows
+    assert {str(one) for one in first.theta} == {"I2", "h2", "h1 + l1*m2", "I1 + I2 + l1**2*m2"}
 
 
 def test_a_motor_without_current_sensor_has_its_torque_constant_and_products_only() -> None:
