@@ -76,6 +76,7 @@ def test_a_users_file_is_compiled_by_its_name(tmp_path: Path) -> None:
         ("model.unknown('x_2', 'kg', 1.0)", "line 6: x_2 is declared twice, or is the name of a derivative"),
         ("model.unknown('k', 'N/m', -1.0)", "line 6: k: the guess -1.0 is not positive"),
         ("model.unknown('k', 'N/m', 0.0, positive=False)", "line 6: k: with a guess of 0, give sd"),
+        ("model.input('v', 'V', hold='zoh', gain_sd=1)", "line 6: v: gain_sd is a relative standard deviation"),
         ("model.unknown('k', 'N/m', 'big')", "line 6: TypeError"),
         ("model.unknown('2k', 'N/m', 1.0)", "line 6: '2k' is no name"),
         ("model.unknown('t', 'N/m', 1.0)", "line 6: t is the time"),
