@@ -8,9 +8,10 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Row
 from pvid.model.corners import slopes
-from pvid.model.identifiability import Identifiability, Shift, Symmetry, identifiable
+from pvid.model.identifiability import Identifiability, Shift, identifiable
 from pvid.model.readable import listed, readable, readable_part
 from pvid.model.signals import jets
+from pvid.model.symmetry import Symmetry
 
 __all__ = ["Identifiability", "check_report", "identifiable", "verdict"]
 
