@@ -114,5 +114,5 @@ def test_the_report_names_every_theta_unknown_and_signal(name: str) -> None:
 def test_the_report_of_a_row_reads_as_mathematics() -> None:
     text = check_report(compiled_of("cart_pendulum"))
     assert "ml*cos(c)   D[x'*cos(a)] + g*sin(a) + a'*x'*sin(a)" in text
-    assert "equation of a has no known term; another row fixes its scale." in text
+    assert "equation of a: no term is free of unknowns; another row fixes the scale." in text
     assert "i has a corner at every step of V" in check_report(compiled_of("dc_motor"))
