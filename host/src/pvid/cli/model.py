@@ -143,7 +143,7 @@ def build(model: str, out: Path, only_check: bool) -> int:
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.")
 @click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Length [s].  [default: the rig's]")
-@click.option("--friction", type=click.Choice(["soft", "sharp"]), default="soft", show_default=True)
+@click.option("--friction", type=click.Choice(["sharp", "soft"]), default="sharp", show_default=True)
 @click.option("--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp.")
 def simulate(model: str, out: Path, seed: int, duration: float | None, friction: str, stiction: float) -> int:
     """Simulates the shipped rig of MODEL with its sensors; writes the run OUT and its rig file."""

@@ -26,8 +26,8 @@ class Imperfections:
     Attributes
     ----------
     friction
-        "soft": the sign of a friction is tanh(v / width) with the rig's width; "sharp": it switches, and sticks where
-        it exceeds the other forces.
+        "sharp": the sign of a friction switches, and it sticks where it exceeds the other forces; "soft": the sign is
+        tanh(v / width) with the rig's width.
     breakaway
         Sharp: the friction that holds at rest over the one that slides, >= 1 (stiction).
     backlash
@@ -42,7 +42,7 @@ class Imperfections:
         White disturbance of an equation by its number from 0 [its unit / sqrt(Hz)], held for a sample.
     """
 
-    friction: Law = "soft"
+    friction: Law = "sharp"
     breakaway: float = 1.0
     backlash: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
     eccentricity: Mapping[str, float] = field(default_factory=lambda: _NOTHING)

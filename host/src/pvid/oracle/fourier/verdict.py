@@ -30,6 +30,7 @@ Name = Literal[
     "range",
     "unexplained",
     "sensor",
+    "friction",
     "scale",
 ]
 Status = Literal["good", "warning", "not_identified"]
