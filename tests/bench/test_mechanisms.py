@@ -1,4 +1,4 @@
-"""A short form of the bench of mechanisms: errors near those of the audit, no false warning, the rows of the page."""
+"""A short form of the bench of mechanisms: errors near those of the audit, no false warning, rows as on the page."""
 
 import numpy as np
 import pytest

@@ -148,6 +148,20 @@ def test_an_unknown_beside_a_signal_in_a_denominator_is_multiplied_out() -> None
     assert row.known == {0: u**2}
 
 
+def test_equations_may_be_written_as_eq_or_as_a_matrix() -> None:
+    rows = []
+    for form in ("expressions", "equalities", "matrix"):
+        model, x, u = small()
+        a, b = model.unknown("a", "s^2", 1.0), model.unknown("b", "s", 1.0)
+        if form == "matrix":
+            model.equation(sp.Matrix([a * x.d(2) - u, b * x.d() - u]))
+        else:
+            for left in (a * x.d(2), b * x.d()):
+                model.equation(sp.Eq(left, u) if form == "equalities" else left - u)
+        rows.append(model.compiled().rows)
+    assert rows[0] == rows[1] == rows[2]
+
+
 def test_known_constants_share_a_coefficient_and_keep_their_names() -> None:
     """The arm's h2 multiplies three channels by known lengths and gravity: one theta."""
     compiled = compiled_of("two_link_arm")

@@ -18,8 +18,8 @@ _DEPENDENT = 1e-13  # of the largest: a combination of starts that the sensors d
 def bound(simulation: RigSimulation, window_s: float | None = None) -> Float:
     """Least standard errors of the unknowns [n_p] from the rig's run, inf where it does not show one.
 
-    Frictions are soft, of the rig's width. The sensors' noise is that of `Signal.sd`; what a drive sets is known exactly,
-    and so are running integrals of it.
+    Frictions are soft, of the rig's width; the sensors' noise is that of `Signal.sd`; what a drive sets is known
+    exactly, and so are running integrals of it.
 
     Parameters
     ----------

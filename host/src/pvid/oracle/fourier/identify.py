@@ -20,6 +20,7 @@ from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.fourier.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
 from pvid.oracle.fourier.solve import Fit, batch, online
 from pvid.oracle.fourier.verdict import Halves, Verdict
+from pvid.oracle.fourier.weights import as_white_force
 
 
 @dataclass(frozen=True)
@@ -137,12 +138,14 @@ def identify(
     reasons["sensors"] = of_sensors(compiled, error, found.se)
     reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
     gains = [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
+    white = as_white_force(fit)
+    by_weights = [] if white is None else [white - fit.p]
     history = online(rows, begun)
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
         p=fit.p,
-        se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains]), axis=0)),
+        se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains, *by_weights]), axis=0)),
         predicted=found.predicted,
         clustered=found.clustered,
         chi2=found.chi2,
