@@ -19,7 +19,7 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import read_recording
 from pvid.sim.bound import bound
 from pvid.sim.drives import DRIVES, drive_named
-from pvid.sim.imperfections import Imperfections, with_play
+from pvid.sim.imperfections import Imperfections, sizes_of, with_play
 from pvid.sim.sensing import sensed
 from pvid.sim.simulated_run import SOFT, RigSimulation, write_simulated_run
 
@@ -163,6 +163,17 @@ def test_wrong_requests_are_one_sentence(simulation: RigSimulation) -> None:
         Imperfections(friction="wet")  # type: ignore[arg-type]
     with pytest.raises(PvidError, match="nothing has no simulated rig"):
         simulated_rig("nothing")
+
+
+def test_imperfections_are_read_from_settings() -> None:
+    sizes = sizes_of(["skew.phi=1e-3", "gain.M=1.01", "skew.psi = 2e-3"])
+    assert sizes == {"skew": {"phi": 1e-3, "psi": 2e-3}, "gain": {"M": 1.01}}
+    for setting, sentence in (
+        ("phi=3", "'phi=3' is not KIND.SIGNAL=SIZE with a KIND of backlash, eccentricity, skew and gain"),
+        ("skew.phi=late", "'late' is no number"),
+    ):
+        with pytest.raises(PvidError, match=sentence):
+            sizes_of([setting])
 
 
 def test_run_is_written_with_its_rig_file(simulation: RigSimulation, tmp_path: Path) -> None:
