@@ -110,6 +110,13 @@ PROOFS = (
         taken=("pvid_scaled_of_q31",),
     ),
     Proof(
+        "elementary_q31",
+        "sine and cosine of any integer in every format, signs, limits; the same of numbers of any size",
+        ("src/number/elementary_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "142"),
+        taken=("pvid_scaled_of_q31",),
+    ),
+    Proof(
         "differentiator_q31",
         "the five-point bank at strides 1 to 3, from empty to three times round, any counts within 2^22",
         ("src/strong/differentiator_q31.c", "src/number/integer_q31.c"),

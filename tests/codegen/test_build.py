@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.build import build, check, files_of
 from pvid.codegen.functions import functions_of
 from pvid.core.sources import source
+from pvid.models.mechanisms import compiled_of
 
 USER = """
 cmake_minimum_required(VERSION 3.20)
@@ -33,6 +35,12 @@ add_executable(user_cpp user.cpp)
 target_link_libraries(user_cpp PRIVATE motor chain)
 target_compile_options(user_cpp PRIVATE -Werror -Wall -Wextra -Wpedantic)
 add_test(NAME user_cpp COMMAND user_cpp)
+"""
+STRONG = """
+cmake_minimum_required(VERSION 3.20)
+project(user LANGUAGES C)
+add_subdirectory({root} pvid EXCLUDE_FROM_ALL)
+add_subdirectory(rigid_body)
 """
 PROGRAM = """
 #include "chain.h"
@@ -55,6 +63,26 @@ def test_two_lines_of_cmake_make_a_library_whose_test_passes(tmp_path: Path) -> 
     run("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug")
     run("ninja", "-C", tmp_path / "b")
     assert "100% tests passed, 0 tests failed out of 3" in run("ctest", "--test-dir", tmp_path / "b")
+
+
+def test_the_twins_file_is_a_module_that_needs_nothing_but_pvid(tmp_path: Path) -> None:
+    build(MOTOR, tmp_path)
+    program = "import motor_twin, numpy as np; print(motor_twin.theta_f32(np.ones((5, 2), np.float32))[2])"
+    assert run(sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {program}") == "[1. 1.]\n"
+
+
+def test_the_strong_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
+    """With the sizes that its header names."""
+    build(compiled_of("rigid_body"), tmp_path / "rigid_body", strong=True)
+    check(compiled_of("rigid_body"), tmp_path / "rigid_body", strong=True)
+    (tmp_path / "CMakeLists.txt").write_text(STRONG.format(root=ROOT), encoding="utf-8")
+    command = ("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_STRONG=ON")
+    run(*command, "-DPVID_MAX_P=6", "-DPVID_MAX_THETA=15", "-DPVID_MAX_MOMENTS=120")
+    compiled = ("ninja", "-C", str(tmp_path / "b"), "rigid_body/CMakeFiles/rigid_body.dir/rigid_body_strong_f32.c.o")
+    run(*compiled)
+    run(*command, "-DPVID_MAX_P=5")
+    done = subprocess.run(compiled, capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "compile pvid and this file with -DPVID_MAX_P=6" in done.stdout
 
 
 def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_equal_values_are_computed_once_and_powers_are_products() -> None:
 
 def test_a_soft_sign_replaces_a_plain_one_where_it_has_a_width() -> None:
     speed = Jet("phi", 1)
-    hard, soft = program_of([speed], [sgn(speed)]), program_of([speed], [sgn(speed)], widths={speed: 0.5})
+    hard, soft = program_of([speed], [sgn(speed)]), program_of([speed], [sgn(speed)], widths={"phi_1": 0.5})
     assert hard.kinds == {"sign"} and soft.kinds == {"soft_sign"}
 
 

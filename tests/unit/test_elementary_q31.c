@@ -30,6 +30,7 @@ static void errors_are_those_of_the_header(void **state)
             assert_true(fabs(fixed(sine, 30) - sin(angle)) <= bound);
             assert_true(fabs(fixed(cosine, 30) - cos(angle)) <= bound);
             assert_true((sine <= ONE) && (sine >= -ONE) && (cosine <= ONE) && (cosine >= -ONE));
+            assert_int_equal(pvid_sin_q31(-given, bits), -sine);
         }
     }
     assert_int_equal(pvid_sin_q31(0, 30), 0);

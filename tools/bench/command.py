@@ -435,6 +435,7 @@ def bench_random_models(update: Path | None, count: int, first: int) -> int:
     with progress_bar("models", count) as advance:
         tally = random_models.run(range(first, first + count), advance)
     put_table(update, "random-models", markdown(random_models.HEADER, [tally.row()]))
+    put_table(update, "compile-times", markdown(random_models.COMPILE_HEADER, random_models.compile_times()))
     for seed, error in tally.tracebacks[:20]:
         click.echo(f"pvid: seed {seed}: {error}", err=True)
     return DIFFERENT if tally.tracebacks else DONE

@@ -6,12 +6,14 @@ from pathlib import Path
 
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
-from pvid.codegen import files_f32, files_q31, self_test, twin_file
+from pvid.codegen import files_f32, files_q31, files_strong, self_test, twin_file
 from pvid.codegen.banner import banner
 from pvid.codegen.fixed_model import fixed_model
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches
+from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
 from pvid.model.compiled import CompiledModel
+from pvid.model.strong import strong_form
 
 _CMAKE = """\
 # {banner}
@@ -36,6 +38,12 @@ if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
   target_compile_options({name} PRIVATE -ffp-contract=off -fno-fast-math)
 endif()
 
+# {name}_strong.h, an identifier from derivatives of the signals: needs a pvid of larger sizes, which its header names.
+option({upper}_STRONG "Build the strong form of {name}" OFF)
+if({upper}_STRONG AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_f32.c)
+  target_sources({name} PRIVATE {name}_strong_f32.c)
+endif()
+
 # The generated functions against the bits of their twin: ctest.
 option({upper}_TEST "Build the test of {name}" ${{PROJECT_IS_TOP_LEVEL}})
 if({upper}_TEST)
@@ -48,8 +56,13 @@ endif()
 """
 
 
-def files_of(functions: ModelFunctions, command: str, reaches: Reaches | None = None) -> dict[str, str]:
-    """Name -> text of each file; the fixed-point ones only where fixed point can compute all functions."""
+def files_of(
+    functions: ModelFunctions, command: str, reaches: Reaches | None = None, strong: StrongFunctions | None = None
+) -> dict[str, str]:
+    """Name -> text of each file.
+
+    The fixed-point ones only where fixed point can compute all functions; the strong form's only where it is given.
+    """
     name = functions.name
     files = {
         f"{name}_sizes.h": files_f32.sizes(functions, command),
@@ -61,9 +74,14 @@ def files_of(functions: ModelFunctions, command: str, reaches: Reaches | None = 
         fixed = fixed_model(functions, reaches)
         files[f"{name}_q31.h"] = files_q31.header(fixed, command)
         files[f"{name}_q31.c"] = files_q31.source(fixed, command)
+    if strong is not None:
+        named = renamed(strong)
+        files[f"{name}_strong.h"] = files_strong.header(named, command)
+        files[f"{name}_strong_f32.c"] = files_strong.source(named, command)
     files[f"{name}_twin.py"] = twin_file.text(functions, command, fixed)
     files[f"{name}_test.c"] = self_test.source(functions, command, fixed)
-    sources = " ".join(one for one in files if one.endswith(".c") and not one.endswith("_test.c"))
+    apart = (f"{name}_test.c", f"{name}_strong_f32.c")
+    sources = " ".join(one for one in files if one.endswith(".c") and one not in apart)
     files["CMakeLists.txt"] = _CMAKE.format(
         banner="\n# ".join(banner(functions, command)), name=name, upper=name.upper(), sources=sources
     )
@@ -80,7 +98,11 @@ def refusal(functions: ModelFunctions, reaches: Reaches | None = None) -> str | 
 
 
 def build(
-    compiled: CompiledModel, directory: Path, command: str | None = None, reaches: Reaches | None = None
+    compiled: CompiledModel,
+    directory: Path,
+    command: str | None = None,
+    reaches: Reaches | None = None,
+    strong: bool = False,
 ) -> list[Path]:
     """Writes the files of a model.
 
@@ -94,12 +116,14 @@ def build(
         For the banner; `pvid model build NAME` by default.
     reaches
         Of the inputs, for the fixed-point formats.
+    strong
+        Adds the strong form, an identifier from derivatives of the signals.
 
     Returns
     -------
     The files.
     """
-    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}", reaches)
+    files = _files(compiled, command, reaches, strong)
     directory.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, text in files.items():
@@ -109,7 +133,13 @@ def build(
     return paths
 
 
-def check(compiled: CompiledModel, directory: Path, command: str | None = None, reaches: Reaches | None = None) -> None:
+def check(
+    compiled: CompiledModel,
+    directory: Path,
+    command: str | None = None,
+    reaches: Reaches | None = None,
+    strong: bool = False,
+) -> None:
     """Whether the files in a folder are those of the model.
 
     Raises
@@ -117,10 +147,18 @@ def check(compiled: CompiledModel, directory: Path, command: str | None = None, 
     PvidError
         For the first file that is missing or differs.
     """
-    files = files_of(functions_of(compiled), command or f"pvid model build {compiled.name}", reaches)
-    for name, text in files.items():
+    for name, text in _files(compiled, command, reaches, strong).items():
         path = directory / name
         if not path.is_file():
             raise PvidError(f"{path} is missing: build the model again")
         if path.read_text(encoding="utf-8") != text:
             raise PvidError(f"{path} is not what {compiled.name} generates now: build the model again")
+
+
+def _files(compiled: CompiledModel, command: str | None, reaches: Reaches | None, strong: bool) -> dict[str, str]:
+    return files_of(
+        functions_of(compiled),
+        command or f"pvid model build {compiled.name}",
+        reaches,
+        strong_functions_of(strong_form(compiled)) if strong else None,
+    )

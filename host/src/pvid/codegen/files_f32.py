@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pvid.codegen import c_f32, describe
 from pvid.codegen.banner import banner, c_comment
 from pvid.codegen.functions import Function, ModelFunctions
@@ -104,38 +106,49 @@ def signature(functions: ModelFunctions, function: Function) -> str:
 
 def source(functions: ModelFunctions, command: str) -> str:
     """NAME_f32.c."""
-    name, upper = functions.name, functions.name.upper()
-    model = functions.model
-    kinds = {kind for function in functions.functions for kind in function.program.kinds}
-    includes = [f'#include "{name}.h"']
-    if kinds & {"sin", "cos", "sign", "soft_sign", "abs"}:
-        includes += ["", '#include "pvid/elementary.h"']
-    if "sqrt" in kinds:
-        includes += ["", "#include <math.h>"]
-    positive = sum(1 << k for k, one in enumerate(model.unknowns) if one.positive)
-    n_theta = len(functions.theta.labels)
-    definitions = [c_f32.function(signature(functions, one), one.program) for one in functions.functions]
+    name = functions.name
     parts = [
         c_comment(banner(functions, command)),
         UNCONTRACTED,
-        "\n".join(includes),
-        *definitions,
-        f"static const uint8_t c_row[{upper}_C] = {{{', '.join(map(str, functions.c_row))}}};\n"
-        f"static const uint8_t c_column[{upper}_C] = {{{', '.join(map(str, functions.c_column))}}};",
-        "\n".join(
-            [
-                f"const pvid_model_f32 {name}_model_f32 = {{",
-                f"    .n_theta = {upper}_THETA,",
-                f"    .n_p = {upper}_P,",
-                f"    .n_moments = {n_theta * (n_theta + 1) // 2},",
-                f"    .n_c = {upper}_C,",
-                f"    .positive = {positive}u,",
-                "    .c_row = c_row,",
-                "    .c_column = c_column,",
-                f"    .theta = {name}_theta_f32,",
-                f"    .jacobian = {name}_jacobian_f32,",
-                "};",
-            ]
-        ),
+        includes_of(f"{name}.h", functions.functions),
+        *(c_f32.function(signature(functions, one), one.program) for one in functions.functions),
+        model_struct(functions, f"{name}_theta_f32", f"{name}_jacobian_f32"),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def includes_of(header: str, functions: Sequence[Function], standard: Sequence[str] = ()) -> str:
+    """What a source with these functions includes."""
+    kinds = {kind for function in functions for kind in function.program.kinds}
+    groups = [[f'#include "{header}"']]
+    if kinds & {"sin", "cos", "sign", "soft_sign", "abs"}:
+        groups.append(['#include "pvid/elementary.h"'])
+    names = sorted({*standard, *(["math.h"] if "sqrt" in kinds else [])})
+    if names:
+        groups.append([f"#include <{one}>" for one in names])
+    return "\n\n".join("\n".join(group) for group in groups)
+
+
+def model_struct(functions: ModelFunctions, theta: str, jacobian: str) -> str:
+    """The pattern and NAME_model_f32, with these functions."""
+    name, upper = functions.name, functions.name.upper()
+    positive = sum(1 << k for k, one in enumerate(functions.model.unknowns) if one.positive)
+    n_theta = len(functions.theta.labels)
+    return "\n".join(
+        [
+            f"static const uint8_t c_row[{upper}_C] = {{{', '.join(map(str, functions.c_row))}}};",
+            f"static const uint8_t c_column[{upper}_C] = {{{', '.join(map(str, functions.c_column))}}};",
+            "",
+            f"const pvid_model_f32 {name}_model_f32 = {{",
+            f"    .n_theta = {upper}_THETA,",
+            f"    .n_p = {upper}_P,",
+            f"    .n_moments = {n_theta * (n_theta + 1) // 2},",
+            f"    .n_c = {upper}_C,",
+            f"    .positive = {positive}u,",
+            "    .c_row = c_row,",
+            "    .c_column = c_column,",
+            f"    .theta = {theta},",
+            f"    .jacobian = {jacobian},",
+            "};",
+        ]
+    )

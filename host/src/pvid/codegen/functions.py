@@ -135,7 +135,7 @@ class ModelFunctions:
 
 
 def functions_of(
-    model: CompiledModel, widths: Mapping[sp.Expr, float] | None = None, signs_are_inputs: bool = False
+    model: CompiledModel, widths: Mapping[str, float] | None = None, signs_are_inputs: bool = False
 ) -> ModelFunctions:
     """What is generated of a model.
 
@@ -144,7 +144,7 @@ def functions_of(
     model
         As compiled; its known constants become literals.
     widths
-        Argument of a sgn -> width of a soft sign instead; see operations.program_of.
+        Argument of a sgn, as in phi_1 -> width of a soft sign instead; see operations.program_of.
     signs_are_inputs
         The caller computes every sgn and passes it as an input.
 
@@ -226,8 +226,13 @@ class _Plain:
         return with_values(self.model, expression.xreplace(values))
 
     def _derivative(self, definition: sp.Expr, order: int) -> sp.Expr:
-        whole = total_derivative(definition.xreplace(self.runs), order) if order else definition
-        return whole.xreplace({one: mark for mark, one in self.runs.items()})
+        """By time; between reversals, where every sign is constant."""
+        if order == 0:
+            return definition
+        whole = definition.xreplace(self.runs).replace(sp.Abs, lambda inner: inner * sgn(inner))
+        signs = {one: sp.Dummy(real=True) for one in whole.atoms(sgn)}
+        back = {mark: one for one, mark in signs.items()} | {one: mark for mark, one in self.runs.items()}
+        return total_derivative(whole.xreplace(signs), order).xreplace(back)
 
 
 def _columns(model: CompiledModel, plain: _Plain) -> tuple[tuple[sp.Expr, ...], tuple[Term, ...], tuple[RowKind, ...]]:

@@ -93,7 +93,7 @@ def program_of(
     arguments: Sequence[sp.Expr],
     expressions: Iterable[sp.Expr],
     names: Sequence[str] | None = None,
-    widths: Mapping[sp.Expr, float] | None = None,
+    widths: Mapping[str, float] | None = None,
 ) -> Program:
     """The operations that compute the expressions.
 
@@ -106,7 +106,7 @@ def program_of(
     names
         Of the arguments; their text by default.
     widths
-        Argument of a sgn -> width of the soft sign v / (|v| + width) in its place; a plain sign without an entry.
+        Argument of a sgn, as text -> width of the soft sign v / (|v| + width) in its place; a plain sign without one.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def program_of(
 class _Builder:
     """The list as it grows; equal values share a place."""
 
-    def __init__(self, arguments: Sequence[sp.Expr], widths: Mapping[sp.Expr, float]) -> None:
+    def __init__(self, arguments: Sequence[sp.Expr], widths: Mapping[str, float]) -> None:
         self.values: list[Value] = []
         self._places: dict[Value, int] = {}
         self._arguments = {one: Argument(place) for place, one in enumerate(arguments)}
@@ -224,7 +224,7 @@ class _Builder:
         if isinstance(e, sp.Abs):
             return self._do("abs", self.place_of(e.args[0]))
         if isinstance(e, sgn | sp.sign):
-            width = self._widths.get(e.args[0], 0.0)
+            width = self._widths.get(str(e.args[0]), 0.0)
             if width > 0:
                 return self._do("soft_sign", self.place_of(e.args[0]), self._put(Literal(Fraction(width))))
             return self._do("sign", self.place_of(e.args[0]))

@@ -90,7 +90,7 @@ class TwinF32:
 
 def loaded(functions: ModelFunctions) -> TwinF32:
     """The text of the module, run."""
-    space = _space(text(functions, "loaded"), functions.name)
+    space = namespace(text(functions, "loaded"), functions.name)
     pattern = PatternModel(
         n_theta=len(functions.theta.labels),
         n_p=len(functions.model.unknowns),
@@ -125,7 +125,7 @@ class TwinQ31:
 
 def loaded_q31(fixed: FixedModel) -> TwinQ31:
     """The fixed-point part of the module, run."""
-    space = _space(text(fixed.functions, "loaded", fixed), fixed.functions.name)
+    space = namespace(text(fixed.functions, "loaded", fixed), fixed.functions.name)
     return TwinQ31(
         channels=space["channels_q31"],
         theta=space["theta_q31"],
@@ -134,7 +134,8 @@ def loaded_q31(fixed: FixedModel) -> TwinQ31:
     )
 
 
-def _space(module: str, name: str) -> dict[str, Any]:
+def namespace(module: str, name: str) -> dict[str, Any]:
+    """What a module's text defines; `name` is that of the model, for messages."""
     space: dict[str, Any] = {}
     exec(compile(module, f"<twin of {name}>", "exec"), space)
     return space

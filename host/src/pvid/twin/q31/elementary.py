@@ -21,15 +21,18 @@ _POLYNOMIAL_BITS = 28
 
 
 def _sine_of_half_turns(h: Int, bits: npt.ArrayLike | int) -> Int:
-    turns = round_shift(h, bits)
-    rest = h - (turns << integers(bits))
-    y = round_shift(rest, integers(bits) - _ANGLE_BITS)
+    places = integers(bits)
+    half = np.int64(1) << (places - 1)
+    from_half = np.abs(h) + half
+    rest = (from_half & ((np.int64(1) << places) - 1)) - half  # |h| less the nearest integer
+    y = round_shift(rest, places - _ANGLE_BITS)
     z = round_shift(y * y, _ANGLE_BITS)
     total: Int = np.full_like(y, _POLYNOMIAL[0])
     for coefficient in _POLYNOMIAL[1:]:
         total = round_shift(total * z, _ANGLE_BITS) + coefficient
     found = np.clip(round_shift(y * total, _POLYNOMIAL_BITS), -ONE, ONE)
-    return np.where(turns & 1, -found, found)
+    is_odd = ((from_half >> places) & 1) != 0
+    return np.where(is_odd != (h < 0), -found, found)
 
 
 def sine(x: npt.ArrayLike, bits: npt.ArrayLike | int) -> Int:

@@ -1,0 +1,135 @@
+"""Expressions that nobody chose: C and numpy give the same bits, and the values within rounding."""
+
+from __future__ import annotations
+
+import ctypes
+import random
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+from generated import WARNINGS
+from rounding import FLOAT32, bounds_of, fixed_bounds_of
+
+from pvid.codegen import c_f32, c_q31, numpy_f32, numpy_q31
+from pvid.codegen.formats import bits_of, fixed
+from pvid.codegen.operations import program_of
+from pvid.codegen.twin_file import namespace
+from pvid.core.sources import INCLUDES, source
+from pvid.model.signals import sgn
+
+COUNT, VECTORS = 60, 500
+NAMES = sp.symbols("q1 q2 v1 u", real=True)
+REACH = (3.0, 40.0, 900.0, 0.02)
+HEAD = """
+import numpy as np
+import numpy.typing as npt
+
+from pvid.twin.f32 import elementary
+from pvid.twin.q31 import elementary as elementary_q31
+from pvid.twin.q31.integer import Int
+
+Float32 = npt.NDArray[np.float32]
+_F = np.float32
+"""
+HEAD_C = """
+#include "pvid/elementary.h"
+#include "pvid/elementary_q31.h"
+"""
+
+Float = npt.NDArray[np.float64]
+
+
+def expression(chance: random.Random, depth: int) -> sp.Expr:
+    """Of + - * / sin cos sgn abs and constants; divisors stay away from 0."""
+    if depth == 0 or chance.random() < 0.15:
+        return chance.choice([*NAMES, sp.Rational(chance.randint(-40, 40) or 1, chance.randint(1, 9))])
+    inner = [expression(chance, depth - 1) for _ in range(2)]
+    makers: list[Callable[[sp.Expr, sp.Expr], sp.Expr]] = [
+        lambda a, b: a + b,
+        lambda a, b: a - b,
+        lambda a, b: a * b,
+        lambda a, b: a * NAMES[chance.randrange(4)],
+        lambda a, _: sp.sin(NAMES[chance.randrange(2)] + a / 1000),
+        lambda a, _: sp.cos(NAMES[chance.randrange(2)]) * a,
+        lambda a, b: a / (sp.Rational(5, 2) + sp.sin(NAMES[chance.randrange(4)])),
+        lambda a, b: sgn(NAMES[chance.randrange(4)]) * a,
+        lambda a, b: sp.Abs(a) + b,
+        lambda a, b: NAMES[chance.randrange(4)] ** chance.randint(2, 3),
+    ]
+    return chance.choice(makers)(*inner)
+
+
+class Case:
+    """An expression, its lists and formats."""
+
+    def __init__(self, number: int, whole: sp.Expr) -> None:
+        self.number, self.whole = number, whole
+        self.program = program_of(NAMES, [whole])
+        self.fixed = fixed(self.program, [(-one, one) for one in REACH], "random")
+
+    @property
+    def code(self) -> str:
+        """In C: f in float, g in integers."""
+        floats = f"void f{self.number}(const float in[], float out[])"
+        integers = f"bool g{self.number}(const int32_t in[], int32_t out[])"
+        limits = [2**30] * len(NAMES)
+        return "\n".join(
+            [
+                f"{floats};\n{integers};",
+                c_f32.function(floats, self.program),
+                c_q31.fixed_function(integers, self.fixed, limits),
+            ]
+        )
+
+    @property
+    def twins(self) -> str:
+        """The same in numpy."""
+        integers = numpy_q31.fixed_function(f"g{self.number}", self.fixed, [2**30] * len(NAMES), "Random.")
+        return f"{numpy_f32.function(f'f{self.number}', self.program, 'Random.')}\n\n\n{integers}"
+
+    def exactly(self, given: Float) -> Float:
+        """In float64."""
+        found = sp.lambdify(NAMES, self.whole, modules=[{"sgn": np.sign}, "numpy"])(*given)
+        return np.broadcast_to(np.asarray(found, np.float64), given.shape[1:])
+
+
+def each(library: ctypes.CDLL, name: str, given: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+    """The result [vectors] of a function in C."""
+    rows = np.ascontiguousarray(given.T)
+    out = np.empty(len(rows), rows.dtype)
+    for k, row in enumerate(rows):
+        place = ctypes.c_void_p(out.ctypes.data + k * out.itemsize)
+        getattr(library, name)(ctypes.c_void_p(row.ctypes.data), place)
+    return out
+
+
+def test_random_expressions(tmp_path: Path) -> None:
+    chance = random.Random(2026)
+    cases = [Case(k, expression(chance, 4)) for k in range(COUNT)]
+    assert {kind for one in cases for kind in one.program.kinds} >= {"+", "-", "*", "/", "sin", "cos", "sign", "abs"}
+    (tmp_path / "random.c").write_text("\n".join([HEAD_C, *(one.code for one in cases)]), encoding="utf-8")
+    core = [source(f"{one}.c") for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
+    options = ["-std=c99", "-O2", "-shared", "-fPIC", "-ffp-contract=off", "-DPVID_PLAIN_NAMES", *WARNINGS, *INCLUDES]
+    sources = [str(tmp_path / "random.c"), *map(str, core)]
+    subprocess.run(["gcc", *options, *sources, "-o", str(tmp_path / "random.so"), "-lm"], check=True)
+    library = ctypes.CDLL(str(tmp_path / "random.so"))
+    space = namespace("\n\n\n".join([HEAD, *(one.twins for one in cases)]), "random")
+    drawn = np.random.default_rng(5).uniform(-1, 1, (len(NAMES), VECTORS)) * np.array(REACH)[:, None]
+    floats = drawn.astype(np.float32)
+    places = np.array([bits_of((-one, one)) for one in REACH])[:, None]
+    integers = np.rint(drawn * 2.0**places).astype(np.int64)
+    for one in cases:
+        want = space[f"f{one.number}"](floats)[0]
+        assert (each(library, f"f{one.number}", floats).view(np.uint32) == want.view(np.uint32)).all(), one.whole
+        given = floats.astype(np.float64)
+        bound = bounds_of(one.program, given, FLOAT32)[0]
+        assert (np.abs(want - one.exactly(given)) <= bound).all(), one.whole
+        counts = space[f"g{one.number}"](integers)[0][0]
+        assert (each(library, f"g{one.number}", integers.astype(np.int32)) == counts).all(), one.whole
+        given = integers * 2.0**-places
+        bound = fixed_bounds_of(one.fixed, given)[0]
+        assert (np.abs(counts * 2.0 ** -one.fixed.result_bits[0] - one.exactly(given)) <= bound).all(), one.whole
