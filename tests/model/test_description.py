@@ -76,6 +76,7 @@ def test_a_users_file_is_compiled_by_its_name(tmp_path: Path) -> None:
         ("model.unknown('x_2', 'kg', 1.0)", "line 6: x_2 is declared twice, or is the name of a derivative"),
         ("model.unknown('k', 'N/m', -1.0)", "line 6: k: the guess -1.0 is not positive"),
         ("model.unknown('k', 'N/m', 0.0, positive=False)", "line 6: k: with a guess of 0, give sd"),
+        ("model.input('v', 'V', hold='zoh', gain_sd=1)", "line 6: v: gain_sd is a relative standard deviation"),
         ("model.unknown('k', 'N/m', 'big')", "line 6: TypeError"),
         ("model.unknown('2k', 'N/m', 1.0)", "line 6: '2k' is no name"),
         ("model.unknown('t', 'N/m', 1.0)", "line 6: t is the time"),
@@ -145,6 +146,20 @@ def test_an_unknown_beside_a_signal_in_a_denominator_is_multiplied_out() -> None
     (row,) = model.compiled().rows
     assert dict(zip(row.theta, row.regressors, strict=True)) == {a: {0: x}, w: {0: -u}}
     assert row.known == {0: u**2}
+
+
+def test_equations_may_be_written_as_eq_or_as_a_matrix() -> None:
+    rows = []
+    for form in ("expressions", "equalities", "matrix"):
+        model, x, u = small()
+        a, b = model.unknown("a", "s^2", 1.0), model.unknown("b", "s", 1.0)
+        if form == "matrix":
+            model.equation(sp.Matrix([a * x.d(2) - u, b * x.d() - u]))
+        else:
+            for left in (a * x.d(2), b * x.d()):
+                model.equation(sp.Eq(left, u) if form == "equalities" else left - u)
+        rows.append(model.compiled().rows)
+    assert rows[0] == rows[1] == rows[2]
 
 
 def test_known_constants_share_a_coefficient_and_keep_their_names() -> None:

@@ -11,7 +11,7 @@ from mechanisms_to_refuse import FINE, cart, linear_in_nothing, motor, unknowns
 from pvid.base.errors import PvidError
 from pvid.model import Model, cos, sin
 from pvid.model.compiled import CompiledModel, Part
-from pvid.model.signals import Jet, jets, total_derivative
+from pvid.model.signals import TIME, Integral, Jet, jets, total_derivative
 from pvid.model.zero import is_zero
 
 
@@ -74,6 +74,56 @@ def test_random_substitutions(seed: int) -> None:
         model.equation(whole - force)
     for residual in on_solutions(model.compiled(), forces):
         assert is_zero(residual)
+
+
+def along(part: Part, motion: dict[str, sp.Expr]) -> sp.Expr:
+    """sum D^m[psi] of a motion whose signals are polynomials of the time; running integrals begin at 0."""
+
+    def value(psi: sp.Expr) -> sp.Expr:
+        integrals = {}
+        for one in psi.atoms(Integral):
+            inside = value(one.args[0])
+            for _ in range(int(one.args[1])):
+                inside = sp.integrate(sp.expand(inside), (TIME, 0, TIME))
+            integrals[one] = inside
+        moving = {jet: sp.diff(motion[jet.of], TIME, jet.order) for jet in jets(psi.xreplace(integrals))}
+        return psi.xreplace(integrals).xreplace(moving)
+
+    return sp.expand(sum((sp.diff(value(psi), TIME, m) for m, psi in part.items()), sp.Integer(0)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_integrator_chains(seed: int) -> None:
+    """Two equations that share G x, G a function of a signal: the row's residual lies in the span of its nuisances."""
+    source = random.Random(seed)
+    model = Model("chain")
+    phi, u, f1, f2 = (model.sensor(name, "", noise=1e-3) for name in ("phi", "u", "f1", "f2"))
+    x, second = model.unmeasured("x", ""), model.known("s", "s", 1.0)
+    w, d, c = (model.unknown(name, "", value) for name, value in (("w", 3.0), ("d", 2.0), ("c", 0.5)))
+    top, gain = source.choice((1, 2)), source.choice((w + u, w * (1 + u**2), u))
+    first = second**top * x.d(top) + gain * x - d * source.choice((phi, phi * u))
+    other = second**2 * phi.d(2) - gain * x + w * d * (phi - c) * source.choice((gain, sp.Integer(1)))
+    model.equation(first - f1)
+    model.equation(other - f2)
+    (row,) = model.compiled().rows
+    assert len(row.nuisances) in (top, 0)
+
+    def polynomial() -> sp.Expr:
+        return sum(sp.Rational(source.randint(-5, 5), source.randint(1, 5)) * TIME**n for n in range(5))
+
+    p = {one: sp.Rational(source.randint(1, 9), 4) for one in (w, d, c)} | {second: sp.Integer(1)}
+    motion = {name: polynomial() for name in ("phi", "u", "x")}
+    for name, whole in (("f1", first), ("f2", other)):
+        motion[name] = along({0: whole.xreplace(p)}, motion)
+    residual = sum(
+        theta.xreplace(p) * along(part, motion).xreplace(p)
+        for theta, part in zip(row.theta, row.regressors, strict=True)
+    )
+    residual = sp.expand(residual - along(row.known, motion).xreplace(p))
+    free = [along(part, motion).xreplace(p) for part in row.nuisances]
+    powers = range(60)
+    columns = [[sp.expand(one).coeff(TIME, n) for n in powers] for one in (*free, residual)]
+    assert sp.Matrix(columns).rank() == sp.Matrix(columns[:-1]).rank() if free else residual == 0
 
 
 def test_a_cart_without_sensor_is_substituted_and_normalised() -> None:

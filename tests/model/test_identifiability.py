@@ -40,7 +40,7 @@ def test_a_motor_without_current_sensor_has_its_torque_constant_and_products_onl
     assert set(shift.unknowns) == {"R", "L", "J", "b", "Tc"}
     assert shift.kind == "product"
     assert len(shift.combinations) == 4
-    assert "declare one of them as known" in verdict(found)
+    assert "declare one of them as known, or add a sensor for i." in verdict(found)
     assert judged(motor(current=True)).identifiable
 
 
@@ -56,6 +56,7 @@ def test_without_a_known_force_only_ratios_are_identifiable() -> None:
     (shift,) = found.shifts
     assert shift.kind == "product"
     assert {str(one) for one in shift.combinations} == {"J/G", "b/G"}
+    assert "nothing known fixes their scale" in verdict(found)
 
 
 def test_sin_squared_plus_cos_squared_is_one() -> None:

@@ -6,7 +6,19 @@ from typing import Any
 
 import pytest
 import sympy as sp
-from sympy.physics.mechanics import KanesMethod, LagrangesMethod, Particle, Point, ReferenceFrame, dynamicsymbols
+from sympy.physics.mechanics import (
+    KanesMethod,
+    LagrangesMethod,
+    Particle,
+    PinJoint,
+    Point,
+    ReferenceFrame,
+    RigidBody,
+    System,
+    Torque,
+    dynamicsymbols,
+    inertia,
+)
 
 from pvid.base.errors import PvidError
 from pvid.model import Model, cos
@@ -52,7 +64,18 @@ def kanes() -> KanesMethod:
     return method
 
 
-@pytest.mark.parametrize("form", [lagranges, kanes])
+def system() -> System:
+    """A rigid body on a pin joint, of which the inertia about its own centre is 0."""
+    base, frame, centre = RigidBody("base"), ReferenceFrame("B"), Point("C")
+    rod = RigidBody("rod", masscenter=centre, frame=frame, mass=M, inertia=(inertia(frame, 0, 0, 0), centre))
+    whole = System.from_newtonian(base)
+    whole.add_joints(PinJoint("pin", base, rod, Q, U, child_point=LENGTH * frame.y, joint_axis=base.z))
+    whole.apply_uniform_gravity(-G * base.y)
+    whole.add_loads(Torque(frame, TAU * base.z))
+    return whole
+
+
+@pytest.mark.parametrize("form", [lagranges, kanes, system])
 def test_the_rows_are_those_written_by_hand(form: Any) -> None:
     model, of = model_and_symbols()
     model.mechanics(form(), of)

@@ -1,5 +1,6 @@
 """Systematic errors of a sensor are found in the residuals, with their size; a perfect rig has none."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,25 +9,23 @@ import pytest
 from bench.mechanisms import design_of, law_of, start_of
 from pvid.models.mechanisms import names
 from pvid.oracle.fourier.identify import Identified, identify
-from pvid.oracle.fourier.sensor_errors import SensorError, SensorErrors
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import simulation_of
 
 
 @cache
-def answer(name: str, key: str = "", signal: str = "", size: float = 0.0) -> tuple[Identified, SensorError | None]:
-    """What a run with sharp friction and one imperfection gives, and the error that is found in it."""
+def answer(name: str, key: str = "", signal: str = "", size: float = 0.0) -> Identified:
+    """What a run with sharp friction and one imperfection gives."""
     simulation = simulation_of(name)
     imperfections = Imperfections(law_of(simulation).friction, **({key: {signal: size}} if key else {}))  # type: ignore[arg-type]
     run, design = simulation.run(3, imperfections), design_of(simulation, imperfections)
-    found = identify(simulation.model, run, simulation.rig.sample_rate, start_of(simulation, 3), design)
-    return found, SensorErrors(run, design, found.fit).found(found.se)
+    return identify(simulation.model, run, simulation.rig.sample_rate, start_of(simulation, 3), design)
 
 
 @pytest.mark.parametrize("name", names())
 def test_perfect_rig_has_no_sensor_in_error(name: str) -> None:
-    found, error = answer(name)
-    assert error is None
+    found = answer(name)
+    assert found.sensor_error is None
     assert found.verdict.status == "good"
 
 
@@ -45,7 +44,8 @@ def test_error_of_a_sensor_is_named_with_its_size(
     name: str, key: str, signal: str, size: float, kind: str, expected: float
 ) -> None:
     """To 10 %: the test is of first order, and the play acts on smoothed samples."""
-    found, error = answer(name, key, signal, size)
+    found = answer(name, key, signal, size)
+    error = found.sensor_error
     assert error is not None and (error.signal, error.kind) == (signal, kind)
     assert error.size == pytest.approx(expected, rel=0.1)
     assert found.verdict.status != "good"
@@ -54,7 +54,8 @@ def test_error_of_a_sensor_is_named_with_its_size(
 
 def test_shift_of_an_error_leads_back_to_the_truth() -> None:
     """The motor's angle a sample late: errors fall from 1 % to below a twentieth of that."""
-    found, error = answer("dc_motor", "skew", "phi", 1e-3)
+    found = answer("dc_motor", "skew", "phi", 1e-3)
+    error = found.sensor_error
     truth = simulation_of("dc_motor").truth
     assert error is not None
     before, after = np.abs(found.p - truth), np.abs(found.p + error.shift - truth)
@@ -65,9 +66,26 @@ def test_shift_of_an_error_leads_back_to_the_truth() -> None:
 
 def test_gain_of_a_voltage_scales_the_motor_and_is_said() -> None:
     """R, L and k in proportion to V; J, b and Tc with the torque constant."""
-    found, _ = answer("dc_motor")
+    found = answer("dc_motor")
     by_gain = dict(zip(found.names, found.by_gain["V"] / found.p, strict=True))
     for name in ("R", "L", "k", "J", "b", "Tc"):
         assert by_gain[name] == pytest.approx(1.0, abs=0.01), name
     scale = next(one for one in found.verdict.reasons if one.name == "scale")
     assert not scale.alarm and "V (1 % of" in scale.text
+
+
+def test_declared_gain_is_part_of_the_standard_errors_and_needs_no_note() -> None:
+    """1 % of the force: every parameter of the cart but the encoder's zero."""
+    simulation = simulation_of("cart_pendulum")
+    signals = tuple(replace(one, gain_sd=0.01 if one.name == "F" else 0.0) for one in simulation.model.signals)
+    run = simulation.run(3, Imperfections("sharp", gain={"F": 1.01}))
+    plain, declared = (
+        identify(model, run, simulation.rig.sample_rate, design=design_of(simulation, Imperfections("sharp")))
+        for model in (simulation.model, replace(simulation.model, signals=signals))
+    )
+    assert np.any(np.abs(plain.p - simulation.truth) > 100 * plain.se)
+    assert np.all(np.abs(declared.p - simulation.truth) < 4 * declared.se)
+    positive = [one.positive for one in simulation.model.unknowns]
+    np.testing.assert_allclose((declared.se / declared.p)[positive], 0.01, rtol=0.05)
+    texts = [next(reason.text for reason in one.verdict.reasons if reason.name == "scale") for one in (plain, declared)]
+    assert "F (1 % of" in texts[0] and "F (" not in texts[1]

@@ -20,6 +20,8 @@ name = "dc_motor"
 g = 9.7
 [sensor.phi]
 resolution = 1e-3
+[sensor.V]
+gain_sd = 0.005
 [nominal]
 R = 2
 """
@@ -47,6 +49,7 @@ def test_values_of_the_file_replace_those_of_the_model() -> None:
     changed = rig.applied(model())
     assert changed.knowns[0].value == 9.7
     assert (changed.signal("phi").resolution, changed.signal("phi").noise) == (1e-3, 0.7)
+    assert (changed.signal("V").gain_sd, changed.signal("phi").gain_sd) == (0.005, 0.0)
     assert (changed.unknowns[0].guess, changed.unknowns[0].sd) == (2.0, 4.0)
     assert changed.unknowns[1].sd == 0.1
 
@@ -72,7 +75,7 @@ def test_settings_come_before_the_file() -> None:
         ("[model]\nname='x'\n[known]\ng='9'", "known.g must be a number, not '9'"),
         ("[model]\nname='x'\n[known]\ng=nan", "known.g must be a number, not 'nan'"),
         ("[model]\nname='x'\n[sensor]\nphi=3", "phi must be a table"),
-        ("[model]\nname='x'\n[sensor.phi]\nbits=3", "'bits' is not a key: resolution and noise are"),
+        ("[model]\nname='x'\n[sensor.phi]\nbits=3", "'bits' is not a key: resolution, noise and gain_sd are"),
         ("[model]\nname='x'\n[sensor.phi]\nnoise=-3", "sensor.phi.noise must not be negative"),
         ("model = 3", "model must be a table"),
         ("[model", "is not TOML"),
@@ -88,7 +91,8 @@ def test_a_mistake_is_named(text: str, sentence: str) -> None:
     ("table", "sentence"),
     [
         ({"known": {"h": 1.0}}, "known.h: the model has no 'h'; it has g"),
-        ({"sensor": {"V": {"noise": 1.0}}}, "sensor.V: the model has no 'V'; it has phi"),
+        ({"sensor": {"U": {"noise": 1.0}}}, "sensor.U: the model has no 'U'; it has V and phi"),
+        ({"sensor": {"V": {"noise": 1.0}}}, "sensor.V: an input of the model has a gain_sd alone"),
         ({"nominal": {"L": 1.0}}, "nominal.L: the model has no 'L'; it has R and i0"),
         ({"nominal": {"R": -1.0}}, "nominal.R must be positive, not -1"),
     ],

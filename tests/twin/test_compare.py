@@ -13,7 +13,10 @@ from pvid.core.sources import INCLUDES, core_sources, source
 from pvid.settings.bounds import SIZES
 
 MUTANTS = {
-    "kapitza_solve_f32.c": ("(self, 0, part * dp[0], &bounded)", "(self, 0, 1.0000001f * (part * dp[0]), &bounded)"),
+    "kapitza_solve_f32.c": (
+        "p, 0, part * dp[0], &solution->bounded)",
+        "p, 0, 1.0000001f * (part * dp[0]), &solution->bounded)",
+    ),
     "kapitza_sums_f32.c": ("four_d2 = 4.0f * d2;", "four_d2 = 4.0000005f * d2;"),
     "information_f32.c": (
         "*low = (kept_high - (total - part)) + (kept_low - part);",

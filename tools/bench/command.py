@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 import tempfile
@@ -50,52 +51,29 @@ def bench_pages(names: tuple[str, ...], docs: Path) -> int:
     return DONE
 
 
-@bench.command(name="laws")
-@UPDATE
-def bench_laws(update: Path | None) -> int:
-    """Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."""
-    from bench import laws
-
-    with progress_bar("laws", laws.NUMBER_OF_ROWS) as advance:
-        rows = [row.cells() for row in laws.laws_table(Native(), advance)]
-    put_table(update, "laws", markdown(laws.HEADER, rows))
-    return DONE
+# name, module, help: the module has HEADER, STEPS (of the progress bar) and MODULE_table(native, progress)
+TABLES = (
+    ("laws", "laws", "Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."),
+    ("strong", "strong", "Errors of the strong form by encoder resolution and differentiator."),
+    ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
+    ("tune", "tuning", "Errors against the truth with the default settings and with those that `tune` picks."),
+    ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
+)
 
 
-@bench.command(name="strong")
-@UPDATE
-def bench_strong(update: Path | None) -> int:
-    """Errors of the strong form by encoder resolution and differentiator."""
-    from bench import strong
-
-    with progress_bar("strong form", len(strong.CASES)) as advance:
-        rows = list(strong.strong_table(Native(), advance))
-    put_table(update, "strong", markdown(strong.HEADER, rows))
-    return DONE
-
-
-@bench.command(name="weak")
-@UPDATE
-def bench_weak(update: Path | None) -> int:
-    """Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."""
-    from bench import weak
-
-    with progress_bar("weak form", len(weak.CASES)) as advance:
-        rows = list(weak.weak_table(Native(), advance))
-    put_table(update, "weak", markdown(weak.HEADER, rows))
-    return DONE
+def _add_table(name: str, module: str, about: str) -> None:
+    @bench.command(name=name, help=about)
+    @UPDATE
+    def command(update: Path | None) -> int:
+        table = importlib.import_module(f"bench.{module}")
+        with progress_bar(name, table.STEPS) as advance:
+            rows = list(getattr(table, f"{module}_table")(Native(), progress=advance))
+        put_table(update, name, markdown(table.HEADER, rows))
+        return DONE
 
 
-@bench.command(name="tune")
-@UPDATE
-def bench_tune(update: Path | None) -> int:
-    """Errors against the truth with the default settings and with those that `tune` picks, on several rigs."""
-    from bench import tuning
-
-    with progress_bar("tuning", len(tuning.CASES) * tuning.SEEDS) as advance:
-        rows = list(tuning.tuning_table(Native(), advance))
-    put_table(update, "tune", markdown(tuning.HEADER, rows))
-    return DONE
+for _table in TABLES:
+    _add_table(*_table)
 
 
 @bench.command(name="mechanisms")
@@ -203,18 +181,6 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
         put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
     traps = [row for rig in rigs for row in recorded_rigs.trap_rows(rig.source, folder)]
     put_table(update, "traps", markdown(recorded_rigs.TRAPS, traps))
-    return DONE
-
-
-@bench.command(name="hard")
-@UPDATE
-def bench_hard(update: Path | None) -> int:
-    """Noise until the answer fails, little motion or drive, one mode, friction, large angles: 40 runs a case."""
-    from bench import hard
-
-    with progress_bar("hard cases", len(hard.CASES) * hard.SEEDS) as advance:
-        rows = list(hard.hard_table(Native(), progress=advance))
-    put_table(update, "hard", markdown(hard.HEADER, rows))
     return DONE
 
 
@@ -469,6 +435,7 @@ def bench_random_models(update: Path | None, count: int, first: int) -> int:
     with progress_bar("models", count) as advance:
         tally = random_models.run(range(first, first + count), advance)
     put_table(update, "random-models", markdown(random_models.HEADER, [tally.row()]))
+    put_table(update, "compile-times", markdown(random_models.COMPILE_HEADER, random_models.compile_times()))
     for seed, error in tally.tracebacks[:20]:
         click.echo(f"pvid: seed {seed}: {error}", err=True)
     return DIFFERENT if tally.tracebacks else DONE

@@ -236,6 +236,9 @@ def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
     )
 
 
+STEPS = len(CASES) * SEEDS
+
+
 def hard_table(
     native: Native, seeds: int = SEEDS, progress: Callable[[int], None] = lambda _: None
 ) -> Iterator[tuple[str, ...]]:

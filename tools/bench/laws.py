@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -23,34 +23,6 @@ RUNS = 40
 PRIORS = (1e3, 1e4, 3e4, 1e5, 3e5, 1e6)  # row_sd [rad/s^8]: H0 = (row_sd / start_sd)^2
 FEEDBACKS_HZ = (1.1, 3.0, 10.0, 100.0)
 START_ERRORS = (0.02, 0.05, 0.10, 0.20, 0.50)
-
-
-@dataclass(frozen=True)
-class LawRow:
-    """Outcome of `runs` starts: how many end within 1 % and 0.01 % in w, d1, d2, and when they settle within 1 %."""
-
-    law: str
-    setting: str
-    start: str
-    runs: int
-    within_1_percent: int
-    within_hundredth: int
-    median_error: float
-    worst_error: float
-    slowest_s: float
-
-    def cells(self) -> tuple[str, ...]:
-        """The row as text; errors in per cent."""
-        return (
-            self.law,
-            self.setting,
-            self.start,
-            f"{self.within_1_percent}/{self.runs}",
-            f"{self.within_hundredth}/{self.runs}",
-            f"{100 * self.median_error:.2g}",
-            f"{100 * self.worst_error:.2g}",
-            f"{self.slowest_s:.1f}" if np.isfinite(self.slowest_s) else "-",
-        )
 
 
 HEADER = (
@@ -86,8 +58,9 @@ def run_law(
     starts: npt.NDArray[np.float64],
     labels: tuple[str, str, str],
     changes: dict[str, object],
-) -> LawRow:
-    """One row of the table, labelled (law, setting, start): every start [runs, 3] with the settings in `changes`."""
+) -> tuple[str, ...]:
+    """One row of the table, labelled (law, setting, start), errors in per cent: every start [runs, 3] with the settings
+    in `changes`."""
     truth = STANDARD_PENDULUM.linear
     last, settled = [], []
     for one in starts:
@@ -99,18 +72,17 @@ def run_law(
         settled.append((outside[-1] + 1) / STANDARD_SAMPLE_RATE if len(outside) else 0.0)
     errors = np.array(last)
     good = errors < 0.01
-    return LawRow(
+    return (
         *labels,
-        len(starts),
-        int(good.sum()),
-        int((errors < 1e-4).sum()),
-        float(np.median(errors)),
-        float(errors.max()),
-        float(np.array(settled).max()) if good.all() else float("inf"),
+        f"{good.sum()}/{len(starts)}",
+        f"{(errors < 1e-4).sum()}/{len(starts)}",
+        f"{100 * np.median(errors):.2g}",
+        f"{100 * errors.max():.2g}",
+        f"{max(settled):.1f}" if good.all() else "-",
     )
 
 
-def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None) -> Iterator[LawRow]:
+def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:
     """All rows: both laws from +-50 %, over priors and feedback rates, then by the size of the start's error."""
     n, y = exact_rows(native)
     truth = STANDARD_PENDULUM.linear
@@ -137,4 +109,4 @@ def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None)
         yield run_law(native, n, y, starts, (law, setting, off), changes)
 
 
-NUMBER_OF_ROWS = len(PRIORS) + len(FEEDBACKS_HZ) + 1 + 2 * len(START_ERRORS)
+STEPS = len(PRIORS) + len(FEEDBACKS_HZ) + 1 + 2 * len(START_ERRORS)

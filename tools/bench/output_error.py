@@ -10,7 +10,6 @@ from scipy.optimize import least_squares
 
 from bench.replay import Replay
 from pvid.base.errors import PvidError
-from pvid.model.signals import Jet
 
 Float = npt.NDArray[np.float64]
 
@@ -34,22 +33,23 @@ class OutputError:
     evaluations: int
 
 
-def output_error(replay: Replay, p: Float, most: int = 100) -> OutputError:
-    """Least squares from p and the replay's own start; the start of the motion is free.
+def output_error(replay: Replay, p: Float, most: int = 100, known: tuple[str, ...] = ()) -> OutputError:
+    """Least squares from p and the replay's own start; the start of the motion is free, but for `known` states.
 
     Positive unknowns are searched in their logarithms.
 
     Parameters
     ----------
     most : steps of the search
+    known : states that start where the replay has them, such as a charge that is counted from the start
     """
     model = replay.model
     positive = np.array([one.positive for one in model.unknowns])
     reach = np.array([one.sd for one in model.unknowns])
     sd = {one.name: one.sd for one in model.signals}
     begun = replay.start()
-    free = sum(isinstance(one, Jet) for one in replay.plant.motion.states)  # running integrals follow and start at 0
-    spans = np.maximum(np.abs(begun[:free]), 1e-3)
+    free = [k for k, one in enumerate(replay.plant.motion.states) if str(one) not in known]
+    spans = np.maximum(np.abs(begun[free]), 1e-3)
     count = 0
 
     def parameters(x: Float) -> Float:
@@ -61,7 +61,7 @@ def output_error(replay: Replay, p: Float, most: int = 100) -> OutputError:
         count += 1
         try:
             start = begun.copy()
-            start[:free] += x[len(p) :] * spans
+            start[free] += x[len(p) :] * spans
             simulated = replay.simulated(parameters(x), start)
         except PvidError:  # a singular mass matrix on the way
             return np.full(len(replay.run) * len(replay.measured), _LOST)
@@ -69,6 +69,6 @@ def output_error(replay: Replay, p: Float, most: int = 100) -> OutputError:
         return np.clip(np.nan_to_num(np.concatenate(errors), nan=_LOST), -_LOST, _LOST)
 
     found = least_squares(
-        residuals, np.zeros(len(p) + free), x_scale="jac", max_nfev=most, ftol=_SETTLED, xtol=_SETTLED, gtol=None
+        residuals, np.zeros(len(p) + len(free)), x_scale="jac", max_nfev=most, ftol=_SETTLED, xtol=_SETTLED, gtol=None
     )
     return OutputError(parameters(found.x), bool(found.status > 0), count)

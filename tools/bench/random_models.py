@@ -13,12 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import sympy as sp
+from sympy.core.cache import clear_cache
 
 from pvid.base.errors import PvidError
 from pvid.model import Integral, Model, cos, sgn, sin
 from pvid.model.identifiability import identifiable
 from pvid.model.report import check_report
 from pvid.model.signals import Jet
+from pvid.models import mechanisms
 
 HEADER = ("models", "compiled", "identifiable", "not identifiable", "refused", "tracebacks", "longest [s]")
 _UNITS = ("s", "m", "rad", "kg*m^2", "1/s", "mm", "V", "furlong", "A*", "deg")
@@ -71,6 +73,24 @@ def run(seeds: range, advance: Callable[[int], None] = lambda done: None) -> Tal
         tally.longest = max(tally.longest, (time.process_time() - began, seed))
         advance(seed - seeds.start + 1)
     return tally
+
+
+COMPILE_HEADER = ("mechanism", "theta", "unknowns", "compiled in [s]", "judged in [s]")
+
+
+def compile_times() -> list[tuple[str, ...]]:
+    """Processor time of each shipped mechanism, in a process that has compiled none yet."""
+    out: list[tuple[str, ...]] = []
+    for name in mechanisms.names():
+        clear_cache()
+        began = time.process_time()
+        compiled = mechanisms.described(name).compiled(name)
+        done = time.process_time()
+        identifiable(compiled)
+        thetas = " + ".join(str(len(row.theta)) for row in compiled.rows)
+        times = (f"{done - began:.2f}", f"{time.process_time() - done:.2f}")
+        out.append((name, thetas, str(len(compiled.p)), *times))
+    return out
 
 
 def described(source: random.Random) -> Model:

@@ -74,6 +74,9 @@ def run_case(native: Native, case: Case) -> tuple[str, ...]:
     )
 
 
+STEPS = len(CASES)
+
+
 def strong_table(native: Native, progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:
     """All rows."""
     for done, case in enumerate(CASES):

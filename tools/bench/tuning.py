@@ -196,6 +196,9 @@ def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
     )
 
 
+STEPS = len(CASES) * SEEDS
+
+
 def tuning_table(native: Native, progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:
     """One row a case."""
     done = 0

@@ -134,6 +134,9 @@ def row(case: Case, outcome: Outcome) -> tuple[str, ...]:
     )
 
 
+STEPS = len(CASES)
+
+
 def weak_table(native: Native, progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:
     """All rows, and the bound itself."""
     for bits in (12, 14, 16):

@@ -170,8 +170,13 @@ class Model:
     # ---- equations
 
     def equation(self, expression: sp.Expr, name: str = "") -> None:
-        """expression = 0."""
-        whole = rational(expression)
+        """expression = 0; a SymPy Eq is one as well, and a matrix is an equation for each entry."""
+        if isinstance(expression, sp.MatrixBase):
+            for one in expression:
+                self.equation(one)
+            return
+        equal = isinstance(expression, sp.Equality)
+        whole = rational(expression.lhs - expression.rhs if equal else expression)
         title = name or f"equation {len(self.equations) + 1}"
         if whole == 0 or not jets(whole):
             raise self._refused(f"{title} contains no signal")

@@ -279,9 +279,7 @@ def by_chain(group: Sequence[Equation], name: str, p: Collection[sp.Symbol]) -> 
     value = ZERO
     for mono, varying in by_unknowns(rest, p).items():
         for m, psi in lower(varying).items():
-            if m > top:
-                raise ModelError(f"{name} would follow from a derivative of {readable(psi)}")
-            value -= mono * (psi if m == top else _running(psi, top - m))
+            value -= mono * (total_derivative(psi, m - top) if m >= top else _running(psi, top - m))
     carrier = next((one for one in group if _orders(one, name) == [0]), None)
     if carrier is None:
         raise ModelError(f"no equation holds {name} without its derivatives")

@@ -9,13 +9,14 @@ from __future__ import annotations
 import itertools
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
 from pvid.model.compiled import CompiledModel, Unknown
 from pvid.model.gradient import jacobian_at, null_space, rank
+from pvid.model.readable import listed
 from pvid.model.solutions import Solutions
 from pvid.model.terms import matchings
 from pvid.model.units import dimension_of_unit
@@ -34,11 +35,13 @@ class Shift:
     unknowns : their names
     combinations : functions of them that are identifiable
     kind : "sum" or "product" where nothing else of them is identifiable; "coefficients": the combinations are theta
+    cure : what would help, as the end of a sentence
     """
 
     unknowns: tuple[str, ...]
     combinations: tuple[sp.Expr, ...]
     kind: str
+    cure: str = ""
 
 
 @dataclass(frozen=True)
@@ -100,10 +103,20 @@ def identifiable(compiled: CompiledModel) -> Identifiability:
     if found < len(p):
         by_theta = max(rank(jacobian_at(theta, p, seed)[0]) for seed in _SEEDS)
         spaces = _of_theta(theta, p) if by_theta == found else _of_solutions(along)
-        shifts = tuple(_shifts(*spaces, theta, p))
+        shifts = tuple(replace(one, cure=_cure(compiled, one)) for one in _shifts(*spaces, theta, p))
     groups = [set(one.unknowns) for one in shifts]
     finite = [one for one in _symmetries(theta, compiled.unknowns) if not any(one.names <= group for group in groups)]
     return Identifiability(found, len(p), shifts, tuple(finite))
+
+
+def _cure(compiled: CompiledModel, shift: Shift) -> str:
+    """A sensor for what is hidden, a known force where there is none, else a known value."""
+    hidden = [jet.of for jet in compiled.hidden if jet not in compiled.opaque]
+    if hidden:
+        return f"declare one of them as known, or add a sensor for {listed(hidden, 'or')}"
+    if shift.kind == "product" and not any(one.driven for one in compiled.signals):
+        return "declare one of them as known, or apply a known force: nothing known fixes their scale"
+    return "declare one of them as known"
 
 
 # ---- shifts

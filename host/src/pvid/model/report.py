@@ -38,11 +38,11 @@ def _shift(one: Shift) -> str:
     names = listed(one.unknowns)
     shown = ", ".join(_in_order(value, one.unknowns) for value in one.combinations)
     if not one.combinations and one.kind == "coefficients":
-        return f"  {names} change together without a trace: declare one of them as known, or add a sensor."
+        return f"  {names} change together without a trace: {one.cure}."
     if not one.combinations:
         return f"  {names}: not determined at all."
     only = f"only {shown}" if one.kind != "coefficients" else f"only what follows from {shown}"
-    return f"  {names}: {only} can be identified; declare one of them as known, or add a sensor."
+    return f"  {names}: {only} can be identified; {one.cure}."
 
 
 def _in_order(value: sp.Expr, names: Sequence[str]) -> str:

@@ -44,10 +44,14 @@ def uncertainty(fit: Fit) -> Uncertainty:
     s_inverse = inverse(information)
     neighbours = np.zeros_like(information)
     theta = fit.parameters.theta(fit.p)
+    adjacent = np.flatnonzero(np.diff(fit.rows.numbers) == 1)
     for d, white in zip(designs, fit.white, strict=True):
-        r1 = fit.rows.with_next(white.kinds, theta, fit.errors)[:-1]
-        shared = white.whitener[:-1] @ r1 @ white.whitener[1:].transpose(0, 2, 1)
-        neighbours += np.einsum("wkp,wkq->pq", d[:-1], shared @ d[1:])
+        back = white.whitener.back(d.transpose(0, 2, 1))
+        r1 = fit.rows.with_next(white.kinds, theta, fit.errors)
+        neighbours += np.einsum("wpk,kl,wql->pq", back[adjacent], r1, back[adjacent + 1], optimize=True)
+        if fit.rows.places.size:
+            scores = fit.rows.directions(white.kinds, theta) @ back.transpose(0, 2, 1)
+            neighbours += fit.rows.reversals.shared(scores, fit.rows.places)
     middle = information + neighbours + neighbours.T
     covariance = s_inverse @ middle @ s_inverse
     free = sum(one.free for one in fit.white) - len(fit.p)

@@ -17,9 +17,10 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
-from pvid.oracle.fourier.sensor_errors import SensorErrors, of_scale, of_sensors
+from pvid.oracle.fourier.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
 from pvid.oracle.fourier.solve import Fit, batch, online
 from pvid.oracle.fourier.verdict import Halves, Verdict
+from pvid.oracle.fourier.weights import as_white_force
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Identified:
     p : [n_p]
     se : published standard errors, those of gains included [n_p]
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
+    sensor_error : the systematic error of a sensor that explains residuals; None: there is none
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
     verdict : whether to trust it
@@ -59,6 +61,7 @@ class Identified:
     halves: Halves | None
     fit: Fit
     by_gain: dict[str, Float]
+    sensor_error: SensorError | None
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
@@ -131,15 +134,18 @@ def identify(
         reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
     sensors = SensorErrors(run, used, fit)
     by_gain = {one.name: sensors.by_gain(one) for one in compiled.signals if one.gain_sd > 0 or one.unit != "rad"}
-    reasons["sensors"] = of_sensors(compiled, sensors.found(found.se), found.se)
+    error = sensors.found(found.se)
+    reasons["sensors"] = of_sensors(compiled, error, found.se)
     reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
     gains = [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
+    white = as_white_force(fit)
+    by_weights = [] if white is None else [white - fit.p]
     history = online(rows, begun)
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
         p=fit.p,
-        se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains]), axis=0)),
+        se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains, *by_weights]), axis=0)),
         predicted=found.predicted,
         clustered=found.clustered,
         chi2=found.chi2,
@@ -152,6 +158,7 @@ def identify(
         halves=halves,
         fit=fit,
         by_gain=by_gain,
+        sensor_error=error,
     )
 
 

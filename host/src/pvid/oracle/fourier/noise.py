@@ -189,7 +189,7 @@ class ReversalNoise:
 
     Attributes
     ----------
-    windows : of each entry, rising [entries]
+    windows : of each entry, rising [entries]; an entry is a reversal in one of the two windows that hold it
     events : reversal of each entry [entries]
     shapes : of each row kind, 2 sd chi^(order) of the columns that hold sgn [entries, columns, K]
     """
@@ -238,41 +238,42 @@ class ReversalNoise:
             [np.einsum("ejk,j->ek", self.shapes[kind], np.append(theta[kind], -1.0)) for kind in kinds], axis=1
         )
 
-    def covariance(self, directions: Float, windows: npt.NDArray[np.int64]) -> Float:
-        """Of each of some windows, by their numbers [windows, rows, rows]."""
-        out = np.zeros((len(windows), directions.shape[1], directions.shape[1]))
-        for k, window in enumerate(windows):
-            own = directions[self._of(window)]
-            if len(own):
-                out[k] = own.T @ own
-        return out
+    def places(self, windows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Entries of each of some windows, by their numbers [windows, most entries]; -1 where there are fewer."""
+        first, behind = np.searchsorted(self.windows, windows), np.searchsorted(self.windows, windows + 1)
+        steps = np.arange(int(np.max(behind - first, initial=0)))
+        found = first[:, np.newaxis] + steps
+        return np.where(found < behind[:, np.newaxis], found, -1)
 
-    def slopes(
-        self, kinds: Sequence[int], theta: Sequence[Float], weight: Float, windows: npt.NDArray[np.int64]
-    ) -> Float:
-        """1/2 tr(weight d covariance / d theta) over some windows [thetas of the kinds]; weight [windows, R, R]."""
-        directions = self.directions(kinds, theta)
+    def slopes(self, kinds: Sequence[int], pulled: Float, places: npt.NDArray[np.int64]) -> Float:
+        """1/2 tr(R^-1 d covariance / d theta) over some windows [thetas of the kinds].
+
+        Parameters
+        ----------
+        pulled : R^-1 times the directions of each window [windows, entries, R]
+        places : of those entries
+        """
         k = self.shapes[0].shape[2]
-        pulled = np.zeros(directions.shape)
-        for one, window in zip(weight, windows, strict=True):
-            pulled[self._of(window)] += directions[self._of(window)] @ one
+        there = places >= 0
+        own = pulled[there]
         return np.concatenate(
             [
-                np.einsum("ejk,ek->j", self.shapes[kind][:, :-1], pulled[:, place * k : (place + 1) * k])
+                np.einsum("ejk,ek->j", self.shapes[kind][places[there], :-1], own[:, place * k : (place + 1) * k])
                 for place, kind in enumerate(kinds)
             ]
         )
 
-    def with_next(self, directions: Float, windows: npt.NDArray[np.int64]) -> Float:
-        """Of each of some windows with the one after it [windows, rows, rows]."""
-        out = np.zeros((len(windows), directions.shape[1], directions.shape[1]))
-        for k, window in enumerate(windows):
-            here, after = self._of(window), self._of(window + 1)
-            _, a, b = np.intersect1d(self.events[here], self.events[after], return_indices=True)
-            if len(a):
-                out[k] = directions[here][a].T @ directions[after][b]
-        return out
+    def shared(self, scores: Float, places: npt.NDArray[np.int64]) -> Float:
+        """Sum over the reversals that two neighbours hold of the earlier's score times the later's [n, n].
 
-    def _of(self, window: int) -> slice:
-        """Entries of a window."""
-        return slice(*np.searchsorted(self.windows, [window, window + 1]))
+        Parameters
+        ----------
+        scores : of each entry of each window [windows, entries, n]
+        places : of those entries
+        """
+        there = places >= 0
+        entries, own = places[there], scores[there]
+        order = np.lexsort((self.windows[entries], self.events[entries]))
+        entries, own = entries[order], own[order]
+        pairs = np.flatnonzero(self.events[entries][1:] == self.events[entries][:-1])
+        return np.asarray(own[pairs].T @ own[pairs + 1])

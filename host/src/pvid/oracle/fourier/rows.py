@@ -19,6 +19,7 @@ from pvid.oracle.fourier.front import grid_of
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.noise import NoiseFilters, NoiseModel, ReversalNoise
 from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.fourier.whitener import Whitener
 
 # Rows that are numerically dependent get this part of the mean variance.
 _RIDGE = 1e-10
@@ -60,21 +61,21 @@ class WhiteRows:
     kinds : of the group
     regressors : of all thetas of the group [windows, thetas, R]
     known : [windows, R]
-    whitener : L^-1 with covariance L L^T [windows, R, R]
+    whitener : of every window
     free : rows less nuisances, of all windows
     """
 
     kinds: tuple[int, ...]
     regressors: Float
     known: Float
-    whitener: Float
+    whitener: Whitener
     free: int
 
     def only(self, windows: slice) -> WhiteRows:
         """Some of the windows."""
         n = self.regressors[windows]
         free = round(self.free * len(n) / len(self.regressors))
-        return WhiteRows(self.kinds, n, self.known[windows], self.whitener[windows], free)
+        return WhiteRows(self.kinds, n, self.known[windows], self.whitener.only(windows), free)
 
     def moments(self) -> tuple[Float, Float]:
         """M [thetas, thetas] and B [thetas]."""
@@ -150,38 +151,49 @@ class WeakRows:
         return np.asarray(first + self.functions.dt * self.functions.hop * (2 + self.numbers))
 
     def covariance(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
-        """R0(p), the equations' errors and those of located reversals [windows, R, R]."""
+        """R0(p) and the equations' errors [R, R]; located reversals come on top, in each window its own."""
         blocks = [[self.noise.covariance(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
         for place, kind in enumerate(kinds):
             error = errors[kind]
             blocks[place][place] = blocks[place][place] + error.variance * self.noise.gram(error.order, error.order)
-        directions = self.reversals.directions(kinds, theta)
-        return np.block(blocks) + self.reversals.covariance(directions, self.numbers)
+        return np.block(blocks)
 
     def with_next(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
-        """The same between each window and the next one [windows, R, R]; the last one is of no use."""
+        """The same between a window and the next one [R, R]."""
         blocks = [[self.noise.with_next(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
         for place, kind in enumerate(kinds):
             error = errors[kind]
             blocks[place][place] = blocks[place][place] + error.variance * self.noise.overlap(error.order, error.order)
-        directions = self.reversals.directions(kinds, theta)
-        return np.block(blocks) + self.reversals.with_next(directions, self.numbers)
+        return np.block(blocks)
 
-    def whitener(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
-        """L^-1 [windows, R, R] of the covariance; rows of a model without noise are scaled to their size."""
+    @property
+    def places(self) -> npt.NDArray[np.int64]:
+        """Entries of `reversals` in each window."""
+        return self.reversals.places(self.numbers)
+
+    def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
+        """Of located reversals, one standard deviation long [windows, entries, R]."""
+        places = self.places
+        return (
+            np.where(
+                (places >= 0)[:, :, np.newaxis], self.reversals.directions(kinds, theta)[np.maximum(places, 0)], 0.0
+            )
+            if places.size
+            else np.zeros((*places.shape, len(kinds) * self.functions.count))
+        )
+
+    def whitener(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Whitener:
+        """Of the covariance of every window; rows of a model without noise are scaled to their size."""
         r = self.covariance(kinds, theta, errors)
         k = self.functions.count
-        diagonal = np.mean(np.einsum("wkk->wk", r), axis=0).reshape(len(kinds), k).mean(axis=1)
-        ridge = np.zeros(len(kinds))
+        diagonal = np.diag(r).reshape(len(kinds), k).mean(axis=1)
         for place, kind in enumerate(kinds):
             if diagonal[place] == 0.0:
-                size = float(np.mean(self.columns[kind][:, :-1] ** 2)) * 1e-12
+                diagonal[place] = float(np.mean(self.columns[kind][:, :-1] ** 2)) * 1e-12
                 own = slice(place * k, (place + 1) * k)
-                r[:, own, own] += size * self.noise.gram(0, 0)
-                diagonal[place] = size
-            ridge[place] = _RIDGE * diagonal[place]
-        r = r + np.diag(np.repeat(ridge, k))
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(r)))
+                r[own, own] += diagonal[place] * self.noise.gram(0, 0)
+        r = r + np.diag(np.repeat(_RIDGE * diagonal, k))
+        return Whitener.of_covariance(r, self.directions(kinds, theta))
 
     def white(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> WhiteRows:
         """Whitened rows of a group at the thetas of all kinds."""
@@ -201,16 +213,13 @@ class WeakRows:
             gone = int(live.sum())
         return WhiteRows(tuple(kinds), regressors, known, whitener, self.windows * len(kinds) * k - gone)
 
-    def white_nuisances(self, kinds: Sequence[int], whitener: Float) -> Float:
+    def white_nuisances(self, kinds: Sequence[int], whitener: Whitener) -> Float:
         """Nuisance columns of a group [windows, nuisances, R]."""
         parts = self._whitened(kinds, whitener)
         plans = [self.compiled.channels.rows[kind] for kind in kinds]
         return np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
 
-    def _whitened(self, kinds: Sequence[int], whitener: Float) -> list[Float]:
-        """Columns of each kind [windows, columns, R]: they fill the kind's own rows, of the whitener those count."""
+    def _whitened(self, kinds: Sequence[int], whitener: Whitener) -> list[Float]:
+        """Columns of each kind [windows, columns, R]: they fill the kind's own rows."""
         k = self.functions.count
-        return [
-            self.columns[kind] @ whitener[:, :, place * k : (place + 1) * k].transpose(0, 2, 1)
-            for place, kind in enumerate(kinds)
-        ]
+        return [whitener.of(self.columns[kind], slice(place * k, (place + 1) * k)) for place, kind in enumerate(kinds)]

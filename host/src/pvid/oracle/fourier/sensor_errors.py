@@ -180,7 +180,7 @@ class SensorErrors:
         out = []
         for white in self.fit.white:
             own = np.concatenate([change[kind] for kind in white.kinds], axis=1)
-            out.append(self._without_nuisances(white, np.einsum("wjk,wk->wj", white.whitener, own)))
+            out.append(self._without_nuisances(white, white.whitener.of(own[:, np.newaxis, :])[:, 0]))
         return np.concatenate(out, axis=1)
 
     def _raw(self, rows: WeakRows) -> list[Float]:

@@ -200,8 +200,7 @@ def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) 
     moments = Moments.of(white)
     k = rows.functions.count
     for place, one in enumerate(white):
-        weight = one.whitener.transpose(0, 2, 1) @ one.whitener
-        total = weight.sum(axis=0)
+        total = one.whitener.total_inverse()
         pulls = []
         for a, kind in enumerate(one.kinds):
             blocks = [total[a * k : (a + 1) * k, b * k : (b + 1) * k] for b in range(len(one.kinds))]
@@ -210,7 +209,9 @@ def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) 
                 for other, block in zip(one.kinds, blocks, strict=True)
             ]
             pulls.append(np.sum(own, axis=0)[: len(theta[kind])])
-        moments.b[place] += np.concatenate(pulls) + rows.reversals.slopes(one.kinds, theta, weight, rows.numbers)
+        moments.b[place] += np.concatenate(pulls)
+        if rows.places.size:
+            moments.b[place] += rows.reversals.slopes(one.kinds, one.whitener.inverse_of_directions(), rows.places)
     return moments
 
 
@@ -235,7 +236,7 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationEr
     # What the projection on the complement of the nuisances took out of the residuals.
     share = plain.free / (rows.windows * rows.functions.count)
     moment = e.T @ e / (len(e) * share)
-    whitener = np.mean(plain.whitener, axis=0)
+    whitener = plain.whitener.base
     for order in range(rows.compiled.channels.rows_top(kind) + 1):
         q, u = np.linalg.eigh(whitener @ rows.noise.gram(order, order) @ whitener.T)
         q = np.maximum(q, 0.0)
@@ -258,10 +259,7 @@ def sharpened(rows: WeakRows, kind: int, theta: Sequence[Float], error: Equation
         errors = [error] * rows.kinds
         white = rows.white((kind,), theta, errors)
         e = white.residuals(theta)
-        turned = white.whitener @ q @ white.whitener.transpose(0, 2, 1)
-        share = white.free / e.size
-        expected = share * float(np.einsum("wkk->", turned))
-        ratio = float(np.einsum("wk,wkl,wl->", e, turned, e, optimize=True)) / expected
+        ratio = white.whitener.energy(q, e) / (white.whitener.trace(q) * white.free / e.size)
         error = EquationError(error.variance * ratio, error.order)
         if abs(ratio - 1) < 1e-3:
             break
