@@ -135,7 +135,7 @@ def test_build_writes_what_check_accepts(tmp_path: Path) -> None:
 
 
 def test_build_takes_what_the_description_does_not_tell(tmp_path: Path) -> None:
-    """Reaches of derivatives for the formats, a soft sign, the strong form; the files name them, so check needs them."""
+    """Reaches of derivatives for the formats, a soft sign, the strong form; the files name them: check needs them."""
     options = ("--strong", "--reach", "phi_1=300", "--soft-sign", "phi_1=0.5", "--bandwidth", "20")
     assert pvid("model", "build", "dc_motor", "-o", tmp_path, *options).return_value == DONE
     header = (tmp_path / "dc_motor_q31.h").read_text(encoding="utf-8")
