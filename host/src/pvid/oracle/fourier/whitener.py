@@ -74,6 +74,11 @@ class Whitener:
         """R_w^-1 U_w as rows [windows, r, R]."""
         return np.asarray(self.shrink @ self.v.transpose(0, 2, 1) @ self.base)
 
+    def log_determinant(self) -> float:
+        """Sum over the windows of log det R_w."""
+        of_base = -2 * float(np.sum(np.log(np.abs(np.diag(self.base)))))
+        return len(self.v) * of_base - float(np.sum(np.linalg.slogdet(self.shrink)[1]))
+
     def trace(self, q: Float) -> float:
         """Sum over the windows of tr(R_w^-1 Q)."""
         return float(np.sum(self.total_inverse() * q))
