@@ -15,6 +15,7 @@ from pvid.oracle.fourier.errors import Uncertainty, uncertainty
 from pvid.oracle.fourier.front import filtered, weights_of
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.fourier.rows import WeakRows
 from pvid.oracle.fourier.solve import Fit, Moments, gauss_newton, inverse, normal
 
 Name = Literal[
@@ -28,6 +29,7 @@ Name = Literal[
     "attenuation",
     "feedback",
     "short",
+    "left_out",
     "range",
     "unexplained",
     "sensor",
@@ -323,6 +325,22 @@ def of_range(model: CompiledModel, p: Float) -> list[Reason]:
         if one.high > one.low and not one.low <= value <= one.high
     ]
     return [Reason("range", f"Outside the plausible range: {listed(out)}.", alarm=True)] if out else []
+
+
+def of_spoiled(rows: WeakRows, fit: Fit) -> list[Reason]:
+    """Windows that were left out of those of a run."""
+    bad = np.setdiff1d(rows.numbers, fit.rows.numbers)
+    if not len(bad):
+        return []
+    first = float(rows.end_times()[np.searchsorted(rows.numbers, bad[0])]) - rows.functions.length
+    return [
+        Reason(
+            "left_out",
+            f"{len(bad)} of {rows.windows} windows are left out, the first at {max(first, 0.0):.3g} s: their residuals "
+            "are far above those of the others.",
+            alarm=False,
+        )
+    ]
 
 
 def settled(fit: Fit) -> list[Reason]:
