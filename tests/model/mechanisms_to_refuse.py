@@ -56,7 +56,7 @@ def cart(hidden: str = "", friction: bool = False) -> Model:
 
 
 def cell(ranges: bool) -> Model:
-    """Two RC pairs whose ranges tell them apart, or do not."""
+    """Two RC pairs, with ranges that exclude their exchange or without."""
     model = Model("cell")
     v, i = (model.sensor(name, unit, resolution=FINE) for name, unit in (("v", "V"), ("i", "A")))
     h1, h2 = model.unmeasured("h1", "V"), model.unmeasured("h2", "V")

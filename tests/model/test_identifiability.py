@@ -80,7 +80,7 @@ def test_a_cart_without_sensor_is_identifiable() -> None:
     assert judged(cart(hidden="x")).identifiable
 
 
-def test_rc_pairs_may_swap_unless_ranges_tell_them_apart() -> None:
+def test_rc_pairs_may_swap_unless_ranges_exclude_it() -> None:
     (swap,) = judged(cell(ranges=False)).symmetries
     assert set(swap.swapped) == {("R1", "R2"), ("T1", "T2")}
     assert not swap.excluded

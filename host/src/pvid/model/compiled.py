@@ -141,10 +141,11 @@ class CompiledModel:
     signals, unknowns, knowns, outputs : as described
     rows : their kinds, in the order of the equations
     opaque
-        jet of an auxiliary signal -> the expression it stands for, for what the compiler must not differentiate:
-        sgn(th') of a row that was multiplied by an operator. Its jets stand in the rows like those of a signal.
+        jet of an auxiliary signal -> the expression that it is computed from: a definition of the description (y''/l1,
+        or Integral(i, 1), since the start of the run); in a strong form also sgn(th'), which is differentiated there.
+        Its jets stand in the rows like those of a signal.
     equations : expressions = 0 as the user wrote them (in jets of signals and hidden), for the simulator
-    hidden : unmeasured coordinates
+    hidden : unmeasured coordinates, and defined integrals, whose rates are among the equations
     """
 
     name: str

@@ -30,7 +30,10 @@ def reduced(
             ready.append(Equation(one.name, opaque.hide(normal_form(one.expression, p)), one.place))
         except ModelError as error:
             raise error.at(one.place) from None
-    return eliminate(ready, hidden, p), opaque
+    try:
+        return eliminate(ready, hidden, p), opaque
+    except ModelError as error:
+        raise error.at(equations[-1].place) from None
 
 
 def rows_of(

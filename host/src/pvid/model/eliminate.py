@@ -294,7 +294,7 @@ def by_chain(group: Sequence[Equation], name: str, p: Collection[sp.Symbol]) -> 
         if moving != 0:
             columns += [{top: sp.expand(moving * TIME**k)} for k in range(top)]
     value_now = -(carrier.expression - gain * Jet(name)) / gain
-    strong = factor * total_derivative_of_ratio(value_now, top) + factor * rest
+    strong = factor * _rate_of_fraction(value_now, top) + factor * rest
     numerator = sp.fraction(sp.cancel(sp.together(strong)))[0]
     return Reduced(
         _joined(group),
@@ -307,10 +307,10 @@ def by_chain(group: Sequence[Equation], name: str, p: Collection[sp.Symbol]) -> 
     )
 
 
-def total_derivative_of_ratio(expression: sp.Expr, times_: int) -> sp.Expr:
-    """d^n/dt^n, not expanded, of a fraction."""
+def _rate_of_fraction(expression: sp.Expr, n: int) -> sp.Expr:
+    """d^n/dt^n, not expanded."""
     whole = expression
-    for _ in range(times_):
+    for _ in range(n):
         whole = added(sp.diff(whole, jet) * jet.d() for jet in jets(whole))
     return whole
 

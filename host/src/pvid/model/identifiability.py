@@ -71,8 +71,13 @@ def identifiable(compiled: CompiledModel) -> Identifiability:
     """Of a compiled model, for any drive; local, so that finite symmetries are listed apart."""
     theta = list(dict.fromkeys(theta for row in compiled.rows for theta in row.theta))
     p = list(compiled.p)
-    along = [Solutions(compiled, seed) for seed in _SEEDS]
-    found = max(one.rank(seed) for one, seed in zip(along, _SEEDS, strict=True))
+    along: list[Solutions] = []
+    found = 0
+    for seed in _SEEDS:
+        along.append(Solutions(compiled, seed))
+        found = max(found, along[-1].rank(seed))
+        if found == len(p):
+            break
     shifts: tuple[Shift, ...] = ()
     if found < len(p):
         by_theta = max(rank(jacobian_at(theta, p, seed)[0]) for seed in _SEEDS)

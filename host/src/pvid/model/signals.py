@@ -11,6 +11,8 @@ from typing import Any
 
 import sympy as sp
 
+from pvid.model.refusal import ModelError
+
 MAX_ORDER = 8  # of a derivative
 
 TIME = sp.Symbol("t", real=True)  # [s] since the start of a window; stands in columns that are free in each window only
@@ -26,7 +28,7 @@ class Jet(sp.Symbol):  # type: ignore[misc]
 
     def __new__(cls, of: str, order: int = 0) -> Jet:
         if order > MAX_ORDER:
-            raise ValueError(f"{of}: derivative {order} is above {MAX_ORDER}")
+            raise ModelError(f"derivative {order} of {of} would be needed: at most {MAX_ORDER} are possible")
         jet: Jet = sp.Symbol.__xnew__(cls, of if order == 0 else f"{of}_{order}", real=True)
         jet.of, jet.order = of, order
         return jet

@@ -14,10 +14,15 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Part, Row
 from pvid.model.gradient import rank
-from pvid.model.signals import TIME, Integral, Jet, jets, sgn, total_derivative
+from pvid.model.signals import MAX_ORDER, TIME, Integral, Jet, jets, order_of, sgn, total_derivative
 from pvid.model.zero import RationalPoint, Sampler
 
 _ROUNDS = 20  # of insertion: a derivative of what is inserted may contain a jet that follows again
+_MOST_TERMS = 200  # of what is inserted: a relation between rows that takes more is left out
+
+
+class _TooLongError(Exception):
+    """A rule would not stay short, or divide by 0."""
 
 
 class Solutions:
@@ -41,9 +46,13 @@ class Solutions:
     def columns(self, seed: int) -> sp.Matrix:
         """d residual / d p and nuisances at random points of solutions [points * rows, n_p + nuisances]."""
         p, rows = self.compiled.p, self.compiled.rows
-        free = [self._inserted(_rate(one)) for row in rows for one in row.nuisances]
         owners = [k for k, row in enumerate(rows) for _ in row.nuisances]
-        slopes = [[self._slope(row, one) for one in p] for row in rows]
+        try:
+            free = [self._inserted(_rate(one)) for row in rows for one in row.nuisances]
+            slopes = [[self._slope(row, one) for one in p] for row in rows]
+        except _TooLongError:
+            self.rules = {}
+            return self.columns(seed)
         flat = []
         for k, row in enumerate(slopes):
             own = [one if owner == k else sp.Integer(0) for one, owner in zip(free, owners, strict=True)]
@@ -64,16 +73,23 @@ class Solutions:
 
     def _add(self, row: Row) -> None:
         residual = sp.Add(*(theta * _rate(part) for theta, part in zip(row.theta, row.regressors, strict=True)))
-        whole = self._inserted(self._at_p(residual - _rate(row.known)))
+        try:
+            whole = self._inserted(self._at_p(residual - _rate(row.known)))
+        except _TooLongError:
+            return
         if row.nuisances or whole.has(Integral, TIME):
             return
         leading = self._leading(whole)
         if leading is None:
             return
         factor = sp.diff(whole, leading)
-        rule = sp.expand(leading - whole / factor)
-        self.rules[leading.of] = leading.order, rule
-        self.rules |= {name: (n, self._inserted(one)) for name, (n, one) in self.rules.items() if name != leading.of}
+        before = dict(self.rules)
+        self.rules[leading.of] = leading.order, sp.expand(leading - whole / factor)
+        others = {name: one for name, one in before.items() if name != leading.of}
+        try:
+            self.rules |= {name: (n, self._inserted(one)) for name, (n, one) in others.items()}
+        except _TooLongError:
+            self.rules = before
 
     def _leading(self, whole: sp.Expr) -> Jet | None:
         """A jet that the row can be solved for: of an input where possible, without derivative; else the highest."""
@@ -112,10 +128,14 @@ class Solutions:
             for jet in jets(whole):
                 if jet.of in self.rules and jet.order >= self.rules[jet.of][0]:
                     order, rule = self.rules[jet.of]
+                    if len(sp.Add.make_args(rule)) > _MOST_TERMS or order_of(rule) + jet.order - order > MAX_ORDER:
+                        raise _TooLongError
                     values[jet] = total_derivative(rule, jet.order - order)
             if not values:
                 break
             whole = sp.expand(whole.xreplace(values))
+            if len(sp.Add.make_args(whole)) > _MOST_TERMS or whole.has(sp.nan, sp.zoo):
+                raise _TooLongError
         return whole
 
 

@@ -16,7 +16,10 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from pvid.model.modular import echelon, rational, residue
+from pvid.model.refusal import ModelError
 from pvid.model.signals import Integral
+
+_ATTEMPTS = 5  # at a point where no denominator is 0
 
 
 def _angles_apart(expression: sp.Expr) -> sp.Expr:
@@ -47,7 +50,7 @@ class RationalPoint:
             self.values.setdefault(one, self.number())
         for one in whole.atoms(sp.sin, sp.cos):
             angle, sign = _base_angle(one.args[0])
-            r = self.slopes.setdefault(angle, self.number())
+            r = self.slopes.setdefault(angle, self.number() / 97)
             sine, cosine = 2 * r / (1 + r**2), (1 - r**2) / (1 + r**2)
             self.values.setdefault(one, sign * sine if isinstance(one, sp.sin) else cosine)
         for one in sorted(whole.free_symbols, key=str):
@@ -105,13 +108,27 @@ class Sampler:
         self.function = function_of_fractions([*self.plain, *sine_marks.values()], apart)
 
     def at_random(self, source: random.Random) -> list[Fraction]:
-        """Values at a new point."""
+        """Values at a new point, at which nothing is divided by 0.
+
+        Raises
+        ------
+        ModelError
+            Where a denominator is always 0.
+        """
+        for _ in range(_ATTEMPTS):
+            try:
+                return self._at_random(source)
+            except ZeroDivisionError:
+                continue
+        raise ModelError("an equation is divided by an expression that is 0")
+
+    def _at_random(self, source: random.Random) -> list[Fraction]:
         numbers = [_fraction(source) for _ in self.plain]
         slopes: dict[sp.Expr, Fraction] = {}
         values = []
         for one in self.sines:
             angle, sign = _base_angle(one.args[0])
-            r = slopes.setdefault(angle, _fraction(source))
+            r = slopes.setdefault(angle, _fraction(source) / 97)
             values.append(sign * 2 * r / (1 + r**2) if isinstance(one, sp.sin) else (1 - r**2) / (1 + r**2))
         return [Fraction(one) for one in self.function(*numbers, *values)]
 

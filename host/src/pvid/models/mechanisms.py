@@ -11,6 +11,7 @@ from typing import Any
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
+from pvid.model.refusal import ModelError, Place
 
 _FOLDER = Path(__file__).parent
 _FILE = "mechanism.py"
@@ -51,6 +52,8 @@ def described(name_or_path: str | Path) -> Model:
     sys.path.insert(0, folder)
     try:
         exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), space)
+    except ModelError as error:
+        raise error.at(Place(str(path), _line(error, path))) from None
     except PvidError:
         raise
     except (OSError, UnicodeDecodeError) as error:
@@ -58,8 +61,7 @@ def described(name_or_path: str | Path) -> Model:
     except SyntaxError as error:
         raise PvidError(f"{Path(error.filename or path).name}, line {error.lineno}: {error.msg}") from None
     except (Exception, SystemExit) as error:
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-        where = f"{path.name}, line {lines[-1]}" if lines else path.name
+        where = str(Place(str(path), _line(error, path))).removesuffix(": ") or path.name
         raise PvidError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from None
     finally:
         sys.path.remove(folder)
@@ -67,6 +69,12 @@ def described(name_or_path: str | Path) -> Model:
     if not isinstance(model, Model):
         raise PvidError(f"{path.name}: the file leaves no variable `model` that is a pvid.model.Model")
     return model
+
+
+def _line(error: BaseException, path: Path) -> int:
+    """The last line of the file on the way to the error; 0: it is elsewhere."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    return (lines[-1] or 0) if lines else 0
 
 
 def compiled_of(name_or_path: str | Path) -> CompiledModel:
