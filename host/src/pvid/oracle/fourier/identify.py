@@ -133,7 +133,7 @@ def identify(
     other = other_length(model, run, used, fit.p)
     if other is not None:
         reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
-    shorter = with_shorter_rates(model, run, used, fit.p)
+    shorter = shorter_rates(model, run, used, fit.p)
     if shorter is not None:
         reasons["smoothing"] = verdict.of_smoothing(compiled, fit, found, shorter, uncertainty(shorter))
     sensors = SensorErrors(run, used, fit)
