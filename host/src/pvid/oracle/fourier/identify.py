@@ -166,9 +166,7 @@ def identify(
     )
 
 
-def with_shorter_rates(
-    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float
-) -> Fit | None:
+def shorter_rates(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:
     """The same with derivatives over fewer samples; None where there are none, or too few samples for the degree."""
     taps = 2 * round(_SHORTER * design.rate_taps / 2) + 1
     if not any(jet.order for jet in model.channels.needed) or taps <= design.rate_degree + 2:
