@@ -134,6 +134,21 @@ def test_build_writes_what_check_accepts(tmp_path: Path) -> None:
     assert pvid("model", "build", "furuta", "-o", tmp_path / "out", "--check").return_value == DIFFERENT
 
 
+def test_build_takes_what_the_description_does_not_tell(tmp_path: Path) -> None:
+    """Reaches of derivatives for the formats, a soft sign, the strong form; the files name them: check needs them."""
+    options = ("--strong", "--reach", "phi_1=300", "--soft-sign", "phi_1=0.5", "--bandwidth", "20")
+    assert pvid("model", "build", "dc_motor", "-o", tmp_path, *options).return_value == DONE
+    header = (tmp_path / "dc_motor_q31.h").read_text(encoding="utf-8")
+    command = "dc_motor --strong --soft-sign phi_1=0.5 --reach phi_1=300 --bandwidth 20`: do not edit."
+    assert command in (tmp_path / "dc_motor_twin.py").read_text(encoding="utf-8")
+    assert "|in[3]| <= 300 rad/s" in header and (tmp_path / "dc_motor_strong_f32.c").is_file()
+    assert pvid("model", "build", "dc_motor", "-o", tmp_path, *options, "--check").return_value == DONE
+    assert pvid("model", "build", "dc_motor", "-o", tmp_path, "--check").return_value == DIFFERENT
+    for wrong, sentence in (("x=3", "dc_motor has no input x"), ("phi_1", "write NAME=VALUE, as in --reach phi_1=40")):
+        with pytest.raises(PvidError, match=sentence):
+            pvid("model", "build", "dc_motor", "-o", tmp_path, "--reach", wrong)
+
+
 def test_a_wrong_model_file_gives_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "wrong.py").write_text("from pvid.model import Model\nmodel = Model('x')\nmodel.sensor('y')\n", "utf-8")
     done = CliRunner().invoke(commands, ["model", "check", str(tmp_path / "wrong.py")])

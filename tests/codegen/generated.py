@@ -66,7 +66,7 @@ class Generated:
 
     def __init__(self, functions: ModelFunctions, folder: Path) -> None:
         self.functions = functions
-        self.files = files_of(functions, "test")
+        self.files = files_of(functions.model, "test")
         for name, text in {**self.files, "loop.c": _LOOP}.items():
             (folder / name).write_text(text, encoding="utf-8")
         code = [folder / name for name in self.files if name.endswith(".c") and not name.endswith("_test.c")]

@@ -14,6 +14,7 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar,
 from pvid.base.errors import PvidError
 
 _MODEL = click.argument("model", metavar="MODEL")
+_ABOVE_0 = click.FloatRange(min=0.0, min_open=True)
 
 
 @click.group(name="model")
@@ -45,12 +46,8 @@ def check(model: str) -> int:
 @click.option("--drive", "only", help="Only this drive.  [default: each of the list]")
 @click.option("--band", nargs=2, type=float, help="Of the drives [Hz].  [default: 10/duration to rate/50]")
 @click.option("--share", default=0.5, show_default=True, help="Largest value of a drive over the reach of its signal.")
-@click.option(
-    "--duration", type=click.FloatRange(min=0.0, min_open=True), help="Of a run [s].  [default: the rig's, 20]"
-)
-@click.option(
-    "--rate", type=click.FloatRange(min=0.0, min_open=True), help="Sample rate [Hz].  [default: the rig's, 1000]"
-)
+@click.option("--duration", type=_ABOVE_0, help="Of a run [s].  [default: the rig's, 20]")
+@click.option("--rate", type=_ABOVE_0, help="Sample rate [Hz].  [default: the rig's, 1000]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def predict(
     model: str,
@@ -116,21 +113,55 @@ def predict(
 @_MODEL
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder to write.")
 @click.option("--check", "only_check", is_flag=True, help="Compare the folder's files with the output instead.")
-def build(model: str, out: Path, only_check: bool) -> int:
+@click.option("--strong", is_flag=True, help="The strong form as well: an identifier from derivatives of the signals.")
+@click.option("--soft-sign", "soft_signs", multiple=True, metavar="V=WIDTH", help="V/(|V| + WIDTH) in place of sgn(V).")
+@click.option("--reach", "reaches", multiple=True, metavar="INPUT=VALUE", help="Fixed point: largest |INPUT|.")
+@click.option(
+    "--bandwidth",
+    type=_ABOVE_0,
+    default=10.0,
+    show_default=True,
+    help="Fixed point: of the signals [Hz], for derivatives.",
+)
+@click.option(
+    "--window", type=_ABOVE_0, default=2.0, show_default=True, help="Fixed point: of integrals since its start [s]."
+)
+def build(
+    model: str,
+    out: Path,
+    only_check: bool,
+    strong: bool,
+    soft_signs: tuple[str, ...],
+    reaches: tuple[str, ...],
+    bandwidth: float,
+    window: float,
+) -> int:
     """Writes the C of MODEL, its numpy twin, a header with every name and unit, a CMake target and a test.
 
     In the CMakeLists.txt of your firmware: add_subdirectory(OUT) and target_link_libraries(my_firmware PRIVATE NAME).
     """
     from pvid.codegen import build as generated
+    from pvid.codegen.reaches import Reaches
     from pvid.models.mechanisms import compiled_of
 
     compiled = compiled_of(model)
+    limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
+    options = generated.Options(limits, _numbers(soft_signs, "--soft-sign"), strong)
+    given = [*(["--strong"] if strong else []), *(f"--soft-sign {one}" for one in soft_signs)]
+    given += [f"--reach {one}" for one in reaches]
+    usual = Reaches()
+    given += [f"--bandwidth {bandwidth:g}"] if bandwidth != usual.bandwidth_hz else []
+    given += [f"--window {window:g}"] if window != usual.window_s else []
+    title = " ".join(["pvid model build", compiled.name, *given])
     if not only_check:
-        for path in generated.build(compiled, out):
+        for path in generated.build(compiled, out, title, options):
             click.echo(path)
+        reason = generated.fixed_point_refusal(compiled, options)
+        if reason is not None:
+            write_stderr(f"pvid: no fixed point: {reason}")
         return DONE
     try:
-        generated.check(compiled, out)
+        generated.check(compiled, out, title, options)
     except PvidError as error:
         write_stderr(f"pvid: {error}")
         return DIFFERENT
@@ -142,7 +173,7 @@ def build(model: str, out: Path, only_check: bool) -> int:
 @_MODEL
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.")
-@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Length [s].  [default: the rig's]")
+@click.option("--duration", type=_ABOVE_0, help="Length [s].  [default: the rig's]")
 @click.option("--friction", type=click.Choice(["sharp", "soft"]), default="sharp", show_default=True)
 @click.option("--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp.")
 @click.option(
@@ -176,3 +207,21 @@ def simulate(
     settings = write_simulated_run(out, run, simulation)
     write_stderr(f"{out}: {simulation.samples} samples of {', '.join(run)}; rig file {settings}")
     return DONE
+
+
+def _numbers(given: tuple[str, ...], option: str) -> dict[str, float]:
+    """NAME=VALUE, several times.
+
+    Raises
+    ------
+    PvidError
+        Where one is not of this kind.
+    """
+    found = {}
+    for one in given:
+        name, _, value = one.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError as error:
+            raise PvidError(f"{option} {one}: write NAME=VALUE, as in {option} phi_1=40") from error
+    return found

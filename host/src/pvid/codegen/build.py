@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pvid.base.atomic_write import appearing
@@ -10,9 +13,10 @@ from pvid.codegen import files_f32, files_q31, files_strong, self_test, twin_fil
 from pvid.codegen.banner import banner
 from pvid.codegen.fixed_model import fixed_model
 from pvid.codegen.functions import ModelFunctions, functions_of
-from pvid.codegen.reaches import Reaches
-from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
+from pvid.codegen.reaches import Reaches, reaches_of
+from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.model.compiled import CompiledModel
+from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
 
 _CMAKE = """\
@@ -56,13 +60,32 @@ endif()
 """
 
 
-def files_of(
-    functions: ModelFunctions, command: str, reaches: Reaches | None = None, strong: StrongFunctions | None = None
-) -> dict[str, str]:
-    """Name -> text of each file.
+@dataclass(frozen=True)
+class Options:
+    """What is generated besides the functions in float32.
 
-    The fixed-point ones only where fixed point can compute all functions; the strong form's only where it is given.
+    Attributes
+    ----------
+    reaches : of the inputs, for the fixed-point formats
+    soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
+    strong : the strong form as well, an identifier from derivatives of the signals
     """
+
+    reaches: Reaches = field(default_factory=Reaches)
+    soft_signs: Mapping[str, float] = field(default_factory=dict)
+    strong: bool = False
+
+
+def files_of(compiled: CompiledModel, command: str, options: Options | None = None) -> dict[str, str]:
+    """Name -> text of each file; the fixed-point ones only where fixed point can compute all functions.
+
+    Raises
+    ------
+    PvidError
+        Where a function cannot be generated; for a soft sign that is in no channel.
+    """
+    chosen = options or Options()
+    functions = _functions(compiled, chosen)
     name = functions.name
     files = {
         f"{name}_sizes.h": files_f32.sizes(functions, command),
@@ -70,17 +93,18 @@ def files_of(
         f"{name}_f32.c": files_f32.source(functions, command),
     }
     fixed = None
-    if refusal(functions, reaches) is None:
-        fixed = fixed_model(functions, reaches)
+    if refusal(functions, chosen.reaches) is None:
+        fixed = fixed_model(functions, chosen.reaches)
         files[f"{name}_q31.h"] = files_q31.header(fixed, command)
         files[f"{name}_q31.c"] = files_q31.source(fixed, command)
-    if strong is not None:
-        named = renamed(strong)
+    apart = [f"{name}_test.c"]
+    if chosen.strong:
+        named = renamed(strong_functions_of(strong_form(compiled)))
         files[f"{name}_strong.h"] = files_strong.header(named, command)
         files[f"{name}_strong_f32.c"] = files_strong.source(named, command)
+        apart.append(f"{name}_strong_f32.c")
     files[f"{name}_twin.py"] = twin_file.text(functions, command, fixed)
     files[f"{name}_test.c"] = self_test.source(functions, command, fixed)
-    apart = (f"{name}_test.c", f"{name}_strong_f32.c")
     sources = " ".join(one for one in files if one.endswith(".c") and one not in apart)
     files["CMakeLists.txt"] = _CMAKE.format(
         banner="\n# ".join(banner(functions, command)), name=name, upper=name.upper(), sources=sources
@@ -88,8 +112,27 @@ def files_of(
     return files
 
 
+def _functions(compiled: CompiledModel, options: Options) -> ModelFunctions:
+    functions = functions_of(compiled, options.soft_signs)
+    signs = {str(one.args[0]) for label in functions.channels.expressions for one in label.atoms(sgn)}
+    for name, width in options.soft_signs.items():
+        if name not in signs:
+            known = f"its signs are of {', '.join(sorted(signs))}" if signs else "it has none"
+            raise PvidError(f"{compiled.name} has no sign of {name}: {known}")
+        if not 0 < width < math.inf:
+            raise PvidError(f"the width of the sign of {name} must be positive, not {width}")
+    return functions
+
+
 def refusal(functions: ModelFunctions, reaches: Reaches | None = None) -> str | None:
-    """Why the functions have no fixed-point form; None where they have one."""
+    """Why the functions have no fixed-point form; None where they have one.
+
+    Raises
+    ------
+    PvidError
+        For a reach that is given for no input.
+    """
+    reaches_of(functions, reaches or Reaches())
     try:
         fixed_model(functions, reaches)
     except PvidError as error:
@@ -97,12 +140,14 @@ def refusal(functions: ModelFunctions, reaches: Reaches | None = None) -> str | 
     return None
 
 
+def fixed_point_refusal(compiled: CompiledModel, options: Options | None = None) -> str | None:
+    """Why a model gets no fixed-point files; None where it gets them."""
+    chosen = options or Options()
+    return refusal(_functions(compiled, chosen), chosen.reaches)
+
+
 def build(
-    compiled: CompiledModel,
-    directory: Path,
-    command: str | None = None,
-    reaches: Reaches | None = None,
-    strong: bool = False,
+    compiled: CompiledModel, directory: Path, command: str | None = None, options: Options | None = None
 ) -> list[Path]:
     """Writes the files of a model.
 
@@ -114,16 +159,14 @@ def build(
         Where; it is made if there is none.
     command
         For the banner; `pvid model build NAME` by default.
-    reaches
-        Of the inputs, for the fixed-point formats.
-    strong
-        Adds the strong form, an identifier from derivatives of the signals.
+    options
+        What is generated besides the functions in float32.
 
     Returns
     -------
     The files.
     """
-    files = _files(compiled, command, reaches, strong)
+    files = files_of(compiled, command or _command(compiled), options)
     directory.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, text in files.items():
@@ -133,21 +176,15 @@ def build(
     return paths
 
 
-def check(
-    compiled: CompiledModel,
-    directory: Path,
-    command: str | None = None,
-    reaches: Reaches | None = None,
-    strong: bool = False,
-) -> None:
-    """Whether the files in a folder are those of the model.
+def check(compiled: CompiledModel, directory: Path, command: str | None = None, options: Options | None = None) -> None:
+    """Whether the files in a folder are those of the model; see `build`.
 
     Raises
     ------
     PvidError
         For the first file that is missing or differs.
     """
-    for name, text in _files(compiled, command, reaches, strong).items():
+    for name, text in files_of(compiled, command or _command(compiled), options).items():
         path = directory / name
         if not path.is_file():
             raise PvidError(f"{path} is missing: build the model again")
@@ -155,10 +192,5 @@ def check(
             raise PvidError(f"{path} is not what {compiled.name} generates now: build the model again")
 
 
-def _files(compiled: CompiledModel, command: str | None, reaches: Reaches | None, strong: bool) -> dict[str, str]:
-    return files_of(
-        functions_of(compiled),
-        command or f"pvid model build {compiled.name}",
-        reaches,
-        strong_functions_of(strong_form(compiled)) if strong else None,
-    )
+def _command(compiled: CompiledModel) -> str:
+    return f"pvid model build {compiled.name}"
