@@ -135,7 +135,7 @@ def identify(
     other = other_length(model, run, used, fit.p)
     if other is not None:
         reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
-    shorter = with_shorter_rates(model, run, used, fit.p)
+    shorter = shorter_rates(model, run, used, fit.p)
     if shorter is not None:
         reasons["smoothing"] = verdict.of_smoothing(compiled, fit, found, shorter, uncertainty(shorter))
     sensors = SensorErrors(run, used, fit)
@@ -168,9 +168,7 @@ def identify(
     )
 
 
-def with_shorter_rates(
-    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float
-) -> Fit | None:
+def shorter_rates(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:
     """The same with derivatives over fewer samples; None where there are none, or too few samples for the degree."""
     taps = 2 * round(_SHORTER * design.rate_taps / 2) + 1
     if not any(jet.order for jet in model.channels.needed) or taps <= design.rate_degree + 2:
