@@ -19,8 +19,8 @@ static int32_t sine_of_half_turns(int64_t h, uint32_t bits)
 {
     const uint64_t half = (uint64_t)1 << (bits - 1u);
     const uint64_t from_half = pvid_magnitude_q31(h) + half;
-    const uint64_t mask = ((uint64_t)1 << bits) - 1u;
-    const int64_t rest = (int64_t)(from_half & mask) - (int64_t)half; /* |h| less the nearest integer */
+    const uint64_t part = from_half & (((uint64_t)1 << bits) - 1u);
+    const int64_t rest = (int64_t)part - (int64_t)half; /* |h| less the nearest integer */
     const int32_t y = (int32_t)pvid_round_shift_q31(rest, bits - ANGLE_BITS);
     const int32_t z = (int32_t)pvid_round_shift_q31(pvid_square_q31(y), ANGLE_BITS);
     int32_t sum = polynomial[0];
