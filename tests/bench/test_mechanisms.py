@@ -34,7 +34,7 @@ def test_errors_are_near_those_of_the_audit_and_warnings_are_none(name: str) -> 
 
 def test_every_imperfection_is_one_that_the_mechanism_can_have() -> None:
     assert mechanisms.number_of_cases("dc_motor") == len(mechanisms.CASES)
-    assert mechanisms.number_of_cases("battery_2rc") == len(mechanisms.CASES) - 3  # no friction, no encoder
+    assert mechanisms.number_of_cases("battery_2rc") == len(mechanisms.CASES) - 4  # no friction, no encoder
     rows = list(mechanisms.imperfection_rows("battery_2rc", 1))
     assert [row[1] for row in rows][0] == "none" and all(len(row) == len(mechanisms.IMPERFECT) for row in rows)
     late = next(row for row in rows if row[1] == "one sensor a sample late")

@@ -78,7 +78,7 @@ def test_real_rig_is_identified_and_its_other_run_predicted(source: Source) -> N
     first, second = (source.load(RECORDINGS, piece) for piece in PIECES)
     found = recorded_rigs.rig_of(source, (first, second), recorded_rigs.DESIGNS[source.name])
     predicted = found.predicted()
-    assert min(one.r2 for one in predicted.values()) > 0.95
+    assert min(one.r2 for one in predicted.values()) > 0.9  # open loop to the end of the run
     published = found.published
     if published is not None:
         theirs = found.replay(1, recorded_rigs.friction_of(published, found.model)).matches(published)

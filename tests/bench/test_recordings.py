@@ -93,9 +93,14 @@ def test_piece_is_read_back_as_it_was_cut(tmp_path: Path) -> None:
     one = source("simple_pendulum")
     t = 0.004 * np.arange(60)
     rows = [f"{a:.6f},{np.sin(a):.9f},0,{np.cos(a):.9f}" for a in t]
-    for piece in (one.identify, one.predict, *one.traps.values()):
+    for piece in one.pieces.values():
         made(tmp_path, one, piece).write_text("\n".join(["time,position,velocity,torque", *rows]), encoding="utf-8")
-    recordings.write_source(one, tmp_path, tmp_path / "cut")
+    written = recordings.write_source(one, tmp_path, tmp_path / "cut")
     cut, back = one.cut(tmp_path, one.predict), one.load(tmp_path / "cut", "predict")
     np.testing.assert_array_equal(back.signals["q"], cut.signals["q"])
     assert back.sample_rate == pytest.approx(250.0)
+    note = written[-1].read_text(encoding="utf-8")
+    assert note.startswith("# simple_pendulum\n")
+    assert all(
+        word in note for word in (one.repository, one.commit, one.licence, one.identify.path, "tau [N*m] torque")
+    )

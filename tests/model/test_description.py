@@ -56,13 +56,20 @@ FINE_LINES = """x = model.sensor("x", "m", resolution=1e-4)
 u = model.input("u", "N", hold="zoh")
 m, b = model.unknown("m", "kg", 1.0), model.unknown("b", "N*s/m", 1.0)
 """
+FINE_EQUATION = "model.equation(m * x.d(2) + b * x.d() - u)\n"
 
 
 def test_a_users_file_is_compiled_by_its_name(tmp_path: Path) -> None:
-    path = written(tmp_path, FINE_LINES + "model.equation(m * x.d(2) + b * x.d() - u)\n")
+    path = written(tmp_path, FINE_LINES + FINE_EQUATION)
     compiled = compiled_of(path)
     assert compiled.name == "mine"
     assert compiled_of(path) is compiled
+
+
+def test_a_file_may_import_what_lies_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "masses_of_mine.py").write_text("GUESS = 1.5\n", encoding="utf-8")
+    path = written(tmp_path, FINE_LINES + "from masses_of_mine import GUESS\n" + FINE_EQUATION)
+    assert compiled_of(path).unknowns[0].guess == 1.0
 
 
 @pytest.mark.parametrize(
@@ -92,6 +99,8 @@ def test_a_users_file_is_compiled_by_its_name(tmp_path: Path) -> None:
         ("model.equation(m * sgn(b) * x.d(2) - u)", "line 6: sgn(b) is not supported: make it the unknown itself"),
         ("model.equation(m * x.d(2) - u * (b / b) ** 0.5 - u * abs(x) ** 0.5)", "line 6: equation 1"),
         ("raise SystemExit(3)", "line 6: SystemExit"),
+        ("raise ValueError('two\\nlines')", "line 6: ValueError: two lines"),
+        ("import nothing_of_this_name", "line 6: ModuleNotFoundError"),
     ],
 )
 def test_errors_name_line_symbol_and_cause(tmp_path: Path, line: str, said: str) -> None:

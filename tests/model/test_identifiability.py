@@ -31,6 +31,8 @@ def test_an_unknown_mass_at_the_elbow_shifts_three_base_parameters() -> None:
     assert shift.kind == "sum"
     assert "only I1 + m2*l1², h1 + l1*m2 can be identified" in verdict(found).replace("l1²*m2", "m2*l1²")
     assert judged(arm(elbow_known=True)).identifiable
+    first, _ = arm(elbow_known=False).compiled().rows
+    assert {str(one) for one in first.theta} == {"I2", "h2", "h1 + l1*m2", "I1 + I2 + l1**2*m2"}
 
 
 def test_a_motor_without_current_sensor_has_its_torque_constant_and_products_only() -> None:
@@ -112,5 +114,5 @@ def test_the_report_names_every_theta_unknown_and_signal(name: str) -> None:
 def test_the_report_of_a_row_reads_as_mathematics() -> None:
     text = check_report(compiled_of("cart_pendulum"))
     assert "ml*cos(c)   D[x'*cos(a)] + g*sin(a) + a'*x'*sin(a)" in text
-    assert "equation of a has no known term; another row fixes its scale." in text
+    assert "equation of a: no term is free of unknowns; another row fixes the scale." in text
     assert "i has a corner at every step of V" in check_report(compiled_of("dc_motor"))

@@ -113,7 +113,7 @@ def test_located_reversals_are_worth_ten_times_the_average_of_the_sign() -> None
 def test_noise_of_the_rows_is_what_the_filters_predict() -> None:
     name = "cart_pendulum"
     model, truth = ready(compiled_of(name)), simulation(name).truth
-    clean = simulation(name).run(0)
+    clean = simulation(name).run(0, Imperfections(friction="soft"))
     design = replace(DESIGNS[name], reversals="soft", soft=simulated_rig(name).friction_width)
     rng = np.random.default_rng(0)
     theta = model.parameters.theta(truth)

@@ -6,18 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bench.mechanisms import design_of, law_of, start_of
+from bench.mechanisms import design_of, start_of
 from pvid.models.mechanisms import names
 from pvid.oracle.fourier.identify import Identified, identify
 from pvid.sim.imperfections import Imperfections
-from pvid.sim.simulated_run import simulation_of
+from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 
 
 @cache
 def answer(name: str, key: str = "", signal: str = "", size: float = 0.0) -> Identified:
     """What a run with sharp friction and one imperfection gives."""
     simulation = simulation_of(name)
-    imperfections = Imperfections(law_of(simulation).friction, **({key: {signal: size}} if key else {}))  # type: ignore[arg-type]
+    imperfections = Imperfections(**({key: {signal: size}} if key else {}))  # type: ignore[arg-type]
     run, design = simulation.run(3, imperfections), design_of(simulation, imperfections)
     return identify(simulation.model, run, simulation.rig.sample_rate, start_of(simulation, 3), design)
 
@@ -52,6 +52,18 @@ def test_error_of_a_sensor_is_named_with_its_size(
     assert any(one.name == "sensor" and signal in one.text for one in found.verdict.reasons)
 
 
+@pytest.mark.parametrize(("name", "width"), [("dc_motor", 3.0), ("two_mass_drive", 1.0)])
+def test_friction_that_is_soft_is_named_with_about_its_width(name: str, width: float) -> None:
+    """Estimated with a sign that switches: widths that are tried are a factor of three apart."""
+    simulation = simulation_of(name)
+    run = simulation.run(3, SOFT)
+    found = identify(simulation.model, run, 1000.0, start_of(simulation, 3), design_of(simulation, PERFECT))
+    error = found.sensor_error
+    assert error is not None and error.kind == "friction"
+    assert width / 2 < error.size < 2 * width
+    assert "friction" in [one.name for one in found.verdict.reasons if one.alarm]
+
+
 def test_shift_of_an_error_leads_back_to_the_truth() -> None:
     """The motor's angle a sample late: errors fall from 1 % to below a twentieth of that."""
     found = answer("dc_motor", "skew", "phi", 1e-3)
@@ -78,9 +90,9 @@ def test_declared_gain_is_part_of_the_standard_errors_and_needs_no_note() -> Non
     """1 % of the force: every parameter of the cart but the encoder's zero."""
     simulation = simulation_of("cart_pendulum")
     signals = tuple(replace(one, gain_sd=0.01 if one.name == "F" else 0.0) for one in simulation.model.signals)
-    run = simulation.run(3, Imperfections("sharp", gain={"F": 1.01}))
+    run = simulation.run(3, Imperfections(gain={"F": 1.01}))
     plain, declared = (
-        identify(model, run, simulation.rig.sample_rate, design=design_of(simulation, Imperfections("sharp")))
+        identify(model, run, simulation.rig.sample_rate, design=design_of(simulation, PERFECT))
         for model in (simulation.model, replace(simulation.model, signals=signals))
     )
     assert np.any(np.abs(plain.p - simulation.truth) > 100 * plain.se)

@@ -61,3 +61,13 @@ def test_standard_errors_contain_the_distance() -> None:
     other = as_white_force(found.fit)
     assert other is not None
     assert (found.se >= np.abs(other - found.p)).all()
+
+
+def test_log_determinant_is_that_of_every_windows_covariance() -> None:
+    fit = batch(WeakRows.of(ready(MODEL), run(0.05), DESIGN))
+    (white,) = fit.white
+    theta = fit.parameters.theta(fit.p)
+    plain = fit.rows.covariance((0,), theta, fit.errors)
+    directions = fit.rows.directions((0,), theta)
+    expected = sum(np.linalg.slogdet(plain + u.T @ u)[1] for u in directions)
+    np.testing.assert_allclose(white.whitener.log_determinant(), expected, rtol=0, atol=1e-3)  # but for the ridge

@@ -6,9 +6,8 @@ import pytest
 from pvid.models.mechanisms import compiled_of, names
 from pvid.models.simulated_rig import simulated_rig
 from pvid.sim.bound import bound
-from pvid.sim.imperfections import Imperfections
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, STANDARD_RELEASE, Sensors, simulate
-from pvid.sim.simulated_run import RigSimulation, rig_of_guess, simulation_of
+from pvid.sim.simulated_run import SOFT, RigSimulation, rig_of_guess, simulation_of
 
 
 @pytest.mark.parametrize("name", names())
@@ -24,7 +23,7 @@ def test_rig_moves_within_the_ranges_of_its_signals(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in names() if simulated_rig(name).friction_width])
 def test_sharp_friction_leaves_no_rig_far_from_the_soft_one(name: str) -> None:
     one = simulation_of(name)
-    soft, sharp = one.motion(), one.motion(Imperfections("sharp"))
+    soft, sharp = one.motion(SOFT), one.motion()
     for signal in one.model.signals:
         if signal.kind == "sensor" and not signal.driven:
             apart = np.ptp(soft[signal.name] - sharp[signal.name])

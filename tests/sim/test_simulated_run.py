@@ -19,9 +19,9 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import read_recording
 from pvid.sim.bound import bound
 from pvid.sim.drives import DRIVES, drive_named
-from pvid.sim.imperfections import Imperfections, with_play
+from pvid.sim.imperfections import Imperfections, sizes_of, with_play
 from pvid.sim.sensing import sensed
-from pvid.sim.simulated_run import RigSimulation, write_simulated_run
+from pvid.sim.simulated_run import SOFT, RigSimulation, write_simulated_run
 
 LSB = 2 * math.pi / 2**12
 
@@ -88,9 +88,9 @@ def test_sensor_rounds_to_its_resolution_with_the_noise_of_its_signal(simulation
 def test_sharp_friction_and_stiction_change_the_motion() -> None:
     weak = Sines(((0.08, 0.7, 0.0), (0.03, 1.9, 1.0)))
     simulation = RigSimulation.of(shaft(), replace(RIG, drive={"M": weak}))
-    soft = simulation.motion()["phi"]
-    sharp = simulation.motion(Imperfections("sharp"))["phi"]
-    stuck = simulation.motion(Imperfections("sharp", breakaway=1.4))["phi"]
+    soft = simulation.motion(SOFT)["phi"]
+    sharp = simulation.motion()["phi"]
+    stuck = simulation.motion(Imperfections(breakaway=1.4))["phi"]
     assert np.ptp(sharp - soft) > 10 * LSB
     assert np.ptp(stuck - sharp) > 10 * LSB
 
@@ -158,11 +158,22 @@ def test_wrong_requests_are_one_sentence(simulation: RigSimulation) -> None:
     with pytest.raises(PvidError, match="gives no value of Tc"):
         RigSimulation.of(shaft(), replace(RIG, truth={"J": 1.0, "b": 1.0}))
     with pytest.raises(PvidError, match="needs a sharp friction"):
-        Imperfections(breakaway=1.5)
+        Imperfections("soft", breakaway=1.5)
     with pytest.raises(PvidError, match="friction is soft or sharp"):
         Imperfections(friction="wet")  # type: ignore[arg-type]
     with pytest.raises(PvidError, match="nothing has no simulated rig"):
         simulated_rig("nothing")
+
+
+def test_imperfections_are_read_from_settings() -> None:
+    sizes = sizes_of(["skew.phi=1e-3", "gain.M=1.01", "skew.psi = 2e-3"])
+    assert sizes == {"skew": {"phi": 1e-3, "psi": 2e-3}, "gain": {"M": 1.01}}
+    for setting, sentence in (
+        ("phi=3", "'phi=3' is not KIND.SIGNAL=SIZE with a KIND of backlash, eccentricity, skew and gain"),
+        ("skew.phi=late", "'late' is no number"),
+    ):
+        with pytest.raises(PvidError, match=sentence):
+            sizes_of([setting])
 
 
 def test_run_is_written_with_its_rig_file(simulation: RigSimulation, tmp_path: Path) -> None:

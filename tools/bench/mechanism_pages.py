@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,6 +25,11 @@ from pvid.oracle.fourier.identify import identify
 from pvid.sim.simulated_run import RigSimulation
 
 SEED = 1
+# Tables of benchmarks/mechanisms.md and their headings on a mechanism's own page.
+TABLES = {
+    "mechanisms": "Errors with soft friction, the rig's own design",
+    "mechanisms-chosen": "Errors with sharp friction, a design chosen on each run",
+}
 _SHOWN = 0.25  # of the run, in the picture
 
 
@@ -87,8 +94,22 @@ def fit_of(example: Example, name: str) -> float:
     return 1.0 - float(np.sum((measured - simulated) ** 2) / np.sum((measured - measured.mean()) ** 2))
 
 
-def page(name: str, example: Example) -> str:
-    """The text of a page, without the table of errors."""
+def errors_of(table: str, page_text: str, name: str) -> list[str]:
+    """Lines of a table of benchmarks/mechanisms.md with the rows of one mechanism, without its column; none: []."""
+    found = re.search(rf"<!-- {table} -->\n(.*?)<!-- /{table} -->", page_text, re.S)
+    lines = found[1].strip().splitlines() if found else []
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    rows = [row for row in cells[2:] if row[0] == name]
+    return [f"| {' | '.join(row[1:])} |" for row in [*cells[:2], *rows]] if rows else []
+
+
+def page(name: str, example: Example, errors: Mapping[str, str]) -> str:
+    """The text of a page.
+
+    Parameters
+    ----------
+    errors : heading -> table
+    """
     model, (_, path) = example.model, path_of(name)
     sensors = [one for one in model.signals if one.kind == "sensor" and not one.driven]
     fits = ", ".join(f"{one.name} {fit_of(example, one.name):.6f}" for one in sensors)
@@ -113,6 +134,7 @@ def page(name: str, example: Example) -> str:
             f"from the same start and drive; R^2 over the whole run: {fits}.",
             "",
             f"![Measured and simulated signals](../images/mechanisms/{name}.png)",
+            *(f"\n## {heading}\n\n{table}" for heading, table in errors.items()),
             "",
         ]
     )
@@ -124,4 +146,7 @@ def write_page(docs: Path, name: str) -> None:
     (docs / "images" / "mechanisms").mkdir(parents=True, exist_ok=True)
     example = example_of(name)
     picture(example, docs / "images" / "mechanisms" / f"{name}.png")
-    write_whole(docs / "mechanisms" / f"{name}.md", page(name, example))
+    measured = (docs / "benchmarks" / "mechanisms.md").read_text(encoding="utf-8")
+    tables = {heading: errors_of(table, measured, name) for table, heading in TABLES.items()}
+    errors = {heading: "\n".join(lines) for heading, lines in tables.items() if lines}
+    write_whole(docs / "mechanisms" / f"{name}.md", page(name, example, errors))

@@ -18,7 +18,7 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.identify import Identified, identify
 from pvid.sim.bound import bound
 from pvid.sim.imperfections import Imperfections
-from pvid.sim.simulated_run import PERFECT, RigSimulation, simulation_of
+from pvid.sim.simulated_run import PERFECT, SOFT, RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
 Progress = Callable[[int], object]
@@ -48,7 +48,6 @@ IMPERFECT = (
     "warnings",
     "wrong without a warning",
 )
-SHARP = Imperfections("sharp")
 
 
 @dataclass(frozen=True)
@@ -67,11 +66,6 @@ class Imperfection:
     gain_sd: float = 0.0
 
 
-def law_of(simulation: RigSimulation) -> Imperfections:
-    """Sharp friction where the rig has friction."""
-    return SHARP if simulation.rig.friction_width else PERFECT
-
-
 def _encoder(simulation: RigSimulation) -> str:
     """The first encoder's name; "" where the mechanism has none."""
     angles = (one.name for one in simulation.model.signals if _measures(one) and one.unit == "rad")
@@ -84,16 +78,20 @@ def _measures(signal: Signal) -> bool:
 
 def _gain(simulation: RigSimulation) -> Imperfections:
     driven = next(one.name for one in simulation.model.signals if one.driven or one.kind == "input")
-    return replace(law_of(simulation), gain={driven: 1.01})
+    return replace(PERFECT, gain={driven: 1.01})
 
 
 def _skew(simulation: RigSimulation) -> Imperfections:
     late = [one.name for one in simulation.model.signals if _measures(one)][-1]
-    return replace(law_of(simulation), skew={late: 1.0 / simulation.rig.sample_rate})
+    return replace(PERFECT, skew={late: 1.0 / simulation.rig.sample_rate})
 
 
 def _stiction(simulation: RigSimulation) -> Imperfections | None:
-    return Imperfections("sharp", breakaway=1.3) if simulation.rig.friction_width else None
+    return Imperfections(breakaway=1.3) if simulation.rig.friction_width else None
+
+
+def _soft(simulation: RigSimulation) -> Imperfections | None:
+    return SOFT if simulation.rig.friction_width else None
 
 
 def _on_encoder(key: str, size: float) -> Callable[[RigSimulation], Imperfections | None]:
@@ -101,13 +99,14 @@ def _on_encoder(key: str, size: float) -> Callable[[RigSimulation], Imperfection
         name = _encoder(simulation)
         turns = bool(name) and np.ptp(simulation.motion()[name]) > 2.0  # else an eccentricity is part of its zero
         given: dict[str, Any] = {key: {name: size}}
-        return replace(law_of(simulation), **given) if name and (turns or key == "backlash") else None
+        return replace(PERFECT, **given) if name and (turns or key == "backlash") else None
 
     return of
 
 
 CASES = (
-    Imperfection("none", law_of),
+    Imperfection("none", lambda _: PERFECT),
+    Imperfection("soft friction", _soft),
     Imperfection("stiction, 1.3 times the friction", _stiction),
     Imperfection("backlash of 3 LSB before the encoder", _on_encoder("backlash", 3.0)),
     Imperfection("eccentric encoder, 3 LSB", _on_encoder("eccentricity", 3.0)),
@@ -233,7 +232,7 @@ def declared(name: str, gain_sd: float) -> CompiledModel:
 
 def smooth(name: str, seeds: int, progress: Progress = int) -> Outcome:
     """Runs with a soft friction of known width, or none, with the rig's design."""
-    return identified(name, seeds, PERFECT, own_design=True, progress=progress)
+    return identified(name, seeds, SOFT, own_design=True, progress=progress)
 
 
 def accuracy_rows(name: str, outcome: Outcome) -> Iterator[tuple[str, ...]]:
@@ -307,12 +306,12 @@ def tables(names: tuple[str, ...], seeds: int, imperfect: int, progress: Progres
     for name in names:
         soft = smooth(name, seeds, progress)
         accuracy += list(accuracy_rows(name, soft))
-        law = law_of(soft.simulation)
-        chosen = identified(name, seeds, law, progress=progress)
+        chosen = identified(name, seeds, PERFECT, progress=progress)
+        rubs = bool(soft.simulation.rig.friction_width)
         sharp += list(accuracy_rows(name, chosen))
         summary += [
-            summary_row(name, "soft, of known width" if law is SHARP else "none", soft),
-            summary_row(name, "sharp; design chosen" if law is SHARP else "none; design chosen", chosen),
+            summary_row(name, "soft, of known width" if rubs else "none", soft),
+            summary_row(name, "sharp; design chosen" if rubs else "none; design chosen", chosen),
         ]
         if imperfect:
             cases += list(imperfection_rows(name, imperfect, progress))

@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bench import strong_savitzky_golay, weak_sindy
-from bench.mechanisms import design_of, law_of, size_of, start_of
+from bench.mechanisms import design_of, size_of, start_of
 from bench.output_error import output_error
 from bench.replay import Replay
 from pvid.base.errors import PvidError
 from pvid.oracle.fourier.identify import identify
 from pvid.rig.run import Recording
-from pvid.sim.simulated_run import RigSimulation, simulation_of
+from pvid.sim.simulated_run import PERFECT, RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Method:
 
 
 def _weak(simulation: RigSimulation, run: Recording, seed: int) -> Float:
-    design = design_of(simulation, law_of(simulation))
+    design = design_of(simulation, PERFECT)
     return identify(simulation.model, run.signals, run.sample_rate, start_of(simulation, seed), design).p
 
 
@@ -151,7 +151,7 @@ def outcome(method: Method, simulation: RigSimulation, runs: list[Recording]) ->
 
 def recorded(simulation: RigSimulation, seed: int) -> Recording:
     """A run of the simulated rig, with sharp friction where it has any."""
-    signals = simulation.run(seed, law_of(simulation))
+    signals = simulation.run(seed, PERFECT)
     t = signals.pop("t")
     return Recording(t, signals, simulation.rig.sample_rate)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
@@ -88,6 +89,11 @@ class Source:
         knowns = tuple(replace(one, value=self.knowns.get(one.name, one.value)) for one in model.knowns)
         return replace(model, knowns=knowns)
 
+    @property
+    def pieces(self) -> dict[str, Piece]:
+        """By the name of the file that they are cut into."""
+        return dict(zip(PIECES, (self.identify, self.predict), strict=True)) | dict(self.traps)
+
     def cut(self, checkouts: Path, piece: Piece) -> Recording:
         """The piece, from a checkout of the repository at CHECKOUTS/OWNER/NAME.
 
@@ -117,14 +123,45 @@ class Source:
 
 
 def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
-    """Cuts the pieces of a source; gives the files."""
-    (folder / source.name).mkdir(parents=True, exist_ok=True)
-    pieces = dict(zip(PIECES, (source.identify, source.predict), strict=True)) | dict(source.traps)
+    """Cuts the pieces of a source and writes where they are from; gives the files."""
+    place = folder / source.name
+    place.mkdir(parents=True, exist_ok=True)
     paths = []
-    for name, piece in pieces.items():
-        paths.append(folder / source.name / f"{name}.csv.gz")
+    for name, piece in source.pieces.items():
+        paths.append(place / f"{name}.csv.gz")
         write_recording(paths[-1], source.cut(checkouts, piece), source.channels)
+    paths.append(place / "PROVENANCE.md")
+    write_whole(paths[-1], provenance(source).encode())
     return paths
+
+
+def provenance(source: Source) -> str:
+    """Where the pieces are from, and what they hold."""
+    columns = ", ".join(f"{one.name} [{one.unit}] {one.meaning}" for one in source.channels)
+    pieces = [
+        f"| {name}.csv.gz | {piece.path} | {piece.part} | {piece.start:g} to {piece.end:g} |"
+        for name, piece in source.pieces.items()
+    ]
+    published = ", ".join(f"{name} = {value:.6g}" for name, value in source.published.items())
+    rate = "the recording's own" if source.rate is None else f"{source.rate:g} Hz"
+    return "\n".join(
+        [
+            f"# {source.name}",
+            "",
+            f"Recorded by others: {source.repository}, commit {source.commit}.",
+            f"Licence: {source.licence}. Its text is the file LICENSE of that repository.",
+            "",
+            f"Columns: t [s], {columns}. Interpolated onto an even clock, rate: {rate}; rounded below the",
+            "resolution of the sensors. Cut by `./tools/pvid bench recordings FOLDER --cut CHECKOUTS`.",
+            "",
+            "| file | of | part | s |",
+            "|---|---|---|---|",
+            *pieces,
+            "",
+            f"Published there ({source.published_at}): {published}." if published else "No parameters are published.",
+            "",
+        ]
+    )
 
 
 # ---- formats

@@ -23,7 +23,7 @@ typedef struct {
     float dead_zone;   /* square of the configured one */
     uint8_t n_p;       /* parameters */
     uint8_t n_excited; /* the first ones, which are checked for excitation */
-    uint8_t positive;  /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a] */
+    uint8_t positive;  /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a]; PVID_MAX_P <= 8 */
     uint8_t engine;    /* PVID_ENGINE_ */
 } pvid_solve_settings_f32;
 

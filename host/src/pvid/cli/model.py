@@ -174,19 +174,34 @@ def build(
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.")
 @click.option("--duration", type=_ABOVE_0, help="Length [s].  [default: the rig's]")
-@click.option("--friction", type=click.Choice(["soft", "sharp"]), default="soft", show_default=True)
+@click.option("--friction", type=click.Choice(["sharp", "soft"]), default="sharp", show_default=True)
 @click.option("--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp.")
-def simulate(model: str, out: Path, seed: int, duration: float | None, friction: str, stiction: float) -> int:
+@click.option(
+    "--imperfect",
+    "imperfect",
+    multiple=True,
+    metavar="KIND.SIGNAL=SIZE",
+    help="backlash or eccentricity [LSB], skew [s], gain [true over recorded]; repeatable.",
+)
+def simulate(
+    model: str,
+    out: Path,
+    seed: int,
+    duration: float | None,
+    friction: str,
+    stiction: float,
+    imperfect: tuple[str, ...],
+) -> int:
     """Simulates the shipped rig of MODEL with its sensors; writes the run OUT and its rig file."""
     from pvid.models.mechanisms import compiled_of
     from pvid.models.simulated_rig import simulated_rig
-    from pvid.sim.imperfections import Imperfections
+    from pvid.sim.imperfections import Imperfections, sizes_of
     from pvid.sim.simulated_run import RigSimulation, write_simulated_run
 
     compiled = compiled_of(model)
     rig = simulated_rig(compiled.name)
     rig = rig if duration is None else replace(rig, duration=duration)
-    law = Imperfections(friction="sharp" if friction == "sharp" else "soft", breakaway=stiction)
+    law = Imperfections("sharp" if friction == "sharp" else "soft", stiction, **sizes_of(imperfect))
     simulation = RigSimulation.of(compiled, rig)
     run = simulation.run(seed, law)
     settings = write_simulated_run(out, run, simulation)

@@ -51,7 +51,7 @@ def factor(name: str, parts: Part, p: Sequence[sp.Symbol], nuisances: Sequence[P
     channels = [one for one, cells in table.items() if set(cells) - {ONE}]
     channels.sort(key=lambda one: (len(table[one]), one.order, sp.count_ops(one.base), str(one.base)))
     matrix = sp.Matrix(len(channels), len(monos), lambda i, j: table[channels[i]].get(monos[j], ZERO))
-    theta, shares = _factored(matrix, monos)
+    theta, shares = _factored(matrix, monos, p)
     order = sorted(range(len(theta)), key=lambda j: _rank_of(theta[j], p))
     regressors = [merged(*({one.order: shares[i, j] * one.base} for i, one in enumerate(channels))) for j in order]
     row = Row(name, tuple(theta[j] for j in order), tuple(regressors), known, tuple(nuisances))
@@ -102,7 +102,7 @@ def _monos(table: _Table, p: Sequence[sp.Symbol]) -> list[sp.Expr]:
     return sorted(found, key=lambda mono: _rank_of(mono, p))
 
 
-def _factored(matrix: sp.Matrix, monos: Sequence[sp.Expr]) -> tuple[list[sp.Expr], sp.Matrix]:
+def _factored(matrix: sp.Matrix, monos: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -> tuple[list[sp.Expr], sp.Matrix]:
     """theta [rank] and shares [channels, rank] with shares * theta = matrix * monos."""
     field = DomainMatrix.from_Matrix(matrix).to_field()
     if field.rank() == len(monos):
@@ -112,11 +112,11 @@ def _factored(matrix: sp.Matrix, monos: Sequence[sp.Expr]) -> tuple[list[sp.Expr
     chosen = matrix.extract(list(pivots), list(range(len(monos))))
     theta = [sp.factor(sum((chosen[r, j] * mono for j, mono in enumerate(monos)), ZERO)) for r in range(len(pivots))]
     for r, value in enumerate(theta):  # numbers belong to the regressor
-        number, rest = value.as_coeff_Mul()
+        number, rest = value.as_independent(*p, as_Add=False)
         if rest.is_Add and rest.could_extract_minus_sign():
             number, rest = -number, -rest
         theta[r] = rest
-        shares[:, r] = shares[:, r] * number
+        shares[:, r] = (shares[:, r] * number).applyfunc(sp.cancel)
     return theta, shares
 
 

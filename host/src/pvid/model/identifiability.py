@@ -6,24 +6,19 @@ where the shift is a translation, products where it is a change of scale, else t
 
 from __future__ import annotations
 
-import itertools
-import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
-from pvid.model.compiled import CompiledModel, Unknown
+from pvid.model.compiled import CompiledModel
 from pvid.model.gradient import jacobian_at, null_space, rank
 from pvid.model.readable import listed
 from pvid.model.solutions import Solutions
-from pvid.model.terms import matchings
-from pvid.model.units import dimension_of_unit
-from pvid.model.zero import RationalPoint
+from pvid.model.symmetry import Symmetry, symmetries
 
 _SEEDS = (1, 2, 3)  # random points at which ranks are taken: one alone could lie on a special surface
-_MOST_SYMMETRIES = 2000  # tried
 
 
 @dataclass(frozen=True)
@@ -42,27 +37,6 @@ class Shift:
     combinations: tuple[sp.Expr, ...]
     kind: str
     cure: str = ""
-
-
-@dataclass(frozen=True)
-class Symmetry:
-    """Another p with the same theta.
-
-    Attributes
-    ----------
-    swapped : pairs of unknowns that exchange their values
-    negated : unknowns that change their sign
-    excluded : whether the ranges of the unknowns exclude one of the two
-    """
-
-    swapped: tuple[tuple[str, str], ...]
-    negated: tuple[str, ...]
-    excluded: bool
-
-    @property
-    def names(self) -> set[str]:
-        """Unknowns that change."""
-        return {name for pair in self.swapped for name in pair} | set(self.negated)
 
 
 @dataclass(frozen=True)
@@ -105,7 +79,7 @@ def identifiable(compiled: CompiledModel) -> Identifiability:
         spaces = _of_theta(theta, p) if by_theta == found else _of_solutions(along)
         shifts = tuple(replace(one, cure=_cure(compiled, one)) for one in _shifts(*spaces, theta, p))
     groups = [set(one.unknowns) for one in shifts]
-    finite = [one for one in _symmetries(theta, compiled.unknowns) if not any(one.names <= group for group in groups)]
+    finite = [one for one in symmetries(theta, compiled.unknowns) if not any(one.names <= group for group in groups)]
     return Identifiability(found, len(p), shifts, tuple(finite))
 
 
@@ -235,51 +209,3 @@ def _sum(vector: Sequence[sp.Expr], p: Sequence[sp.Symbol], names: Sequence[int]
 
 def _product(vector: Sequence[sp.Expr], p: Sequence[sp.Symbol], names: Sequence[int]) -> sp.Expr:
     return sp.Mul(*(p[k] ** value for value, k in zip(vector, names, strict=True)))
-
-
-# ---- finite symmetries
-
-
-def _symmetries(theta: Sequence[sp.Expr], unknowns: Sequence[Unknown]) -> list[Symmetry]:
-    """Exchanges of unknowns of one unit, and changes of sign, that leave every theta as it is; the smallest of each."""
-    p = [one.symbol for one in unknowns]
-    out: list[Symmetry] = []
-    for pairs in itertools.islice(matchings(_like(unknowns)), _MOST_SYMMETRIES):
-        if any(set(one.swapped) <= {(str(p[i]), str(p[j])) for i, j in pairs} for one in out):
-            continue
-        exchange = {p[i]: p[j] for i, j in pairs} | {p[j]: p[i] for i, j in pairs}
-        if _same(theta, exchange):
-            named = tuple((str(p[i]), str(p[j])) for i, j in pairs)
-            out.append(Symmetry(named, (), any(_apart(unknowns[i], unknowns[j]) for i, j in pairs)))
-    free = [one.symbol for one in unknowns if not one.positive]
-    for count in range(1, len(free) + 1):
-        for chosen in itertools.islice(itertools.combinations(free, count), _MOST_SYMMETRIES):
-            if any(set(one.negated) <= set(map(str, chosen)) for one in out if one.negated):
-                continue
-            if _same(theta, {one: -one for one in chosen}):
-                named_ = tuple(map(str, chosen))
-                ranges = [one for one in unknowns if one.symbol in chosen]
-                out.append(Symmetry((), named_, any(one.low >= 0 or one.high <= 0 for one in ranges)))
-    return out
-
-
-def _like(unknowns: Sequence[Unknown]) -> list[tuple[int, int]]:
-    """Pairs of unknowns with one unit and, both or none, a sign."""
-    units = [(dimension_of_unit(one.unit), one.positive) for one in unknowns]
-    return [(i, j) for i, j in itertools.combinations(range(len(unknowns)), 2) if units[i] == units[j]]
-
-
-def _apart(one: Unknown, other: Unknown) -> bool:
-    return one.high <= other.low or other.high <= one.low
-
-
-def _same(theta: Sequence[sp.Expr], change: Mapping[sp.Symbol, sp.Expr]) -> bool:
-    """Whether each theta is unchanged, at a random rational point."""
-    for value in theta:
-        if not value.free_symbols & set(change):
-            continue
-        point = RationalPoint(random.Random(5))
-        other = value.subs(change, simultaneous=True)
-        if point.of(value) != point.of(other):
-            return False
-    return True

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from pvid.model.compiled import Row, Unknown
+from pvid.model.compiled import Part, Row, Unknown
 from pvid.model.factor import divided
 from pvid.model.gradient import jacobian_at, rank
 from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
+from pvid.model.signals import order_of
 
 
 def with_scales(rows: Sequence[Row], unknowns: Sequence[Unknown]) -> list[Row]:
@@ -39,6 +40,11 @@ def _follows(theta: sp.Expr, fixed: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -
     return rank(both[:-1, :]) == rank(both)
 
 
+def _derivatives(part: Part) -> int:
+    """Most derivatives of a signal, those of the test function included."""
+    return max(m + order_of(psi) for m, psi in part.items())
+
+
 def _normaliser(row: Row, unknowns: Sequence[Unknown]) -> sp.Expr:
     """A theta that cannot be 0: a product of positive unknowns, of the regressor that takes the most derivatives, whose
     noise is largest and does no harm in Y."""
@@ -54,6 +60,6 @@ def _normaliser(row: Row, unknowns: Sequence[Unknown]) -> sp.Expr:
             f"{row.name} fixes its coefficients up to a common factor only: declare one of "
             f"{', '.join(map(readable, row.theta))} as known"
         )
-    highest = max(max(part) for _, part in candidates)
-    among = [theta for theta, part in candidates if max(part) == highest]
+    highest = max(_derivatives(part) for _, part in candidates)
+    among = [theta for theta, part in candidates if _derivatives(part) == highest]
     return min(among, key=lambda theta: (sp.count_ops(theta), str(theta)))

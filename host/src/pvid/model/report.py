@@ -8,9 +8,10 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Row
 from pvid.model.corners import slopes
-from pvid.model.identifiability import Identifiability, Shift, Symmetry, identifiable
+from pvid.model.identifiability import Identifiability, Shift, identifiable
 from pvid.model.readable import listed, readable, readable_part
 from pvid.model.signals import jets
+from pvid.model.symmetry import Symmetry
 
 __all__ = ["Identifiability", "check_report", "identifiable", "verdict"]
 
@@ -100,9 +101,9 @@ def _advice(compiled: CompiledModel) -> list[str]:
         psis = [psi for part in (*row.regressors, row.known) for psi in part.values()]
         needs = sorted({jet for psi in psis for jet in jets(psi) if jet.order > 0}, key=str)
         if needs:
-            lines.append(f"{row.name} needs {listed([readable(one) for one in needs])}, smoothed.")
+            lines.append(f"{row.name}: smoothed derivatives are needed: {', '.join(map(readable, needs))}.")
         if not row.known:
-            lines.append(f"{row.name} has no known term; another row fixes its scale.")
+            lines.append(f"{row.name}: no term is free of unknowns; another row fixes the scale.")
         if row.top >= 4:
-            lines.append(f"{row.name} takes {row.top} derivatives: it needs a smooth window and a good sensor.")
+            lines.append(f"{row.name}: test functions are differentiated {row.top} times; the sensor must be fine.")
     return ["\n".join(lines)] if lines else []

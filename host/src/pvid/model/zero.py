@@ -10,6 +10,7 @@ import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Any
 
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
@@ -79,6 +80,14 @@ class _FractionPrinter(PythonCodePrinter):  # type: ignore[misc]
         return f"Fraction({number.p}, {number.q})"
 
 
+def function_of_fractions(arguments: Sequence[sp.Symbol], values: Sequence[sp.Expr]) -> Any:
+    """A Python function, exact on fractions, of rational functions."""
+    names = {one: sp.Dummy() for one in arguments}
+    whole = [one.xreplace(names) for one in values]
+    printer = _FractionPrinter({"fully_qualified_modules": False})
+    return sp.lambdify(list(names.values()), whole, modules=[{"Fraction": Fraction}], printer=printer, cse=True)
+
+
 class Sampler:
     """Many functions at once at random rational points; fast, and exact."""
 
@@ -93,15 +102,7 @@ class Sampler:
         sine_marks = {one: sp.Dummy() for one in self.sines}
         apart = [one.xreplace(sine_marks) for one in apart]
         self.plain = sorted(sp.Tuple(*apart).free_symbols - set(sine_marks.values()), key=lambda one: one.sort_key())
-        names = {one: sp.Dummy() for one in self.plain}
-        printer = _FractionPrinter({"fully_qualified_modules": False})
-        self.function = sp.lambdify(
-            [*names.values(), *sine_marks.values()],
-            [one.xreplace(names) for one in apart],
-            modules=[{"Fraction": Fraction}],
-            printer=printer,
-            cse=True,
-        )
+        self.function = function_of_fractions([*self.plain, *sine_marks.values()], apart)
 
     def at_random(self, source: random.Random) -> list[Fraction]:
         """Values at a new point."""

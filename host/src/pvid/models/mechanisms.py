@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import traceback
 from functools import lru_cache
 from pathlib import Path
@@ -37,7 +38,7 @@ def path_of(name_or_path: str | Path) -> tuple[str, Path]:
 
 
 def described(name_or_path: str | Path) -> Model:
-    """The description in a model file.
+    """The description in a model file, which may import Python files that lie beside it.
 
     Raises
     ------
@@ -46,6 +47,8 @@ def described(name_or_path: str | Path) -> Model:
     """
     _, path = path_of(name_or_path)
     space: dict[str, Any] = {"__name__": "pvid_model_file", "__file__": str(path)}
+    folder = str(path.resolve().parent)
+    sys.path.insert(0, folder)
     try:
         exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), space)
     except PvidError:
@@ -53,11 +56,13 @@ def described(name_or_path: str | Path) -> Model:
     except (OSError, UnicodeDecodeError) as error:
         raise PvidError(f"{path}: {error}") from None
     except SyntaxError as error:
-        raise PvidError(f"{path.name}, line {error.lineno}: {error.msg}") from None
+        raise PvidError(f"{Path(error.filename or path).name}, line {error.lineno}: {error.msg}") from None
     except (Exception, SystemExit) as error:
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         where = f"{path.name}, line {lines[-1]}" if lines else path.name
-        raise PvidError(f"{where}: {type(error).__name__}: {error}") from None
+        raise PvidError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from None
+    finally:
+        sys.path.remove(folder)
     model = space.get("model")
     if not isinstance(model, Model):
         raise PvidError(f"{path.name}: the file leaves no variable `model` that is a pvid.model.Model")

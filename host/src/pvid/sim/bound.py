@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from pvid.model.signals import Jet
 from pvid.models.simulated_rig import Servo
-from pvid.sim.simulated_run import RigSimulation
+from pvid.sim.simulated_run import SOFT, RigSimulation
 
 Float = npt.NDArray[np.float64]
 
@@ -18,7 +18,8 @@ _DEPENDENT = 1e-13  # of the largest: a combination of starts that the sensors d
 def bound(simulation: RigSimulation, window_s: float | None = None) -> Float:
     """Least standard errors of the unknowns [n_p] from the rig's run, inf where it does not show one.
 
-    The sensors' noise is that of `Signal.sd`; what a drive sets is known exactly, and so are running integrals of it.
+    Frictions are soft, of the rig's width; the sensors' noise is that of `Signal.sd`; what a drive sets is known
+    exactly, and so are running integrals of it.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def information_of(simulation: RigSimulation, window_s: float | None = None) -> 
     """Fisher's information on the unknowns [n_p, n_p], summed over the windows."""
     rig, plant = simulation.rig, simulation.plant
     truth = simulation.truth
-    trajectory = simulation.motion()
+    trajectory = simulation.motion(SOFT)
     n = round((window_s or rig.window_s) * rig.sample_rate)
     known = {jet.of for jet in simulation.model.opaque}  # integrals of what is driven, from the start of the run
     free = [place for place, one in enumerate(plant.motion.states) if isinstance(one, Jet) and one.of not in known]
@@ -70,7 +71,7 @@ class _Window:
         if len(drives) == len(rig.drive):
             self.inputs = plant.inputs(drives, first, samples, rig.sample_rate, rig.substeps)
         else:
-            self.inputs = simulation.motion().inputs[first : first + samples]
+            self.inputs = simulation.motion(SOFT).inputs[first : first + samples]
         sensors = [one for one in simulation.model.signals if one.kind == "sensor" and not one.driven]
         names = [str(one) for one in (*plant.motion.states, *plant.motion.highest)]
         self.places = [names.index(one.name) for one in sensors]
@@ -88,7 +89,7 @@ class _Window:
             rig.sample_rate,
             self.samples,
             rig.substeps,
-            simulation.friction(),
+            simulation.friction(SOFT),
         )
         return np.ravel(np.asarray(out[:, self.places] / self.sd))
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed, shown
 
 Float = npt.NDArray[np.float64]
 Law = Literal["soft", "sharp"]
 
+_KINDS = ("backlash", "eccentricity", "skew", "gain")  # with a size by signal
 _NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
@@ -26,8 +28,8 @@ class Imperfections:
     Attributes
     ----------
     friction
-        "soft": the sign of a friction is tanh(v / width) with the rig's width; "sharp": it switches, and sticks where
-        it exceeds the other forces.
+        "sharp": the sign of a friction switches, and it sticks where it exceeds the other forces; "soft": the sign is
+        tanh(v / width) with the rig's width.
     breakaway
         Sharp: the friction that holds at rest over the one that slides, >= 1 (stiction).
     backlash
@@ -42,7 +44,7 @@ class Imperfections:
         White disturbance of an equation by its number from 0 [its unit / sqrt(Hz)], held for a sample.
     """
 
-    friction: Law = "soft"
+    friction: Law = "sharp"
     breakaway: float = 1.0
     backlash: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
     eccentricity: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
@@ -60,6 +62,27 @@ class Imperfections:
     def key(self) -> tuple[object, ...]:
         """What the motion depends on, for a cache."""
         return (self.friction, self.breakaway, *(tuple(sorted(one.items())) for one in (self.gain, self.process)))
+
+
+def sizes_of(settings: Iterable[str]) -> dict[str, Any]:
+    """Fields of Imperfections from KIND.SIGNAL=SIZE, as in skew.phi=1e-3.
+
+    Raises
+    ------
+    PvidError
+        Where one is not.
+    """
+    out: dict[str, dict[str, float]] = {}
+    for setting in settings:
+        place, _, size = setting.partition("=")
+        kind, _, signal = place.strip().partition(".")
+        if kind not in _KINDS or not signal:
+            raise PvidError(f"{shown(setting)} is not KIND.SIGNAL=SIZE with a KIND of {listed(_KINDS)}")
+        try:
+            out.setdefault(kind, {})[signal] = float(size)
+        except ValueError as error:
+            raise PvidError(f"{shown(setting)}: {shown(size)} is no number") from error
+    return out
 
 
 def with_play(values: Float, width: float) -> Float:

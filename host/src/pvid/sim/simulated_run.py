@@ -27,6 +27,7 @@ Float = npt.NDArray[np.float64]
 
 _PHASE = 0.7  # of an eccentric encoder [rad]
 PERFECT = Imperfections()
+SOFT = Imperfections("soft")
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,5 +10,5 @@ RIG = SimulatedRig(
     start={"phi1": 0.06, "phi": 0.08},
     duration=40.0,
     window_s=1.5,
-    design=dict(functions=12, decimation=8, taps=61, rate_taps=61, rate_degree=6),
+    design=dict(functions=12, decimation=8, taps=61, rate_taps=101, rate_degree=6),
 )

@@ -23,6 +23,7 @@ from pvid.oracle.fourier.rows import Compiled, WeakRows
 from pvid.oracle.fourier.solve import batch
 
 _FEWEST_WINDOWS = 18
+_SHORT_RUN = 10  # windows of a run that has no more: its halves are not compared
 _SHORTEST_STEPS = 40  # of a window
 _LENGTHS = 6
 _FUNCTIONS = (12, 24, 40)
@@ -44,12 +45,17 @@ class Scored:
 
 
 def score_of(
-    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, start: Float | None, errors: bool
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    design: FourierDesign,
+    start: Float | None,
+    errors: bool,
+    fewest: int = 1,
 ) -> Scored | None:
-    """None where the design does not fit the run."""
+    """None where the design does not fit the run, or has not the fewest windows that are wanted."""
     try:
         rows = WeakRows.of(model, run, design)
-        if rows.windows < _FEWEST_WINDOWS - 2:
+        if rows.windows < fewest:
             return None
         fit = batch(rows, start, equation_error=errors)
         found = uncertainty(fit)
@@ -69,9 +75,9 @@ def power_of(model: Compiled) -> int:
     return max(6, 2 * ((model.channels.top + 3) // 2), 8 if model.channels.top >= 4 else 6)
 
 
-def lengths(samples: int, sample_rate: float) -> list[float]:
+def lengths(samples: int, sample_rate: float, fewest: int = _FEWEST_WINDOWS) -> list[float]:
     """Windows to try [s], the longest first."""
-    longest = 2 * samples / sample_rate / (_FEWEST_WINDOWS + 1)
+    longest = 2 * samples / sample_rate / (fewest + 1)
     shortest = _SHORTEST_STEPS / sample_rate
     if longest < shortest:
         return []
@@ -96,16 +102,20 @@ def ranked(
     basis = FourierDesign(sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
     tried: list[Scored] = []
     errors = False
+    fewest = _FEWEST_WINDOWS
 
     def attempt(designs: Iterable[FourierDesign]) -> None:
         for design in designs:
             best = min(tried, key=lambda one: one.score, default=None)
-            found = score_of(model, run, design, best.p if best else start, errors)
+            found = score_of(model, run, design, best.p if best else start, errors, fewest - 2)
             if found is not None:
                 tried.append(found)
 
-    windows = lengths(samples, sample_rate)
-    attempt(made(basis, window_s=one) for one in windows)
+    for fewest in (_FEWEST_WINDOWS, _SHORT_RUN):
+        windows = lengths(samples, sample_rate, fewest)
+        attempt(made(basis, window_s=one) for one in windows)
+        if tried:
+            break
     if not tried:
         raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
     best = min(tried, key=lambda one: one.score)

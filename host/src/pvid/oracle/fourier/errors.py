@@ -40,7 +40,10 @@ def uncertainty(fit: Fit) -> Uncertainty:
     designs, residuals = fit.designs(), fit.residuals()
     unit = fit.parameters.unit(fit.p)
     prior = fit.parameters.prior(fit.start)
-    information = sum((np.einsum("wkp,wkq->pq", d, d) for d in designs), np.diag(prior))
+    information = np.diag(prior)
+    for d in designs:
+        own = flat(d.transpose(0, 2, 1))
+        information = information + own @ own.T
     s_inverse = inverse(information)
     neighbours = np.zeros_like(information)
     theta = fit.parameters.theta(fit.p)
@@ -48,10 +51,10 @@ def uncertainty(fit: Fit) -> Uncertainty:
     for d, white in zip(designs, fit.white, strict=True):
         back = white.whitener.back(d.transpose(0, 2, 1))
         r1 = fit.rows.with_next(white.kinds, theta, fit.errors)
-        neighbours += np.einsum("wpk,kl,wql->pq", back[adjacent], r1, back[adjacent + 1], optimize=True)
+        neighbours += flat(back[adjacent] @ r1) @ flat(back[adjacent + 1]).T
         if fit.rows.places.size:
-            scores = fit.rows.directions(white.kinds, theta) @ back.transpose(0, 2, 1)
-            neighbours += fit.rows.reversals.shared(scores, fit.rows.places)
+            in_doubt = fit.rows.directions(white.kinds, theta) @ back.transpose(0, 2, 1)
+            neighbours += fit.rows.reversals.shared(in_doubt, fit.rows.places)
     middle = information + neighbours + neighbours.T
     covariance = s_inverse @ middle @ s_inverse
     free = sum(one.free for one in fit.white) - len(fit.p)
@@ -68,6 +71,11 @@ def uncertainty(fit: Fit) -> Uncertainty:
         covariance * np.outer(unit, unit),
         explained(fit),
     )
+
+
+def flat(x: Float) -> Float:
+    """[windows, n, R] as [n, windows R]."""
+    return x.transpose(1, 0, 2).reshape(x.shape[1], -1)
 
 
 def clustered_variance(scores: Float, s_inverse: Float) -> Float:

@@ -69,6 +69,7 @@ class Identified:
         return {name: (float(p), float(se)) for name, p, se in zip(self.names, self.p, self.se, strict=True)}
 
 
+_SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
 _KEPT = 16
 _ready: dict[int, Compiled] = {}
 
@@ -132,6 +133,9 @@ def identify(
     other = other_length(model, run, used, fit.p)
     if other is not None:
         reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
+    shorter = with_shorter_rates(model, run, used, fit.p)
+    if shorter is not None:
+        reasons["smoothing"] = verdict.of_smoothing(compiled, fit, found, shorter, uncertainty(shorter))
     sensors = SensorErrors(run, used, fit)
     by_gain = {one.name: sensors.by_gain(one) for one in compiled.signals if one.gain_sd > 0 or one.unit != "rad"}
     error = sensors.found(found.se)
@@ -160,6 +164,16 @@ def identify(
         by_gain=by_gain,
         sensor_error=error,
     )
+
+
+def with_shorter_rates(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float
+) -> Fit | None:
+    """The same with derivatives over fewer samples; None where there are none, or too few samples for the degree."""
+    taps = 2 * round(_SHORTER * design.rate_taps / 2) + 1
+    if not any(jet.order for jet in model.channels.needed) or taps <= design.rate_degree + 2:
+        return None
+    return batch(WeakRows.of(model, run, replace(design, rate_taps=taps)), p)
 
 
 def other_length(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:

@@ -90,7 +90,7 @@ class WhiteRows:
     def slopes(self, jacobian: Sequence[Float]) -> Float:
         """d rows / d step, from d theta / d step of all kinds [windows, R, n_p]."""
         own = np.concatenate([jacobian[kind] for kind in self.kinds])
-        return np.asarray(np.einsum("wjk,jp->wkp", self.regressors, own, optimize=True))
+        return np.asarray(self.regressors.transpose(0, 2, 1) @ own)
 
 
 class WeakRows:

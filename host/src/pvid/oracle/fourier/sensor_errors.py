@@ -1,19 +1,21 @@
-"""Would a systematic error of one sensor explain the residuals, and how far would it move the estimate?
+"""Would a systematic error of one sensor, or a soft friction, explain the residuals, and how far would it move p?
 
 An error a f(t) in a recorded signal z moves the residuals by a c, c = (e(z + step f) - e(z))/step. Residuals e are then
 fitted by J dp + a c: a and its standard error show whether the error is there, dp how far p moves with it. Errors that
-are tried: a delay, a play (backlash), an eccentric encoder, the gain of an input. Where a gain only scales p no data
+are tried: a delay, a play (backlash), an eccentric encoder, the gain of an input, a friction that does not switch at
+once. Where a gain only scales p no data
 show it: p is then off by what `by_gain` gives, and that belongs to its standard errors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.fourier.design import FourierDesign
@@ -25,7 +27,7 @@ from pvid.oracle.fourier.solve import Fit, inverse
 from pvid.oracle.fourier.verdict import Reason, listed
 from pvid.sim.imperfections import with_play
 
-Kind = Literal["delay", "play", "eccentric", "gain"]
+Kind = Literal["delay", "play", "eccentric", "gain", "friction"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
@@ -43,6 +45,8 @@ _LARGEST_GAIN = 0.2
 _LARGEST = 100.0  # play or eccentricity [resolutions]
 _LONGEST = 0.25  # delay [windows]
 
+_WIDTHS = (0.03, 0.1, 0.3, 1.0)  # of a soft friction, over the root mean square of the speed
+_WHOLE = (0.4, 2.5)  # a friction that is soft has a column of size 1
 _SMOOTHED = 21  # samples, for the direction of a play
 _PLAY = 3.0  # width of the play that is tried [resolutions]
 _PART = 1e-3  # of a resolution or of a signal's size: steps of the differences
@@ -54,9 +58,10 @@ class SensorError:
 
     Attributes
     ----------
-    signal : name
+    signal : name; of a friction the argument of sgn
     kind : what it is
-    size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal], gain less 1
+    size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal], gain less 1; width over
+        which a friction changes its sign [unit of the argument]
     certainty : size over its standard error
     shift : by how much p moves when the error is taken off [n_p]
     """
@@ -73,6 +78,8 @@ class SensorError:
         if self.kind == "delay":
             late = "late" if self.size > 0 else "early"
             return f"{self.signal} seems to be sampled {abs(self.size):.2g} s {late}"
+        if self.kind == "friction":
+            return f"the friction sgn({self.signal}) seems to change over about {self.size:.2g}, not at once"
         if self.kind == "gain":
             than = "larger" if self.size < 0 else "smaller"
             return f"{self.signal} seems to be {100 * abs(self.size):.2g} % {than} than recorded"
@@ -111,13 +118,15 @@ class SensorErrors:
         for signal in self.model.signals:
             if signal.name not in self.run:
                 continue
-            yield self._test(signal, "delay", [self._delay(signal)])
+            name = signal.name
+            yield self._test(name, "delay", [self._delay(signal)], _LONGEST * self.design.window_s)
             if signal.kind == "input":
-                yield self._test(signal, "gain", [self._gain(signal)])
+                yield self._test(name, "gain", [self._gain(signal)], _LARGEST_GAIN)
             if signal.kind == "sensor" and not signal.driven and signal.resolution:
-                yield self._test(signal, "play", [self._play(signal)])
+                yield self._test(name, "play", [self._play(signal)], _LARGEST * signal.resolution)
                 if signal.unit == "rad" and np.ptp(self.run[signal.name]) > _TURNS:
-                    yield self._test(signal, "eccentric", self._eccentric(signal))
+                    yield self._test(name, "eccentric", self._eccentric(signal), _LARGEST * signal.resolution)
+        yield from self._frictions()
 
     def by_gain(self, signal: Signal) -> Float:
         """What p is off by if a signal is recorded (1 + g) times as large as it is, over g [n_p]."""
@@ -127,29 +136,37 @@ class SensorErrors:
         """Column of a gain less 1."""
         return self._column({signal.name: self.run[signal.name] * (1 + _PART)}, _PART)
 
-    def _test(self, signal: Signal, kind: Kind, columns: list[Float]) -> SensorError:
+    def _frictions(self) -> Iterator[SensorError]:
+        """Signs that are soft, of several widths; only one that is soft in full counts."""
+        channels, grid = self.fit.rows.compiled.channels, self.fit.rows.record.grid
+        if not channels.signs or self.design.reversals == "soft":
+            return
+        argument = channels.signs[0]
+        symbols = sorted(argument.free_symbols, key=str)
+        speed = sp.lambdify(symbols, argument, "numpy")(*[grid.jets[one] for one in symbols])
+        for part in _WIDTHS:
+            width = part * float(np.sqrt(np.mean(np.square(speed))))
+            soft = replace(self.design, reversals="soft", soft=width)
+            found = self._test(str(argument), "friction", [self._column({}, -1.0, soft)], _WHOLE[1])
+            whole = _WHOLE[0] < found.size < _WHOLE[1]
+            yield replace(found, size=width, certainty=found.certainty if whole else 0.0)
+
+    def _test(self, signal: str, kind: Kind, columns: list[Float], largest: float) -> SensorError:
         c = np.stack(columns, axis=-1)
         mixed = np.einsum("wkp,wkc->pc", self.designs, c)
         rest = c - self.designs @ (self.inverse @ mixed)
         normal = np.einsum("wkc,wkd->cd", rest, rest)
         whole = np.einsum("wkc,wkc->c", c, c)
         if not np.all(np.diag(normal) > _OWN * np.maximum(whole, 1e-300)):
-            return SensorError(signal.name, kind, 0.0, 0.0, np.zeros(len(self.unit)))
+            return SensorError(signal, kind, 0.0, 0.0, np.zeros(len(self.unit)))
         back = inverse(normal)
         size = back @ np.einsum("wkc,wk->c", rest, self.residuals)
         left = self.residuals - rest @ size
         variance = clustered_variance(np.einsum("wkc,wk->wc", rest, left), back)
         shift = -self.unit * (self.inverse @ (mixed @ size))
         amount = float(size[0]) if len(size) == 1 else float(np.hypot(*size))
-        certainty = (
-            float(np.max(np.abs(size) / np.sqrt(variance))) if abs(amount) < self._largest(signal, kind) else 0.0
-        )
-        return SensorError(signal.name, kind, amount, certainty, shift)
-
-    def _largest(self, signal: Signal, kind: Kind) -> float:
-        if kind == "gain":
-            return _LARGEST_GAIN
-        return _LONGEST * self.design.window_s if kind == "delay" else _LARGEST * signal.resolution
+        certainty = float(np.max(np.abs(size) / np.sqrt(variance))) if abs(amount) < largest else 0.0
+        return SensorError(signal, kind, amount, certainty, shift)
 
     def _delay(self, signal: Signal) -> Float:
         """Column of a delay [s]."""
@@ -172,9 +189,9 @@ class SensorErrors:
         step = _PART * (signal.resolution or 1.0)
         return [self._column({signal.name: values + step * wave(values)}, step) for wave in (np.sin, np.cos)]
 
-    def _column(self, changed: Mapping[str, Float], step: float) -> Float:
+    def _column(self, changed: Mapping[str, Float], step: float, design: FourierDesign | None = None) -> Float:
         """How the whitened residuals move [windows, rows of all kinds] per unit of an error."""
-        rows = WeakRows.of(self.fit.rows.compiled, {**self.run, **changed}, self.design)
+        rows = WeakRows.of(self.fit.rows.compiled, {**self.run, **changed}, design or self.design)
         moved = self._raw(rows.only(np.isin(rows.numbers, self.fit.rows.numbers)))
         change = [(now - before) / step for now, before in zip(moved, self._bare, strict=True)]
         out = []
@@ -199,12 +216,12 @@ class SensorErrors:
 
 
 def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> list[Reason]:
-    """A sensor's error explains the residuals."""
+    """An error explains the residuals."""
     if error is None:
         return []
     names = [model.p_names[k] for k in np.argsort(-np.abs(error.shift) / se) if abs(error.shift[k]) > _MOVES * se[k]]
     text = f"{error.text} ({error.certainty:.0f} standard errors from none), which moves {listed(names)}."
-    return [Reason("sensor", text)]
+    return [Reason("friction" if error.kind == "friction" else "sensor", text)]
 
 
 def of_scale(model: CompiledModel, by_gain: Mapping[str, Float], p: Float, se: Float) -> list[Reason]:

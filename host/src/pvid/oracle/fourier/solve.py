@@ -226,7 +226,8 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationEr
     One found `last` time is improved; the orders are not compared again.
 
     With R0 = L L^T, L^-1 Q L^-T = U diag(q) U^T and z = U^T L^-1 e the likelihood of the variance v is that of
-    independent z_i of variances 1 + v q_i.
+    independent z_i of variances 1 + v q_i. That is where a variance starts; orders are compared with the weights of
+    each window, reversals and all.
     """
     if last is not None and last.variance:
         return sharpened(rows, kind, theta, last)
@@ -237,16 +238,27 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationEr
     share = plain.free / (rows.windows * rows.functions.count)
     moment = e.T @ e / (len(e) * share)
     whitener = plain.whitener.base
+    without = unlikely(rows, kind, theta, EquationError())
     for order in range(rows.compiled.channels.rows_top(kind) + 1):
         q, u = np.linalg.eigh(whitener @ rows.noise.gram(order, order) @ whitener.T)
         q = np.maximum(q, 0.0)
         z = np.einsum("ij,ik,kj->j", u, moment, u)
-        v, rise = most_likely(q, z)
+        v, _ = most_likely(q, z)
+        if not v:
+            continue
+        found = sharpened(rows, kind, theta, EquationError(v, order))
         # Neighbours share half of their samples: rows count half.
-        rise *= len(e) * share / 2
+        rise = (without - unlikely(rows, kind, theta, found)) / 2
         if rise > gain:
-            best, gain = EquationError(v, order), rise
-    return sharpened(rows, kind, theta, best) if best.variance else best
+            best, gain = found, rise
+    return best
+
+
+def unlikely(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError) -> float:
+    """Minus twice the logarithm of the likelihood of one kind's residuals, but for a constant."""
+    white = rows.white((kind,), theta, [error] * rows.kinds)
+    e = white.residuals(theta)
+    return float(np.sum(e**2)) + white.whitener.log_determinant() * white.free / e.size
 
 
 def sharpened(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError) -> EquationError:

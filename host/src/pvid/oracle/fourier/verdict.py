@@ -24,12 +24,14 @@ Name = Literal[
     "shape",
     "halves",
     "windows",
+    "smoothing",
     "attenuation",
     "feedback",
     "short",
     "range",
     "unexplained",
     "sensor",
+    "friction",
     "scale",
 ]
 Status = Literal["good", "warning", "not_identified"]
@@ -214,6 +216,23 @@ def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fl
             f"Motion that the equations do not explain bends {listed(names)} ({names[0]} is {fit.p[k]:.4g}, and "
             f"{other[k]:.4g} with the highest derivative as the dependent signal): excite more strongly, or take "
             "longer windows and fewer functions.",
+        )
+    ]
+
+
+def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+    """Two lengths of the filter that gives derivatives disagree: one of them blurs the motion, which no residual shows."""
+    clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
+    names = differing(fit.parameters, model.p_names, fit.p, other.p, clash)
+    if not names:
+        return []
+    k = model.p_names.index(names[0])
+    taps = [one.rows.record.grid.design.rate_taps for one in (fit, other)]
+    return [
+        Reason(
+            "smoothing",
+            f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {listed(names)} ({names[0]}: "
+            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer filter blurs the motion, or the shorter one folds noise.",
         )
     ]
 

@@ -1,0 +1,39 @@
+"""A run with few windows is identified, without a comparison of its halves; one with none is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from pvid.base.errors import PvidError
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import SimulatedRig
+from pvid.oracle.fourier.choice import chosen
+from pvid.oracle.fourier.identify import identify, ready
+from pvid.sim.simulated_run import RigSimulation
+
+MODEL = compiled_of(ROOT / "tests" / "data" / "recordings" / "free_pendulum.py")
+RATE = 100.0
+RIG = SimulatedRig(
+    model=MODEL.name,
+    truth={"w2": 64.0, "k": 0.05, "c": 0.1, "o": 0.0},
+    drive={},
+    start={"q": np.pi + 1.0},
+    sample_rate=RATE,
+    duration=2.4,
+    friction_width=0.1,
+)
+SWING = RigSimulation.of(MODEL, RIG)
+
+
+def test_run_of_240_samples_is_identified_without_halves() -> None:
+    found = identify(MODEL, SWING.run(0), RATE)
+    assert found.halves is None
+    assert "short" in [one.name for one in found.verdict.reasons]
+    assert (np.abs(found.p - SWING.truth) < 4 * found.se).all()
+
+
+def test_run_of_50_samples_is_refused() -> None:
+    with pytest.raises(PvidError, match="the run of 0.5 s is too short for free_pendulum: record longer"):
+        chosen(ready(MODEL), {"q": SWING.run(0)["q"][:50]}, RATE)

@@ -1,0 +1,33 @@
+"""The pages of the shipped mechanisms have today's description and report; each has its picture."""
+
+from __future__ import annotations
+
+import pytest
+from conftest import ROOT
+
+from bench.mechanism_pages import errors_of
+from pvid.model.report import check_report
+from pvid.models.mechanisms import compiled_of, names, path_of
+
+DOCS = ROOT / "host" / "docs"
+TABLE = """
+<!-- errors -->
+| mechanism | parameter | RMS % |
+|---|---|---|
+| motor | R | 0.1 |
+| arm | I1 | 0.2 |
+<!-- /errors -->
+"""
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_page_shows_the_mechanism_as_it_is(name: str) -> None:
+    text = (DOCS / "mechanisms" / f"{name}.md").read_text(encoding="utf-8")
+    assert path_of(name)[1].read_text(encoding="utf-8").rstrip() in text, "write it anew: ./tools/pvid bench pages"
+    assert check_report(compiled_of(name)).rstrip() in text, "write it anew: ./tools/pvid bench pages"
+    assert (DOCS / "images" / "mechanisms" / f"{name}.png").is_file()
+
+
+def test_rows_of_one_mechanism_are_taken_from_the_table() -> None:
+    assert errors_of("errors", TABLE, "arm") == ["| parameter | RMS % |", "| --- | --- |", "| I1 | 0.2 |"]
+    assert errors_of("errors", TABLE, "boat") == []
