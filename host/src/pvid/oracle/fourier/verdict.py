@@ -223,7 +223,7 @@ def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fl
 
 
 def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
-    """Two lengths of the filter that gives derivatives disagree: a blurred motion leaves no residual."""
+    """Two lengths of the filter that gives derivatives disagree: one blurs the motion, which no residual shows."""
     clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
     names = differing(fit.parameters, model.p_names, fit.p, other.p, clash)
     if not names:
@@ -234,7 +234,7 @@ def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit,
         Reason(
             "smoothing",
             f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {listed(names)} ({names[0]}: "
-            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer filter blurs the motion, or the shorter folds noise.",
+            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer blurs the motion, or the shorter folds noise.",
         )
     ]
 
