@@ -73,3 +73,26 @@ CHAIN = CompiledModel(
     ),
     opaque={Jet("s"): sgn(PHI.d())},
 )
+
+# Names that mean something in C, C++, Python or the generated files.
+NAMES = """
+y1 j0 gamma index time exp row limits sin cos main bool signal abs np Scaled elementary elementary_q31 v0 w1 in out
+""".split()
+_SIGNALS = [Jet(name) for name in NAMES[:12]]
+_UNKNOWNS = [sp.Symbol(name, real=True) for name in NAMES[12:]]
+ODDLY_NAMED = CompiledModel(
+    "double",
+    "names",
+    tuple(Signal(jet, "", "sensor", resolution=1e-3) for jet in _SIGNALS),
+    tuple(unknown(one, 1.0, 0.1, 10.0) for one in _UNKNOWNS),
+    (),
+    (),
+    (
+        Row(
+            "row",
+            tuple(one * _UNKNOWNS[k - 1] + one for k, one in enumerate(_UNKNOWNS)),
+            tuple({0: _SIGNALS[k] * _SIGNALS[k - 1]} for k, _ in enumerate(_UNKNOWNS)),
+            {0: _SIGNALS[-1]},
+        ),
+    ),
+)

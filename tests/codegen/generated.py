@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import sympy as sp
-from described import CHAIN, MOTOR
+from described import CHAIN, MOTOR, ODDLY_NAMED
 
 from pvid.codegen.build import files_of
 from pvid.codegen.functions import Function, ModelFunctions, functions_of
@@ -19,7 +19,7 @@ from pvid.core.sources import INCLUDES, source
 from pvid.models import mechanisms
 
 VECTORS = 20_000
-BY_HAND = {one.name: one for one in (MOTOR, CHAIN)}
+BY_HAND = {one.name: one for one in (MOTOR, CHAIN, ODDLY_NAMED)}
 MODELS = (*BY_HAND, *mechanisms.names())
 WARNINGS = (
     *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wcast-align", "-Wcast-qual", "-Wconversion", "-Wvla"),

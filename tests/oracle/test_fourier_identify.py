@@ -220,6 +220,20 @@ def test_a_missing_sample_costs_its_windows_only() -> None:
     assert np.all(np.abs(fit.p - simulation("rigid_body").truth) < 4 * uncertainty(fit).se)
 
 
+def test_windows_with_a_spike_are_left_out_and_reported() -> None:
+    sim = simulation("cart_pendulum")
+    run = sim.run(0, SHARP)
+    run["x"] = run["x"].copy()
+    run["x"][7_300] += 0.05
+    found = identify(sim.model, run, 1000.0, start=sim.truth, design=DESIGNS["cart_pendulum"])
+    left = [one for one in found.verdict.reasons if one.name == "left_out"]
+    assert len(left) == 1 and "2 of 38 windows" in left[0].text and not left[0].alarm
+    assert np.all(np.abs(found.p - sim.truth) < 4 * found.se)
+    assert found.chi2 < 1.3
+    clean = identify(sim.model, sim.run(0, SHARP), 1000.0, start=sim.truth, design=DESIGNS["cart_pendulum"])
+    assert "left_out" not in [one.name for one in clean.verdict.reasons]
+
+
 def test_sentences_name_what_is_wrong_with_a_run() -> None:
     run = simulation("rigid_body").run(0)
     model = compiled_of("rigid_body")

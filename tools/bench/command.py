@@ -181,7 +181,13 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
         put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
     traps = [row for rig in rigs for row in recorded_rigs.trap_rows(rig.source, folder)]
     put_table(update, "traps", markdown(recorded_rigs.TRAPS, traps))
-    return DONE
+    faults = [fault for rig in rigs for fault in recorded_rigs.missed(rig)]
+    faults += [
+        f"{row[0]}: the run {row[1]} does not raise its alarm" for row in traps if row[1] not in row[2].split(", ")
+    ]
+    for fault in faults:
+        write_stderr(f"pvid: {fault}")
+    return DIFFERENT if faults else DONE
 
 
 @bench.command(name="longevity")

@@ -131,7 +131,7 @@ class Outcome:
 
 
 def _percent(part: float) -> str:
-    return f"{100 * part:.2g}" if part < 1 else "> 100"
+    return f"{float(f'{100 * part:.2g}'):g}" if part < 1 else "> 100"
 
 
 def outcome(method: Method, simulation: RigSimulation, runs: list[Recording]) -> Outcome:

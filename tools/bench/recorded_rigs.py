@@ -37,6 +37,7 @@ TRAPS = ("rig", "run that must raise", "alarms", "R^2 of the rows", "first param
 
 # Estimates differ by so many standard errors: their difference is not covered.
 CLASH = 4.0
+_LEAST_R2 = 0.9
 _SOFT = 0.02  # width of a soft friction [unit of the velocity]
 
 
@@ -184,6 +185,28 @@ def verdict_rows(rig: Rig) -> list[tuple[str, ...]]:
     """Rows of the table of alarms."""
     differing = listed([name for name, apart in zip(rig.model.p_names, rig.clash(), strict=True) if apart > CLASH])
     return [(rig.source.name, *(listed(list(one.alarms)) for one in rig.estimates), differing)]
+
+
+def missed(rig: Rig) -> list[str]:
+    """The bars that a rig misses, a sentence each.
+
+    The second run is predicted open loop to its end, and better than by the published values; the estimates of both
+    runs agree but for offsets, or there is an alarm.
+    """
+    faults = []
+    predicted = rig.predicted()
+    published = rig.published
+    theirs = None if published is None else rig.replay(1, friction_of(published, rig.model)).matches(published)
+    for name, match in predicted.items():
+        if not match.r2 > _LEAST_R2:
+            faults.append(f"{rig.source.name}: {name} is predicted with R^2 {match.r2:.4f}, not above {_LEAST_R2}")
+        if theirs is not None and not match.r2 > theirs[name].r2:
+            faults.append(f"{rig.source.name}: the published values predict {name} better")
+    apart = [name for name, clash in zip(rig.model.p_names, rig.clash(), strict=True) if clash > CLASH]
+    differing = [name for name in apart if not name.startswith("o")]
+    if differing and not any(one.alarms for one in rig.estimates):
+        faults.append(f"{rig.source.name}: the runs disagree on {listed(differing)}, and there is no alarm")
+    return faults
 
 
 def trap_rows(source: Source, folder: Path) -> list[tuple[str, ...]]:

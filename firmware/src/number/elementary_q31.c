@@ -17,10 +17,11 @@ static const int32_t polynomial[6] = {-1879182, 22020091, -160859250, 684554113,
 /* sin(pi h 2^-bits) in Q30, bits 32..62, |h| < 5.3e18. */
 static int32_t sine_of_half_turns(int64_t h, uint32_t bits)
 {
-    const uint64_t half = (uint64_t)1 << (bits - 1u);
+    const uint32_t half_bits = bits - 1u;
+    const uint64_t half = (uint64_t)1 << half_bits;
     const uint64_t from_half = pvid_magnitude_q31(h) + half;
-    const uint64_t mask = ((uint64_t)1 << bits) - 1u;
-    const int64_t rest = (int64_t)(from_half & mask) - (int64_t)half; /* |h| less the nearest integer */
+    const uint64_t part = from_half & (((uint64_t)1 << bits) - 1u);
+    const int64_t rest = (int64_t)part - (int64_t)half; /* |h| less the nearest integer */
     const int32_t y = (int32_t)pvid_round_shift_q31(rest, bits - ANGLE_BITS);
     const int32_t z = (int32_t)pvid_round_shift_q31(pvid_square_q31(y), ANGLE_BITS);
     int32_t sum = polynomial[0];
@@ -30,7 +31,8 @@ static int32_t sine_of_half_turns(int64_t h, uint32_t bits)
     const int64_t sine = pvid_round_shift_q31(pvid_product_q31(y, sum), POLYNOMIAL_BITS);
     const int32_t held = (int32_t)pvid_clamp_q31(sine, PVID_ONE_Q30);
     const bool is_odd = ((from_half >> bits) & 1u) != 0u;
-    return (is_odd != (h < 0)) ? -held : held;
+    const bool is_negative = h < 0;
+    return (is_odd != is_negative) ? -held : held;
 }
 
 int32_t pvid_sin_q31(int32_t x, uint32_t bits)

@@ -90,7 +90,7 @@ def _prototypes(functions: ModelFunctions) -> list[str]:
     lines: list[str] = []
     for function in functions.functions:
         lines += [
-            f"/* {MEANING[function.name]} {function.program.operations} operations. */",
+            f"/* {MEANING[function.name]} {function.program.cost}. */",
             f"{signature(functions, function)};",
             "",
         ]

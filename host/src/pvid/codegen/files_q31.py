@@ -29,14 +29,14 @@ def header(fixed: FixedModel, command: str) -> str:
     for one in fixed.of_inputs:
         what = one.function
         lines += [
-            f"/* {MEANING[what.name]} {what.program.operations} operations. Returns false, and",
+            f"/* {MEANING[what.name]} {what.program.cost}. Returns false, and",
             " * writes nothing, iff an input is beyond its reach. */",
             f"{signature(functions, what)};",
             "",
         ]
     for what in fixed.of_parameters:
         lines += [
-            f"/* {MEANING[what.name]} {what.program.operations} operations. */",
+            f"/* {MEANING[what.name]} {what.program.cost}. */",
             f"{signature(functions, what)};",
             "",
         ]

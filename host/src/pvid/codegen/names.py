@@ -15,7 +15,7 @@ _RESERVED = frozenset(
     sizeof static static_assert static_cast struct switch template this thread_local throw true try typedef typeid
     typename union unsigned using virtual void volatile wchar_t while xor xor_eq
     int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t NULL INT32_C INT64_C
-    in out np elementary
+    in out limits np elementary elementary_q31 Scaled
     """.split()
 ) | set(keyword.kwlist)
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

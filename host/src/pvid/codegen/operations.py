@@ -67,6 +67,11 @@ class Program:
         """How many there are."""
         return sum(isinstance(one, Operation) for one in self.values)
 
+    @property
+    def cost(self) -> str:
+        """As in "3 operations"."""
+        return f"{self.operations} operation{'' if self.operations == 1 else 's'}"
+
     def literal(self, place: int) -> Fraction:
         """The constant at a place."""
         value = self.values[place]

@@ -19,8 +19,8 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.front import samples_of
 from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.gate import gated
 from pvid.oracle.fourier.rows import Compiled, WeakRows
-from pvid.oracle.fourier.solve import batch
 
 _FEWEST_WINDOWS = 18
 _SHORT_RUN = 10  # windows of a run that has no more: its halves are not compared
@@ -57,7 +57,7 @@ def score_of(
         rows = WeakRows.of(model, run, design)
         if rows.windows < fewest:
             return None
-        fit = batch(rows, start, equation_error=errors)
+        fit = gated(rows, start, equation_error=errors)
         found = uncertainty(fit)
     except (PvidError, np.linalg.LinAlgError):
         return None

@@ -16,9 +16,10 @@ from pvid.oracle.fourier.choice import chosen
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.gate import gated
 from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.fourier.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
-from pvid.oracle.fourier.solve import Fit, batch, online
+from pvid.oracle.fourier.solve import Fit, online
 from pvid.oracle.fourier.verdict import Halves, Verdict
 from pvid.oracle.fourier.weights import as_white_force
 
@@ -118,7 +119,7 @@ def identify(
     begun = start_of(compiled, start)
     used = design or chosen(model, run, sample_rate, begun)
     rows = WeakRows.of(model, run, used)
-    fit = batch(rows, begun, compensate=compensate)
+    fit = gated(rows, begun, compensate=compensate)
     found = uncertainty(fit)
     halves = verdict.halves_of(fit)
     reasons = {
@@ -129,11 +130,12 @@ def identify(
         "feedback": verdict.of_feedback(compiled, fit),
         "residuals": verdict.of_residuals(found),
         "range": verdict.of_range(compiled, fit.p),
+        "left_out": verdict.of_spoiled(rows, fit),
     }
     other = other_length(model, run, used, fit.p)
     if other is not None:
         reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
-    shorter = with_shorter_rates(model, run, used, fit.p)
+    shorter = shorter_rates(model, run, used, fit.p)
     if shorter is not None:
         reasons["smoothing"] = verdict.of_smoothing(compiled, fit, found, shorter, uncertainty(shorter))
     sensors = SensorErrors(run, used, fit)
@@ -144,7 +146,7 @@ def identify(
     gains = [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
     white = as_white_force(fit)
     by_weights = [] if white is None else [white - fit.p]
-    history = online(rows, begun)
+    history = online(fit.rows, begun)
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
@@ -155,7 +157,7 @@ def identify(
         chi2=found.chi2,
         verdict=Verdict(verdict.named(reasons)),
         r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},
-        times=rows.end_times(),
+        times=fit.rows.end_times(),
         history=history,
         design=used,
         equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
@@ -166,14 +168,12 @@ def identify(
     )
 
 
-def with_shorter_rates(
-    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float
-) -> Fit | None:
+def shorter_rates(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:
     """The same with derivatives over fewer samples; None where there are none, or too few samples for the degree."""
     taps = 2 * round(_SHORTER * design.rate_taps / 2) + 1
     if not any(jet.order for jet in model.channels.needed) or taps <= design.rate_degree + 2:
         return None
-    return batch(WeakRows.of(model, run, replace(design, rate_taps=taps)), p)
+    return gated(WeakRows.of(model, run, replace(design, rate_taps=taps)), p)
 
 
 def other_length(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:
@@ -185,5 +185,5 @@ def other_length(model: Compiled, run: Mapping[str, npt.ArrayLike], design: Four
         except PvidError:
             continue
         if rows.windows >= 8:
-            return batch(rows, p)
+            return gated(rows, p)
     return None

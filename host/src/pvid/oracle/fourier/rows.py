@@ -93,6 +93,12 @@ class WhiteRows:
         return np.asarray(self.regressors.transpose(0, 2, 1) @ own)
 
 
+def record_of(compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign) -> Record:
+    """Channels of a run (name -> samples) at every step."""
+    whole = with_jumps(run, compiled.jumps, design.sample_rate)
+    return compiled.channels.record(grid_of(compiled.model, whole, design, compiled.channels.needed))
+
+
 class WeakRows:
     """All windows of a run.
 
@@ -123,9 +129,7 @@ class WeakRows:
     @classmethod
     def of(cls, compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign) -> WeakRows:
         """Those of a run: name -> samples."""
-        whole = with_jumps(run, compiled.jumps, design.sample_rate)
-        grid = grid_of(compiled.model, whole, design, compiled.channels.needed)
-        return cls(compiled, compiled.channels.record(grid))
+        return cls(compiled, record_of(compiled, run, design))
 
     @property
     def windows(self) -> int:

@@ -22,7 +22,7 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import clustered_variance
 from pvid.oracle.fourier.front import filtered, polynomial_weights
 from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.rows import WeakRows, WhiteRows
+from pvid.oracle.fourier.rows import WhiteRows, record_of
 from pvid.oracle.fourier.solve import Fit, inverse
 from pvid.oracle.fourier.verdict import Reason, listed
 from pvid.sim.imperfections import with_play
@@ -106,7 +106,7 @@ class SensorErrors:
         information = np.einsum("wkp,wkq->pq", self.designs, self.designs) + np.diag(fit.parameters.prior(fit.start))
         self.inverse = inverse(information)
         self.unit = fit.parameters.unit(fit.p)
-        self._bare = self._raw(fit.rows)
+        self._bare = self._raw(fit.rows.columns)
 
     def found(self, se: Float) -> SensorError | None:
         """The surest of the errors that are there and move p by more than its standard errors [n_p] allow."""
@@ -191,8 +191,8 @@ class SensorErrors:
 
     def _column(self, changed: Mapping[str, Float], step: float, design: FourierDesign | None = None) -> Float:
         """How the whitened residuals move [windows, rows of all kinds] per unit of an error."""
-        rows = WeakRows.of(self.fit.rows.compiled, {**self.run, **changed}, design or self.design)
-        moved = self._raw(rows.only(np.isin(rows.numbers, self.fit.rows.numbers)))
+        record = record_of(self.fit.rows.compiled, {**self.run, **changed}, design or self.design)
+        moved = self._raw([one[self.fit.rows.numbers] for one in record.columns(self.fit.rows.functions)])
         change = [(now - before) / step for now, before in zip(moved, self._bare, strict=True)]
         out = []
         for white in self.fit.white:
@@ -200,11 +200,11 @@ class SensorErrors:
             out.append(self._without_nuisances(white, white.whitener.of(own[:, np.newaxis, :])[:, 0]))
         return np.concatenate(out, axis=1)
 
-    def _raw(self, rows: WeakRows) -> list[Float]:
+    def _raw(self, whole: list[Float]) -> list[Float]:
         """Residuals at p before whitening, of each kind [windows, K]."""
         return [
             columns[:, len(th)] - np.einsum("wjk,j->wk", columns[:, : len(th)], th)
-            for columns, th in zip(rows.columns, self.theta, strict=True)
+            for columns, th in zip(whole, self.theta, strict=True)
         ]
 
     def _without_nuisances(self, white: WhiteRows, rows: Float) -> Float:

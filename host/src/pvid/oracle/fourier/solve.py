@@ -18,6 +18,7 @@ _SETTLED = 1e-8  # a step below this ends the search
 
 # An error of the equation is taken for real if it raises twice the logarithm of the likelihood by this much.
 _EVIDENCE = 10.0
+_HINT = 2.0  # with the mean of the windows' weights, below which the exact likelihood is not computed
 
 _SEARCHES = 8  # passes after which an error that was found is only improved
 _SHARPENING = 3  # steps of a variance at a time
@@ -243,8 +244,8 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationEr
         q, u = np.linalg.eigh(whitener @ rows.noise.gram(order, order) @ whitener.T)
         q = np.maximum(q, 0.0)
         z = np.einsum("ij,ik,kj->j", u, moment, u)
-        v, _ = most_likely(q, z)
-        if not v:
+        v, rise = most_likely(q, z)
+        if rise * len(e) * share < _HINT:
             continue
         found = sharpened(rows, kind, theta, EquationError(v, order))
         # Neighbours share half of their samples: rows count half.

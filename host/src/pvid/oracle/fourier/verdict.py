@@ -15,6 +15,7 @@ from pvid.oracle.fourier.errors import Uncertainty, uncertainty
 from pvid.oracle.fourier.front import filtered, weights_of
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.fourier.rows import WeakRows
 from pvid.oracle.fourier.solve import Fit, Moments, gauss_newton, inverse, normal
 
 Name = Literal[
@@ -28,6 +29,7 @@ Name = Literal[
     "attenuation",
     "feedback",
     "short",
+    "left_out",
     "range",
     "unexplained",
     "sensor",
@@ -221,7 +223,7 @@ def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fl
 
 
 def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
-    """Two lengths of the filter that gives derivatives disagree: one of them blurs the motion, which no residual shows."""
+    """Two lengths of the filter that gives derivatives disagree: one blurs the motion, which no residual shows."""
     clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
     names = differing(fit.parameters, model.p_names, fit.p, other.p, clash)
     if not names:
@@ -232,7 +234,7 @@ def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit,
         Reason(
             "smoothing",
             f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {listed(names)} ({names[0]}: "
-            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer filter blurs the motion, or the shorter one folds noise.",
+            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer blurs the motion, or the shorter folds noise.",
         )
     ]
 
@@ -323,6 +325,22 @@ def of_range(model: CompiledModel, p: Float) -> list[Reason]:
         if one.high > one.low and not one.low <= value <= one.high
     ]
     return [Reason("range", f"Outside the plausible range: {listed(out)}.", alarm=True)] if out else []
+
+
+def of_spoiled(rows: WeakRows, fit: Fit) -> list[Reason]:
+    """Windows that were left out of those of a run."""
+    bad = np.setdiff1d(rows.numbers, fit.rows.numbers)
+    if not len(bad):
+        return []
+    first = float(rows.end_times()[np.searchsorted(rows.numbers, bad[0])]) - rows.functions.length
+    return [
+        Reason(
+            "left_out",
+            f"{len(bad)} of {rows.windows} windows are left out, the first at {max(first, 0.0):.3g} s: their residuals "
+            "are far above those of the others.",
+            alarm=False,
+        )
+    ]
 
 
 def settled(fit: Fit) -> list[Reason]:
