@@ -17,12 +17,13 @@ from pvid.model.gradient import rank
 from pvid.model.signals import MAX_ORDER, TIME, Integral, Jet, jets, order_of, sgn, total_derivative
 from pvid.model.zero import RationalPoint, Sampler
 
-_ROUNDS = 20  # of insertion: a derivative of what is inserted may contain a jet that follows again
+_ROUNDS = 8  # of insertion: a derivative of what is inserted may contain a jet that follows again
+_MOST_DIGITS = 300  # of a number in it
 _MOST_TERMS = 200  # of what is inserted: a relation between rows that takes more is left out
 
 
 class _TooLongError(Exception):
-    """A rule would not stay short, or divide by 0."""
+    """A rule would not stay short, would divide by 0, or needs itself."""
 
 
 class Solutions:
@@ -132,11 +133,17 @@ class Solutions:
                         raise _TooLongError
                     values[jet] = total_derivative(rule, jet.order - order)
             if not values:
-                break
+                return whole
             whole = sp.expand(whole.xreplace(values))
-            if len(sp.Add.make_args(whole)) > _MOST_TERMS or whole.has(sp.nan, sp.zoo):
-                raise _TooLongError
-        return whole
+            terms = sp.Add.make_args(whole)
+            if len(terms) > _MOST_TERMS or whole.has(sp.nan, sp.zoo) or any(map(_has_long_number, terms)):
+                break
+        raise _TooLongError
+
+
+def _has_long_number(term: sp.Expr) -> bool:
+    number = term.as_coeff_Mul()[0]
+    return bool(number.is_Rational and max(abs(number.p), number.q) > 10**_MOST_DIGITS)
 
 
 def _rate(part: Part) -> sp.Expr:

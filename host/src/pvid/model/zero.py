@@ -19,11 +19,19 @@ from pvid.model.modular import echelon, rational, residue
 from pvid.model.refusal import ModelError
 from pvid.model.signals import Integral
 
+_LONGEST_SUM, _LARGEST_MULTIPLE = 4, 6  # of the angles that are split
 _ATTEMPTS = 5  # at a point where no denominator is 0
 
 
 def _angles_apart(expression: sp.Expr) -> sp.Expr:
-    return sp.expand_trig(expression) if expression.has(sp.sin, sp.cos) else expression
+    """Sines of short sums by those of their terms; a long sum stays an angle of its own."""
+    sines = [one for one in expression.atoms(sp.sin, sp.cos) if _is_short(sp.expand(one.args[0]))]
+    return expression.xreplace({one: sp.expand_trig(one) for one in sines}) if sines else expression
+
+
+def _is_short(angle: sp.Expr) -> bool:
+    terms = sp.Add.make_args(angle)
+    return len(terms) <= _LONGEST_SUM and all(abs(term.as_coeff_Mul()[0]) <= _LARGEST_MULTIPLE for term in terms)
 
 
 def _base_angle(argument: sp.Expr) -> tuple[sp.Expr, int]:
@@ -45,7 +53,7 @@ class RationalPoint:
 
     def of(self, expression: sp.Expr) -> sp.Expr:
         """The expression's value: a rational number where it is a rational function of symbols, sines and cosines."""
-        whole = sp.expand_trig(expression) if expression.has(sp.sin, sp.cos) else sp.sympify(expression)
+        whole = _angles_apart(sp.sympify(expression))
         for one in whole.atoms(Integral):
             self.values.setdefault(one, self.number())
         for one in whole.atoms(sp.sin, sp.cos):
