@@ -31,6 +31,7 @@ Kind = Literal["delay", "play", "eccentric", "gain", "friction"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
+_CERTAIN_OF_FRICTION = 8.0  # what is located wrongly near a reversal looks like a narrow soft friction
 _MOVES = 1.0
 
 # An encoder shows an eccentricity only where it turns by this much [rad].
@@ -45,7 +46,7 @@ _LARGEST_GAIN = 0.2
 _LARGEST = 100.0  # play or eccentricity [resolutions]
 _LONGEST = 0.25  # delay [windows]
 
-_WIDTHS = (0.03, 0.1, 0.3, 1.0)  # of a soft friction, over the root mean square of the speed
+_WIDTHS = (0.03, 0.055, 0.1, 0.18, 0.3, 0.55, 1.0)  # of a soft friction, over the root mean square of the speed
 _WHOLE = (0.4, 2.5)  # a friction that is soft has a column of size 1
 _SMOOTHED = 21  # samples, for the direction of a play
 _PLAY = 3.0  # width of the play that is tried [resolutions]
@@ -149,7 +150,11 @@ class SensorErrors:
             soft = replace(self.design, reversals="soft", soft=width)
             found = self._test(str(argument), "friction", [self._column({}, -1.0, soft)], _WHOLE[1])
             whole = _WHOLE[0] < found.size < _WHOLE[1]
-            yield replace(found, size=width, certainty=found.certainty if whole else 0.0)
+            yield replace(
+                found,
+                size=width,
+                certainty=found.certainty if whole and found.certainty > _CERTAIN_OF_FRICTION else 0.0,
+            )
 
     def _test(self, signal: str, kind: Kind, columns: list[Float], largest: float) -> SensorError:
         c = np.stack(columns, axis=-1)
