@@ -12,7 +12,7 @@ from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.rows import EquationError, WeakRows, WhiteRows
 
 _STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
-_PASSES = 25  # of whitening at the present p
+PASSES = 25  # of whitening at the present p
 _STEPS = 30  # of Gauss-Newton between two whitenings
 _SETTLED = 1e-8  # a step below this ends the search
 
@@ -155,7 +155,13 @@ class Fit:
         return [one.residuals(theta) for one in self.white]
 
 
-def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = True, compensate: bool = True) -> Fit:
+def batch(
+    rows: WeakRows,
+    start: Float | None = None,
+    equation_error: bool = True,
+    compensate: bool = True,
+    passes: int = PASSES,
+) -> Fit:
     """All windows at once: whiten at p, step, and again until p stays.
 
     Parameters
@@ -164,13 +170,14 @@ def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = Tru
     start : of p; None: the guesses
     equation_error : estimate the error of each equation from its residuals and weight with it
     compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R / d theta
+    passes : of whitening at the present p, at most
     """
     parameters = rows.compiled.parameters
     p = begun = parameters.checked(start)
     prior = parameters.prior(begun)
     errors = [EquationError()] * rows.kinds
     settled = False
-    for turn in range(_PASSES):
+    for turn in range(passes):
         theta = parameters.theta(p)
         white = [rows.white(group, theta, errors) for group in rows.groups]
         moments = compensated(rows, white, theta) if compensate else Moments.of(white)
