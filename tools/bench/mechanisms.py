@@ -111,8 +111,8 @@ CASES = (
     Imperfection("backlash of 3 LSB before the encoder", _on_encoder("backlash", 3.0)),
     Imperfection("eccentric encoder, 3 LSB", _on_encoder("eccentricity", 3.0)),
     Imperfection("one sensor a sample late", _skew),
-    Imperfection("input 1 % larger than recorded", _gain),
-    Imperfection("the same, gain_sd = 1 % declared", _gain, gain_sd=0.01),
+    Imperfection("input 1 % larger than recorded, gain_sd = 0", _gain),
+    Imperfection("the same, gain_sd = 1 %, the default", _gain, gain_sd=0.01),
 )
 
 

@@ -68,12 +68,15 @@ def identify_run(
 def _print(answer: MechanismAnswer) -> None:
     found = answer.found
     if answer.identified:
-        table = Table("parameter", "estimate", "standard error", title=f"{answer.model.title}: weak form, float64")
+        table = Table(
+            "parameter", "estimate", "standard error", "of it noise", title=f"{answer.model.title}: weak form, float64"
+        )
         for column in table.columns[1:]:
             column.justify = "right"
         for name, one in answer.values.items():
-            assert one.value is not None and one.se is not None
-            table.add_row(escape(f"{name} [{one.unit}]" if one.unit else name), *with_error(one.value, one.se))
+            assert one.value is not None and one.se is not None and one.se_noise is not None
+            label = escape(f"{name} [{one.unit}]" if one.unit else name)
+            table.add_row(label, *with_error(one.value, one.se), f"{one.se_noise:.2g}")
         Console().print(table)
     explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
     click.echo(

@@ -19,6 +19,7 @@ from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
 from pvid.model.units import Dimension, dimension_of, dimension_of_unit
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
+_GAIN_SD = 0.01  # of what is driven, unless given: no residual shows a torque constant that is 1 % off
 _TAKEN = {"t": "the time", "theta": "the coefficients of a row"}
 
 
@@ -49,7 +50,7 @@ class Model:
         noise: float | None = None,
         reach: float = 1.0,
         driven: bool = False,
-        gain_sd: float = 0.0,
+        gain_sd: float | None = None,
     ) -> Jet:
         """A measured signal.
 
@@ -59,7 +60,7 @@ class Model:
         noise : standard deviation of its white noise, in resolutions (0.5); in its unit where there is no resolution
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
-        gain_sd : relative standard deviation of its gain, which most runs do not show
+        gain_sd : relative standard deviation of its gain, which most runs do not show; 0.01 if it is driven, else 0
         """
         if resolution < 0 or not math.isfinite(resolution):
             raise self._refused(f"{name}: resolution must not be negative")
@@ -67,7 +68,7 @@ class Model:
             raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
         level = 0.5 if noise is None else noise
         jet = self._signal(name, unit, reach)
-        self._gain(name, gain_sd)
+        gain = self._gain(name, gain_sd, driven)
         self.signals.append(
             Signal(
                 jet,
@@ -77,26 +78,31 @@ class Model:
                 float(level),
                 float(reach),
                 driven=driven,
-                gain_sd=float(gain_sd),
+                gain_sd=gain,
             )
         )
         return jet
 
     def input(
-        self, name: str, unit: str, hold: Literal["zoh", "sampled"], reach: float = 1.0, gain_sd: float = 0.0
+        self, name: str, unit: str, hold: Literal["zoh", "sampled"], reach: float = 1.0, gain_sd: float | None = None
     ) -> Jet:
-        """A signal that is known exactly but for its gain (relative standard deviation gain_sd); hold "zoh": the value
-        set at t_k holds until t_(k+1), "sampled": it is a value at t_k."""
+        """A signal that is known exactly but for its gain (relative standard deviation gain_sd, 0.01).
+
+        hold "zoh": the value set at t_k holds until t_(k+1); "sampled": it is a value at t_k.
+        """
         if hold not in ("zoh", "sampled"):
             raise self._refused(f'{name}: hold is "{hold}", it must be "zoh" or "sampled"')
         jet = self._signal(name, unit, reach)
-        self._gain(name, gain_sd)
-        self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, True, float(gain_sd)))
+        gain = self._gain(name, gain_sd, driven=True)
+        self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, True, gain))
         return jet
 
-    def _gain(self, name: str, gain_sd: float) -> None:
+    def _gain(self, name: str, gain_sd: float | None, driven: bool) -> float:
+        if gain_sd is None:
+            return _GAIN_SD if driven else 0.0
         if not 0 <= gain_sd < 1:
             raise self._refused(f"{name}: gain_sd is a relative standard deviation, from 0 to below 1")
+        return float(gain_sd)
 
     def unmeasured(self, name: str, unit: str) -> Jet:
         """A coordinate that no sensor measures; the compiler eliminates it."""

@@ -26,11 +26,13 @@ Float = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter, or what follows from p: its value and standard error; None where it is not identified."""
+    """A parameter, or what follows from p: its value, its standard error and the part of it that is from noise; None
+    where it is not identified."""
 
     unit: str
     value: float | None
     se: float | None
+    se_noise: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,10 @@ class MechanismAnswer:
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
         found = self.found
-        parameters = {name: {"value": one.value, "se": one.se, "unit": one.unit} for name, one in self.values.items()}
+        parameters = {
+            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
+            for name, one in self.values.items()
+        }
         return {
             "identified": self.identified,
             "status": found.verdict.status,
@@ -111,24 +116,37 @@ def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
 
 
 def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
-    def shown(unit: str, value: float, se: float) -> Value:
-        return Value(unit, value, se) if found.verdict.identified else Value(unit, None, None)
+    covariance = _noise_covariance(model, found)
+    gains = [one.gain_sd * found.by_gain[one.name] for one in model.signals if one.gain_sd > 0]
+    whole = covariance + sum((np.outer(gain, gain) for gain in gains), np.zeros_like(covariance))
+
+    def shown(unit: str, value: float, slope: Float) -> Value:
+        if not found.verdict.identified:
+            return Value(unit, None, None, None)
+        se, noise = (float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance))
+        return Value(unit, value, se, noise)
 
     values = {one.name: shown(one.unit, *_output(model, found, one)) for one in model.outputs}
-    for one, p, se in zip(model.unknowns, found.p, found.se, strict=True):
-        values[one.name] = shown(one.unit, float(p), float(se))
+    for k, one in enumerate(model.unknowns):
+        values[one.name] = shown(one.unit, float(found.p[k]), np.eye(len(found.p))[k])
     return values
 
 
-def _output(model: CompiledModel, found: Identified, output: Output) -> tuple[float, float]:
-    """Value and standard error by the delta method; NaN where it does not exist at p."""
+def _noise_covariance(model: CompiledModel, found: Identified) -> Float:
+    """Of p: the correlations of the rows' noise, with the published standard errors but for those of the gains."""
+    covariance = uncertainty(found.fit).covariance
+    gains = [one.gain_sd * found.by_gain[one.name] for one in model.signals if one.gain_sd > 0]
+    noise = np.sqrt(np.maximum(found.se**2 - sum((gain**2 for gain in gains), np.zeros_like(found.se)), 0.0))
+    widened = noise / np.sqrt(np.diag(covariance))
+    return np.asarray(covariance * np.outer(widened, widened))
+
+
+def _output(model: CompiledModel, found: Identified, output: Output) -> tuple[float, Float]:
+    """Value at p and its gradient [n_p]; NaN where it does not exist at p."""
     value = model.with_knowns(output.value)
     gradient = sp.lambdify(model.p, [value, *(value.diff(symbol) for symbol in model.p)], "numpy")
     with np.errstate(all="ignore"):
         at, *slopes = (complex(one) for one in gradient(*found.p.astype(complex)))
     if abs(at.imag) > 0:
-        return float("nan"), float("nan")
-    covariance = uncertainty(found.fit).covariance
-    widened = found.se / np.sqrt(np.diag(covariance))  # to the published standard errors
-    slope = np.array(slopes).real * widened
-    return at.real, float(np.sqrt(slope @ covariance @ slope))
+        return float("nan"), np.full(len(found.p), np.nan)
+    return at.real, np.array(slopes).real

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,8 @@ class RigSimulation:
         missing = [name for name in model.p_names if name not in rig.truth]
         if missing:
             raise PvidError(f"the simulated rig of {model.name} gives no value of {', '.join(missing)}")
-        return cls(model, rig, Plant(model))
+        exact = tuple(replace(one, gain_sd=0.0) for one in model.signals)  # a simulation has no error of a gain
+        return cls(replace(model, signals=exact), rig, Plant(model))
 
     @property
     def truth(self) -> Float:
@@ -198,5 +199,6 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     channels = tuple(Channel(one.name, one.unit, one.name) for one in model.signals)
     write_recording(path, Recording(run["t"], signals, rate), channels)
     settings = path.with_name(f"{path.name.removesuffix('.gz').rpartition('.')[0]}.toml")
-    MechanismRig(model.name, rate, known=simulation.rig.knowns).write(settings)
+    exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven}
+    MechanismRig(model.name, rate, known=simulation.rig.knowns, sensor=exact).write(settings)
     return settings
