@@ -34,9 +34,8 @@ DESIGNS = {
     "two_mass_drive": FourierDesign(1000.0, 0.5, 16, 8),
 }
 
-# RMS errors in per cent of the truth: evidence/models.md 3 for a soft friction that is known (of the arm, the motor's L
-# and the two-mass drive those are what the prototype could at best), here reached with a friction that switches.
-# The two windows that a rig starts with are part of the rig, not of the figures: a fifth on top, as agreed.
+# RMS errors in per cent of the truth that a prototype of the weak form had with a soft friction of known width; here
+# friction switches. The battery's slow pair, the drive's J2 and c: up to twice those, this run shows less of them.
 BARS = {
     "battery_2rc": dict(R0=0.077, R1=0.10, T1=0.14, R2=0.08, T2=0.15),
     "cart_pendulum": dict(mt=0.013, ml=0.003, J=0.003, b=0.014, Fc=0.024, bp=0.044),
@@ -75,7 +74,8 @@ def test_errors_with_a_friction_that_switches_are_those_of_a_soft_known_one(name
     rms = np.sqrt(np.mean(np.square(off), axis=0))
     for parameter, bar in BARS[name].items():
         k = model.p_names.index(parameter)
-        assert 100 * rms[k] / abs(truth[k]) < 1.2 * 1.5 * bar, parameter  # three draws: 1.5
+        # 1.2 of the bars is the aim for many draws; of three the RMS may be 1.5 times too large.
+        assert 100 * rms[k] / abs(truth[k]) < 1.2 * 1.5 * bar, parameter
     # Each of the errors over its standard error, all parameters and seeds.
     ratio = np.array(off) / np.array(wide)
     assert 0.4 < np.sqrt(np.mean(ratio**2)) < 1.6

@@ -30,6 +30,9 @@ _FUNCTIONS = (12, 24, 40)
 _FEW_FUNCTIONS = (5, 8)  # of runs with motion that the equations do not explain: it is above the drive's frequencies
 _RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
 
+# Enough to compare designs, each from the best p so far.
+_PASSES = 10
+
 # Above this the equations' own errors are estimated when designs are compared.
 _MODEL_ERROR = 5.0
 
@@ -57,7 +60,7 @@ def score_of(
         rows = WeakRows.of(model, run, design)
         if rows.windows < fewest:
             return None
-        fit = gated(rows, start, equation_error=errors)
+        fit = gated(rows, start, equation_error=errors, passes=_PASSES)
         found = uncertainty(fit)
     except (PvidError, np.linalg.LinAlgError):
         return None

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.rows import WeakRows
-from pvid.oracle.fourier.solve import Fit, batch
+from pvid.oracle.fourier.solve import PASSES, Fit, batch
 
 # A window is spoiled if its residuals have this many times the energy of the median window's. Windows of one sample's
 # spike are at 1e3 and more; without spoiled ones the largest of a hundred windows of 24 rows is below 3.
@@ -34,12 +34,18 @@ def spoiled(fit: Fit) -> npt.NDArray[np.bool_]:
     return out if out.sum() <= max(2, _FEW * len(out)) else np.zeros(len(out), np.bool_)
 
 
-def gated(rows: WeakRows, start: Float | None = None, equation_error: bool = True, compensate: bool = True) -> Fit:
+def gated(
+    rows: WeakRows,
+    start: Float | None = None,
+    equation_error: bool = True,
+    compensate: bool = True,
+    passes: int = PASSES,
+) -> Fit:
     """The estimate from the windows that are not spoiled."""
-    fit = batch(rows, start, equation_error, compensate)
+    fit = batch(rows, start, equation_error, compensate, passes)
     for _ in range(_ROUNDS):
         bad = spoiled(fit)
         if not bad.any():
             break
-        fit = replace(batch(fit.rows.only(~bad), fit.p, equation_error, compensate), start=fit.start)
+        fit = replace(batch(fit.rows.only(~bad), fit.p, equation_error, compensate, passes), start=fit.start)
     return fit

@@ -12,7 +12,7 @@ from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.rows import EquationError, WeakRows, WhiteRows
 
 _STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
-_PASSES = 25  # of whitening at the present p
+PASSES = 25  # of whitening at the present p
 _STEPS = 30  # of Gauss-Newton between two whitenings
 _SETTLED = 1e-8  # a step below this ends the search
 
@@ -20,7 +20,7 @@ _SETTLED = 1e-8  # a step below this ends the search
 _EVIDENCE = 10.0
 _HINT = 2.0  # with the mean of the windows' weights, below which the exact likelihood is not computed
 
-_SEARCHES = 8  # passes after which an error that was found is only improved
+_SEARCHES = (2, 6)  # passes that look for an error of the equation; the others improve its variance
 _SHARPENING = 3  # steps of a variance at a time
 
 
@@ -155,7 +155,13 @@ class Fit:
         return [one.residuals(theta) for one in self.white]
 
 
-def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = True, compensate: bool = True) -> Fit:
+def batch(
+    rows: WeakRows,
+    start: Float | None = None,
+    equation_error: bool = True,
+    compensate: bool = True,
+    passes: int = PASSES,
+) -> Fit:
     """All windows at once: whiten at p, step, and again until p stays.
 
     Parameters
@@ -164,13 +170,14 @@ def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = Tru
     start : of p; None: the guesses
     equation_error : estimate the error of each equation from its residuals and weight with it
     compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R / d theta
+    passes : of whitening at the present p, at most
     """
     parameters = rows.compiled.parameters
     p = begun = parameters.checked(start)
     prior = parameters.prior(begun)
     errors = [EquationError()] * rows.kinds
     settled = False
-    for turn in range(_PASSES):
+    for turn in range(passes):
         theta = parameters.theta(p)
         white = [rows.white(group, theta, errors) for group in rows.groups]
         moments = compensated(rows, white, theta) if compensate else Moments.of(white)
@@ -178,9 +185,7 @@ def batch(rows: WeakRows, start: Float | None = None, equation_error: bool = Tru
         changed = False
         if equation_error and turn >= 2:
             now = parameters.theta(p)
-            found = [
-                error_of(rows, kind, now, errors[kind] if turn >= _SEARCHES else None) for kind in range(rows.kinds)
-            ]
+            found = [improved(rows, kind, now, errors[kind], turn) for kind in range(rows.kinds)]
             changed = any(differs(a, b) for a, b in zip(errors, found, strict=True))
             errors = found
         if size < _SETTLED and turn >= 3 and not changed:
@@ -221,17 +226,20 @@ def differs(a: EquationError, b: EquationError) -> bool:
     return a.order != b.order or abs(a.variance - b.variance) > 1e-3 * max(a.variance, b.variance)
 
 
-def error_of(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationError | None = None) -> EquationError:
-    """The equation's error of most likelihood: white noise of order 0.. in the row, beside that of the sensors.
+def improved(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationError, turn: int) -> EquationError:
+    """The equation's error at a pass of the search for p."""
+    if turn in _SEARCHES:
+        return error_of(rows, kind, theta)
+    return sharpened(rows, kind, theta, last, 1) if last.variance else last
 
-    One found `last` time is improved; the orders are not compared again.
+
+def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError:
+    """The equation's error of most likelihood: white noise of order 0.. in the row, beside that of the sensors.
 
     With R0 = L L^T, L^-1 Q L^-T = U diag(q) U^T and z = U^T L^-1 e the likelihood of the variance v is that of
     independent z_i of variances 1 + v q_i. That is where a variance starts; orders are compared with the weights of
     each window, reversals and all.
     """
-    if last is not None and last.variance:
-        return sharpened(rows, kind, theta, last)
     plain = rows.white((kind,), theta, [EquationError()] * rows.kinds)
     e = plain.residuals(theta)
     best, gain = EquationError(), _EVIDENCE
@@ -262,13 +270,15 @@ def unlikely(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationE
     return float(np.sum(e**2)) + white.whitener.log_determinant() * white.free / e.size
 
 
-def sharpened(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError) -> EquationError:
+def sharpened(
+    rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError, steps: int = _SHARPENING
+) -> EquationError:
     """The variance with the weights of each window in place of their mean.
 
     Where the likelihood is at its maximum, sum e^T R^-1 Q R^-1 e = sum tr(R^-1 Q): v is scaled by their ratio.
     """
     q = rows.noise.gram(error.order, error.order)
-    for _ in range(_SHARPENING):
+    for _ in range(steps):
         errors = [error] * rows.kinds
         white = rows.white((kind,), theta, errors)
         e = white.residuals(theta)
