@@ -10,10 +10,10 @@ def shown(text: str, longest: int = 40) -> str:
     return ascii(text if len(text) <= longest else text[: longest - 3] + "...")
 
 
-def listed(names: Iterable[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+def listed(names: Iterable[object], word: str = "and") -> str:
+    """``a``, ``a and b``, ``a, b and c``; with another word in place of and."""
+    *first, last = map(str, names)
+    return f"{', '.join(first)} {word} {last}" if first else last
 
 
 def reason(error: BaseException) -> str:

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
+from pvid.base.wording import listed
 from pvid.model.lower import lower
-from pvid.model.readable import listed, readable
+from pvid.model.readable import readable
 from pvid.model.refusal import ModelError, Place
 from pvid.model.signals import TIME, Integral, Jet, jets, total_derivative
 from pvid.model.terms import ONE, ZERO, added, by_unknowns, merged, terms_of, times, varies

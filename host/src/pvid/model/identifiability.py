@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
+from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel
 from pvid.model.gradient import jacobian_at, null_space, rank
-from pvid.model.readable import listed
 from pvid.model.solutions import Solutions
 from pvid.model.symmetry import Symmetry, symmetries
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import sympy as sp
@@ -53,9 +52,3 @@ def readable_part(part: Part) -> str:
             out.append((" - " if negative else " + ") + (f"{order}[{text}]" if m else text))
     whole = "".join(out)
     return whole.removeprefix(" + ").replace(" - ", "-", 1) if whole.startswith(" - ") else whole[3:] or "0"
-
-
-def listed(names: Sequence[str], last: str = "and") -> str:
-    """As in "a, b and c"."""
-    names = [str(one) for one in names]
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}" if names else ""

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import sympy as sp
 
+from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Row
 from pvid.model.corners import slopes
 from pvid.model.identifiability import Identifiability, Shift, identifiable
-from pvid.model.readable import listed, readable, readable_part
+from pvid.model.readable import readable, readable_part
 from pvid.model.signals import jets
 from pvid.model.symmetry import Symmetry
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
+from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import clustered_variance
@@ -24,7 +25,7 @@ from pvid.oracle.fourier.front import filtered, polynomial_weights
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.rows import WhiteRows, record_of
 from pvid.oracle.fourier.solve import Fit, inverse
-from pvid.oracle.fourier.verdict import Reason, listed
+from pvid.oracle.fourier.verdict import Reason
 from pvid.sim.imperfections import with_play
 
 Kind = Literal["delay", "play", "eccentric", "gain", "friction"]

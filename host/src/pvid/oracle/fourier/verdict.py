@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import sympy as sp
 
+from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Jet
 from pvid.oracle.fourier.errors import Uncertainty, uncertainty
@@ -112,11 +113,6 @@ class Halves:
     first: Float
     second: Float
     clash: Float
-
-
-def listed(names: list[str]) -> str:
-    """a, b and c."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[Reason]:
