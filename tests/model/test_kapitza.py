@@ -106,7 +106,7 @@ def test_jacobian_equals_the_oracles(compiled: CompiledModel) -> None:
 
 
 def test_strong_form_is_the_papers() -> None:
-    """MATH.md 2: 11 theta, 18 non-zeros of the Jacobian, Y and every regressor."""
+    """theory.md 2: 11 theta, 18 non-zeros of the Jacobian, Y and every regressor."""
     model = Model("pendulum, encoder without offset")
     u, phi = model.input("u", "1/s^2", hold="sampled"), model.sensor("phi", "rad", resolution=1e-4)
     x = model.unmeasured("x", "rad")
