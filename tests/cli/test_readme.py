@@ -156,7 +156,9 @@ def test_identifiers_and_files_that_pages_name_exist() -> None:
             if name not in words and not name.endswith("_"):
                 missing.append(f"{page.relative_to(ROOT)}: {name}")
         for name in re.findall(r"[\w/.]+\.(?:c|h|py|toml|cmake|md)\b", span):
-            known = name.rsplit("/", 1)[-1] in files or re.match(r"(run|rig|run-tuned|main|RUN|link|motor|dc_motor\w*|weak_config)\b", name)
+            known = name.rsplit("/", 1)[-1] in files or re.match(
+                r"(run|rig|run-tuned|main|RUN|link|motor|dc_motor\w*|weak_config)\b", name
+            )
             if not known:
                 missing.append(f"{page.relative_to(ROOT)}: {name}")
         for name in re.findall(r"^(?:firmware|host|tests|tools)/[\w/.-]+", span):

@@ -73,7 +73,7 @@ def test_a_relation_between_rows_is_found() -> None:
     found = judged(two_sensors())
     assert (found.rank, found.unknowns) == (3, 4)
     assert set(found.unidentifiable) == {"b1", "b2"}
-    assert "b1 and b2 change together" in verdict(found)
+    assert "b1 and b2 can change together" in verdict(found)
 
 
 def test_a_cart_without_sensor_is_identifiable() -> None:

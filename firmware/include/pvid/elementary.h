@@ -1,6 +1,6 @@
 /* pvid/elementary.h - sine, cosine and sign in float32, with the same bits on every processor.
  *
- * What the functions that `pvid model build` writes call. They use + - * / and comparisons only, no library function;
+ * The functions that `pvid model build` writes call these. They use + - * / and comparisons only, no library function;
  * pvid.twin.f32.elementary has the same operations in numpy. Pure functions: no state, reentrant.
  *
  *   const float moment = weight * pvid_sin_f32(angle);
@@ -18,9 +18,9 @@ extern "C" {
 #define PVID_ANGLE_LIMIT_F32 16384.0f
 
 /* sin x, cos x [-1..1] of x [rad], |x| <= PVID_ANGLE_LIMIT_F32; else NaN, so that the estimator refuses the row.
- * Error: below 1.3e-7 for |x| <= 1000, below 3e-7 up to the limit. cos 0 is 1. Method: x less the nearest multiple of
- * pi (for cosine of pi + 1/2), in three parts of pi of which the products with the first two are exact; a polynomial of
- * degree 9. Cost: about 20 operations. */
+ * Error: below 1.3e-7 for |x| <= 1000, below 3e-7 up to the limit. cos 0 is 1. Method: x less the nearest k pi (for
+ * the cosine: the nearest (k + 1/2) pi), with pi in three parts; the products with the first two parts are exact. Then
+ * a polynomial of degree 9. Cost: about 20 operations. */
 float pvid_sin_f32(float x);
 float pvid_cos_f32(float x);
 

@@ -1,8 +1,7 @@
 /* Accuracy of p from the normal equations: residual variance, kappa, standard errors. Pure: the results depend on the
  * arguments alone. Private to the core.
  *
- *   pvid_assess_f32(&system, &settings, &estimate);     at once; the parts below serve an engine that works in
- * stages
+ *   pvid_assess_f32(&system, &settings, &estimate);     in one call; the other functions are its stages
  */
 #ifndef PVID_ASSESS_F32_H
 #define PVID_ASSESS_F32_H

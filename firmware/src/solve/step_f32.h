@@ -79,7 +79,7 @@ static inline bool pvid_step_is_excited_f32(const pvid_solve_settings_f32 *setti
 }
 
 /* Whether p is within the dead zone of estimator.h: F^T (S + H0)^-1 F <= dead_zone^2 correlation s^2. False for NaN.
- * Cost: a solve. */
+ * settings->dead_zone already contains the square. Cost: a solve. */
 static inline bool pvid_step_is_in_dead_zone_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
                                                  const pvid_cholesky_f32 *factor)
 {

@@ -40,7 +40,7 @@ def _shift(one: Shift) -> str:
     names = listed(one.unknowns)
     shown = ", ".join(_in_order(value, one.unknowns) for value in one.combinations)
     if not one.combinations and one.kind == "coefficients":
-        return f"  {names} change together without a trace: {one.cure}."
+        return f"  {names} can change together while the data stay the same: {one.cure}."
     if not one.combinations:
         return f"  {names}: not determined at all."
     only = f"only {shown}" if one.kind != "coefficients" else f"only what follows from {shown}"

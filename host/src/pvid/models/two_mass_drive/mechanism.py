@@ -11,7 +11,7 @@ kt, Tc = model.known("kt", "N*m/A", 0.1), model.unknown("Tc", "N*m", 0.03)
 J1, J2 = model.unknown("J1", "kg*m^2", 4e-4), model.unknown("J2", "kg*m^2", 8e-4)
 k, c = model.unknown("k", "N*m/rad", 2.0), model.unknown("c", "N*m*s", 2e-3)
 b1, b2 = model.unknown("b1", "N*m*s", 1e-3), model.unknown("b2", "N*m*s", 2e-3)
-i0 = model.unknown("i0", "A", 0.0, positive=False, sd=0.2)  # the amplifier's zero
+i0 = model.unknown("i0", "A", 0.0, positive=False, sd=0.2)  # offset of the current sensor
 shaft = k * (th - x) + c * (th.d() - x.d())
 model.equation(J1 * th.d(2) + b1 * th.d() + Tc * sgn(th.d()) + shaft - kt * (i - i0))
 model.equation(J2 * x.d(2) + b2 * x.d() - shaft)

@@ -78,14 +78,14 @@ class SensorError:
     def text(self) -> str:
         """In words."""
         if self.kind == "delay":
-            late = "late" if self.size > 0 else "early"
-            return f"{self.signal} seems to be sampled {abs(self.size):.2g} s {late}"
+            shifted = "delayed" if self.size > 0 else "advanced"
+            return f"{self.signal} seems to be {shifted} by {abs(self.size):.2g} s"
         if self.kind == "friction":
-            return f"the friction sgn({self.signal}) seems to change over about {self.size:.2g}, not at once"
+            return f"the friction seems to be soft: sgn({self.signal}) changes over a width of about {self.size:.2g}"
         if self.kind == "gain":
             than = "larger" if self.size < 0 else "smaller"
             return f"{self.signal} seems to be {100 * abs(self.size):.2g} % {than} than recorded"
-        what = "a play of" if self.kind == "play" else "an eccentric encoder, amplitude"
+        what = "a backlash of" if self.kind == "play" else "an eccentric encoder of amplitude"
         return f"{self.signal} seems to have {what} {abs(self.size):.2g}"
 
 
@@ -226,7 +226,7 @@ def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> li
     if error is None:
         return []
     names = [model.p_names[k] for k in np.argsort(-np.abs(error.shift) / se) if abs(error.shift[k]) > _MOVES * se[k]]
-    text = f"{error.text} ({error.certainty:.0f} standard errors from none), which moves {listed(names)}."
+    text = f"{error.text} ({error.certainty:.0f} standard errors from 0). This error biases {listed(names)}."
     return [Reason("friction" if error.kind == "friction" else "sensor", text)]
 
 
@@ -240,6 +240,6 @@ def of_scale(model: CompiledModel, by_gain: Mapping[str, Float], p: Float, se: F
             scales.append(f"{signal.name} ({100 * moved[k] / abs(p[k]):.2g} % of {model.p_names[k]})")
     if not scales:
         return []
-    text = "The standard errors contain no error of gains (gain_sd); one of 1 % moves the estimate: "
+    text = "The standard errors include no gain error (gain_sd = 0). A gain error of 1 % changes the estimate: "
     text += ", ".join(scales) + "."
     return [Reason("scale", text, alarm=False)]

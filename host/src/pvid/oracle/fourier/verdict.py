@@ -126,7 +126,8 @@ def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[R
         return []
     names = [model.p_names[k] for k in bad]
     partner = partner_of(fit, int(bad[0]))
-    mixed = f"; the run cannot separate {names[0]} from {model.p_names[partner]}" if partner is not None else ""
+    together = f"{names[0]} and {model.p_names[partner]}" if partner is not None else ""
+    mixed = f"; {together} are not identifiable together" if together else ""
     error = f"the standard error of {names[0]} is {found.se[bad[0]]:.2g}"
     return [Reason("not_identified", f"The run does not determine {listed(names)}: {error}{mixed}.")]
 
@@ -194,7 +195,7 @@ def of_windows(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, o
         Reason(
             "windows",
             f"Windows of {lengths[0]:.3g} s and {lengths[1]:.3g} s disagree on {listed(names)} ({names[0]}: "
-            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): noise inside the motion or a missing term bends the estimate.",
+            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): noise in the regressors or a missing term biases the estimate.",
         )
     ]
 
@@ -211,7 +212,7 @@ def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fl
     return [
         Reason(
             "attenuation",
-            f"Motion that the equations do not explain bends {listed(names)} ({names[0]} is {fit.p[k]:.4g}, and "
+            f"Motion that the equations do not explain biases {listed(names)} ({names[0]} is {fit.p[k]:.4g}, and "
             f"{other[k]:.4g} with the highest derivative as the dependent signal): excite more strongly, or take "
             "longer windows and fewer functions.",
         )
@@ -230,7 +231,8 @@ def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit,
         Reason(
             "smoothing",
             f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {listed(names)} ({names[0]}: "
-            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer blurs the motion, or the shorter folds noise.",
+            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer filter attenuates the motion, or the shorter one passes "
+            "too much noise.",
         )
     ]
 
@@ -243,7 +245,7 @@ def of_residuals(found: Uncertainty) -> list[Reason]:
             Reason(
                 "shape",
                 f"The residuals are {found.weighted_chi2:.3g} times what sensors and a white error of the equations "
-                "explain: they follow the motion.",
+                "explain: they are correlated with the motion, and a term is probably missing.",
             )
         )
     if found.chi2 > _CHI2:
@@ -294,8 +296,9 @@ def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
             out.append(
                 Reason(
                     "feedback",
-                    f"{one.name} is a law of the measured outputs ({100 * (1 - left):.4g} % explained): regression may "
-                    "have found the controller, not the mechanism. Add an excitation that does not depend on them.",
+                    f"{one.name} is a function of the measured outputs ({100 * (1 - left):.4g} % explained): the "
+                    "estimate may describe the controller, not the mechanism. Add an excitation that does not depend "
+                    "on the outputs.",
                 )
             )
     return out
@@ -320,7 +323,7 @@ def of_range(model: CompiledModel, p: Float) -> list[Reason]:
         for one, value in zip(model.unknowns, p, strict=True)
         if one.high > one.low and not one.low <= value <= one.high
     ]
-    return [Reason("range", f"Outside the plausible range: {listed(out)}.", alarm=True)] if out else []
+    return [Reason("range", f"Outside the range (low, high): {listed(out)}.", alarm=True)] if out else []
 
 
 def of_spoiled(rows: WeakRows, fit: Fit) -> list[Reason]:
@@ -341,7 +344,7 @@ def of_spoiled(rows: WeakRows, fit: Fit) -> list[Reason]:
 
 def settled(fit: Fit) -> list[Reason]:
     """The search did not come to rest."""
-    return [] if fit.settled else [Reason("not_settled", "The search for the parameters did not come to rest.")]
+    return [] if fit.settled else [Reason("not_settled", "The iteration for the parameters did not converge.")]
 
 
 def widened(se: Float, halves: Halves | None) -> Float:
