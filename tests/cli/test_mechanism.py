@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -46,6 +48,14 @@ def test_a_simulated_run_is_identified_with_the_rig_file_beside_it(motor: Path, 
         one = shown["parameters"][name]
         # the law of friction of the simulation is soft, that of the model is sharp: 4 standard errors and a warning
         assert abs(one["value"] - truth) < 4 * one["se"] or shown["warning"], name
+
+
+def test_a_run_of_the_pendulum_is_identified_without_loading_sympy() -> None:
+    """It takes a third of a second, for nothing there."""
+    loaded = "import sys, pvid.cli.identify, pvid.cli.tune; print('sympy' in sys.modules)"
+    assert (
+        subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True).stdout == "False\n"
+    )
 
 
 def test_columns_and_units_are_mapped(motor: Path, tmp_path: Path) -> None:

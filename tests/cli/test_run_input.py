@@ -15,8 +15,8 @@ from click.testing import CliRunner, Result
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.log.rig_settings import parse_settings, rig_for, rig_path_of
-from pvid.rig.file import RigFile
+from pvid.log.rig_settings import parse_settings, rig_for
+from pvid.rig.file import RigFile, rig_path_of
 from pvid.rig.run import Run, read_run, write_run
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 

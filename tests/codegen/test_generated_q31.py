@@ -157,7 +157,7 @@ def test_reaches_follow_from_the_description_or_are_given() -> None:
     assert given["phi_1"] == 40
     with pytest.raises(PvidError, match="motor has no input speed: its inputs are V, i, phi, phi_1"):
         reaches_of(functions, Reaches(of={"speed": 1.0}))
-    # what makes a divisor 0 possible is told by its reach
+    # no reach of the motor allows a divisor of 0
     assert refusal(functions) is None
 
 

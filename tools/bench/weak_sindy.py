@@ -1,6 +1,6 @@
 """pysindy's weak form on the mechanisms that it can express: x' = C f(x, u) with measured states x.
 
-It knows no ties between equations (k stands in both of a motor), no hidden states and no mass matrix. The motor, with a
+It has no ties between equations (k is in both of a motor), no hidden states and no mass matrix. The motor, with a
 velocity from a polynomial smoother for a state, and the rigid body are within its reach. The parameters follow from
 its coefficients by hand, here.
 """

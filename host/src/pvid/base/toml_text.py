@@ -6,12 +6,30 @@ import tomllib
 from typing import Any
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import shown
 
 # Longer ones are slips. A key of many parts takes tomllib time and memory that grow with their square: half a minute
 # and 4 GB for 60 kB.
 MOST_BYTES = 64_000
 TOO_LONG = f"is no TOML for pvid: it is longer than {MOST_BYTES // 1000} kB"
 _LONGEST_LINE = 4000
+
+
+def key_and_value(setting: str, example: str) -> tuple[str, Any]:
+    """`l1=0.25` as a key and its value, which is written as in TOML; the quotes of a word may be left out.
+
+    Raises
+    ------
+    PvidError
+        When it is none; the sentence contains the example.
+    """
+    key, equals, text = (part.strip() for part in setting.partition("="))
+    if not equals or not key or not text:
+        raise PvidError(f"--set {shown(setting)} is not KEY=VALUE, as in --set {example}")
+    try:
+        return key, toml_document(f"value = {text}")["value"]
+    except PvidError:
+        return key, text
 
 
 def toml_document(text: str) -> dict[str, Any]:

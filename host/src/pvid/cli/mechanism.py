@@ -15,9 +15,9 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.cli.input import print_notes
 from pvid.rig.columns import parsed
-from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import is_run, read_recording
-from pvid.run.mechanism import MechanismAnswer, channels_of, identify_mechanism, model_of
+from pvid.run.mechanism import MechanismAnswer, identify_mechanism, model_of
 
 
 def identify_run(

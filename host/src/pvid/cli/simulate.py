@@ -10,8 +10,7 @@ import click
 import numpy as np
 
 from pvid.base.console import DONE, write_stderr
-from pvid.log.rig_settings import rig_path_of
-from pvid.rig.file import RigFile
+from pvid.rig.file import RigFile, rig_path_of
 from pvid.rig.run import write_run
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,

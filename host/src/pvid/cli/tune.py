@@ -13,7 +13,8 @@ from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, read_input, rig_options
 from pvid.cli.result import identified, print_warning
 from pvid.core.native import Native
-from pvid.log.rig_settings import rig_for, rig_path_of
+from pvid.log.rig_settings import rig_for
+from pvid.rig.file import rig_path_of
 from pvid.rig.sensor_steps import resolved
 from pvid.run import answer
 

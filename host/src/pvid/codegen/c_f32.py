@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pvid.codegen.literals import c_literal
 from pvid.codegen.operations import Program
-from pvid.codegen.statements import Language, statements, uses_arguments
+from pvid.codegen.statements import Language, call_of, statements, uses_arguments
 
 _CALLS = {
     "sin": "pvid_sin_f32({})",
@@ -25,9 +25,7 @@ def function(signature: str, program: Program) -> str:
         statement=lambda name, text: f"const float {name} = {text};",
         argument=lambda place: f"in[{place}]",
         literal=lambda place: c_literal(program.literal(place)),
-        operation=lambda place, operands: _CALLS.get(program.kind(place), f"{{}} {program.kind(place)} {{}}").format(
-            *operands
-        ),
+        operation=lambda place, operands: call_of(program, place, operands, _CALLS),
     )
     lines, results = statements(program, language)
     if not uses_arguments(program):

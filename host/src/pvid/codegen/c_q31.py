@@ -7,11 +7,17 @@ from fractions import Fraction
 
 from pvid.base.errors import PvidError
 from pvid.codegen.c_f32 import definition
-from pvid.codegen.formats import FixedProgram, angle_of, nearest, shift_of, width_of
+from pvid.codegen.formats import FixedProgram, nearest
 from pvid.codegen.operations import Program
-from pvid.codegen.statements import Language, statements, uses_arguments
+from pvid.codegen.statements import Language, fixed_call_of, statements, uses_arguments
 
 _CALLS = {
+    "*": "pvid_fixed_product_q31({}, {}, {})",
+    "/": "pvid_fixed_quotient_q31({}, {}, {})",
+    "sin": "pvid_sin_q31({}, {})",
+    "cos": "pvid_cos_q31({}, {})",
+    "soft_sign": "pvid_soft_sign_q31({}, {})",
+    "shift": "pvid_fixed_shift_q31({}, {})",
     "sign": "pvid_sign_q31({})",
     "abs": "pvid_fixed_magnitude_q31({})",
     "neg": "-{}",
@@ -25,7 +31,7 @@ def fixed_function(signature: str, made: FixedProgram, limits: Sequence[int]) ->
         statement=lambda name, text: f"const int32_t {name} = {text};",
         argument=lambda place: f"in[{place}]",
         literal=lambda place: str(made.integer(place)),
-        operation=lambda place, operands: _fixed(made, place, operands),
+        operation=lambda place, operands: fixed_call_of(made, place, operands, _CALLS),
     )
     lines, results = statements(program, language)
     checks = [
@@ -37,27 +43,6 @@ def fixed_function(signature: str, made: FixedProgram, limits: Sequence[int]) ->
     return definition(
         signature, [*checks, *lines, *(f"out[{k}] = {one};" for k, one in enumerate(results)), "return true;"]
     )
-
-
-def _fixed(made: FixedProgram, place: int, operands: list[str]) -> str:
-    kind, first = made.program.kind(place), operands[0]
-    if kind in "+-":
-        shifted = [_shifted(one, by) for one, by in zip(operands, made.alignment(place), strict=True)]
-        return f"{shifted[0]} {kind} {shifted[1]}"
-    if kind == "*":
-        return f"pvid_fixed_product_q31({first}, {operands[1]}, {shift_of(made, place)})"
-    if kind == "/":
-        return f"pvid_fixed_quotient_q31({first}, {operands[1]}, {shift_of(made, place)})"
-    if kind in ("sin", "cos"):
-        by, bits = angle_of(made, place)
-        return f"pvid_{kind}_q31({_shifted(first, by)}, {bits})"
-    if kind == "soft_sign":
-        return f"pvid_soft_sign_q31({first}, {width_of(made, place)})"
-    return _CALLS[kind].format(first)
-
-
-def _shifted(text: str, by: int) -> str:
-    return f"pvid_fixed_shift_q31({text}, {by})" if by else text
 
 
 _SCALED = {

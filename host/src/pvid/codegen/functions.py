@@ -28,7 +28,7 @@ class Input:
 
     Attributes
     ----------
-    symbol : as it stands in the channels
+    symbol : as in the channels
     name : in C and Python
     meaning : in words
     unit : "" for a pure number
@@ -199,7 +199,7 @@ def with_values(model: CompiledModel, expression: sp.Expr) -> sp.Expr:
 class _Plain:
     """Replaces the known constants by their values, and defined signals by their definitions.
 
-    runs : symbol -> the integral since the start of the run that it stands for
+    runs : symbol -> the integral since the start of the run
     """
 
     def __init__(self, model: CompiledModel) -> None:

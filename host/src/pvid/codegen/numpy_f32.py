@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pvid.codegen.literals import python_literal
 from pvid.codegen.operations import Program
-from pvid.codegen.statements import Language, statements
+from pvid.codegen.statements import Language, call_of, statements
 
 _CALLS = {
     "sin": "elementary.sine({})",
@@ -23,9 +23,7 @@ def function(name: str, program: Program, summary: str) -> str:
         statement=lambda one, text: f"{one} = {text}",
         argument=lambda place: f"_in[{place}]",
         literal=lambda place: python_literal(program.literal(place)),
-        operation=lambda place, operands: _CALLS.get(program.kind(place), f"{{}} {program.kind(place)} {{}}").format(
-            *operands
-        ),
+        operation=lambda place, operands: call_of(program, place, operands, _CALLS),
     )
     lines, results = statements(program, language)
     return "\n".join(

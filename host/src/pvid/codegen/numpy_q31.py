@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pvid.codegen.c_q31 import scaled_literal
-from pvid.codegen.formats import FixedProgram, angle_of, shift_of, width_of
+from pvid.codegen.formats import FixedProgram
 from pvid.codegen.operations import Program
-from pvid.codegen.statements import Language, statements
+from pvid.codegen.statements import Language, fixed_call_of, statements
 
 _CALLS = {
+    "*": "elementary_q31.product({}, {}, {})",
+    "/": "elementary_q31.quotient({}, {}, {})",
+    "sin": "elementary_q31.sine({}, {})",
+    "cos": "elementary_q31.cosine({}, {})",
+    "soft_sign": "elementary_q31.soft_sign({}, {})",
+    "shift": "elementary_q31.shift({}, {})",
     "sign": "elementary_q31.sign({})",
     "abs": "elementary_q31.magnitude({})",
     "neg": "-{}",
@@ -23,7 +29,7 @@ def fixed_function(name: str, made: FixedProgram, limits: Sequence[int], summary
         statement=lambda one, text: f"{one} = {text}",
         argument=lambda place: f"_in[{place}]",
         literal=lambda place: str(made.integer(place)),
-        operation=lambda place, operands: _fixed(made, place, operands),
+        operation=lambda place, operands: fixed_call_of(made, place, operands, _CALLS),
     )
     lines, results = statements(program, language)
     return "\n".join(
@@ -36,27 +42,6 @@ def fixed_function(name: str, made: FixedProgram, limits: Sequence[int], summary
             f"    return _out, elementary_q31.within(_in, {list(limits)!r})",
         ]
     )
-
-
-def _fixed(made: FixedProgram, place: int, operands: list[str]) -> str:
-    kind, first = made.program.kind(place), operands[0]
-    if kind in "+-":
-        shifted = [_shifted(one, by) for one, by in zip(operands, made.alignment(place), strict=True)]
-        return f"{shifted[0]} {kind} {shifted[1]}"
-    if kind == "*":
-        return f"elementary_q31.product({first}, {operands[1]}, {shift_of(made, place)})"
-    if kind == "/":
-        return f"elementary_q31.quotient({first}, {operands[1]}, {shift_of(made, place)})"
-    if kind in ("sin", "cos"):
-        by, bits = angle_of(made, place)
-        return f"elementary_q31.{'sine' if kind == 'sin' else 'cosine'}({_shifted(first, by)}, {bits})"
-    if kind == "soft_sign":
-        return f"elementary_q31.soft_sign({first}, {width_of(made, place)})"
-    return _CALLS[kind].format(first)
-
-
-def _shifted(text: str, by: int) -> str:
-    return f"elementary_q31.shift({text}, {by})" if by else text
 
 
 _SCALED = {

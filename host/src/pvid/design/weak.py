@@ -122,11 +122,6 @@ class WeakDesign:
         return (self.taps - 1) // 2
 
     @property
-    def latency_s(self) -> float:
-        """Age of a window's middle when the window is complete [s]."""
-        return self.delay / self.sample_rate + self.hop_s
-
-    @property
     def smoothing_gain(self) -> float:
         """Standard deviation of a decimated sample for white noise of 1 on the samples."""
         centre = 1 - 2 * float(np.sum(self.smooth))

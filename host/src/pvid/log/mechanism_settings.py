@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pvid.base.toml_text import toml_document
-from pvid.log.rig_settings import rig_path_of
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.file import parsed_file
+from pvid.rig.file import parsed_file, rig_path_of
 from pvid.rig.mechanism_file import MechanismRig, with_settings
 from pvid.rig.run import is_run
 
@@ -43,5 +42,4 @@ def mechanism_rig(
         document["model"]["name"] = str(rig_path.parent / table["name"])
     if model in MODELS:
         return None
-    rig = MechanismRig.of_document(with_settings(document, settings))
-    return rig
+    return MechanismRig.of_document(with_settings(document, settings))

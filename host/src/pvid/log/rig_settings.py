@@ -7,18 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from pvid.base.errors import PvidError
-from pvid.base.toml_text import toml_document
-from pvid.base.wording import shown
+from pvid.base.toml_text import key_and_value
 from pvid.log.rig import rig_of_log
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.file import RigFile, check_setting, load
+from pvid.rig.file import RigFile, check_setting, load, rig_path_of
 from pvid.rig.run import is_run
-
-
-def rig_path_of(run_path: Path) -> Path:
-    """RUN.toml, beside RUN.csv or RUN.csv.gz."""
-    name = run_path.name.removesuffix(".gz")
-    return run_path.with_name(Path(name).stem + ".toml")
 
 
 def rig_for(run_path: Path | None, rig_path: Path | None, settings: Iterable[str] = ()) -> RigFile:
@@ -70,13 +63,7 @@ def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
     """
     document: dict[str, Any] = {}
     for setting in settings:
-        key, equals, text = (part.strip() for part in setting.partition("="))
-        if not equals or not key or not text:
-            raise PvidError(f"--set {shown(setting)} is not KEY=VALUE, as in --set l1=0.25")
-        try:
-            value = toml_document(f"value = {text}")["value"]
-        except PvidError:
-            value = text
+        key, value = key_and_value(setting, "l1=0.25")
         table, dot, name = key.rpartition(".")
         try:
             value = check_setting(table, name, value)

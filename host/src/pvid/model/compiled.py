@@ -143,7 +143,7 @@ class CompiledModel:
     opaque
         jet of an auxiliary signal -> the expression that it is computed from: a definition of the description (y''/l1,
         or Integral(i, 1), since the start of the run); in a strong form also sgn(th'), which is differentiated there.
-        Its jets stand in the rows like those of a signal.
+        The rows contain its jets like those of a signal.
     equations : expressions = 0 as the user wrote them (in jets of signals and hidden), for the simulator
     hidden : unmeasured coordinates, and defined integrals, whose rates are among the equations
     """

@@ -26,7 +26,7 @@ _SUFFIX = "_jump"
 def slopes(model: CompiledModel) -> dict[tuple[str, str], sp.Expr]:
     """(sensor, held input) -> d sensor' / d input, a function of p alone.
 
-    Of a sensor whose first derivative is the highest one and stands in one equation, where no other signal with corners
+    Of a sensor whose first derivative is the highest one and occurs in one equation, where no other signal with corners
     does; what is no function of p alone is left out.
     """
     held = [one for one in model.signals if one.kind == "input" and one.hold == "zoh"]

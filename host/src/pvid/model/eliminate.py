@@ -23,7 +23,7 @@ _D = sp.Symbol("D")  # d/dt in the matrix of operators
 
 
 class ChainError(ModelError):
-    """A term stands in the way of the integrator chain."""
+    """A term prevents the integrator chain."""
 
     def __init__(self, cause: str, term: sp.Expr) -> None:
         super().__init__(cause)
@@ -155,7 +155,7 @@ def _joined(equations: Sequence[Equation]) -> str:
 
 
 def substituted(group: Sequence[Equation], name: str) -> list[Equation] | None:
-    """The other equations, where the coordinate stands as one jet only, linearly; None where it does not.
+    """The other equations, where the coordinate occurs as one jet only, linearly; None where it does not.
 
     Multiplied by the jet's factor, so that nothing is divided by.
     """

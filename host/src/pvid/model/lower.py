@@ -11,7 +11,7 @@ from pvid.model.signals import Jet, jets, order_of, total_derivative
 from pvid.model.terms import ZERO, added, merged, terms_of
 from pvid.model.zero import is_zero
 
-OPAQUE = "_"  # names of auxiliary signals start with it: what stands for sgn(..), |..| and must not be differentiated
+OPAQUE = "_"  # names of auxiliary signals start with it; they replace sgn(..) and |..|, which have no derivative
 
 _PRINTABLE = (sp.sin, sp.cos)  # functions a psi may contain
 

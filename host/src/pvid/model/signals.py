@@ -15,7 +15,7 @@ from pvid.model.refusal import ModelError
 
 MAX_ORDER = 8  # of a derivative
 
-TIME = sp.Symbol("t", real=True)  # [s] since the start of a window; stands in columns that are free in each window only
+TIME = sp.Symbol("t", real=True)  # [s] since the start of a window; only in columns that are free in each window
 
 
 class Jet(sp.Symbol):  # type: ignore[misc]

@@ -17,7 +17,7 @@ from pvid.model.signals import Integral, jets, total_derivative
 def strong_form(compiled: CompiledModel) -> CompiledModel:
     """The model with rows whose parts are of order 0 only.
 
-    Where an elimination differentiates sgn(..) or |..|, an auxiliary signal of `opaque` stands for it, and its jets in
+    Where an elimination differentiates sgn(..) or |..|, an auxiliary signal of `opaque` replaces it, and its jets in
     the rows are its derivatives.
     """
     integrals = {jet: value for jet, value in compiled.opaque.items() if value.has(Integral)}

@@ -319,6 +319,12 @@ class RigFile:
             raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
 
 
+def rig_path_of(run_path: Path) -> Path:
+    """RUN.toml, beside RUN.csv or RUN.csv.gz."""
+    name = run_path.name.removesuffix(".gz")
+    return run_path.with_name(Path(name).stem + ".toml")
+
+
 def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile:
     """Reads a rig file; PvidError names the file and the key. `settings` come before what it holds."""
     return parsed_file(path, lambda text: RigFile.parse(text, settings))

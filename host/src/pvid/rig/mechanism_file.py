@@ -17,17 +17,21 @@ A key that the model does not have becomes a PvidError that names it and lists t
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.base.toml_text import toml_document
+from pvid.base.toml_text import key_and_value, toml_document
 from pvid.base.wording import listed, shown
-from pvid.model.compiled import CompiledModel
+from pvid.models.model import Channel
+
+if TYPE_CHECKING:  # it loads SymPy, without which a run of the pendulum does
+    from pvid.model.compiled import CompiledModel
 
 _OF_A_SENSOR = ("resolution", "noise", "gain_sd")
 
@@ -138,6 +142,14 @@ class MechanismRig:
         return replace(model, knowns=knowns, signals=tuple(signals), unknowns=tuple(unknowns))
 
 
+def channels_of(model: CompiledModel) -> tuple[Channel, ...]:
+    """The signals of a model as channels of a recording; a column's name may carry a unit behind the signal's."""
+    return tuple(
+        Channel(one.name, one.unit, one.name, usual_names=rf"^{re.escape(one.name)}([\s_(\[].*)?$")
+        for one in model.signals
+    )
+
+
 def with_settings(document: Mapping[str, Any], settings: Iterable[str]) -> dict[str, Any]:
     """The tables of a rig file with `KEY=VALUE` in place of its own: known.g=9.7, sensor.phi.resolution=1e-3.
 
@@ -148,13 +160,7 @@ def with_settings(document: Mapping[str, Any], settings: Iterable[str]) -> dict[
     """
     changed = {key: _copied(value) for key, value in document.items()}
     for setting in settings:
-        key, equals, text = (part.strip() for part in setting.partition("="))
-        if not equals or not key or not text:
-            raise PvidError(f"--set {shown(setting)} is not KEY=VALUE, as in --set known.g=9.81")
-        try:
-            value = toml_document(f"value = {text}")["value"]
-        except PvidError:
-            value = text
+        key, value = key_and_value(setting, "known.g=9.81")
         *tables, name = key.split(".")
         place = changed
         for table in tables:

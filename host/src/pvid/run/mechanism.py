@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,8 +13,6 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
 from pvid.models.mechanisms import compiled_of
-from pvid.models.model import Channel
-from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.identify import Identified
 from pvid.oracle.fourier.identify import identify as identified_by
 from pvid.rig.mechanism_file import MechanismRig
@@ -82,14 +79,6 @@ class MechanismAnswer:
         }
 
 
-def channels_of(model: CompiledModel) -> tuple[Channel, ...]:
-    """The signals of a model as channels of a recording; a column's name may carry a unit behind the signal's."""
-    return tuple(
-        Channel(one.name, one.unit, one.name, usual_names=rf"^{re.escape(one.name)}([\s_(\[].*)?$")
-        for one in model.signals
-    )
-
-
 def model_of(rig: MechanismRig) -> CompiledModel:
     """The compiled model with the values of a rig."""
     return rig.applied(compiled_of(rig.model))
@@ -116,29 +105,23 @@ def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
 
 
 def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
-    covariance = _noise_covariance(model, found)
-    gains = [one.gain_sd * found.by_gain[one.name] for one in model.signals if one.gain_sd > 0]
-    whole = covariance + sum((np.outer(gain, gain) for gain in gains), np.zeros_like(covariance))
+    gains = np.array([one.gain_sd * found.by_gain[one.name] for one in model.signals if one.gain_sd > 0])
+    gains = gains.reshape(-1, len(found.p))
+    # Of noise: the correlations of the rows, with the published standard errors but for those of the gains.
+    noise = np.sqrt(np.maximum(found.se**2 - np.sum(gains**2, axis=0), 0.0))
+    widened = noise / np.sqrt(np.diag(found.covariance))
+    covariance = found.covariance * np.outer(widened, widened)
+    whole = covariance + gains.T @ gains
 
     def shown(unit: str, value: float, slope: Float) -> Value:
         if not found.verdict.identified:
             return Value(unit, None, None, None)
-        se, noise = (float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance))
-        return Value(unit, value, se, noise)
+        return Value(unit, value, *(float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance)))
 
     values = {one.name: shown(one.unit, *_output(model, found, one)) for one in model.outputs}
     for k, one in enumerate(model.unknowns):
         values[one.name] = shown(one.unit, float(found.p[k]), np.eye(len(found.p))[k])
     return values
-
-
-def _noise_covariance(model: CompiledModel, found: Identified) -> Float:
-    """Of p: the correlations of the rows' noise, with the published standard errors but for those of the gains."""
-    covariance = uncertainty(found.fit).covariance
-    gains = [one.gain_sd * found.by_gain[one.name] for one in model.signals if one.gain_sd > 0]
-    noise = np.sqrt(np.maximum(found.se**2 - sum((gain**2 for gain in gains), np.zeros_like(found.se)), 0.0))
-    widened = noise / np.sqrt(np.diag(covariance))
-    return np.asarray(covariance * np.outer(widened, widened))
 
 
 def _output(model: CompiledModel, found: Identified, output: Output) -> tuple[float, Float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,12 +57,6 @@ def predicted(name: str, simulation: RigSimulation) -> Prediction:
     worst = int(np.argmax(relative))
     partner = partner_of(found.fit, worst)
     return Prediction(name, relative, model.p_names[worst], "" if partner is None else model.p_names[partner])
-
-
-def predictions(simulations: Iterable[tuple[str, RigSimulation]]) -> Iterator[Prediction]:
-    """Of each drive."""
-    for name, simulation in simulations:
-        yield predicted(name, simulation)
 
 
 def advice(model: CompiledModel, found: list[Prediction]) -> str:

@@ -25,7 +25,7 @@ _PART = 2000  # samples whose smooth inputs are in memory at a time
 
 @dataclass(frozen=True)
 class Friction:
-    """The law that stands for sgn.
+    """The law of sgn.
 
     Attributes
     ----------

@@ -14,9 +14,9 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.models.mechanisms import compiled_of
-from pvid.models.model import Channel
 from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
-from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.file import rig_path_of
+from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, write_recording
 from pvid.sim.drives import drive_named
 from pvid.sim.imperfections import Imperfections, disturbance, eccentric, with_play
@@ -196,9 +196,8 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     """Writes a run (the suffix gives the format) and beside it its rig file, whose path is returned."""
     model, rate = simulation.model, simulation.rig.sample_rate
     signals = {one.name: run[one.name] for one in model.signals}
-    channels = tuple(Channel(one.name, one.unit, one.name) for one in model.signals)
-    write_recording(path, Recording(run["t"], signals, rate), channels)
-    settings = path.with_name(f"{path.name.removesuffix('.gz').rpartition('.')[0]}.toml")
+    write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
+    settings = rig_path_of(path)
     exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven}
     MechanismRig(model.name, rate, known=simulation.rig.knowns, sensor=exact).write(settings)
     return settings

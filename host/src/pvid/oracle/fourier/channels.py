@@ -130,7 +130,7 @@ class Channels:
 
     @cached_property
     def opaque(self) -> dict[Jet, sp.Expr]:
-        """The auxiliary signals that stand in the rows."""
+        """The auxiliary signals in the rows."""
         used = set().union(*(jets(one) for one in self.expressions))
         return {
             jet: self.model.with_knowns(expression)
@@ -158,7 +158,7 @@ class Channels:
 
     @cached_property
     def sign_marks(self) -> dict[sp.Expr, sp.Symbol]:
-        """sgn(argument) -> the symbol that stands for it in code."""
+        """sgn(argument) -> its symbol in code."""
         return {sgn(one): sp.Symbol(f"sgn_of_{place}", real=True) for place, one in enumerate(self.signs)}
 
     @cached_property

@@ -36,6 +36,7 @@ class Identified:
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
     sensor_error : the systematic error of a sensor that explains residuals; None: there is none
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
+    covariance : of p, that of `predicted` [n_p, n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
     verdict : whether to trust it
     r2 : of each row kind
@@ -52,6 +53,7 @@ class Identified:
     se: Float
     predicted: Float
     clustered: Float
+    covariance: Float
     chi2: float
     verdict: Verdict
     r2: dict[str, float]
@@ -154,6 +156,7 @@ def identify(
         se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains, *by_weights]), axis=0)),
         predicted=found.predicted,
         clustered=found.clustered,
+        covariance=found.covariance,
         chi2=found.chi2,
         verdict=Verdict(verdict.named(reasons)),
         r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},

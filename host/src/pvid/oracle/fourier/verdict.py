@@ -158,83 +158,74 @@ def halves_of(fit: Fit) -> Halves | None:
     return Halves(parts[0][0], parts[1][0], np.abs(parts[0][0] - parts[1][0]) / spread)
 
 
-def differing(parameters: Parameters, names: tuple[str, ...], one: Float, other: Float, clash: Float) -> list[str]:
-    """Names of the parameters in which two estimates disagree."""
+def disagreement(
+    name: Name, model: CompiledModel, parameters: Parameters, one: Float, other: Float, clash: Float, text: str
+) -> list[Reason]:
+    """Two estimates [n_p] that are `clash` [n_p] standard errors apart disagree.
+
+    Parameters
+    ----------
+    text
+        Of the sentence, with {names} of the parameters in question, and of the first one {name}, {one} and {other}.
+    """
     size = np.where(parameters.positive, np.maximum(np.abs(one), np.abs(other)), parameters.sd)
-    apart = (clash > _CLASH) & (np.abs(one - other) > _VISIBLE * size)
-    return [name for name, bad in zip(names, apart, strict=True) if bad]
+    apart = np.flatnonzero((clash > _CLASH) & (np.abs(one - other) > _VISIBLE * size))
+    if not len(apart):
+        return []
+    k = int(apart[0])
+    names = listed(model.p_names[bad] for bad in apart)
+    shown = text.format(names=names, name=model.p_names[k], one=f"{one[k]:.4g}", other=f"{other[k]:.4g}")
+    return [Reason(name, shown)]
 
 
 def of_halves(model: CompiledModel, fit: Fit, halves: Halves | None) -> list[Reason]:
     """The halves of a run disagree."""
     if halves is None:
         return [Reason("short", "The run is too short to compare its halves.", alarm=False)]
-    names = differing(fit.parameters, model.p_names, halves.first, halves.second, halves.clash)
-    if not names:
-        return []
-    k = model.p_names.index(names[0])
-    return [
-        Reason(
-            "halves",
-            f"The halves of the run disagree on {listed(names)} ({names[0]}: {halves.first[k]:.4g} and "
-            f"{halves.second[k]:.4g}): something changed, or the equations lack a term.",
-        )
-    ]
+    text = (
+        "The halves of the run disagree on {names} ({name}: {one} and {other}): something changed, or the equations "
+        "lack a term."
+    )
+    return disagreement("halves", model, fit.parameters, halves.first, halves.second, halves.clash, text)
 
 
 def of_windows(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
     """Two lengths of window disagree."""
-    # Both come from the same samples: the larger error bounds that of the difference.
-    clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
-    names = differing(fit.parameters, model.p_names, fit.p, other.p, clash)
-    if not names:
-        return []
-    k = model.p_names.index(names[0])
     lengths = [one.rows.functions.length for one in (fit, other)]
-    return [
-        Reason(
-            "windows",
-            f"Windows of {lengths[0]:.3g} s and {lengths[1]:.3g} s disagree on {listed(names)} ({names[0]}: "
-            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): noise in the regressors or a missing term biases the estimate.",
-        )
-    ]
+    text = (
+        f"Windows of {lengths[0]:.3g} s and {lengths[1]:.3g} s disagree on {{names}} ({{name}}: {{one}} and "
+        "{other}): noise in the regressors or a missing term biases the estimate."
+    )
+    return _of_same_samples("windows", model, fit, found, other, of_other, text)
+
+
+def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+    """Two lengths of the filter that gives derivatives disagree: one blurs the motion, which no residual shows."""
+    taps = [one.rows.record.grid.design.rate_taps for one in (fit, other)]
+    text = (
+        f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {{names}} ({{name}}: {{one}} and "
+        "{other}): the longer filter attenuates the motion, or the shorter one passes too much noise."
+    )
+    return _of_same_samples("smoothing", model, fit, found, other, of_other, text)
+
+
+def _of_same_samples(
+    name: Name, model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty, text: str
+) -> list[Reason]:
+    """Two estimates from the same samples disagree: the larger error bounds that of the difference."""
+    clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
+    return disagreement(name, model, fit.parameters, fit.p, other.p, clash, text)
 
 
 def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Float | None) -> list[Reason]:
     """The same rows with the highest derivative as the dependent signal disagree."""
     if other is None:
         return []
-    clash = np.abs(fit.p - other) / found.se
-    names = differing(fit.parameters, model.p_names, fit.p, other, clash)
-    if not names:
-        return []
-    k = model.p_names.index(names[0])
-    return [
-        Reason(
-            "attenuation",
-            f"Motion that the equations do not explain biases {listed(names)} ({names[0]} is {fit.p[k]:.4g}, and "
-            f"{other[k]:.4g} with the highest derivative as the dependent signal): excite more strongly, or take "
-            "longer windows and fewer functions.",
-        )
-    ]
-
-
-def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
-    """Two lengths of the filter that gives derivatives disagree: one blurs the motion, which no residual shows."""
-    clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
-    names = differing(fit.parameters, model.p_names, fit.p, other.p, clash)
-    if not names:
-        return []
-    k = model.p_names.index(names[0])
-    taps = [one.rows.record.grid.design.rate_taps for one in (fit, other)]
-    return [
-        Reason(
-            "smoothing",
-            f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {listed(names)} ({names[0]}: "
-            f"{fit.p[k]:.4g} and {other.p[k]:.4g}): the longer filter attenuates the motion, or the shorter one passes "
-            "too much noise.",
-        )
-    ]
+    text = (
+        "Motion that the equations do not explain biases {names} ({name} is {one}, and {other} with the highest "
+        "derivative as the dependent signal): excite more strongly, or take longer windows and fewer functions."
+    )
+    return disagreement("attenuation", model, fit.parameters, fit.p, other, np.abs(fit.p - other) / found.se, text)
 
 
 def of_residuals(found: Uncertainty) -> list[Reason]:
