@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 from pvid.codegen import numpy_f32
 from pvid.codegen.banner import banner
 from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
@@ -75,11 +73,15 @@ def loaded(made: FourierFunctions) -> FourierModel:
     )
 
 
-@lru_cache(maxsize=32)
-def _kept(made_of: int, compiled: CompiledModel) -> FourierModel:
-    return loaded(fourier_functions_of(compiled))
+_KEPT = 16
+_made: dict[int, tuple[CompiledModel, FourierModel]] = {}
 
 
 def fourier_model_of(compiled: CompiledModel) -> FourierModel:
-    """The tables and twin of a compiled model, without corners as given; kept for the same object."""
-    return _kept(id(compiled), compiled)
+    """The tables and twin of a compiled model, without corners as given; made once for each object."""
+    found = _made.get(id(compiled))
+    if found is None or found[0] is not compiled:
+        found = _made[id(compiled)] = (compiled, loaded(fourier_functions_of(compiled)))
+        while len(_made) > _KEPT:
+            del _made[next(iter(_made))]
+    return found[1]
