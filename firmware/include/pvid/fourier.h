@@ -134,7 +134,8 @@ typedef struct {
     const float *circle;                   /* [2 hop] cos(pi j / hop) */
     const pvid_fourier_noise_f32 *noise;   /* [n_noise] */
     uint16_t n_noise;
-    const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const uint8_t *error_order;    /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const float *error_variance;   /* [kinds] variance of that noise at a step, >= 0; 0: the sensors explain the rows */
     const float *sign_width;    /* [signs] of the soft sign v / (|v| + width); 0: the mean of sgn over a step */
     float overlap;              /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_fourier_design_f32;
@@ -147,7 +148,6 @@ typedef struct {
     const float *range;     /* [samples] window dropped if a sample's absolute value is beyond, > 0; NULL: no check */
     const float *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, >= 0; NULL:
                                no check */
-    bool equation_error;    /* weights contain the equations' own errors, found from the residuals */
     bool compensation;      /* B gets what the sensors' noise takes from it (errors in variables) */
     uint8_t iterations;     /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3 */
     pvid_estimator_config_f32 estimator; /* row_sd 1: rows are in standard deviations. init sets model, update_rate_hz,
