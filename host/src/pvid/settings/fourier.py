@@ -220,7 +220,8 @@ class FourierDesign32:
     filter : of each jet
     circle : cos(pi j / hop) [2 hop]
     noise : sorted by kind, then power
-    error_order : of each kind uint8 [kinds]
+    error_order : of each kind uint8 [kinds]: its own error is that derivative of white noise
+    error_variance : of that noise at a step [kinds]; 0: the sensors explain the rows
     sign_width : of the soft sign [signs]; 0: the mean of sgn over a step
     overlap : variance inflation by the noise that overlapping windows share
     """
@@ -234,6 +235,7 @@ class FourierDesign32:
     circle: Float32
     noise: tuple[FourierNoise, ...]
     error_order: UInt8
+    error_variance: Float32
     sign_width: Float32
     overlap: float
 
@@ -263,7 +265,6 @@ class FourierConfig:
     estimator : its start, start_sd and bounds have n_p entries; row_sd is 1
     range : window dropped if a sample's absolute value is beyond [samples]; None: no check
     drive_min : window dropped if the standard deviation of a sample is below [samples]; None: no check
-    equation_error : weights contain the equations' own errors
     compensation : B gets what the sensors' noise takes from it
     iterations : Gauss-Newton steps a window
     """
@@ -273,7 +274,6 @@ class FourierConfig:
     estimator: EstimatorConfig
     range: Float32 | None = None
     drive_min: Float32 | None = None
-    equation_error: bool = True
     compensation: bool = True
     iterations: int = 3
     trust: TrustConfig = field(default_factory=TrustConfig)

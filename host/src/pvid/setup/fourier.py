@@ -35,8 +35,8 @@ def for_engine(design: FourierDesign) -> FourierDesign:
     block = _STEPS_OF_A_BLOCK
     least = -(-(design.highest + 1) // block) * block
     hop = max(round(design.hop / block) * block, least)
-    reversals = "soft" if design.reversals == "soft" else "averaged"
-    return replace(design, window_s=2 * hop * design.dt, reversals=reversals, joint=False)
+    found = replace(design, window_s=2 * hop * design.dt, joint=False)
+    return found if design.reversals == "soft" else replace(found, reversals="averaged")
 
 
 def design_tables(
@@ -49,7 +49,7 @@ def design_tables(
     model : of the mechanism that the rows are of
     rows : of a recorded or simulated run, with the design: their noise depends on the motion
     p : parameters near those of the rig [n_p]
-    errors : of each kind: the orders of the equations' own errors; order 0 by default
+    errors : of the equations themselves, of each kind; None by default
     """
     design = rows.record.grid.design
     _check(design, rows)
@@ -64,6 +64,7 @@ def design_tables(
         circle=_as_float32(np.cos(np.pi * np.arange(2 * design.hop) / design.hop)),
         noise=tuple(entry for kind in range(rows.kinds) for entry in _noise(rows, kind, p)),
         error_order=np.array([one.order for one in found], np.uint8),
+        error_variance=_as_float32([one.variance for one in found]),
         sign_width=np.full(model.signs, design.soft if design.reversals == "soft" else 0.0, np.float32),
         overlap=float(np.float32(overlap_of(rows, p, found))),
     )

@@ -129,7 +129,7 @@ class NoiseModel:
         return out
 
     def of_harmonics(self, kind: int) -> Float:
-        """P [powers, columns, columns] with D_h = sum_j omega_h^(2 j) theta^T P_j theta, theta = -1 for the column of Y.
+        """P [powers, columns, columns] with D_h = sum_j omega_h^(2 j) theta^T P_j theta, theta = -1 for Y's column.
 
         D_h is the variance a step of the noise at harmonic h. It is that of `covariance`, because gram(m, n) is
         (-1)^((m - n)/2) times the one of m + n halved, and those of odd sums cancel.
