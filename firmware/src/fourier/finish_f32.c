@@ -30,7 +30,7 @@ enum {
     STAGE_MEAN,    /* the scores to their means */
     STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
     STAGE_JUDGE,   /* trust.h publishes the estimate or holds it */
-    STAGE_IDLE
+    STAGE_IDLE = PVID_FOURIER_IDLE
 };
 
 /* Entries of the noise table, and products of the residuals, in a stage. */
@@ -75,11 +75,6 @@ pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pv
     pvid_fourier_scores_init_f32(&self->scores, config->estimator.forgetting_s * windows_hz);
     self->stage = STAGE_IDLE;
     return PVID_OK;
-}
-
-bool pvid_fourier_finish_is_busy_f32(const pvid_fourier_finish_f32 *self)
-{
-    return self->stage != (uint8_t)STAGE_IDLE;
 }
 
 static void begin_kind(pvid_fourier_finish_f32 *self)

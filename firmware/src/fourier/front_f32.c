@@ -11,6 +11,7 @@
 #include <stddef.h>
 
 #include "fourier/schedule.h"
+#include "number/unroll.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
 
@@ -114,7 +115,7 @@ static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier
 }
 
 /* Signals that need samples of other ticks. Returns false if there are none: the next sample is missing. */
-static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model, const float sample[],
+PVID_SELDOM static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model, const float sample[],
                           float place[])
 {
     const bool first = self->seen == 0u;
@@ -164,7 +165,7 @@ static void begin_jet(pvid_fourier_front_f32 *self, const pvid_fourier_design_f3
     self->sum = 0.0f;
 }
 
-static void begin_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
+PVID_SELDOM static void begin_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
 {
     /* the newest signals are before head, the instant `half` before those */
     const uint16_t back = (uint16_t)(self->half + 1u);
@@ -228,18 +229,27 @@ static size_t add_pairs(pvid_fourier_front_f32 *self, const pvid_fourier_design_
     return pairs;
 }
 
+/* A part of the job. */
+PVID_SELDOM static void advance_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
+{
+    for (size_t left = self->pairs_per_tick; (left > 0u) && (self->jet < design->model->jets);) {
+        left -= add_pairs(self, design, left);
+    }
+}
+
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,
                                  const float sample[])
 {
-    if (!store(self, design->model, sample)) {
+    const pvid_fourier_model_f32 *model = design->model;
+    if (!store(self, model, sample)) {
         return false;
     }
     self->wait--;
     if (self->wait == 0u) {
         begin_job(self, design);
     }
-    for (size_t left = self->pairs_per_tick; (left > 0u) && (self->jet < design->model->jets);) {
-        left -= add_pairs(self, design, left);
+    if (self->jet < model->jets) {
+        advance_job(self, design);
     }
     return self->begun && (self->wait == self->step_wait);
 }
