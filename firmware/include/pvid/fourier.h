@@ -30,6 +30,7 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
+#include "pvid/fourier_parts.h"
 #include "pvid/gate.h"
 #include "pvid/trust.h"
 
@@ -39,35 +40,6 @@ extern "C" {
 
 /* ---- the model: generated, the same for every rig ---- */
 
-/* Where a signal comes from. */
-enum {
-    PVID_SIGNAL_SAMPLED = 0, /* the sample */
-    PVID_SIGNAL_HELD,        /* of an input that is held from tick to tick: its mean about the tick */
-    PVID_SIGNAL_JUMP         /* dt/12 times the sample's difference to the one before, dt the tick */
-};
-
-typedef struct {
-    uint8_t sample; /* index in the argument of step */
-    uint8_t source; /* PVID_SIGNAL_ */
-} pvid_fourier_signal;
-
-/* A signal or one of its derivatives. */
-typedef struct {
-    uint8_t signal;
-    uint8_t order;
-} pvid_fourier_jet;
-
-#define PVID_FOURIER_NONE 255u
-
-/* A channel: gain I^fold[integrand], I the integral from the window's start. */
-typedef struct {
-    uint8_t gain;      /* index among the gains; PVID_FOURIER_NONE: 1 with fold 0, whose sums are known */
-    uint8_t integrand; /* index among the integrands; PVID_FOURIER_NONE: 1, so that I^fold is t^fold / fold! */
-    uint8_t fold;      /* 0: no integral; 1, 2 */
-    uint8_t plain;     /* of an integral: the channel with the same gain and fold 0 */
-    uint8_t ramp;      /* of fold 2: the channel with the same gain and I^1[1] = t */
-} pvid_fourier_channel;
-
 /* A share of a column: += factor D^order[channel]. */
 typedef struct {
     uint8_t channel;
@@ -75,13 +47,6 @@ typedef struct {
     uint8_t column; /* of its kind: theta's in order, then Y, then the nuisances */
     float factor;
 } pvid_fourier_term_f32;
-
-typedef struct {
-    uint8_t thetas;
-    uint8_t nuisances; /* columns that are projected out: unknown starts of integrals */
-    uint16_t first;    /* its first term; terms are sorted by kind, then by column */
-    uint16_t end;      /* behind its last term */
-} pvid_fourier_kind;
 
 typedef struct {
     uint8_t samples;  /* entries of the argument of step */
@@ -134,7 +99,8 @@ typedef struct {
     const float *circle;                   /* [2 hop] cos(pi j / hop) */
     const pvid_fourier_noise_f32 *noise;   /* [n_noise] */
     uint16_t n_noise;
-    const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const uint8_t *error_order;    /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const float *error_variance;   /* [kinds] variance of that noise at a step, >= 0; 0: the sensors explain the rows */
     const float *sign_width;    /* [signs] of the soft sign v / (|v| + width); 0: the mean of sgn over a step */
     float overlap;              /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_fourier_design_f32;
@@ -147,7 +113,6 @@ typedef struct {
     const float *range;     /* [samples] window dropped if a sample's absolute value is beyond, > 0; NULL: no check */
     const float *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, >= 0; NULL:
                                no check */
-    bool equation_error;    /* weights contain the equations' own errors, found from the residuals */
     bool compensation;      /* B gets what the sensors' noise takes from it (errors in variables) */
     uint8_t iterations;     /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3 */
     pvid_estimator_config_f32 estimator; /* row_sd 1: rows are in standard deviations. init sets model, update_rate_hz,
