@@ -18,8 +18,8 @@
 extern "C" {
 #endif
 
-/* Layout of the sums: n_moments of M, n_theta of B, yy, weight. For a model without its own `project` b and rr take the
- * places of B and yy (estimator.h). */
+/* Layout of the sums: n_moments of M, block by block (model.h), n_theta of B, yy, weight. For a model without its own
+ * `project` b and rr take the places of B and yy (estimator.h). */
 #define PVID_MAX_SUMS (PVID_MAX_MOMENTS + PVID_MAX_THETA + 2)
 
 /* Limit of the root of a row's sum of squares: 2^32 such rows fit into float32. */
@@ -36,6 +36,11 @@ void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 
  * may be NULL for a model without its own accumulate. Cost: one product and two additions per sum. */
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS]);
+
+/* Adds a row of a kind that the model has: n contains the entries of this kind alone. For models without their own
+ * accumulate. Cost: one product and one addition per sum of the kind. */
+void pvid_information_add_kind_f32(pvid_information_f32 *self, const pvid_model_f32 *model, uint8_t kind,
+                                   const float n[], float y);
 
 /* Ends a group of rows (one tick of the strong form, one window of the weak form); folds and forgets at the end of
  * a block. */

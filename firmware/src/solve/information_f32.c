@@ -5,6 +5,7 @@
 #include <stddef.h>
 
 #include "number/unroll.h"
+#include "solve/kinds.h"
 
 /* exp(-x), 0 <= x <= 4, by the series of exp(x): the core has no libm but sqrtf. Accurate to a few
  * ulp; called once, in init. */
@@ -47,21 +48,21 @@ static size_t number_of_sums(const pvid_information_f32 *self)
     return (size_t)self->n_moments + self->n_theta + 2u;
 }
 
-/* All products of a row, the packed upper triangle by rows, then N y, y^2 and the weight. */
-static inline void accumulate_any(size_t n_theta, const float *restrict n, float y, float row_weight,
-                                  float *restrict low)
+/* All products of a row of n_own entries: the packed upper triangle by rows, N y, then y^2 and the weight. */
+static inline void accumulate_any(size_t n_own, const float *restrict n, float y, float row_weight,
+                                  float *restrict moments, float *restrict b, float *restrict tail)
 {
-    for (size_t i = 0; i < n_theta; i++) {
-        for (size_t j = i; j < n_theta; j++) {
-            *low += n[i] * n[j];
-            low++;
+    for (size_t i = 0; i < n_own; i++) {
+        for (size_t j = i; j < n_own; j++) {
+            *moments += n[i] * n[j];
+            moments++;
         }
     }
-    for (size_t i = 0; i < n_theta; i++) {
-        low[i] += y * n[i];
+    for (size_t i = 0; i < n_own; i++) {
+        b[i] += y * n[i];
     }
-    low[n_theta] += y * y;
-    low[n_theta + 1u] += row_weight;
+    tail[0] += y * y;
+    tail[1] += row_weight;
 }
 
 #define EIGHT 8u
@@ -85,16 +86,24 @@ static inline void accumulate_eight(const float *restrict n, float y, float row_
     low[EIGHT + 1u] += row_weight;
 }
 
+void pvid_information_add_kind_f32(pvid_information_f32 *self, const pvid_model_f32 *model, uint8_t kind,
+                                   const float n[], float y)
+{
+    const pvid_block block = pvid_block_of_kind(model->n_theta, model->n_kinds, model->kind_end, kind);
+    float *b = &self->low[model->n_moments];
+    accumulate_any(block.n, n, y, self->row_weight, &self->low[block.moment], &b[block.first], &b[model->n_theta]);
+}
+
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS])
 {
     if (model->accumulate != NULL) {
         model->accumulate(n, y, self->high, self->low, sums);
     } else {
-        if (model->n_theta == EIGHT) {
+        if ((model->n_theta == EIGHT) && (model->n_kinds <= 1u)) {
             accumulate_eight(n, y, self->row_weight, self->low);
         } else {
-            accumulate_any(model->n_theta, n, y, self->row_weight, self->low);
+            pvid_information_add_kind_f32(self, model, 0, n, y);
         }
         if (sums != NULL) {
             pvid_information_read_f32(self, sums);

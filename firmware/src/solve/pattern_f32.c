@@ -2,7 +2,10 @@
 
 #include "solve/pattern_f32.h"
 
-void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const float x[], float out[])
+#include "solve/kinds.h"
+
+void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t n,
+                                      const float x[], float out[])
 {
     const uint8_t *c_row = model->c_row;
     const uint8_t *c_column = model->c_column;
@@ -10,7 +13,10 @@ void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c
     const size_t n_p = model->n_p;
     float sum[PVID_MAX_P] = {0.0f};
     for (size_t k = 0; k < n_c; k++) {
-        sum[c_column[k]] += c[k] * x[c_row[k]];
+        const size_t i = (size_t)c_row[k] - first; /* beyond n also for a row before `first` */
+        if (i < n) {
+            sum[c_column[k]] += c[k] * x[i];
+        }
     }
     for (size_t a = 0; a < n_p; a++) {
         out[a] = sum[a];
@@ -56,9 +62,9 @@ void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], 
                                   const float m[], float t[])
 {
     const uint8_t *c_row = model->c_row;
-    const size_t n_theta = model->n_theta;
     for (size_t k = first; k < last; k++) {
-        add_column(n_theta, m, c_row[k], c[k], t);
+        const pvid_block block = pvid_block_of_entry(model->n_theta, model->n_kinds, model->kind_end, c_row[k]);
+        add_column(block.n, &m[block.moment], c_row[k] - block.first, c[k], &t[block.first]);
     }
 }
 

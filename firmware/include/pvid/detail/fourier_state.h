@@ -53,8 +53,11 @@ typedef struct {
 
 /* Whether a window is to be used. */
 typedef struct {
-    uint16_t beyond;                                /* steps that may yet contain a sample beyond its range */
-    bool out[2];                                    /* of each half: contains such a step */
+    const float *range;                                  /* of the configuration; NULL: no check */
+    const float *drive_min;
+    uint16_t delay;                                      /* steps from a sample to the last step that it is part of */
+    uint16_t beyond;                                     /* steps that may yet contain a sample beyond its range */
+    bool out[2];                                         /* of each half: contains such a step */
     pvid_fourier_spread_f32 spread[2][PVID_MAX_SAMPLES]; /* of each half, if a sample has a least deviation */
 } pvid_fourier_watch_f32;
 
@@ -75,17 +78,84 @@ typedef struct {
     float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_f32;
 
+/* Most cosine or sine rows of a window. */
+#define PVID_FOURIER_FAMILY ((PVID_MAX_FUNCTIONS / 2) + 1)
+
+/* The noise of a kind's rows, R = T diag(D) T^T, as Cholesky factors of the cosine rows and of the sine rows; and what
+ * follows from R^-1. */
+typedef struct {
+    uint8_t cosines;                                       /* rows of cosines; the others are sines */
+    uint8_t powers;                                        /* of omega^2 in use */
+    float omega;                                           /* 2 pi / T [rad/s] */
+    float bell[(PVID_MAX_POWER / 2) + 1];                  /* (-1)^d binomial(n, n/2 + d) / 2^n */
+    float weight[PVID_MAX_POWER];                          /* c_j of the sensors, variance at the power j of omega^2 */
+    float spectrum[PVID_MAX_HARMONICS];                    /* D_h */
+    float factor[PVID_MAX_FUNCTIONS][PVID_MAX_POWER + 1];  /* rows of L within the band, diagonal last and inverted */
+    float share[PVID_MAX_POWER];                           /* Q_j = tr(R^-1 dR/dc_j) */
+} pvid_fourier_white_f32;
+
+/* Mean products of the windows' scores s = C^T (sum N e), of a window with itself and with the one before. */
+typedef struct {
+    uint16_t windows; /* in the means */
+    bool known;       /* the window before has a score */
+    float memory;     /* windows in the means; 0: all */
+    float own[PVID_MAX_P];
+    float before[PVID_MAX_P];
+    float same[PVID_MAX_P][PVID_MAX_P];      /* upper triangle */
+    float neighbour[PVID_MAX_P][PVID_MAX_P];
+} pvid_fourier_scores_f32;
+
+/* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
+typedef struct {
+    bool compensation;
+    bool shares;        /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
+    bool alone;         /* the next window has no neighbour before it */
+    uint8_t stage;
+    uint8_t part;       /* of a column's stages */
+    uint8_t kind;
+    uint8_t theta;      /* first one of the kind */
+    uint8_t used;       /* kinds whose rows have been added */
+    uint8_t live;       /* nuisances of the kind that are projected out */
+    uint8_t iteration;  /* solves done for this window */
+    uint16_t index;     /* within the stage */
+    uint16_t term;      /* next one of the kind */
+    pvid_reason reason; /* of the last solve, then of the window */
+    float size;         /* of the last step, relative */
+    float rss;          /* of the kind's rows before the steps */
+    float expected;     /* sum over the kinds of the rows' variance by the sensors alone */
+    float free;         /* rows less nuisances of the kinds that were added */
+    float own[PVID_MAX_COLUMNS];     /* square of each nuisance before projection, then inverse of what remains */
+    float pull[PVID_MAX_THETA];      /* g: what the sensors' noise takes from B */
+    float score[PVID_MAX_THETA];     /* sum N e + g of the window */
+    float folded[2][PVID_MAX_HARMONICS];
+    float row[PVID_MAX_FUNCTIONS];                      /* e of the kind's rows */
+    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y, nuisances */
+    pvid_gate_f32 gate[PVID_MAX_KINDS];
+    pvid_fourier_white_f32 white;
+    pvid_fourier_scores_f32 scores;
+    pvid_estimator_solve_f32 solve;
+    pvid_estimate_f32 candidate; /* the assessed estimate, published if it is trusted */
+} pvid_fourier_finish_f32;
+
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    float dt;          /* between steps [s] */
-    uint8_t harmonics; /* H + 1 */
-    uint8_t channels;  /* that are summed */
+    float dt;                /* between steps [s] */
+    uint8_t harmonics;       /* H + 1 */
+    uint8_t channels;        /* that are summed */
+    uint8_t iterations;
+    uint8_t items_per_tick;  /* harmonics that a tick adds or joins */
+    uint8_t stages_per_tick; /* stages of a whole window per tick */
+    bool warm;               /* a window has been complete since the restart */
+    bool frozen;             /* complete windows are dropped */
     pvid_fourier_front_f32 front;
-    pvid_fourier_history_f32 step;
+    pvid_fourier_history_f32 history;
     pvid_fourier_watch_f32 watch;
     pvid_fourier_sums_f32 sums;
     float window[PVID_MAX_CHANNELS][2][PVID_MAX_HARMONICS]; /* S_h of the last whole window: real parts, imaginary parts */
+    pvid_fourier_finish_f32 finish;
+    pvid_estimator_f32 estimator;
+    pvid_trust_f32 trust;
 };
 
 #endif

@@ -93,9 +93,11 @@ def fourier_functions_of(compiled: CompiledModel) -> FourierFunctions:
     used = _ordered(model, whole)
     signal_names = tuple(dict.fromkeys(jet.of for jet in used))
     shelf = _Shelf(plain)
-    places = [shelf.place_of(one) for one in whole.channels]
+    for one in [one for one in whole.channels if one.fold or one.gain != _ONE]:
+        shelf.place_of(one)
     for one in [one for one in whole.channels if one.fold]:
         shelf.complete(one)
+    places = [shelf.place_of(one) for one in whole.channels]  # the constant comes last
     jet_names = identifiers([str(one) for one in used])
     run_names = identifiers([str(one) for one in plain.runs])
     marks = list(whole.sign_marks.values())

@@ -99,6 +99,7 @@ def loaded(functions: ModelFunctions) -> TwinF32:
         c_column=functions.c_column,
         theta=space["theta_f32"],
         jacobian=space["jacobian_f32"],
+        kind_end=functions.kind_end if len(functions.kinds) > 1 else (),
     )
     return TwinF32(
         channels=space["channels_f32"],
