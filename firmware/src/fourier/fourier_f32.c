@@ -12,6 +12,7 @@
 #include "fourier/sums_f32.h"
 #include "fourier/valid_f32.h"
 #include "fourier/watch_f32.h"
+#include "fourier/white_f32.h"
 #include "judge/publication.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
@@ -49,11 +50,12 @@ static pvid_status init_estimator(pvid_fourier_f32 *self, const pvid_fourier_con
     for (size_t i = 0; i < model->kinds; i++) {
         nuisances += (float)model->kind[i].nuisances;
     }
-    const float rows = (float)design->functions * (float)model->kinds;
+    const float functions = (float)design->functions * (float)model->kinds;
+    const float rows = (float)pvid_fourier_rows(design) * (float)model->kinds;
     pvid_estimator_config_f32 estimator = config->estimator;
     estimator.model = model->model;
     estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)design->hop);
-    estimator.row_weight = (rows - nuisances) / rows;
+    estimator.row_weight = (functions - nuisances) / rows;
     estimator.correlation = design->overlap;
     return pvid_estimator_init_f32(&self->estimator, &estimator);
 }
