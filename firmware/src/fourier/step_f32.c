@@ -1,0 +1,150 @@
+#include "number/uncontracted.h"
+
+/* Signs need the arguments of both neighbours, and an integral the next step's integrand. So with the jets of step k
+ * the gains and integrands of step k - 1 follow, and with those the channels of step k - 2:
+ *
+ *   sign        width > 0:  v / (|v| + width);   width 0: the mean of sgn over the step, v linear there,
+ *               2 v_k / |g| within -1..1, g = (v_(k+1) - v_(k-1)) / 2  (at the first step v_1 - v_0)
+ *   run         + dt/2 (r_(k-1) + r_k), r its derivative, with what rounding takes off kept (Kahan)
+ *   I^1_k       I^1_(k-1) + dt/24 (-f_(k-2) + 13 f_(k-1) + 13 f_k - f_(k+1))
+ *   I^2_k       I^2_(k-1) + dt/2 (I^1_(k-1) + I^1_k) - dt^2/12 (f_k - f_(k-1))
+ *   of 1:       t and t^2/2
+ *
+ * Both integrals are 0 at the first step of a half window; their values there without that are the `edge`. */
+#include "fourier/step_f32.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "pvid/elementary.h"
+
+void pvid_fourier_step_reset_f32(pvid_fourier_history_f32 *self)
+{
+    self->known = 0;
+}
+
+/* Mean of sgn over a step, v linear there with this difference to the next step. */
+static float mean_sign(float v, float slope)
+{
+    const float twice = 2.0f * v;
+    const float size = pvid_magnitude_f32(slope);
+    float sign = 0.0f;
+    if (twice > size) {
+        sign = 1.0f;
+    } else if (twice < -size) {
+        sign = -1.0f;
+    } else if (size > 0.0f) {
+        sign = twice / size;
+    } else {
+        sign = 0.0f;
+    }
+    return sign;
+}
+
+/* Signs of the step whose arguments are v[0]; `next`: those of the step behind it. */
+static void find_signs(const pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design,
+                       const float next[], float sign[])
+{
+    for (size_t i = 0; i < design->model->signs; i++) {
+        const float v = self->v[0][i];
+        const float width = design->sign_width[i];
+        const float slope = (self->known > 1u) ? (0.5f * (next[i] - self->v[1][i])) : (next[i] - v);
+        sign[i] = (width > 0.0f) ? pvid_soft_sign_f32(v, width) : mean_sign(v, slope);
+    }
+}
+
+/* Moves the runs by a step; rate: their derivatives at its end. */
+static void move_runs(pvid_fourier_history_f32 *self, size_t runs, float half_dt, const float rate[])
+{
+    for (size_t i = 0; i < runs; i++) {
+        const float rise = (half_dt * (self->rate[i] + rate[i])) + self->run_low[i];
+        const float moved = self->run[i] + rise;
+        self->run_low[i] = rise - (moved - self->run[i]);
+        self->run[i] = moved;
+    }
+}
+
+/* Integrals at the step whose integrands are f[0]; `next`: those of the step behind it. */
+static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float dt, bool begins, const float next[])
+{
+    const float part = dt / 24.0f;
+    const float half = 0.5f * dt;
+    const float end = (dt * dt) / 12.0f;
+    for (size_t i = 0; i < integrands; i++) {
+        const float now = self->f[0][i];
+        const float last = self->f[1][i];
+        float once = 0.0f;
+        float twice = 0.0f;
+        if (self->known > 2u) {
+            const float before = (self->known > 3u) ? self->f[2][i] : ((2.0f * last) - now);
+            const float rise = part * (((-before + (13.0f * last)) + (13.0f * now)) - next[i]);
+            once = self->once[i] + rise;
+            twice = self->twice[i] + ((half * (self->once[i] + once)) - (end * (now - last)));
+        }
+        if (begins) {
+            self->edge[0][i] = once;
+            self->edge[1][i] = twice;
+            once = 0.0f;
+            twice = 0.0f;
+        }
+        self->once[i] = once;
+        self->twice[i] = twice;
+    }
+}
+
+/* Values of the channels at the step whose gains are `gain`, at this time since the start of its half. */
+static void find_channels(const pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model, float t,
+                          float channel[])
+{
+    const float of_one[2] = {t, 0.5f * (t * t)};
+    for (size_t c = 0; c < model->channels; c++) {
+        const pvid_fourier_channel *one = &model->channel[c];
+        if (one->gain != PVID_FOURIER_NONE) {
+            float value = self->gain[one->gain];
+            if (one->fold == 1u) {
+                value *= (one->integrand == PVID_FOURIER_NONE) ? of_one[0] : self->once[one->integrand];
+            } else if (one->fold == 2u) {
+                value *= (one->integrand == PVID_FOURIER_NONE) ? of_one[1] : self->twice[one->integrand];
+            } else {
+                /* the gain alone */
+            }
+            channel[c] = value;
+        }
+    }
+}
+
+bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, float dt,
+                                const float jet[], uint16_t index, float channel[])
+{
+    const pvid_fourier_model_f32 *model = design->model;
+    const size_t integrands = model->integrands;
+    float arguments[PVID_MAX_INPUTS] = {0}; /* of the newest step: derivatives of the runs, then arguments of sgn */
+    float next[PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS];
+    bool complete = false;
+    if (model->prepare != NULL) {
+        model->prepare(jet, arguments);
+    }
+    const float *v = &arguments[model->runs];
+    if (self->known > 0u) {
+        find_signs(self, design, v, &self->now[model->jets + model->runs]);
+        model->values(self->now, next);
+        const float *f = &next[model->gains];
+        complete = self->known > 1u;
+        if (complete) {
+            integrate(self, integrands, dt, index == 0u, f);
+            find_channels(self, model, dt * (float)index, channel);
+            memcpy(self->f[2], self->f[1], integrands * sizeof(float));
+            memcpy(self->f[1], self->f[0], integrands * sizeof(float));
+        }
+        memcpy(self->gain, next, model->gains * sizeof(float));
+        memcpy(self->f[0], f, integrands * sizeof(float));
+        move_runs(self, model->runs, 0.5f * dt, arguments);
+    }
+    memcpy(self->v[1], self->v[0], model->signs * sizeof(float));
+    memcpy(self->v[0], v, model->signs * sizeof(float));
+    memcpy(self->rate, arguments, model->runs * sizeof(float));
+    memcpy(self->now, jet, model->jets * sizeof(float));
+    memcpy(&self->now[model->jets], self->run, model->runs * sizeof(float));
+    self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
+    return complete;
+}
