@@ -15,20 +15,12 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.core.fourier_native import FourierIdentifier
-from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.gate import gated
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import WeakRows
+from pvid.run.engine_design import engine_config
 from pvid.run.mechanism import MechanismAnswer, Value, gains_of, values_of
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig
 from pvid.settings.record import Record
-from pvid.setup.fourier import config_of, design_tables, for_engine
-
-Float = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,30 +71,6 @@ class CoreAnswer:
             "hash": f"{self.hash:08x}",
             "core": "f32",
         }
-
-
-def engine_config(
-    compiled: CompiledModel, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float
-) -> FourierConfig:
-    """Settings of the engine for a rig, from a run of it.
-
-    Parameters
-    ----------
-    run : name of each signal -> samples [n]
-    design : of the oracle; the engine gets the nearest one that it has
-    p : parameters near those of the rig [n_p]
-
-    Raises
-    ------
-    PvidError
-        Where the engine does not have what the model or the design needs.
-    """
-    model = ready(compiled)
-    tables_of = fourier_model_of(compiled)
-    rows = WeakRows.of(model, run, for_engine(design))
-    fit = gated(rows, p)
-    tables = design_tables(tables_of, rows, fit.p, fit.errors)
-    return config_of(tables, design.sample_rate, model.parameters)
 
 
 def samples_of(config: FourierConfig, run: Mapping[str, npt.ArrayLike]) -> npt.NDArray[np.float32]:
