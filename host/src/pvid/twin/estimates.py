@@ -7,9 +7,7 @@ import numpy as np
 MAX_P = 6  # places for parameters
 
 
-def _layout(
-    number: type[np.generic], matrix: str, weight: type[np.generic], places: int = MAX_P
-) -> np.dtype[np.void]:
+def _layout(number: type[np.generic], matrix: str, weight: type[np.generic], places: int = MAX_P) -> np.dtype[np.void]:
     per_parameter = [("p", number, (places,)), ("se", number, (places,)), (matrix, number, (places, places))]
     scalars = [(name, number) for name in ("kappa", "least_pivot", "residual_sd")]
     return np.dtype([*per_parameter, *scalars, ("weight", weight), ("misfit", number)])
