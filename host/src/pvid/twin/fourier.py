@@ -208,4 +208,3 @@ class FourierTwin:
         """Steps all lanes through a run [ticks, samples] from its first sample."""
         recorder = Recorder(self.estimator, len(np.asarray(samples)), sums, progress, self.trust)
         return recorder.finished(self.follow(samples, recorder))
-
