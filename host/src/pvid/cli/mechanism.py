@@ -12,19 +12,33 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.console import DONE, NOTHING_IDENTIFIED, write_stderr
+from pvid.base.console import DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
+from pvid.board.compare_on import Outcome
 from pvid.cli.input import print_notes
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
-from pvid.rig.run import is_run, read_recording
+from pvid.rig.run import Recording, is_run, read_recording
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 
 if TYPE_CHECKING:
+    from pvid.model.compiled import CompiledModel
     from pvid.run.mechanism_f32 import CoreAnswer
 
 _POSSIBLE = (("core", "f64"), ("core", "f32"), ("form", "weak"))
+
+
+def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Recording, CompiledModel]:
+    """The longest stretch of a recording without a missing sample, and the model with the values of the rig."""
+    model = model_of(rig)
+    if not is_run(path):
+        raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals")
+    recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
+    recording.refuse_damaged()
+    recording = recording.whole()
+    print_notes(recording.notes)
+    return recording, model
 
 
 def identify_run(
@@ -42,19 +56,14 @@ def identify_run(
     ----------
     only_in_c : options that the C core alone has, by name; a value is refused
     """
-    model = model_of(rig)
+    name = model_of(rig).name
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
-                f"--{option} {value}: {model.name} is identified in float64, or in float32 by --core f32, by the weak "
-                f"form; omit --{option}"
+                f"--{option} {value}: {name} is identified in float64, or in float32 by --core f32, by the weak form; "
+                f"omit --{option}"
             )
-    if not is_run(path):
-        raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals")
-    recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
-    recording.refuse_damaged()
-    recording = recording.whole()
-    print_notes(recording.notes)
+    recording, model = recording_of(path, rig, columns)
     answer = identify_mechanism(recording, model)
     core: CoreAnswer | None = None
     if only_in_c.get("core") == "f32":
@@ -80,6 +89,28 @@ def identify_run(
         write_stderr(f"pvid: nothing identified{reason}")
         return NOTHING_IDENTIFIED
     return DONE
+
+
+def compare_recording(path: Path, rig: MechanismRig, columns: str | None, **given: str | None) -> Outcome:
+    """The C core against its twin on a recording of a described mechanism.
+
+    Parameters
+    ----------
+    given : options, by name; a value that the weak engine in float32 does not have is refused
+    """
+    from pvid.run.mechanism_compare import compare_recording as compared
+
+    name = model_of(rig).name
+    for option, value in given.items():
+        if value is not None and (option, value) not in (("core", "f32"), ("form", "weak")):
+            raise PvidError(
+                f"--{option} {value}: {name} is compared in float32 by the weak form on this computer; omit --{option}"
+            )
+    recording, model = recording_of(path, rig, columns)
+    with progress_bar("f32", len(recording)) as advance:
+        found = compared(model, recording, advance)
+    verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
+    return Outcome("host", "f32", "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict)
 
 
 def _print(answer: MechanismAnswer) -> None:

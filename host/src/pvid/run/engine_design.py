@@ -73,5 +73,10 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
     return engine_config(compiled, run, _with(design, functions), np.asarray(simulation.truth))
 
 
+def samples_of(config: FourierConfig, run: Run) -> npt.NDArray[np.float32]:
+    """The argument of step at every tick [ticks, samples]."""
+    return np.stack([np.asarray(run[name], np.float32) for name in config.design.model.sample_names], axis=1)
+
+
 def _with(design: FourierDesign, functions: int | None) -> FourierDesign:
     return design if functions is None else replace(design, functions=functions)

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.fourier_library import fourier_native
 from pvid.core.fourier_native import FourierIdentifier
-from pvid.run.engine_design import engine_config
+from pvid.run.engine_design import engine_config, samples_of
 from pvid.run.mechanism import MechanismAnswer, Value, gains_of, values_of
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig
@@ -71,11 +70,6 @@ class CoreAnswer:
             "hash": f"{self.hash:08x}",
             "core": "f32",
         }
-
-
-def samples_of(config: FourierConfig, run: Mapping[str, npt.ArrayLike]) -> npt.NDArray[np.float32]:
-    """The argument of step at every tick [ticks, samples]."""
-    return np.stack([np.asarray(run[name], np.float32) for name in config.design.model.sample_names], axis=1)
 
 
 def identify_in_c(answer: MechanismAnswer) -> CoreAnswer:
