@@ -240,6 +240,11 @@ class FourierDesign32:
     overlap: float
 
     @property
+    def n_noise(self) -> int:
+        """Entries of `noise`."""
+        return len(self.noise)
+
+    @property
     def highest(self) -> int:
         """H, the highest harmonic."""
         return self.functions // 2 + self.power // 2
