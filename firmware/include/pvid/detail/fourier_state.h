@@ -98,6 +98,7 @@ typedef struct {
     uint16_t windows; /* in the means */
     bool known;       /* the window before has a score */
     float memory;     /* windows in the means; 0: all */
+    float residual;   /* mean square of their residuals */
     float own[PVID_MAX_P];
     float before[PVID_MAX_P];
     float same[PVID_MAX_P][PVID_MAX_P]; /* upper triangle */
@@ -123,6 +124,7 @@ typedef struct {
     float rss;                        /* of the kind's rows before the steps */
     float expected;                   /* sum over the kinds of the rows' variance by the sensors alone */
     float free;                       /* rows less nuisances of the kinds that were added */
+    float square;       /* sum of squares of their residuals before the steps */
     float own[PVID_MAX_COLUMNS];      /* square of each nuisance before projection, then inverse of what remains */
     float pull[PVID_MAX_THETA];       /* g: what the sensors' noise takes from B */
     float score[PVID_MAX_THETA];      /* sum N e + g of the window */
