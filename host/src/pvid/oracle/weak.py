@@ -245,9 +245,16 @@ L2_MIN = 0.05
 
 
 def remainder_of_motion(
-    p: Float, motion: tuple[Float, Float], phi: Float, u: Float, design: WeakDesign, full_angle: bool
+    p: Float,
+    motion: tuple[Float, Float],
+    phi: Float,
+    u: Float,
+    design: WeakDesign,
+    full_angle: bool,
+    friction: bool = True,
 ) -> Remainder:
-    """Remainder of the linear rows of one window, with q and q' of `internal_motion` (theory.md 5, (12)).
+    """Remainder of the linear rows of one window, with q and q' of `internal_motion` (theory.md 5, (12)); without
+    `friction` its columns k are 0.
 
     With q known, so is the motion: phi1 = q + k phi, k = L2 (1 + L1). The exact equations are
 
@@ -281,6 +288,8 @@ def remainder_of_motion(
             g * (a1 - np.sin(a1)) + (versine * acceleration2 + sine * v2**2) / big_l1,
             g * (a2 - np.sin(a2)) + versine * acceleration1 - sine * v1**2,
         )
+    if not friction:
+        return Remainder(y, np.zeros((2, design.functions)))
     columns_of_damping = [
         weakened(-v1 / l1**2, np.zeros_like(v1)),
         weakened(rate / l1**2, -big_l1 * rate / l1**2),

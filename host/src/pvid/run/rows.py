@@ -146,7 +146,7 @@ class RunRows:
         """Rows with the remainder of large angles at p subtracted from Y, and with the columns of friction if p has its
         two coefficients. `sound`: windows in which the remainder was found; the others remain linear."""
         friction = len(p) > _CORE
-        damping = p[_CORE:] if friction else np.zeros(2)
+        damping = p[_CORE:] if friction else None
         y = np.zeros((len(self.phi), self.design.functions))
         k = np.zeros((len(self.phi), 2, self.design.functions))
         sound = np.zeros(len(self.phi), np.bool_)
