@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "solve/kinds.h"
+#include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "pvid/pvid.h"
 
@@ -62,6 +62,13 @@ static float integer(void)
     return (float)((int)((generator >> 8) % 19u) - 9);
 }
 
+static pvid_block block_of(size_t i)
+{
+    pvid_block block;
+    pvid_information_block_f32(&model, i, &block);
+    return block;
+}
+
 static size_t kind_of(size_t i)
 {
     return (i < 2u) ? 0u : ((i < 3u) ? 1u : 2u);
@@ -74,19 +81,21 @@ static void blocks_lie_behind_each_other(void **state)
     const size_t n[N_KINDS] = {2, 1, 3};
     const size_t moment[N_KINDS] = {0, 3, 4};
     for (size_t i = 0; i < N_THETA; i++) {
-        const pvid_block block = pvid_block_of_entry(N_THETA, N_KINDS, kind_end, i);
+        const pvid_block block = block_of(i);
         assert_int_equal(block.first, first[kind_of(i)]);
         assert_int_equal(block.n, n[kind_of(i)]);
         assert_int_equal(block.moment, moment[kind_of(i)]);
     }
     for (size_t kind = 0; kind < N_KINDS; kind++) {
-        const pvid_block block = pvid_block_of_kind(N_THETA, N_KINDS, kind_end, kind);
+        const pvid_block block = block_of(pvid_kind_first(kind_end, kind));
         assert_int_equal(block.first, first[kind]);
         assert_int_equal(block.n, n[kind]);
         assert_int_equal(block.moment, moment[kind]);
     }
-    for (size_t kinds = 0; kinds < 2u; kinds++) { /* one kind without a list */
-        const pvid_block whole = pvid_block_of_kind(N_THETA, kinds, NULL, 0);
+    for (uint8_t kinds = 0; kinds < 2u; kinds++) { /* one kind without a list */
+        const pvid_model_f32 one = {.n_theta = N_THETA, .n_kinds = kinds};
+        pvid_block whole;
+        pvid_information_block_f32(&one, pvid_kind_first(NULL, 0), &whole);
         assert_int_equal(whole.first, 0);
         assert_int_equal(whole.n, N_THETA);
         assert_int_equal(whole.moment, 0);
@@ -105,7 +114,7 @@ static void rows_go_to_the_block_of_their_kind(void **state)
     double yy = 0.0;
     for (int row = 0; row < 30; row++) {
         const uint8_t kind = (uint8_t)(row % N_KINDS);
-        const pvid_block block = pvid_block_of_kind(N_THETA, N_KINDS, kind_end, kind);
+        const pvid_block block = block_of(pvid_kind_first(kind_end, kind));
         float n[3];
         const float y = integer();
         yy += (double)y * (double)y;
@@ -118,7 +127,7 @@ static void rows_go_to_the_block_of_their_kind(void **state)
                 m[block.first + i][block.first + j] += (double)n[i] * (double)n[j];
             }
         }
-        pvid_information_add_kind_f32(&information, &model, kind, n, y);
+        pvid_information_add_block_f32(&information, &model, &block, n, y);
         pvid_information_end_group_f32(&information);
     }
     float sums[PVID_MAX_SUMS];
@@ -185,9 +194,9 @@ static void products_with_blocks_equal_dense_products(void **state)
         }
     }
     for (size_t kind = 0; kind < N_KINDS; kind++) {
-        const pvid_block block = pvid_block_of_kind(N_THETA, N_KINDS, kind_end, kind);
+        const pvid_block block = block_of(pvid_kind_first(kind_end, kind));
         float gradient[N_P];
-        pvid_pattern_transpose_times_f32(&model, c, block.first, block.n, &x[block.first], gradient);
+        pvid_pattern_transpose_times_f32(&model, c, &block, &x[block.first], gradient);
         for (size_t a = 0; a < N_P; a++) {
             double sum = 0.0;
             for (size_t i = block.first; i < block.first + block.n; i++) {
@@ -234,6 +243,7 @@ static void kinds_divide_theta_or_are_refused(void **state)
     static const uint8_t late[2] = {2, 7};
     static const uint8_t empty[3] = {3, 3, 6};
     static const uint8_t none[2] = {0, 6};
+    static const uint8_t back[2] = {6, 3};
     static const uint8_t falling[3] = {4, 2, 6};
     assert_int_equal(init_with(3, kind_end, 10), PVID_OK);
     assert_int_equal(init_with(6, every, 6), PVID_OK);
@@ -247,6 +257,7 @@ static void kinds_divide_theta_or_are_refused(void **state)
     assert_int_equal(init_with(3, empty, 6 + 6), PVID_BAD_MODEL);
     assert_int_equal(init_with(2, none, 21), PVID_BAD_MODEL);
     assert_int_equal(init_with(3, falling, 10 + 10), PVID_BAD_MODEL);
+    assert_int_equal(init_with(2, back, 21), PVID_BAD_MODEL);
 }
 
 static void a_model_with_functions_of_its_own_has_one_kind(void **state)
@@ -280,7 +291,7 @@ static void several_kinds_find_their_parameters(void **state)
     assert_int_equal(pvid_estimator_init_f32(&estimator, &fresh), PVID_OK);
     for (int group = 0; group < 200; group++) {
         for (size_t kind = 0; kind < N_KINDS; kind++) {
-            const pvid_block block = pvid_block_of_kind(N_THETA, N_KINDS, kind_end, kind);
+            const pvid_block block = block_of(pvid_kind_first(kind_end, kind));
             float n[3];
             float y = 0.0f;
             for (size_t i = 0; i < block.n; i++) {

@@ -93,7 +93,6 @@
 /* information.h */
 #define pvid_information_init_f32 PVID_SIZED(pvid_information_init_f32)
 #define pvid_information_add_f32 PVID_SIZED(pvid_information_add_f32)
-#define pvid_information_add_kind_f32 PVID_SIZED(pvid_information_add_kind_f32)
 #define pvid_information_end_group_f32 PVID_SIZED(pvid_information_end_group_f32)
 #define pvid_information_fade_f32 PVID_SIZED(pvid_information_fade_f32)
 #define pvid_information_read_f32 PVID_SIZED(pvid_information_read_f32)

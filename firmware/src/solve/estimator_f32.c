@@ -238,8 +238,9 @@ pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[
     if (self->settings.gain < 1.0f) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         float gradient[PVID_MAX_P];
+        const pvid_block whole = {0, model->n_theta, 0};
         model->jacobian(self->p, c);
-        pvid_pattern_transpose_times_f32(model, c, 0, model->n_theta, g, gradient);
+        pvid_pattern_transpose_times_f32(model, c, &whole, g, gradient);
         pvid_row_accumulate_innovation_f32(self, model->n_p, gradient, 1.0f);
     }
     return PVID_ACCUMULATED;

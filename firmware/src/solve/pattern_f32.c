@@ -2,9 +2,9 @@
 
 #include "solve/pattern_f32.h"
 
-#include "solve/kinds.h"
+#include "solve/information_f32.h"
 
-void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t n,
+void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const pvid_block *block,
                                       const float x[], float out[])
 {
     const uint8_t *c_row = model->c_row;
@@ -13,8 +13,8 @@ void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c
     const size_t n_p = model->n_p;
     float sum[PVID_MAX_P] = {0.0f};
     for (size_t k = 0; k < n_c; k++) {
-        const size_t i = (size_t)c_row[k] - first; /* beyond n also for a row before `first` */
-        if (i < n) {
+        const size_t i = (size_t)c_row[k] - block->first; /* beyond n also for a row before the block */
+        if (i < block->n) {
             sum[c_column[k]] += c[k] * x[i];
         }
     }
@@ -62,8 +62,11 @@ void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], 
                                   const float m[], float t[])
 {
     const uint8_t *c_row = model->c_row;
+    pvid_block block = {0, 0, 0};
     for (size_t k = first; k < last; k++) {
-        const pvid_block block = pvid_block_of_entry(model->n_theta, model->n_kinds, model->kind_end, c_row[k]);
+        if (c_row[k] >= (block.first + block.n)) { /* they ascend */
+            pvid_information_block_f32(model, c_row[k], &block);
+        }
         add_column(block.n, &m[block.moment], c_row[k] - block.first, c[k], &t[block.first]);
     }
 }

@@ -6,9 +6,10 @@
 #include <stddef.h>
 
 #include "pvid/model.h"
+#include "solve/kinds.h"
 
-/* out[n_p] = C^T x for the non-zeros c of C and x that is 0 outside of its entries first..first+n-1, which are x[n]. */
-void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t n,
+/* out[n_p] = C^T x for the non-zeros c of C and a vector that is x[block->n] in this block and 0 outside. */
+void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const pvid_block *block,
                                       const float x[], float out[]);
 
 /* The first non-zero of column a of C. */

@@ -13,7 +13,7 @@
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
 #include "solve/direct_f32.h"
-#include "solve/kinds.h"
+#include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
 #include "solve/step_f32.h"
@@ -43,11 +43,6 @@ enum {
 
 /* ---- rows ---- */
 
-static inline pvid_block block_of(const pvid_model_f32 *model, size_t i)
-{
-    return pvid_block_of_entry(model->n_theta, model->n_kinds, model->kind_end, i);
-}
-
 /* e = y - N^T theta and, while g < 1, gradient = C^T N, by theta and the pattern of C, for a row of this block. */
 static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *block, const float n[], float y,
                              float gradient[])
@@ -56,7 +51,7 @@ static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *b
     if (self->settings.gain < 1.0f) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         model->jacobian(self->p, c);
-        pvid_pattern_transpose_times_f32(model, c, block->first, block->n, n, gradient);
+        pvid_pattern_transpose_times_f32(model, c, block, n, gradient);
     }
     const float *theta = &self->theta[block->first];
     float e = y;
@@ -69,7 +64,8 @@ static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *b
 pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y)
 {
     const pvid_model_f32 *model = self->model;
-    const pvid_block block = pvid_block_of_kind(model->n_theta, model->n_kinds, model->kind_end, kind);
+    pvid_block block;
+    pvid_information_block_f32(model, pvid_kind_first(model->kind_end, kind), &block);
     const pvid_reason reason = pvid_row_accept_f32(self, block.n, n, y, pvid_row_squares_f32(block.n, n, y));
     if (reason != PVID_ACCUMULATED) {
         return reason;
@@ -85,11 +81,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const fl
     }
     self->group_rss += e * e;
     self->group_weight += self->information.row_weight;
-    if (model->n_kinds > 1u) {
-        pvid_information_add_kind_f32(&self->information, model, kind, n, e);
-    } else {
-        pvid_information_add_f32(&self->information, model, n, e, NULL);
-    }
+    pvid_information_add_block_f32(&self->information, model, &block, n, e);
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;
 }
@@ -223,7 +215,8 @@ static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
     const float *b = &solve->sums[self->model->n_moments];
     const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
     for (size_t i = first; i < last; i++) {
-        const pvid_block block = block_of(self->model, i);
+        pvid_block block;
+        pvid_information_block_f32(self->model, i, &block);
         const float *m = &solve->sums[block.moment];
         const size_t row = i - block.first;
         const float moved = pvid_pattern_times_f32(block.n, m, row, &solve->theta_step[block.first]);
