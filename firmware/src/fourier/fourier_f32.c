@@ -20,14 +20,14 @@
 #include "number/unroll.h"
 #include "number/unroll.h"
 
-static bool all_finite(const float values[], size_t n)
+static inline bool all_finite(const float values[], size_t n)
 {
-    for (size_t i = 0; i < n; i++) {
-        if (!pvid_finite_f32(values[i])) {
-            return false;
-        }
+    const float *end = &values[n];
+    bool finite = true;
+    for (const float *value = values; value < end; value++) {
+        finite = finite && pvid_finite_f32(*value);
     }
-    return true;
+    return finite;
 }
 
 static pvid_status limits_are_valid(const pvid_fourier_config_f32 *config)
@@ -222,7 +222,7 @@ PVID_SELDOM static void advance_sums(pvid_fourier_f32 *self)
 
 PVID_SELDOM static void advance_finish(pvid_fourier_f32 *self, pvid_reason *reason)
 {
-    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_fourier_finish_is_busy_f32(&self->finish); i++) {
+    for (uint8_t left = self->stages_per_tick; left > 0u; left--) {
         pvid_fourier_finish_step_f32(self, reason);
     }
 }
