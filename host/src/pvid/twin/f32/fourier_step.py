@@ -19,16 +19,21 @@ _LATER = 2  # steps from a step's jets to its channels
 
 @dataclass
 class Runs:
-    """Integrals since the start of the run, kept over gaps, and what rounding took off [runs]."""
+    """Integrals since the start of the run, kept over gaps, and what rounding took off [runs].
+
+    lead: from the run's first sample to its first step [s]
+    """
 
     value: npt.NDArray[Any]
     low: npt.NDArray[Any]
+    lead: np.float32
+    ran: bool = False
 
     @classmethod
-    def of(cls, design: FourierDesign32) -> Runs:
+    def of(cls, design: FourierDesign32, lead: np.float32) -> Runs:
         """At the start of a run."""
         nothing = np.zeros(design.model.runs, np.float32)
-        return cls(nothing, nothing)
+        return cls(nothing, nothing, lead)
 
     def at_steps(self, rates: Float32, dt: np.float32) -> Float32:
         """Their values at the steps of a stretch [runs, steps] from their derivatives [runs, steps]."""
@@ -40,6 +45,8 @@ class Runs:
                 moved = self.value + rise
                 self.low = rise - (moved - self.value)
                 self.value = moved
+            elif not self.ran:
+                self.value, self.ran = self.lead * rates[:, step], True
             out[:, step] = self.value
         return out
 
