@@ -113,7 +113,7 @@ def values(jets: Float32, design: FourierDesign32, runs: Runs, dt: np.float32) -
             return nothing
         v = arguments[model.runs :]
         width = np.asarray(design.sign_width, np.float32)[:, None]
-        signs = np.where(width > 0, elementary.soft_sign(v[:, :-1], width), mean_signs(v))
+        signs = np.where(width > 0, elementary.tanh(v[:, :-1] / width), mean_signs(v))
         found = model.values(np.concatenate([jets[:, :-1], of_runs[:, :-1], signs.astype(np.float32, copy=False)]))
         gains, integrands = found[: model.gains], found[model.gains :].T
         once, twice = _integrals(integrands, hop, dt)
