@@ -15,7 +15,7 @@ Places = npt.NDArray[np.int64]
 _F = np.float32
 _HELD_SCALE = _F(1) / _F(24)
 _LEAST_BEFORE = 2  # ticks before the first step
-_LONG_STEP, _PAIRS = 8, 12
+_LONG_STEP, _PAIRS = 8, 16
 
 
 @dataclass(frozen=True)
