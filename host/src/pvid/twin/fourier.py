@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import EstimatorConfig
-from pvid.settings.fourier import FourierConfig, FourierDesign32
+from pvid.settings.fourier import FourierConfig
 from pvid.twin.f32 import fourier_front, fourier_step, fourier_sums, fourier_watch
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.f32.estimator import RelativeEstimator
