@@ -59,6 +59,24 @@ typedef struct {
     int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
 } pvid_fourier_window_q31;
 
+/* Most rows of a window: parts of its sums. */
+#define PVID_FOURIER_ROWS_Q31 (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+
+/* The noise of a kind's rows, and the directions that the test functions leave out. */
+typedef struct {
+    uint8_t cosines;                                          /* real parts; the other rows are imaginary parts */
+    uint8_t powers;                                           /* of h^2 in use */
+    pvid_scaled_q31 weight[PVID_MAX_POWER];                   /* c_j of the sensors, variance at the power j of h^2 */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                /* D_h, then 1 / sqrt(D_h) */
+    int32_t basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* orthonormal, one of each family in a row, Q30 */
+} pvid_fourier_white_q31;
+
+/* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
+typedef struct {
+    int16_t exponent[PVID_MAX_COLUMNS];
+    int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
+} pvid_fourier_columns_q31;
+
 /* From counts to the S_h of windows. */
 typedef struct {
     const pvid_fourier_design_q31 *design;
