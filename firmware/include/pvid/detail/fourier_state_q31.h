@@ -9,12 +9,13 @@
 
 /* The front end: signals of the last ticks, and the FIR job of the last complete step in slices. */
 typedef struct {
+    bool plain;                          /* every signal is a sample */
     bool held;                           /* a signal needs the next sample: all signals are those of the tick before */
     bool seen;                           /* a sample since the restart */
     uint8_t jet;                         /* being formed; jets: none */
     uint16_t half;                       /* of the longest filter */
     uint16_t length;                     /* places of the ring in use, 2 half + D: a job may last a whole block */
-    uint16_t pairs_per_tick;             /* such that a job lasts half a block */
+    uint16_t pairs_per_tick;             /* such that a job lasts half a block at most */
     uint16_t head;                       /* place of the next signals */
     uint16_t wait;                       /* ticks until the next job begins */
     uint16_t centre;                     /* place of the job's instant */

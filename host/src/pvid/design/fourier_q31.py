@@ -263,8 +263,8 @@ class _Channels:
         return gain * self.edge(one, one.fold) if one.fold else gain
 
     def value(self, k: int) -> int:
-        """Shift from there to the channel."""
-        return shift_to(self.most(k), CHANNEL_BITS - 1e-6)
+        """Shift from there to the channel, at least 1."""
+        return max(1, shift_to(self.most(k), CHANNEL_BITS - 1e-6))
 
     def half_sum(self, k: int) -> float:
         """Largest sum of half a window."""

@@ -104,7 +104,7 @@ def _integrals(f: Int, design: FourierDesignQ31) -> tuple[Int, Int, Int]:
     second: Int = twice[:, 0]
     for k in range(1, count):
         next_first = first + rise[:, k - 1]
-        second = second + (first + next_first - bend[:, k - 1])
+        second = integers(second + (first + next_first - bend[:, k - 1]))
         first = next_first
         if k % hop == 0:
             edges[0, :, k // hop - 1] = round_shift(first, shifts[:, 0])
