@@ -29,8 +29,8 @@ class NoiseFilters:
     """How the noise of each sensor enters the columns of each row kind, to first order, from the symbolic derivatives.
 
     D^m[psi(z, z')] with noise n in z: sum over d of (-1)^m (-D)^d [chi^(m) dpsi/dz^(d)] n. Running integrals smooth
-    their noise away and are left out. Noise of a velocity enters through a soft sign by its slope; with located reversals
-    it is in their times (`ReversalNoise`).
+    their noise away and are left out. Noise of a velocity enters through a soft sign by its slope; where reversals are
+    located it is in their times (`ReversalNoise`).
     """
 
     def __init__(self, channels: Channels) -> None:
