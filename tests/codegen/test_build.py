@@ -77,7 +77,7 @@ def test_the_strong_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
     check(compiled_of("rigid_body"), tmp_path / "rigid_body", options=Options(strong=True))
     (tmp_path / "CMakeLists.txt").write_text(STRONG.format(root=ROOT), encoding="utf-8")
     command = ("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_STRONG=ON")
-    run(*command, "-DPVID_MAX_P=6", "-DPVID_MAX_THETA=15", "-DPVID_MAX_MOMENTS=120")
+    run(*command, "-DPVID_MAX_P=6", "-DPVID_MAX_THETA=15", "-DPVID_MAX_MOMENTS=45")
     compiled = ("ninja", "-C", str(tmp_path / "b"), "rigid_body/CMakeFiles/rigid_body.dir/rigid_body_strong_f32.c.o")
     run(*compiled)
     run(*command, "-DPVID_MAX_P=5")

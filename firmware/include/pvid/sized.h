@@ -48,6 +48,8 @@
 #define pvid_estimator_init_f32 PVID_SIZED(pvid_estimator_init_f32)
 #define pvid_estimator_step_f32 PVID_SIZED(pvid_estimator_step_f32)
 #define pvid_estimator_add_f32 PVID_SIZED(pvid_estimator_add_f32)
+#define pvid_estimator_add_kind_f32 PVID_SIZED(pvid_estimator_add_kind_f32)
+#define pvid_estimator_add_to_b_f32 PVID_SIZED(pvid_estimator_add_to_b_f32)
 #define pvid_estimator_update_f32 PVID_SIZED(pvid_estimator_update_f32)
 #define pvid_estimator_iterate_f32 PVID_SIZED(pvid_estimator_iterate_f32)
 #define pvid_estimator_begin_f32 PVID_SIZED(pvid_estimator_begin_f32)
