@@ -376,16 +376,27 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
 @click.option("--only", type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again.")
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that caused a defect.")
+@click.option(
+    "--done",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="File of finished chunks: a run that was stopped continues behind them.",
+)
 @UPDATE
 def bench_attack(
-    mutants: int, seed: int, only: tuple[str, ...], processes: int, keep: Path | None, update: Path | None
+    mutants: int,
+    seed: int,
+    only: tuple[str, ...],
+    processes: int,
+    keep: Path | None,
+    done: Path | None,
+    update: Path | None,
 ) -> int:
     """Runs mutated rig files, runs and command lines, and counts defects."""
     from bench.attack import HEADER, KINDS, campaign
 
     kinds = only or KINDS
     with progress_bar("mutants", mutants * len(kinds)) as advance:
-        tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve())
+        tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve(), done)
     for tally in tallies:
         for arguments, wrong, number in tally.defects:
             write_stderr(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")

@@ -109,6 +109,7 @@ void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self)
     self->iteration = 0;
     self->expected = 0.0f;
     self->free = 0.0f;
+    self->square = 0.0f;
     memset(self->score, 0, sizeof self->score);
     begin_kind(self);
 }
@@ -383,6 +384,7 @@ static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
     }
     finish->used++;
     finish->free += freedom;
+    finish->square += finish->rss;
     if (!finish->shares) {
         finish->expected += 1.0f;
     }
@@ -467,7 +469,7 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         repeat = !pvid_estimator_assess_advance_f32(&self->estimator, &finish->solve);
         break;
     case STAGE_MEAN:
-        pvid_fourier_scores_add_f32(&finish->scores, self->estimator.model->n_p);
+        pvid_fourier_scores_add_f32(&finish->scores, self->estimator.model->n_p, finish->square / finish->free);
         break;
     case STAGE_CLUSTER:
         repeat = cluster_stage(self);

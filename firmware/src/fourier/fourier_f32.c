@@ -131,10 +131,13 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->channels = summed_channels(design->model);
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_fourier_front_init_f32(&self->front, design, config->sample_rate_hz);
+    pvid_fourier_step_init_f32(&self->history, (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
-    self->items_per_tick = pvid_fourier_items_per_tick(design->decimation, self->harmonics);
-    self->stages_per_tick = pvid_fourier_stages_per_tick(pvid_fourier_finish_stages_f32(self), design->hop,
-                                                         design->decimation, self->harmonics);
+    const uint32_t free_ticks = pvid_fourier_free_ticks(
+        design->decimation, pvid_fourier_job_ticks(design->decimation, pvid_fourier_front_pairs_f32(design)));
+    self->items_per_tick = pvid_fourier_items_per_tick(free_ticks, self->harmonics);
+    self->stages_per_tick =
+        pvid_fourier_stages_per_tick(pvid_fourier_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
     if (self->stages_per_tick == 0u) {
         return PVID_BAD_ITERATIONS;
     }
@@ -187,7 +190,7 @@ static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[])
     const pvid_fourier_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
     const size_t half = self->sums.half;
-    if (!pvid_fourier_step_take_f32(&self->history, design, self->dt, self->front.jet_value, index,
+    if (!pvid_fourier_step_take_f32(&self->history, design, self->channels, self->dt, self->front.jet_value, index,
                                     pvid_fourier_sums_place_f32(&self->sums))) {
         return PVID_ACCUMULATED;
     }
@@ -241,7 +244,8 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
         dropped = next_step(self, sample);
     }
     pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    if (!steps || (design->decimation == 1u)) {
+    const bool works = (self->front.wait <= self->front.work_wait) || !self->front.begun;
+    if ((works && !steps) || (design->decimation == 1u)) {
         if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
             advance_sums(self);
         } else {

@@ -15,6 +15,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/unroll.h"
+
 void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
 {
     self->half = 0;
@@ -61,29 +63,38 @@ bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *self, uint8_t ha
 }
 
 /* Adds the four steps of the block to one harmonic of all channels. */
-static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, uint8_t channels)
+static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
 {
     const uint32_t h = self->harmonic;
     const uint32_t turn = 2u * (uint32_t)design->hop;
     const uint32_t quarter = (uint32_t)design->hop / 2u;
-    const float (*block)[PVID_MAX_CHANNELS] = (const float (*)[PVID_MAX_CHANNELS])self->block[self->filling ^ 1u];
-    float (*sum)[2] = self->sum[self->target][h];
+    const float *circle = design->circle;
     uint32_t at = (h * self->start) % turn;
     float cosine[PVID_FOURIER_BLOCK];
     float sine[PVID_FOURIER_BLOCK];
+    PVID_UNROLL
     for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
-        cosine[k] = design->circle[at];
-        sine[k] = design->circle[(at >= quarter) ? (at - quarter) : ((at + turn) - quarter)];
+        cosine[k] = circle[at];
+        sine[k] = circle[(at >= quarter) ? (at - quarter) : ((at + turn) - quarter)];
         at += h;
         at = (at >= turn) ? (at - turn) : at;
     }
-    const bool first = self->start == 0u;
+    float (*sum)[2] = self->sum[self->target][h];
+    if (self->start == 0u) {
+        for (size_t c = 0; c < channels; c++) {
+            sum[c][0] = 0.0f;
+            sum[c][1] = 0.0f;
+        }
+    }
+    const float *x = self->block[self->filling ^ 1u][0];
     for (size_t c = 0; c < channels; c++) {
-        float re = first ? 0.0f : sum[c][0];
-        float im = first ? 0.0f : sum[c][1];
+        float re = sum[c][0];
+        float im = sum[c][1];
+        PVID_UNROLL
         for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
-            re += cosine[k] * block[k][c];
-            im += sine[k] * block[k][c];
+            const float value = x[(k * PVID_MAX_CHANNELS) + c];
+            re += cosine[k] * value;
+            im += sine[k] * value;
         }
         sum[c][0] = re;
         sum[c][1] = im;

@@ -6,9 +6,11 @@ The core's arrays get the sizes that the mechanism needs. Flags are those of too
 from __future__ import annotations
 
 import hashlib
+import os
 import subprocess
 import tempfile
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
@@ -86,14 +88,22 @@ def _build(compiler: str, texts: Mapping[str, str], definitions: list[str], libr
         for name, text in texts.items():
             (folder / name).write_text(text, encoding="utf-8")
         options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}", f"-I{folder}"]
-        code = [str(folder / name) for name in sorted(texts) if name.endswith(".c")]
-        _run([compiler, *options, "-shared", *code, *map(str, _sources()), "-o", str(folder / library.name), "-lm"])
+        code = [folder / name for name in sorted(texts) if name.endswith(".c")]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            objects = list(pool.map(lambda path: _object(compiler, options, path, Path(made)), [*code, *_sources()]))
+        _run([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
         (folder / HEADERS).write_text(_declarations(compiler, texts, options, Path(made)), encoding="utf-8")
         try:
             folder.rename(library.parent)
         except OSError:
             if not library.exists():
                 raise
+
+
+def _object(compiler: str, options: list[str], source: Path, folder: Path) -> str:
+    made = str(folder / f"{source.stem}.o")
+    _run([compiler, *options, "-c", str(source), "-o", made])
+    return made
 
 
 def _declarations(compiler: str, texts: Mapping[str, str], options: list[str], folder: Path) -> str:

@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -96,9 +98,24 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     return sized_for(replace(rig, identifier=replace(rig.identifier, survey=False)), run)
 
 
-@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
 def survey(rig: RigFile, run: Run) -> Survey | None:
-    """Searches a run for p; None where no start leads to plausible parameters."""
+    """Searches a run for p; None where no start leads to plausible parameters.
+
+    What was found is kept as long as the run is: advice identifies a run again with some of the settings changed.
+    """
+    kept = _FOUND.setdefault(run, {})
+    asked = rig.identifier
+    key = replace(rig, identifier=replace(asked, core="f32", law="stationary")), asked.core_traits.corrects_angles
+    if key not in kept:
+        kept[key] = _found(rig, run)
+    return kept[key]
+
+
+_FOUND: WeakKeyDictionary[Run, dict[tuple[RigFile, bool], Survey | None]] = WeakKeyDictionary()
+
+
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
+def _found(rig: RigFile, run: Run) -> Survey | None:
     if not np.isfinite(run.phi).any():
         return None
     outcomes: list[tuple[RigFile, Fit]] = []
@@ -154,7 +171,8 @@ def _starts(rig: RigFile) -> Iterator[RigFile]:
     guess = rig.nominal
     for l2 in _SCALES:
         for rho2 in _SCALES:
-            yield replace(rig, nominal=replace(guess, l2=guess.l2 * l2, rho2=guess.rho2 * rho2))
+            with suppress(PvidError):  # a length beyond those of a rig file
+                yield replace(rig, nominal=replace(guess, l2=guess.l2 * l2, rho2=guess.rho2 * rho2))
 
 
 def _best(outcomes: list[tuple[RigFile, Fit]]) -> tuple[RigFile, Fit]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import EstimatorConfig
-from pvid.settings.fourier import NONE, FourierConfig, FourierDesign32
+from pvid.settings.fourier import FourierConfig, FourierDesign32
 from pvid.twin.f32 import fourier_front, fourier_step, fourier_sums, fourier_watch
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.f32.estimator import RelativeEstimator
@@ -187,7 +187,7 @@ class FourierTwin:
         Returns the reason of every tick [ticks, lanes].
         """
         given = np.asarray(samples, np.float32)
-        finite = np.isfinite(given).all(axis=1)
+        finite: npt.NDArray[np.bool_] = np.all(np.isfinite(given), axis=1)
         reason = np.empty((len(given), self.estimator.p.shape[1]), np.uint8)
         work: Stages = iter(())
         parts: Iterator[tuple[int, int]] = iter(segments(finite))
@@ -208,8 +208,3 @@ class FourierTwin:
         """Steps all lanes through a run [ticks, samples] from its first sample."""
         recorder = Recorder(self.estimator, len(np.asarray(samples)), sums, progress, self.trust)
         return recorder.finished(self.follow(samples, recorder))
-
-
-def summed_channels(design: FourierDesign32) -> int:
-    """Channels that are summed: all but the constant."""
-    return sum(one.gain != NONE for one in design.model.channel)

@@ -74,7 +74,7 @@ def magnitude(x: npt.ArrayLike) -> Float32:
     return np.where(given < 0, -given, given)
 
 
-def soft_sign(v: npt.ArrayLike, width: np.float32) -> Float32:
+def soft_sign(v: npt.ArrayLike, width: np.float32 | Float32) -> Float32:
     """pvid_soft_sign_f32 of v, 1/2 at v = width."""
     given = np.asarray(v, np.float32)
     found: Float32 = given / (magnitude(given) + width)

@@ -254,7 +254,7 @@ class Estimator:
         covariance = cholesky.inverse(f) * wide
         se = np.sqrt(np.stack([covariance[a, a] for a in range(n_p)]))
         known = f.ok & np.isfinite(covariance).all(axis=(0, 1)) & np.isfinite(se).all(axis=0)
-        out = np.zeros(self.p.shape[1], estimates.F32)
+        out = np.zeros(self.p.shape[1], estimates.f32_of(n_p))
         out["p"][:, :n_p] = self.p.T
         out["kappa"] = np.where(kappa.ok, kappa.first_pivot, np.float32(0))
         out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))

@@ -93,7 +93,8 @@ class Finish:
         estimator = self.estimator
         lanes = estimator.p.shape[1]
         score = np.zeros((estimator.model.n_theta, lanes), np.float32)
-        expected, free, used = np.zeros(lanes, np.float32), np.zeros(lanes, np.float32), 0
+        nothing = np.zeros(lanes, np.float32)
+        expected, free, square, used = nothing, nothing, nothing, 0
         first = 0
         for kind, own in enumerate(self.design.model.kind):
             block = slice(first, first + own.thetas)
@@ -116,7 +117,7 @@ class Finish:
                     estimator.information.fade(self.trust.next_fade_factor())
                 estimator.sums = estimator.information.read()
             used += 1
-            free = free + freedom
+            free, square = free + freedom, square + rss
             yield None
             if self.shares:
                 yield from self._share(white, block, score)
@@ -132,7 +133,7 @@ class Finish:
         if used == 0:
             self.scores.skip()
             return
-        yield from self._steps(score, expected / _F(used), free)
+        yield from self._steps(score, expected / _F(used), free, square)
 
     def _share(self, white: White, block: slice, score: Float32) -> Stages:
         """The stages of the noise's share, the last of which adds the compensation."""
@@ -148,7 +149,7 @@ class Finish:
             estimator.add_to_b(pull)
         yield None
 
-    def _steps(self, score: Float32, expected: Float32, free: Float32) -> Stages:
+    def _steps(self, score: Float32, expected: Float32, free: Float32, square: Float32) -> Stages:
         """From the rows in the sums to the verdict."""
         estimator = self.estimator
         self.scores.take(estimator.model, estimator.p, score)
@@ -168,7 +169,7 @@ class Finish:
             yield None
         with np.errstate(all="ignore"):
             candidate, above_noise = estimator.judged()
-            self.scores.add()
+            self.scores.add(square / free)
             self._cluster(candidate)
             variance_ratio = group_rss / (free * expected)
         yield self.trust.judge(reason, size, above_noise, variance_ratio, candidate)

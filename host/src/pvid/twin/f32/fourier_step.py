@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,8 +21,8 @@ _LATER = 2  # steps from a step's jets to its channels
 class Runs:
     """Integrals since the start of the run, kept over gaps, and what rounding took off [runs]."""
 
-    value: Float32
-    low: Float32
+    value: npt.NDArray[Any]
+    low: npt.NDArray[Any]
 
     @classmethod
     def of(cls, design: FourierDesign32) -> Runs:

@@ -1,0 +1,74 @@
+/* pvid/detail/fourier_state_q31.h - the state behind fourier_q31.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_FOURIER_STATE_Q31_H
+#define PVID_DETAIL_FOURIER_STATE_Q31_H
+
+#include "pvid/fourier_q31.h"
+
+/* Steps that are added to the sums together. */
+#define PVID_FOURIER_BLOCK_Q31 4
+
+/* The front end: signals of the last ticks, and the FIR job of the last complete step in slices. */
+typedef struct {
+    bool held;                           /* a signal needs the next sample: all signals are those of the tick before */
+    bool seen;                           /* a sample since the restart */
+    uint8_t jet;                         /* being formed; jets: none */
+    uint16_t half;                       /* of the longest filter */
+    uint16_t length;                     /* places of the ring in use, 2 half + D: a job may last a whole block */
+    uint16_t pairs_per_tick;             /* such that a job lasts half a block */
+    uint16_t head;                       /* place of the next signals */
+    uint16_t wait;                       /* ticks until the next job begins */
+    uint16_t centre;                     /* place of the job's instant */
+    uint16_t pair;                       /* pairs of the present jet that are done */
+    int64_t sum;                         /* of the present jet */
+    int32_t before[3][PVID_MAX_SAMPLES]; /* counts of the last three ticks, latest first */
+    int32_t value[PVID_MAX_INPUTS];      /* jets of the job's instant */
+    int32_t ring[PVID_MAX_RING];         /* [length][signals] */
+} pvid_fourier_front_q31;
+
+/* From the jets of a step to the channels of the second one before it. */
+typedef struct {
+    uint8_t known;                     /* steps since the restart, 0..4 */
+    int32_t now[PVID_MAX_INPUTS];      /* inputs of `values` at the step before the newest; runs and signs last */
+    int32_t rate[PVID_MAX_INTEGRANDS]; /* derivatives of the runs there */
+    int32_t v[2][PVID_MAX_INTEGRANDS]; /* arguments of sgn there and at the step before */
+    int64_t run[PVID_MAX_INTEGRANDS];  /* twice the sum of the derivatives of the runs up to there, by trapezoids */
+    int32_t gain[PVID_MAX_CHANNELS];   /* at the step before that */
+    int32_t f[3][PVID_MAX_INTEGRANDS]; /* integrands there and at the two steps before it, latest first */
+    int64_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
+    int64_t twice[PVID_MAX_INTEGRANDS];
+    int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end, rounded */
+    uint16_t index;                          /* of the step whose channels come next, in its half */
+    uint8_t half;                            /* that fills, 0 or 1 */
+} pvid_fourier_values_q31;
+
+/* The sums of the two halves of a window, and the block of steps that is being added to them. */
+typedef struct {
+    uint8_t filling; /* block that fills, 0 or 1 */
+    uint8_t slice;   /* harmonics of the other block that are done; all: none is being added */
+    uint8_t target;  /* half to which it is added */
+    bool last;       /* it completes its half */
+    bool joins;      /* and this half completes a window */
+    uint8_t halves;  /* complete since the restart, 0..2 */
+    uint16_t start;  /* of its first step in its half */
+    int32_t block[2][PVID_FOURIER_BLOCK_Q31][PVID_MAX_CHANNELS];
+    int32_t sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
+} pvid_fourier_sums_q31;
+
+/* S_h of a window, real and imaginary part. */
+typedef struct {
+    int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
+} pvid_fourier_window_q31;
+
+/* From counts to the S_h of windows. */
+typedef struct {
+    const pvid_fourier_design_q31 *design;
+    bool at_once;            /* D is small: a tick does all that is due */
+    bool due;                /* the jets of a step are complete, its channels are not made yet */
+    uint8_t slices_per_tick; /* harmonics to which a tick adds a block */
+    pvid_fourier_front_q31 front;
+    pvid_fourier_values_q31 values;
+    pvid_fourier_sums_q31 sums;
+    pvid_fourier_window_q31 window;
+} pvid_fourier_collect_q31;
+
+#endif

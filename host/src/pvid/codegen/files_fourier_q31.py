@@ -1,0 +1,110 @@
+"""The tables of the fixed-point weak engine in C: a model and a design for pvid/fourier_q31.h."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pvid.codegen.fourier_q31 import FixedFourier, c_functions
+from pvid.settings.fourier import NONE
+from pvid.settings.fourier_q31 import FourierDesignQ31, Rescale
+
+_WIDTH = 12  # numbers a line
+
+
+def source(made: FixedFourier, design: FourierDesignQ31, prefix: str) -> str:
+    """Functions, PREFIX_fourier_q31 and PREFIX_design_q31; all static but the design."""
+    return "\n\n".join(
+        [
+            '#include "pvid/fourier_q31.h"\n#include "pvid/elementary_q31.h"\n\n#include <stddef.h>',
+            c_functions(made, prefix).rstrip(),
+            *_model(made, prefix),
+            *_design(design, prefix),
+        ]
+    )
+
+
+def _place(place: int) -> str:
+    return "PVID_FOURIER_NONE" if place == NONE else str(place)
+
+
+def _structs(kind: str, name: str, entries: Iterable[Sequence[object]]) -> str:
+    lines = [f"    {{{', '.join(map(str, one))}}}," for one in entries]
+    return "\n".join([f"static const {kind} {name}[{len(lines)}] = {{", *lines, "};"]) if lines else ""
+
+
+def _numbers(kind: str, name: str, values: Iterable[int]) -> str:
+    given = [str(int(one)) for one in values]
+    rows = [f"    {', '.join(given[k : k + _WIDTH])}," for k in range(0, len(given), _WIDTH)]
+    return "\n".join([f"static const {kind} {name}[{len(given)}] = {{", *rows, "};"]) if given else ""
+
+
+def _model(made: FixedFourier, prefix: str) -> list[str]:
+    model = made.model
+    channels = [
+        (_place(one.gain), _place(one.integrand), one.fold, _place(one.plain), _place(one.ramp))
+        for one in model.channel
+    ]
+    kinds = [(one.thetas, one.nuisances, one.first, one.end) for one in model.kind]
+    counts = {
+        "samples": model.samples,
+        "signals": len(model.signal),
+        "jets": len(model.jet),
+        "runs": model.runs,
+        "signs": model.signs,
+        "gains": model.gains,
+        "integrands": model.integrands,
+        "channels": len(model.channel),
+        "kinds": len(model.kind),
+    }
+    tables = ("signal", "jet", "channel", "term", "kind")
+    struct = [
+        f"static const pvid_fourier_model_q31 {prefix}_fourier_q31 = {{",
+        *(f"    .{name} = {count}," for name, count in counts.items()),
+        *(f"    .{name} = {prefix}_{name}," for name in tables),
+        f"    .prepare = {prefix + '_prepare_q31' if made.prepare else 'NULL'},",
+        f"    .values = {prefix}_values_q31,",
+        "};",
+    ]
+    return [
+        _structs("pvid_fourier_signal", f"{prefix}_signal", [(one.sample, int(one.source)) for one in model.signal]),
+        _structs("pvid_fourier_jet", f"{prefix}_jet", [(one.signal, one.order) for one in model.jet]),
+        _structs("pvid_fourier_channel", f"{prefix}_channel", channels),
+        _structs("pvid_fourier_term_q31", f"{prefix}_term", [(x.channel, x.order, x.column) for x in model.term]),
+        _structs("pvid_fourier_kind", f"{prefix}_kind", kinds),
+        "\n".join(struct),
+    ]
+
+
+def _rescale(one: Rescale) -> str:
+    return f"{{{one.down}, {one.shift}, {one.multiplier}}}"
+
+
+def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
+    parts, filters = [], []
+    for k, one in enumerate(design.filter):
+        weights = f"{prefix}_weights_{k}" if one.half else "NULL"
+        if one.half:
+            parts.append(_numbers("PVID_TABLE int32_t", weights, one.weights))
+        filters.append((one.half, one.bits, str(one.is_wide).lower(), _rescale(one.rescale), weights))
+    formats = [(one.value, one.own, one.plain, one.ramp) for one in design.format]
+    tables = {
+        "full_scale": _numbers("int32_t", f"{prefix}_full_scale", design.full_scale),
+        "filter": _structs("pvid_fourier_filter_q31", f"{prefix}_filter", filters),
+        "run": _structs(
+            "pvid_fourier_rescale_q31", f"{prefix}_run", [(x.down, x.shift, x.multiplier) for x in design.run]
+        ),
+        "sign_width": _numbers("int32_t", f"{prefix}_sign_width", design.sign_width),
+        "integral": _structs("pvid_fourier_integral_q31", f"{prefix}_integral", design.integral),
+        "format": _structs("pvid_fourier_format_q31", f"{prefix}_format", formats),
+        "circle": _numbers("PVID_TABLE int16_t", f"{prefix}_circle", design.circle.tolist()),
+    }
+    sizes = ("functions", "power", "decimation", "sum_shift", "hop")
+    struct = [
+        f"extern const pvid_fourier_design_q31 {prefix}_design_q31;",
+        f"const pvid_fourier_design_q31 {prefix}_design_q31 = {{",
+        f"    .model = &{prefix}_fourier_q31,",
+        *(f"    .{name} = {getattr(design, name)}," for name in sizes),
+        *(f"    .{name} = {prefix}_{name if text else ''}," for name, text in tables.items() if text),
+        "};",
+    ]
+    return [*parts, *(text for text in tables.values() if text), "\n".join(struct)]

@@ -1,0 +1,247 @@
+"""Fixed-point weak engines of the shipped mechanisms: formats, runs as counts, and their C as a library."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.files_fourier_q31 import source as tables_source
+from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
+from pvid.core.sources import INCLUDES, core_sources
+from pvid.design.fourier_q31 import CIRCLE, DOWN, Sensing, Sizes, fixed_design
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.front import weights_of
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.rows import record_of
+from pvid.settings.fourier import NONE
+from pvid.settings.fourier_q31 import FourierDesignQ31
+from pvid.setup.fourier import for_engine
+from pvid.sim.imperfections import Imperfections
+from pvid.sim.simulated_run import RigSimulation
+from pvid.twin.q31.fourier_front import jets
+from pvid.twin.q31.fourier_values import steps
+
+Float = npt.NDArray[np.float64]
+Int = npt.NDArray[np.int64]
+
+# Designs that the engine has; those of the rigs but for long windows, which would make the tests slow.
+DESIGNS = {
+    "kapitza": FourierDesign(
+        1000.0,
+        1.28,
+        9,
+        6,
+        decimation=16,
+        taps=41,
+        degree=6,
+        rate_taps=41,
+        rate_degree=6,
+    ),
+    "dc_motor": FourierDesign(1000.0, 0.4, 16, 6, rate_taps=21, rate_degree=3),
+    "cart_pendulum": FourierDesign(1000.0, 0.96, 12, 6, decimation=4, taps=41, rate_taps=41, rate_degree=4),
+    "furuta": FourierDesign(1000.0, 0.96, 12, 6, decimation=4, taps=41, rate_taps=41, rate_degree=4),
+    "two_link_arm": FourierDesign(1000.0, 0.96, 12, 6, decimation=8, taps=61, rate_taps=61, rate_degree=6),
+    "two_mass_drive": FourierDesign(1000.0, 0.48, 16, 8, decimation=2, rate_taps=31, rate_degree=4),
+    "rigid_body": FourierDesign(1000.0, 0.96, 12, 6, decimation=8, taps=31, degree=4),
+    "battery_2rc": FourierDesign(1.0, 1200.0, 16, 6),
+}
+_HIGHEST = 2.0  # reach of a jet over the largest of the run
+
+
+class Rig:
+    """A mechanism, its run in counts, and its fixed-point weak form."""
+
+    def __init__(self, name: str, samples: int, seed: int = 0) -> None:
+        simulation = RigSimulation.of(compiled_of(name), simulated_rig(name))
+        run = simulation.run(seed, Imperfections())
+        compiled = compiled_of(name)
+        self.name, self.compiled = name, ready(compiled)
+        self.oracle_design = for_engine(DESIGNS[name])
+        self.run = {key: np.asarray(x, np.float64)[:samples] for key, x in run.items()}
+        self.made = fourier_functions_of(compiled)
+        known = {one.name: one for one in compiled.signals}
+        # inputs are known exactly: as counts of 16 bits
+        self.lsb = tuple(known[one].resolution or known[one].reach / 2**15 for one in self.made.samples)
+        self.counts = np.array(
+            [np.rint(self.run[one] / lsb) for one, lsb in zip(self.made.samples, self.lsb, strict=True)]
+        ).astype(np.int64)
+        # what the integers are made of, for float64
+        self.exact = dict(
+            zip(
+                self.made.samples,
+                self.counts * np.array(self.lsb)[:, np.newaxis],
+                strict=True,
+            )
+        )
+        self.record = record_of(self.compiled, self.exact, self.oracle_design)
+        of_jets = {str(one): x for one, x in self.record.grid.jets.items()}
+        reaches = {one: _HIGHEST * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in self.made.jet_names}
+        hours = len(next(iter(self.run.values()))) / self.oracle_design.sample_rate
+        self.fixed: FixedFourier = fixed_fourier(self.made, JetReaches(run_s=2 * hours, of=reaches))
+        full = tuple(round(1.5 * known[one].reach / lsb) for one, lsb in zip(self.made.samples, self.lsb, strict=True))
+        design = self.oracle_design
+        self.sizes_of_form = Sizes(
+            functions=design.functions,
+            power=design.power,
+            decimation=design.decimation,
+            hop=design.hop,
+            weights=tuple(_outwards(weights_of(design, jet.order)) for jet in self.made.jet),
+            sign_width=(0.0,) * len(self.made.sign_names),
+        )
+        self.design: FourierDesignQ31 = fixed_design(
+            self.fixed.model,
+            self.sizes_of_form,
+            Sensing(self.lsb, full, design.sample_rate),
+            self.fixed.formats,
+        )
+
+    def oracle_sums(self) -> dict[int, Float]:
+        """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
+        functions = self.oracle_design.test_functions
+        sums = self.record.sums(functions)
+        out = {}
+        first = 0
+        for row in self.record.channels.rows:
+            ordered = sorted(row.terms, key=lambda one: (one.column, one.order, one.channel))
+            for mine, theirs in zip(self.made.term[first:], ordered, strict=False):
+                whole = np.zeros((sums.shape[1], functions.highest + 1, 2))
+                whole[:, 0, 0] = sums[theirs.channel, :, 0]
+                whole[:, 1:, 0], whole[:, 1:, 1] = (
+                    sums[theirs.channel, :, 1::2],
+                    sums[theirs.channel, :, 2::2],
+                )
+                out[mine.channel] = whole
+            first += len(row.terms)
+        return out
+
+    def sizes(self) -> dict[int, float]:
+        """Largest sum of |channel| over a window, integrals counted from the start of the window, by place."""
+        design = self.design
+        made = steps(jets(self.counts, design), design, np.zeros(design.model.runs, np.int64))
+        out = {}
+        for place, one in enumerate(design.model.channel):
+            if one.gain == NONE:
+                out[place] = 2.0 * design.hop
+                continue
+            whole = np.abs(made.channels[place]).astype(np.float64)
+            window = np.convolve(whole, np.ones(2 * design.hop), "valid").max()
+            down = 2.0 ** (DOWN + design.sum_shift + design.format[place].own)
+            out[place] = 4.0**one.fold * window * CIRCLE / down * design.units[place]
+        return out
+
+
+def _outwards(weights: Float) -> Float:
+    return weights[len(weights) // 2 + 1 :]
+
+
+@cache
+def rig(name: str, samples: int) -> Rig:
+    """Made once."""
+    return Rig(name, samples)
+
+
+_DRIVER = """
+#include "fourier/collect_q31.h"
+
+extern const pvid_fourier_design_q31 rig_design_q31;
+unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[]);
+
+/* S_h of the windows of a run, channel by channel; returns their number. */
+unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[])
+{
+    static pvid_fourier_collect_q31 self;
+    const pvid_fourier_model_q31 *model = rig_design_q31.model;
+    const unsigned harmonics = (rig_design_q31.functions / 2u) + (rig_design_q31.power / 2u) + 1u;
+    unsigned windows = 0;
+    pvid_fourier_collect_init_q31(&self, &rig_design_q31);
+    for (unsigned k = 0; k < ticks; k++) {
+        const pvid_fourier_tick tick = pvid_fourier_collect_step_q31(&self, &counts[k * model->samples]);
+        outcome[k] = (uint8_t)tick;
+        if ((tick == PVID_FOURIER_WINDOW) && (windows < most)) {
+            for (unsigned c = 0; c < model->channels; c++) {
+                for (unsigned h = 0; h < harmonics; h++) {
+                    *window++ = self.window.s[c][h][0];
+                    *window++ = self.window.s[c][h][1];
+                }
+            }
+            windows++;
+        }
+    }
+    return windows;
+}
+"""
+SIZES = (
+    "PVID_MAX_CHANNELS=24",
+    "PVID_MAX_HARMONICS=25",
+    "PVID_MAX_RING=1024",
+    "PVID_MAX_INPUTS=24",
+)
+# Not -O1: with -fsanitize=undefined the compiler of Debian 12 (gcc 12.2) then takes the sign off a negative sine.
+_OPTIONS = (
+    *(
+        "-std=c99",
+        "-O2",
+        "-fPIC",
+        "-DPVID_PLAIN_NAMES",
+        "-fsanitize=undefined",
+        "-fsanitize-undefined-trap-on-error",
+    ),
+    *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wvla"),
+    *(f"-D{one}" for one in SIZES),
+    *INCLUDES,
+)
+
+
+class Core:
+    """The C of the engine, compiled once; signed overflow ends the program."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "driver.c").write_text(_DRIVER, encoding="utf-8")
+        names = (
+            "collect_q31",
+            "front_q31",
+            "values_q31",
+            "sums_q31",
+            "integer_q31",
+            "elementary_q31",
+            "scaled_q31",
+        )
+        rooms = ("fourier", "number")
+        core = [str(one) for one in core_sources("*_q31.c") if one.stem in names and one.parent.name in rooms]
+        self._run([*_OPTIONS, "-c", *core, str(folder / "driver.c")])
+        self.libraries: dict[str, ctypes.CDLL] = {}
+
+    def _run(self, arguments: list[str]) -> None:
+        subprocess.run(["gcc", *arguments], check=True, cwd=self.folder)
+
+    def library(self, one: Rig) -> ctypes.CDLL:
+        """With the tables of a rig."""
+        if one.name not in self.libraries:
+            code = self.folder / f"{one.name}.tables.c"
+            code.write_text(tables_source(one.fixed, one.design, "rig"), encoding="utf-8")
+            library = self.folder / f"{one.name}.so"
+            objects = [str(path) for path in self.folder.glob("*.o")]
+            self._run([*_OPTIONS, "-shared", str(code), *objects, "-o", str(library)])
+            self.libraries[one.name] = ctypes.CDLL(str(library))
+        return self.libraries[one.name]
+
+    def windows(self, one: Rig, counts: Int) -> tuple[Int, Int]:
+        """S_h [windows, channels, H + 1, 2] of counts [samples, ticks], and what each tick did."""
+        design = one.design
+        given = np.ascontiguousarray(counts.T, np.int32)
+        size = len(design.model.channel) * (design.highest + 1) * 2
+        most = given.shape[0] // (design.hop * design.decimation) + 1
+        out, outcome = np.zeros((most, size), np.int32), np.zeros(len(given), np.uint8)
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, out, outcome)]
+        count = self.library(one).run(pointers[0], len(given), pointers[1], most, pointers[2])
+        shape = (count, len(design.model.channel), design.highest + 1, 2)
+        return out[:count].reshape(shape).astype(np.int64), outcome.astype(np.int64)
