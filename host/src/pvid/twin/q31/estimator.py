@@ -201,7 +201,7 @@ class EstimatorQ31:
         sums = self.sums.copy()
         sums[places] += row[upper] * row[column]
         sums[self.model.moments : -2][block] += row * e
-        sums[-2] += e * e
+        sums[-2] = np.minimum(sums[-2] + e * e, 3 * SUM_LIMIT)
         sums[-1] += weight
         self.sums = sums
         if self.is_rate:
