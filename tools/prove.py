@@ -75,7 +75,7 @@ def in_stages(program: str) -> tuple[str, ...]:
     return (
         *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
         "-eva-slevel-function",
-        "main:200,checks_noise:5,eliminate_part:30,above_noise_stage:30,factor_stage:60,advance_shared:60,solve_stage:30,"
+        "main:200,checks_noise:5,pvid_system_eliminate_q31:30,above_noise_stage:30,factor_stage:60,advance_shared:60,solve_stage:30,"
         "pvid_estimator_advance_q31:100,pvid_estimator_assess_advance_q31:100,kappa_stage:60,widen_stage:60,"
         f"pvid_assess_invert_q31:20,pvid_cholesky_eliminate_q31:20,{program}:5000",
     )

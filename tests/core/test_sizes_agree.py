@@ -27,6 +27,8 @@ OTHER = {
     "PVID_MAX_ITERATIONS": 20,
     "PVID_MAX_PASSES": 4,
     "PVID_MAX_THETA_Q31": 12,
+    "PVID_MAX_MOMENTS_Q31": 78,
+    "PVID_MAX_C_Q31": 24,
 }
 
 LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}

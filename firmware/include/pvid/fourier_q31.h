@@ -94,6 +94,16 @@ typedef struct {
     uint8_t ramp;  /* of fold 2: of I^1 at the end of the first half times B_h of the channel `ramp` */
 } pvid_fourier_format_q31;
 
+/* Share of the variance D_h of the sums at harmonic h in the rows of a kind by the sensors' noise:
+ * += W_h factor theta_a theta_b h^(2 power), with theta = -1 for the column of Y; W_h: 2 hop at h = 0, else hop. */
+typedef struct {
+    uint8_t kind;
+    uint8_t power;
+    uint8_t a; /* columns of the kind, a <= b; pairs with a < b are counted once, with twice the factor */
+    uint8_t b;
+    pvid_scaled_q31 factor;
+} pvid_fourier_noise_q31;
+
 typedef struct {
     const pvid_fourier_model_q31 *model;
     uint8_t functions;         /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
@@ -109,6 +119,12 @@ typedef struct {
     const pvid_fourier_integral_q31 *integral; /* [integrands] */
     const pvid_fourier_format_q31 *format;     /* [channels] */
     const PVID_TABLE int16_t *circle;          /* [2 hop] 32767 cos(pi j / hop) */
+    const pvid_scaled_q31 *factor; /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
+    const pvid_fourier_noise_q31 *noise; /* [n_noise] */
+    uint16_t n_noise;
+    const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const pvid_scaled_q31
+        *error_variance; /* [kinds] of that noise at a step, times W_h h^(2 order) the share in D_h; or 0 */
 } pvid_fourier_design_q31;
 
 #ifdef __cplusplus

@@ -9,12 +9,13 @@
 
 /* The front end: signals of the last ticks, and the FIR job of the last complete step in slices. */
 typedef struct {
+    bool plain;                          /* every signal is a sample */
     bool held;                           /* a signal needs the next sample: all signals are those of the tick before */
     bool seen;                           /* a sample since the restart */
     uint8_t jet;                         /* being formed; jets: none */
     uint16_t half;                       /* of the longest filter */
     uint16_t length;                     /* places of the ring in use, 2 half + D: a job may last a whole block */
-    uint16_t pairs_per_tick;             /* such that a job lasts half a block */
+    uint16_t pairs_per_tick;             /* such that a job lasts half a block at most */
     uint16_t head;                       /* place of the next signals */
     uint16_t wait;                       /* ticks until the next job begins */
     uint16_t centre;                     /* place of the job's instant */
@@ -58,6 +59,24 @@ typedef struct {
 typedef struct {
     int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
 } pvid_fourier_window_q31;
+
+/* Most rows of a window: parts of its sums. */
+#define PVID_FOURIER_ROWS_Q31 (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+
+/* The noise of a kind's rows, and the directions that the test functions leave out. */
+typedef struct {
+    uint8_t cosines;                                          /* real parts; the other rows are imaginary parts */
+    uint8_t powers;                                           /* of h^2 in use */
+    pvid_scaled_q31 weight[PVID_MAX_POWER];                   /* c_j of the sensors, variance at the power j of h^2 */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                /* D_h, then 1 / sqrt(D_h) */
+    int32_t basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* orthonormal, one of each family in a row, Q30 */
+} pvid_fourier_white_q31;
+
+/* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
+typedef struct {
+    int16_t exponent[PVID_MAX_COLUMNS];
+    int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
+} pvid_fourier_columns_q31;
 
 /* From counts to the S_h of windows. */
 typedef struct {

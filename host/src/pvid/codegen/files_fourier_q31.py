@@ -96,6 +96,14 @@ def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
         "sign_width": _numbers("int32_t", f"{prefix}_sign_width", design.sign_width),
         "integral": _structs("pvid_fourier_integral_q31", f"{prefix}_integral", design.integral),
         "format": _structs("pvid_fourier_format_q31", f"{prefix}_format", formats),
+        "factor": _structs("pvid_scaled_q31", f"{prefix}_factor", design.factor),
+        "noise": _structs(
+            "pvid_fourier_noise_q31",
+            f"{prefix}_noise",
+            [(x.kind, x.power, x.a, x.b, f"{{{x.factor[0]}, {x.factor[1]}}}") for x in design.noise],
+        ),
+        "error_order": _numbers("uint8_t", f"{prefix}_error_order", design.error_order),
+        "error_variance": _structs("pvid_scaled_q31", f"{prefix}_error_variance", design.error_variance),
         "circle": _numbers("PVID_TABLE int16_t", f"{prefix}_circle", design.circle.tolist()),
     }
     sizes = ("functions", "power", "decimation", "sum_shift", "hop")
@@ -104,6 +112,7 @@ def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
         f"const pvid_fourier_design_q31 {prefix}_design_q31 = {{",
         f"    .model = &{prefix}_fourier_q31,",
         *(f"    .{name} = {getattr(design, name)}," for name in sizes),
+        f"    .n_noise = {len(design.noise)},",
         *(f"    .{name} = {prefix}_{name if text else ''}," for name, text in tables.items() if text),
         "};",
     ]

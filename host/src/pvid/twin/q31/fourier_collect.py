@@ -14,6 +14,7 @@ from pvid.twin.q31.fourier_values import LATER, steps
 from pvid.twin.q31.integer import Int
 
 _BLOCK = 4
+_LEAST_PAIRS = 16  # of a filter, a tick
 _SHARING = 4  # the least D whose ticks share the work
 
 
@@ -54,9 +55,10 @@ class Schedule:
         ticks = design.decimation
         share = ticks // 2 if ticks > 1 else 1
         pairs = sum(one.half for one in design.filter)
-        each = -(-pairs // share)
+        each = max(-(-pairs // share), _LEAST_PAIRS)
         at_once = ticks < _SHARING
-        others = ticks if at_once else ticks - ticks // 2 - 1
+        job = max(-(-pairs // each), 1)
+        others = ticks if at_once else ticks - job - 1
         slots = max(_BLOCK * others // 2, 1)
         harmonics = design.highest + 1
         slices = -(-harmonics // slots)
@@ -64,7 +66,7 @@ class Schedule:
             decimation=ticks,
             hop=design.hop,
             first=first_step(design) + design.half + int(is_held(design)),
-            job=max(-(-pairs // each), 1) if pairs else 1,
+            job=job,
             at_once=at_once,
             slices=slices,
             adding=-(-harmonics // slices),
@@ -76,7 +78,7 @@ class Schedule:
         ticks = self.decimation
         if self.at_once:
             return self.hop * ticks
-        return self.hop // _BLOCK * (_BLOCK * (ticks - ticks // 2 - 1) - self.adding)
+        return self.hop // _BLOCK * (_BLOCK * (ticks - self.job - 1) - self.adding)
 
     def tick_of_jets(self, step: int) -> int:
         """In which the channels are made from the jets of a step."""
