@@ -215,14 +215,13 @@ static int32_t entry_of(const pvid_fourier_columns_q31 *columns, size_t place, s
     return (int32_t)pvid_clamp_q31(pvid_scale_q31(columns->x[place][row], shift), INT32_MAX);
 }
 
-/* Row k of the kind, among the thetas of all kinds; returns Y. */
+/* Row k of the kind; returns Y. */
 static int32_t row_of(const pvid_fourier_q31 *self, size_t k, int32_t n[PVID_MAX_THETA_Q31])
 {
     const pvid_fourier_finish_q31 *finish = &self->finish;
     const size_t thetas = kind_of(self)->thetas;
-    memset(n, 0, PVID_MAX_THETA_Q31 * sizeof n[0]);
     for (size_t j = 0; j < thetas; j++) {
-        n[finish->theta + j] = entry_of(&finish->columns, j, k, finish->n_bits[finish->theta + j]);
+        n[j] = entry_of(&finish->columns, j, k, finish->n_bits[finish->theta + j]);
     }
     return entry_of(&finish->columns, thetas, k, finish->y_bits);
 }
@@ -232,11 +231,13 @@ static bool residual_stage(pvid_fourier_q31 *self)
     pvid_fourier_finish_q31 *finish = &self->finish;
     const size_t rows = pvid_fourier_rows_q31(self->design);
     const size_t last = lesser((size_t)finish->index + RESIDUALS_PER_STAGE, rows);
+    pvid_block block;
+    pvid_information_block_q31(self->estimator.model, finish->theta, &block);
     for (size_t k = finish->index; k < last; k++) {
         int32_t n[PVID_MAX_THETA_Q31];
         int64_t e;
         const int32_t y = row_of(self, k, n);
-        const bool fits = pvid_estimator_innovation_q31(&self->estimator, n, y, &e);
+        const bool fits = pvid_estimator_innovation_q31(&self->estimator, &block, n, y, &e);
         const int64_t within = pvid_clamp_q31(e, PVID_ROW_LIMIT_Q31);
         finish->saturated = finish->saturated || !fits;
         finish->rss = pvid_clamp_q31(finish->rss + (within * within), PVID_WIDE);
@@ -290,7 +291,8 @@ static bool add_stage(pvid_fourier_q31 *self, pvid_reason *reason)
     int32_t n[PVID_MAX_THETA_Q31];
     const int32_t y = row_of(self, finish->index, n);
     /* INT32_MAX: beyond the limit of a row */
-    const pvid_reason added = pvid_estimator_add_q31(&self->estimator, n, finish->saturated ? INT32_MAX : y);
+    const pvid_reason added =
+        pvid_estimator_add_kind_q31(&self->estimator, finish->kind, n, finish->saturated ? INT32_MAX : y);
     if (added != PVID_ACCUMULATED) {
         *reason = added;
     }
