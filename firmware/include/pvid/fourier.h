@@ -101,7 +101,7 @@ typedef struct {
     uint16_t n_noise;
     const uint8_t *error_order;    /* [kinds] order of the derivative of white noise that the equation's own error is */
     const float *error_variance;   /* [kinds] variance of that noise at a step, >= 0; 0: the sensors explain the rows */
-    const float *sign_width;    /* [signs] of the soft sign v / (|v| + width); 0: the mean of sgn over a step */
+    const float *sign_width;    /* [signs] of the soft sign tanh(v / width); 0: the mean of sgn over a step */
     float overlap;              /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_fourier_design_f32;
 

@@ -57,11 +57,6 @@ void pvid_fourier_sums_join_f32(pvid_fourier_sums_f32 *self, float edge[2][PVID_
     self->joined = 0;
 }
 
-bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *self, uint8_t harmonics)
-{
-    return (self->harmonic < harmonics) || (self->joined < harmonics);
-}
-
 /* Adds the four steps of the block to one harmonic of all channels. */
 static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
 {

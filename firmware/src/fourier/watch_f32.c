@@ -25,12 +25,10 @@ void pvid_fourier_watch_reset_f32(pvid_fourier_watch_f32 *self)
 
 void pvid_fourier_watch_sample_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[])
 {
-    if (self->range != NULL) {
-        for (size_t i = 0; i < samples; i++) {
-            const float limit = self->range[i];
-            if ((sample[i] > limit) || (sample[i] < -limit)) {
-                self->beyond = self->delay;
-            }
+    for (size_t i = 0; i < samples; i++) {
+        const float limit = self->range[i];
+        if ((sample[i] > limit) || (sample[i] < -limit)) {
+            self->beyond = self->delay;
         }
     }
 }

@@ -11,6 +11,7 @@
 typedef struct {
     uint8_t needs;           /* samples of other ticks that the signals need; with the next one all signals are those of
                                 the tick before */
+    bool busy;               /* a job is in progress */
     bool begun;              /* a job has begun since the restart */
     uint8_t seen;            /* 1: there is a sample since the restart */
     uint8_t jet;             /* being formed; jets: none */
