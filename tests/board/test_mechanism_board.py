@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from pvid.log.recorder import EmulatorSource, Logger
 from pvid.log.rig import engine_text_of_log, mechanism_of_log, rig_of_log
 from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.models.mechanisms import names
+from pvid.show.log_figure import write_log_figure
+from pvid.show.page_state import LiveState
 
 TICKS = 3000  # of the motor: some windows more than the first estimate takes
 
@@ -147,6 +150,28 @@ def test_log_of_a_mechanism_is_exported_under_its_names(log: Path, motor: Mechan
     assert set(truth) <= set(last) and float(last["R"]) == pytest.approx(1.2, rel=0.01) and float(last["R_se"]) > 0
     with pytest.raises(PvidError, match="is the log of a described mechanism"):
         rig_of_log(log)
+
+
+def test_page_shows_the_names_and_units_of_the_mechanism(log: Path) -> None:
+    state = LiveState(log, "the motor")
+    data = log.read_bytes()
+    for first in range(0, len(data), 5000):
+        state.take(data[first : first + 5000])
+    shown = json.loads(state.as_json())
+    assert "weak form of dc_motor" in shown["board"] and shown["lost"] == ""
+    assert [row["symbol"] for row in shown["parameters"]] == ["R", "L", "k", "J", "b", "Tc", "i0"]
+    assert [row["unit"] for row in shown["parameters"]][:4] == ["ohm", "H", "N*m/A", "kg*m²"]
+    assert [curve["label"] for curve in shown["motion"]] == ["V V [V]", "i i [A]", "phi phi [rad]"]
+    assert [len(curve["x"]) > 100 for curve in shown["motion"]] == [True] * 3
+    assert len(shown["estimates"]["curves"]) == 7 and "noise of the sensors" in shown["residual"]
+
+
+def test_log_of_a_mechanism_is_plotted(log: Path, tmp_path: Path) -> None:
+    out = tmp_path / "motor.svg"
+    write_log_figure(log, mechanism_of_log(log), out)
+    drawn = out.read_text()
+    for words in ("Tc [N*m]", "phi [rad]", "kappa of R", "weak form of dc_motor", f"{TICKS} samples"):
+        assert f"<!-- {words}" in drawn or words in drawn, words
 
 
 def test_options_that_do_not_fit_are_refused(tmp_path: Path) -> None:
