@@ -13,6 +13,8 @@ from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import StreamRig
 from pvid.core.sources import FIRMWARE, FOLDERS, sources_of
 from pvid.design.c_tables import float_literal
+from pvid.link.names import names_of
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.settings.enums import Core
 from pvid.twin.sensor import SensorConstants
 
@@ -26,7 +28,7 @@ def _tables(rig: StreamRig) -> str:
 
 def _macros(rig: StreamRig) -> list[str]:
     """stream_rig.h but for the number of it all."""
-    units = ", ".join(float_literal(np.float32(unit)) for unit in rig.p_unit)
+    units = ", ".join(float_literal(np.float32(unit)) for unit in rig.p_unit[: len(MODELS[DEFAULT].parameters)])
     form, core = rig.case.form, rig.case.core
     sensor = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
     return [
@@ -45,6 +47,19 @@ def _macros(rig: StreamRig) -> list[str]:
     ]
 
 
+def _described() -> list[str]:
+    """What no bit depends on, and is not in the number."""
+    model = MODELS[DEFAULT]
+    return [
+        f"#define STREAM_SAMPLES {len(model.channels)}u",
+        f"#define STREAM_NAMES {_c_string(names_of(model).text)}",
+    ]
+
+
+def _c_string(text: str) -> str:
+    return '"' + text.replace("\n", "\\n") + '"'
+
+
 def settings_number(rig: StreamRig) -> int:
     """CRC-32 of the settings and tables an image must hold to be configured for `rig`."""
     return zlib.crc32("\n".join([*_macros(rig), _tables(rig)]).encode())
@@ -61,7 +76,7 @@ def headers(rig: StreamRig) -> dict[str, str]:
         f"#define STREAM_SETTINGS 0x{settings_number(rig):08X}u /* CRC-32 of the following lines and of the tables */"
     )
     return {
-        "stream_rig.h": _guarded("STREAM_RIG_H", [number, *_macros(rig)]),
+        "stream_rig.h": _guarded("STREAM_RIG_H", [number, *_macros(rig), *_described()]),
         "stream_tables.h": _tables(rig),
     }
 

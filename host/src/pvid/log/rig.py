@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.link.frames import Hello
+from pvid.link.frames import Hello, Names
+from pvid.log.board_model import mechanism_of
 from pvid.log.reader import LogReader, LogStream
-from pvid.log.values import Values, is_rate
+from pvid.log.values import UNKNOWN_RIG, Values, is_rate
+from pvid.models.model import Mechanism
 from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile
 from pvid.rig.run import MIN_ROWS, Run
@@ -34,6 +37,24 @@ def rig_of_log(path: Path) -> RigFile | None:
         if reader.account.frames:
             break  # it stands in front of all that the board said
     return None
+
+
+def mechanism_of_log(path: Path) -> Mechanism:
+    """The mechanism of a log: that of its rig file, else the first one that the board named; UNKNOWN_RIG if none did.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, or the rig file in it is none.
+    """
+    rig = rig_of_log(path)
+    if rig is not None:
+        return rig.mechanism
+    for record in LogReader(path):
+        if isinstance(record.item, Names):
+            with suppress(PvidError):
+                return mechanism_of(record.item.text)
+    return UNKNOWN_RIG
 
 
 def refuse_to_append(path: Path, rig: RigFile | None) -> None:
