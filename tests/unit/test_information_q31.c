@@ -165,9 +165,27 @@ static void any_sum_of_squares_may_be_the_largest(void **state)
     }
 }
 
+/* Rows of many kinds add to the residual sum only: it stops at 3 2^60, from which the end of a group divides it. */
+static void residuals_of_many_rows_stop_at_their_limit(void **state)
+{
+    (void)state;
+    start(0);
+    const int32_t row[N] = {0, 0, 0};
+    const int64_t largest = (int64_t)3 << 60;
+    for (int k = 0; k < 100; k++) {
+        pvid_information_add_q31(&information, &whole, row, PVID_ROW_LIMIT_Q31, fresh);
+        const int64_t exact = (int64_t)(k + 1) << 56;
+        assert_int_equal(information.sums[9], (exact < largest) ? exact : largest);
+    }
+    end_group();
+    assert_int_equal(information.exponent, 1);
+    assert_int_equal(information.sums[9], largest / 4);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(residuals_of_many_rows_stop_at_their_limit),
         cmocka_unit_test(sums_are_exact),
         cmocka_unit_test(the_past_fades_by_exp),
         cmocka_unit_test(sums_keep_below_their_limit),

@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-#include "fourier/front_q31.h"
+#include "fourier/fourier_front_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/values_q31.h"
 
@@ -33,7 +33,8 @@ static uint32_t slices(const pvid_fourier_design_q31 *design)
 
 uint32_t pvid_fourier_free_ticks_q31(const pvid_fourier_design_q31 *design)
 {
-    const uint32_t blocks = design->hop / (uint32_t)PVID_FOURIER_BLOCK_Q31;
+    /* but the block in which the next window is joined */
+    const uint32_t blocks = (design->hop / (uint32_t)PVID_FOURIER_BLOCK_Q31) - 1u;
     const uint32_t each = (uint32_t)PVID_FOURIER_BLOCK_Q31 * other_ticks(design);
     const uint32_t adding = (pvid_fourier_harmonics_q31(design) + (slices(design) - 1u)) / slices(design);
     return (design->decimation < SHARING) ? (blocks * each) : (blocks * (each - adding));

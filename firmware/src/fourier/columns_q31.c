@@ -49,40 +49,51 @@ static int32_t length_of(pvid_scaled_q31 weight, int32_t s)
     return (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(s)) + 30 + weight.e;
 }
 
-void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
-                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
-                                   size_t place, size_t first, size_t end)
+/* A term at harmonic h: `adds` its products to the column, else finds the longest. */
+static void take_term(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
+                      const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t t, size_t h,
+                      bool adds)
 {
-    const pvid_fourier_term_q31 *term = design->model->term;
+    const pvid_fourier_term_q31 term = design->model->term[t];
     const size_t rows = pvid_fourier_rows_q31(design);
-    int64_t sum[PVID_FOURIER_ROWS_Q31] = {0};
-    int32_t longest = INT32_MIN;
-    /* once for the largest, once for the sums */
-    for (size_t pass = 0; pass < 2u; pass++) {
-        for (size_t t = first; t < end; t++) {
-            const turn turned = turn_of(term[t].order);
-            for (size_t h = 0; h < white->cosines; h++) {
-                const pvid_scaled_q31 weight = weight_of(design->factor[t], term[t].order, h, white->scale[h]);
-                const size_t parts = ((h > 0u) && ((white->cosines + h) <= rows)) ? 2u : 1u;
-                for (size_t part = 0; (part < parts) && (weight.m != 0); part++) {
-                    const int32_t s = window->s[term[t].channel][h][turned.part[part]];
-                    if (s == 0) {
-                        continue;
-                    }
-                    if (pass == 0u) {
-                        const int32_t length = length_of(weight, s);
-                        longest = (length > longest) ? length : longest;
-                    } else {
-                        const int64_t product = pvid_product_q31(turned.is_negative[part] ? -s : s, weight.m);
-                        const size_t row = (part == 0u) ? h : ((white->cosines + h) - 1u);
-                        sum[row] += pvid_scale_q31(product, (longest - SUM_BITS) - weight.e);
-                    }
-                }
-            }
+    const turn turned = turn_of(term.order);
+    const pvid_scaled_q31 weight = weight_of(design->factor[t], term.order, h, white->scale[h]);
+    const size_t parts = ((h > 0u) && ((white->cosines + h) <= rows)) ? 2u : 1u;
+    for (size_t part = 0; (part < parts) && (weight.m != 0); part++) {
+        const int32_t s = window->s[term.channel][h][turned.part[part]];
+        if (s == 0) {
+            continue;
+        }
+        if (adds) {
+            const int64_t product = pvid_product_q31(turned.is_negative[part] ? -s : s, weight.m);
+            const size_t row = (part == 0u) ? h : ((white->cosines + h) - 1u);
+            self->sum[row] += pvid_scale_q31(product, (self->longest - SUM_BITS) - weight.e);
+        } else {
+            const int32_t length = length_of(weight, s);
+            self->longest = (length > self->longest) ? length : self->longest;
         }
     }
-    const int32_t exponent = pvid_fourier_block_q31(sum, 0, rows, self->x[place]);
-    const int32_t unit = (longest == INT32_MIN) ? 0 : (longest - SUM_BITS);
+}
+
+/* For each harmonic: what is longest; then for each: the sums; then the block. */
+void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
+                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
+                                   size_t place, size_t first, size_t end, size_t part)
+{
+    const size_t harmonics = white->cosines;
+    if (part == 0u) {
+        memset(self->sum, 0, sizeof self->sum);
+        self->longest = INT32_MIN;
+    }
+    if (part < (2u * harmonics)) {
+        const bool adds = part >= harmonics;
+        for (size_t t = first; t < end; t++) {
+            take_term(self, design, white, window, t, adds ? (part - harmonics) : part, adds);
+        }
+        return;
+    }
+    const int32_t exponent = pvid_fourier_block_q31(self->sum, 0, pvid_fourier_rows_q31(design), self->x[place]);
+    const int32_t unit = (self->longest == INT32_MIN) ? 0 : (self->longest - SUM_BITS);
     self->exponent[place] = (int16_t)pvid_clamp_q31((int64_t)unit + exponent, INT16_MAX);
 }
 

@@ -7,10 +7,17 @@
 
 #include "pvid/fourier_q31.h"
 
-/* Column `place` of a kind in standard deviations, from its terms first..end-1 and the sums of the window. */
+/* Parts of making a column. */
+static inline size_t pvid_fourier_column_parts_q31(const pvid_fourier_white_q31 *white)
+{
+    return (2u * (size_t)white->cosines) + 1u;
+}
+
+/* The next part of making column `place` of a kind in standard deviations, from its terms first..end-1 and the sums of
+ * the window; parts count from 0. */
 void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
                                    const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
-                                   size_t place, size_t first, size_t end);
+                                   size_t place, size_t first, size_t end, size_t part);
 
 /* sum x^2 2^-16, in the column's own unit. */
 uint64_t pvid_fourier_columns_square_q31(const pvid_fourier_design_q31 *design, const int32_t x[]);

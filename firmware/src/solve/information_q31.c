@@ -9,6 +9,8 @@
 #define BLOCK_MAX 64u
 #define SUM_LOW ((int64_t)1 << 54)
 #define KEEP INT32_MAX
+#define RESIDUAL_MAX (3 * PVID_SUM_LIMIT) /* of rr, which the rows of all kinds add to: 16 rows of one stay below it   \
+                                           */
 
 /* exp(-block / groups) in Q31 for block <= groups / 4, by the series of exp. */
 static int32_t decay(uint32_t block, uint32_t groups)
@@ -75,7 +77,7 @@ void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *bloc
             fresh[block->first + i] += product;
         }
     }
-    tail[0] += pvid_square_q31(error);
+    tail[0] = pvid_clamp_q31(tail[0] + pvid_square_q31(error), RESIDUAL_MAX);
     tail[1] += self->row_weight;
 }
 

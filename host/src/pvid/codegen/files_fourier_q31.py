@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from pvid.codegen.fourier_q31 import FixedFourier, c_functions
+from pvid.codegen.parameters_q31 import ParametersQ31, c_parameters
 from pvid.settings.fourier import NONE
-from pvid.settings.fourier_q31 import FourierDesignQ31, Rescale
+from pvid.settings.fourier_q31 import FourierConfigQ31, FourierDesignQ31, Rescale
 
 _WIDTH = 12  # numbers a line
 
 
-def source(made: FixedFourier, design: FourierDesignQ31, prefix: str) -> str:
+def source(made: FixedFourier, parameters: ParametersQ31, design: FourierDesignQ31, prefix: str) -> str:
     """Functions, PREFIX_fourier_q31 and PREFIX_design_q31; all static but the design."""
     return "\n\n".join(
         [
             '#include "pvid/fourier_q31.h"\n#include "pvid/elementary_q31.h"\n\n#include <stddef.h>',
             c_functions(made, prefix).rstrip(),
+            c_parameters(parameters, prefix).rstrip(),
             *_model(made, prefix),
             *_design(design, prefix),
         ]
@@ -63,6 +65,7 @@ def _model(made: FixedFourier, prefix: str) -> list[str]:
         *(f"    .{name} = {prefix}_{name}," for name in tables),
         f"    .prepare = {prefix + '_prepare_q31' if made.prepare else 'NULL'},",
         f"    .values = {prefix}_values_q31,",
+        f"    .model = &{prefix}_model_q31,",
         "};",
     ]
     return [
@@ -117,3 +120,37 @@ def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
         "};",
     ]
     return [*parts, *(text for text in tables.values() if text), "\n".join(struct)]
+
+
+def configuration(config: FourierConfigQ31, prefix: str) -> str:
+    """PREFIX_config_q31, behind the design."""
+    own, trust, gate = config.estimator, config.trust, config.gate
+    arrays = ("start", "start_sd", "lower", "upper", "p_bits", "n_bits")
+    numbers = ("y_bits", "row_sd", "forgetting_groups", "gain", "correlation", "row_weight", "step_limit")
+    more = ("kappa_min", "noise_margin", "dead_zone", "divider")
+    of_trust = ("kappa_min", "se_max", "misfit_max", "groups_min", "revert_after", "renewal")
+    parts = [_numbers("int32_t", f"{prefix}_offset", config.offset)]
+    if config.drive_min is not None:
+        parts.append(_numbers("int32_t", f"{prefix}_drive_min", config.drive_min))
+    drive = f"{prefix}_drive_min" if config.drive_min is not None else "NULL"
+    struct = [
+        f"extern const pvid_fourier_config_q31 {prefix}_config_q31;",
+        f"const pvid_fourier_config_q31 {prefix}_config_q31 = {{",
+        f"    .design = &{prefix}_design_q31,",
+        f"    .offset = {prefix}_offset,",
+        f"    .drive_min = {drive},",
+        f"    .iterations = {config.iterations},",
+        "    .estimator = {",
+        *(f"        .{name} = {{{', '.join(map(_literal, getattr(own, name)))}}}," for name in arrays),
+        *(f"        .{name} = {getattr(own, name)}," for name in (*numbers, *more)),
+        "    },",
+        "    .trust = {" + ", ".join(f".{name} = {getattr(trust, name)}" for name in of_trust) + "},",
+        f"    .gate = {{.sigmas = {gate.sigmas}, .patience_groups = {gate.patience_groups}}},",
+        "};",
+    ]
+    return "\n\n".join([*parts, "\n".join(struct)])
+
+
+def _literal(value: int) -> str:
+    """Also of the least int32."""
+    return "INT32_MIN" if value == -(2**31) else str(value)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.fourier import FourierChannel, FourierJet, FourierKind, FourierSignal
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 
 Int16 = npt.NDArray[np.int16]
 Int32 = npt.NDArray[np.int32]
@@ -169,3 +170,25 @@ class FourierDesignQ31:
     def powers(self) -> int:
         """Of h^2 in the noise."""
         return 1 + max((*(one.power for one in self.noise), *self.error_order), default=0)
+
+
+@dataclass(frozen=True, eq=False)
+class FourierConfigQ31:
+    """pvid_fourier_config_q31: settings of the identifier.
+
+    Attributes
+    ----------
+    design : tables
+    estimator : rows are in standard deviations, row_sd 2^(8 + y_bits)
+    offset : reading of each sensor at 0 [counts]
+    drive_min : window dropped if the standard deviation of a sample is below [counts]; None: no check
+    iterations : Gauss-Newton steps a window
+    """
+
+    design: FourierDesignQ31
+    estimator: EstimatorConfigQ31
+    offset: tuple[int, ...]
+    drive_min: tuple[int, ...] | None = None
+    iterations: int = 3
+    trust: TrustConfigQ31 = TrustConfigQ31()
+    gate: GateConfigQ31 = GateConfigQ31()

@@ -1,4 +1,4 @@
-"""Twin of fourier/front_f32.c. It feeds forward: a whole stretch of finite samples is computed at once."""
+"""Twin of fourier/fourier_front_f32.c. It feeds forward: a whole stretch of finite samples is computed at once."""
 
 from __future__ import annotations
 
