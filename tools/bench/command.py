@@ -104,6 +104,23 @@ def bench_mechanisms(chosen: tuple[str, ...], seeds: int, imperfect: int, update
     return DONE
 
 
+@bench.command(name="engine")
+@click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@UPDATE
+def bench_engine(chosen: tuple[str, ...], seeds: int, update: Path | None) -> int:
+    """Errors of the weak engine in C beside those of the float64 oracle on the shipped mechanisms."""
+    from bench import engine
+    from pvid.models.mechanisms import names
+
+    some = chosen or names()
+    with progress_bar("engine", seeds * len(engine.cases(some))) as advance:
+        done = iter(range(1, seeds * len(engine.cases(some)) + 1))
+        rows = list(engine.table(some, seeds, lambda: advance(next(done))))
+    put_table(update, "engine", markdown(engine.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:
