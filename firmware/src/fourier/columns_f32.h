@@ -7,26 +7,19 @@
 
 #include "pvid/fourier.h"
 
-/* folded += factor (-1)^order (i omega_h)^order S_h of a term. */
+/* sum += factor (-1)^order (i omega_h)^order S_h of a term, real and imaginary parts. */
 void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const pvid_fourier_term_f32 *term,
                                   size_t harmonics, float omega, const float window[][2][PVID_MAX_HARMONICS],
-                                  float folded[2][PVID_MAX_HARMONICS]);
-
-/* One of the n/2 multiplications by sin^2; pass counts from 0. */
-void pvid_fourier_columns_pass_f32(size_t harmonics, size_t pass, float folded[2][PVID_MAX_HARMONICS]);
-
-/* Then the rows: cosines, sines. */
-void pvid_fourier_columns_rows_f32(const pvid_fourier_design_f32 *design, size_t cosines,
-                                   const float folded[2][PVID_MAX_HARMONICS], float column[]);
+                                  float sum[2][PVID_MAX_HARMONICS]);
 
 /* A nuisance after those before it have been taken off: keeps 1 / its square, or 0 if less than 1e-6 of `whole`, its
  * square before that, remains. Returns whether it is kept. */
-bool pvid_fourier_columns_keep_f32(size_t functions, const float nuisance[], float whole, float *inverse);
+bool pvid_fourier_columns_keep_f32(size_t rows, const float nuisance[], float whole, float *inverse);
 
 /* x^T x */
-float pvid_fourier_columns_square_f32(size_t functions, const float x[]);
+float pvid_fourier_columns_square_f32(size_t rows, const float x[]);
 
 /* Takes a nuisance off a column. */
-void pvid_fourier_columns_project_f32(size_t functions, const float nuisance[], float inverse, float column[]);
+void pvid_fourier_columns_project_f32(size_t rows, const float nuisance[], float inverse, float column[]);
 
 #endif

@@ -16,8 +16,8 @@ void pvid_fourier_scores_skip_f32(pvid_fourier_scores_f32 *self);
 void pvid_fourier_scores_take_f32(pvid_fourier_scores_f32 *self, const pvid_estimator_f32 *estimator,
                                   const float sum[]);
 
-/* Adds it to the means. */
-void pvid_fourier_scores_add_f32(pvid_fourier_scores_f32 *self, size_t n_p);
+/* Adds it to the means. residual: mean square of the window's rows before its steps of p. */
+void pvid_fourier_scores_add_f32(pvid_fourier_scores_f32 *self, size_t n_p, float residual);
 
 /* Variance of p[a] from the scatter, given the covariance of an assessment, `wide` times the inverse of S, and the
  * number of windows in the sums. */

@@ -2,10 +2,10 @@
 
 /* A_h and B_h = sum_k channel(t_k) (cos + i sin)(2 pi h k / (2 hop)), k = 0..hop - 1, of the two halves of a window.
  *
- * A block of four steps is complete every four steps; while the next one fills it is added, one harmonic after the other.
- * The circle has all the factors: cos(pi j / hop) at j = h k mod 2 hop, the sine a quarter turn before. Behind the last
- * block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral I = E_1 + I' (E_1 + E_2 of
- * the first half at its end) gets what I' from the second half's own start lacks:
+ * A block of four steps is complete every four steps; while the next one fills it is added, one harmonic after the
+ * other. The circle has all the factors: cos(pi j / hop) at j = h k mod 2 hop, the sine a quarter turn before. Behind
+ * the last block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral I = E_1 + I'
+ * (E_1 + E_2 of the first half at its end) gets what I' from the second half's own start lacks:
  *
  *   fold 1:  B + E_1 B[plain]        fold 2:  (B + E_2 B[plain]) + E_1 B[ramp]
  *
@@ -14,6 +14,8 @@
 
 #include <stddef.h>
 #include <string.h>
+
+#include "number/unroll.h"
 
 void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
 {
@@ -55,35 +57,39 @@ void pvid_fourier_sums_join_f32(pvid_fourier_sums_f32 *self, float edge[2][PVID_
     self->joined = 0;
 }
 
-bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *self, uint8_t harmonics)
-{
-    return (self->harmonic < harmonics) || (self->joined < harmonics);
-}
-
 /* Adds the four steps of the block to one harmonic of all channels. */
-static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, uint8_t channels)
+static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
 {
     const uint32_t h = self->harmonic;
     const uint32_t turn = 2u * (uint32_t)design->hop;
     const uint32_t quarter = (uint32_t)design->hop / 2u;
-    const float (*block)[PVID_MAX_CHANNELS] = (const float (*)[PVID_MAX_CHANNELS])self->block[self->filling ^ 1u];
-    float (*sum)[2] = self->sum[self->target][h];
+    const float *circle = design->circle;
     uint32_t at = (h * self->start) % turn;
     float cosine[PVID_FOURIER_BLOCK];
     float sine[PVID_FOURIER_BLOCK];
+    PVID_UNROLL
     for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
-        cosine[k] = design->circle[at];
-        sine[k] = design->circle[(at >= quarter) ? (at - quarter) : ((at + turn) - quarter)];
+        cosine[k] = circle[at];
+        sine[k] = circle[(at >= quarter) ? (at - quarter) : ((at + turn) - quarter)];
         at += h;
         at = (at >= turn) ? (at - turn) : at;
     }
-    const bool first = self->start == 0u;
+    float (*sum)[2] = self->sum[self->target][h];
+    if (self->start == 0u) {
+        for (size_t c = 0; c < channels; c++) {
+            sum[c][0] = 0.0f;
+            sum[c][1] = 0.0f;
+        }
+    }
+    const float *x = self->block[self->filling ^ 1u][0];
     for (size_t c = 0; c < channels; c++) {
-        float re = first ? 0.0f : sum[c][0];
-        float im = first ? 0.0f : sum[c][1];
+        float re = sum[c][0];
+        float im = sum[c][1];
+        PVID_UNROLL
         for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
-            re += cosine[k] * block[k][c];
-            im += sine[k] * block[k][c];
+            const float value = x[(k * PVID_MAX_CHANNELS) + c];
+            re += cosine[k] * value;
+            im += sine[k] * value;
         }
         sum[c][0] = re;
         sum[c][1] = im;
@@ -128,8 +134,7 @@ static void join(const pvid_fourier_sums_f32 *self, const pvid_fourier_design_f3
 }
 
 bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
-                                   uint8_t harmonics, uint8_t channels, float dt,
-                                   float window[][2][PVID_MAX_HARMONICS])
+                                   uint8_t harmonics, uint8_t channels, float dt, float window[][2][PVID_MAX_HARMONICS])
 {
     /* a window's harmonic is joined right behind the addition to it */
     if (self->joined < self->harmonic) {

@@ -51,6 +51,8 @@ def header(
         ),
     ]
     body = [
+        "#include <stddef.h>",
+        "",
         f'#include "{name}_weak.h"',
         "",
         *size_check(needed),

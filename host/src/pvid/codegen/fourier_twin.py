@@ -6,10 +6,9 @@ from pvid.codegen import numpy_f32
 from pvid.codegen.banner import banner
 from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
 from pvid.codegen.functions import Function
-from pvid.codegen.twin_file import namespace
+from pvid.codegen.twin_file import namespace, pattern_of
 from pvid.model.compiled import CompiledModel
 from pvid.settings.fourier import FourierModel
-from pvid.twin.f32.pattern import PatternModel
 
 _SUMMARIES = {
     "prepare": "Derivatives of the runs and arguments of sgn [results, ...] from the jets [jets, ...].",
@@ -44,16 +43,6 @@ def text(made: FourierFunctions, command: str) -> str:
 def loaded(made: FourierFunctions) -> FourierModel:
     """The model for the twin and for designs."""
     space = namespace(text(made, "loaded"), made.name)
-    functions = made.functions
-    pattern = PatternModel(
-        n_theta=len(functions.theta.labels),
-        n_p=len(functions.model.unknowns),
-        positive=tuple(one.positive for one in functions.model.unknowns),
-        c_row=functions.c_row,
-        c_column=functions.c_column,
-        theta=space["theta_f32"],
-        jacobian=space["jacobian_f32"],
-    )
     return FourierModel(
         name=made.name,
         sample_names=made.samples,
@@ -69,7 +58,7 @@ def loaded(made: FourierFunctions) -> FourierModel:
         kind=made.kind,
         prepare=space.get("prepare_f32"),
         values=space["values_f32"],
-        model=pattern,
+        model=pattern_of(made.functions, space),
     )
 
 

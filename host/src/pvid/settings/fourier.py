@@ -101,6 +101,10 @@ class ThetaModel(Protocol):
     def n_p(self) -> int: ...
     @property
     def positive(self) -> tuple[bool, ...]: ...
+    @property
+    def theta(self) -> Function: ...
+    @property
+    def jacobian(self) -> Function: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,6 +242,11 @@ class FourierDesign32:
     error_variance: Float32
     sign_width: Float32
     overlap: float
+
+    @property
+    def n_noise(self) -> int:
+        """Entries of `noise`."""
+        return len(self.noise)
 
     @property
     def highest(self) -> int:

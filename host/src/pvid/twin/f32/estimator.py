@@ -82,7 +82,8 @@ class Estimator:
         self.phase = np.zeros(len(configs), np.int64)
         self.gain = np.array([self._gain(c, rate) for c in configs], np.float32)
         self.innovation = np.zeros_like(self.p)
-        self.information = Information(n_sums, _lanes([c.forgetting_s for c in configs]) * rate)
+        self.forgetting_s = _lanes([c.forgetting_s for c in configs])
+        self.information = Information(n_sums, self.forgetting_s * rate)
         self.sums = self.information.read()
         self.counters = {name: np.zeros(len(configs), np.int64) for name in COUNTERS}
         self.size = np.zeros(len(configs), np.float32)
@@ -253,7 +254,7 @@ class Estimator:
         covariance = cholesky.inverse(f) * wide
         se = np.sqrt(np.stack([covariance[a, a] for a in range(n_p)]))
         known = f.ok & np.isfinite(covariance).all(axis=(0, 1)) & np.isfinite(se).all(axis=0)
-        out = np.zeros(self.p.shape[1], estimates.F32)
+        out = np.zeros(self.p.shape[1], estimates.f32_of(n_p))
         out["p"][:, :n_p] = self.p.T
         out["kappa"] = np.where(kappa.ok, kappa.first_pivot, np.float32(0))
         out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))
@@ -295,6 +296,7 @@ class RelativeEstimator(Estimator):
         self.expected = np.zeros(len(configs), np.float32)
         self.everywhere = np.ones(len(configs), np.bool_)
         self.was_due = True
+        self.judged_variance = self.row_variance
 
     @property
     def is_rate(self) -> bool:
@@ -396,7 +398,7 @@ class RelativeEstimator(Estimator):
         """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
         sums = self.information.read()
         s, residual = self._assessed(sums)
-        variance = self._variance(sums, residual)
+        variance = self.judged_variance = self._variance(sums, residual)
         return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
 
     def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:

@@ -11,6 +11,7 @@ Float32 = npt.NDArray[np.float32]
 
 _F = np.float32
 _WINDOWS_MAX = 0xFFFF
+_FAR_BELOW = _F(0.05)
 
 
 class Scores:
@@ -24,8 +25,9 @@ class Scores:
 
     def __init__(self, n_p: int, memory: Float32) -> None:
         lanes = len(memory)
-        self.windows = 0
-        self.known = False
+        self.windows = np.zeros(lanes, np.int64)
+        self.known = np.zeros(lanes, np.bool_)
+        self.residual = np.zeros(lanes, np.float32)
         with np.errstate(all="ignore"):
             self.least = np.where(memory > 0, _F(1) / memory, _F(0)).astype(np.float32, copy=False)
         self.own = np.zeros((n_p, lanes), np.float32)
@@ -35,27 +37,32 @@ class Scores:
 
     def skip(self) -> None:
         """A window without a score."""
-        self.known = False
+        self.known = np.zeros_like(self.known)
 
     def take(self, model: PatternModel, p: Float32, total: Float32) -> None:
         """The score of a window from sum N e + g [n_theta, lanes] at the present p."""
         with np.errstate(all="ignore"):
             self.own = model.transpose_times(model.jacobian(p), total)
 
-    def add(self) -> None:
-        """Adds it to the means."""
-        newest = _F(2) / (_F(self.windows) + _F(2))
-        weight = np.where(newest > self.least, newest, self.least).astype(np.float32, copy=False)
-        a, b = np.triu_indices(len(self.own))
+    def add(self, residual: Float32) -> None:
+        """Adds it to the means; residual: mean square of the window's rows before its steps of p [lanes]."""
         own, before = self.own, self.before
         with np.errstate(all="ignore"):
+            anew = residual < _FAR_BELOW * self.residual
+            self.windows = np.where(anew, 0, self.windows)
+            self.neighbour = np.where(anew, _F(0), self.neighbour)
+            known = self.known & ~anew
+            newest = _F(2) / (self.windows.astype(np.float32) + _F(2))
+            weight = np.where(newest > self.least, newest, self.least).astype(np.float32, copy=False)
+            self.residual = self.residual + weight * (residual - self.residual)
+            a, b = np.triu_indices(len(own))
             self.same[a, b] = self.same[a, b] + weight * (own[a] * own[b] - self.same[a, b])
-            if self.known:
-                both = own[a] * before[b] + before[a] * own[b]
-                self.neighbour[a, b] = self.neighbour[a, b] + weight * (both - self.neighbour[a, b])
+            both = own[a] * before[b] + before[a] * own[b]
+            moved = self.neighbour[a, b] + weight * (both - self.neighbour[a, b])
+            self.neighbour[a, b] = np.where(known, moved, self.neighbour[a, b])
         self.before = own.copy()
-        self.known = True
-        self.windows = min(self.windows + 1, _WINDOWS_MAX)
+        self.known = np.ones_like(self.known)
+        self.windows = np.minimum(self.windows + 1, _WINDOWS_MAX)
 
     def variance(self, a: int, covariance: Float32, wide: Float32, windows: Float32) -> Float32:
         """Variance of p[a] from the scatter [lanes], given the covariance of an assessment [n_p, n_p, lanes]."""

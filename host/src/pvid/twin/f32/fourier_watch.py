@@ -22,7 +22,7 @@ def halves_beyond(samples: Float32, ranges: Float32, ticks: Places, delay: int, 
     ticks : of the steps [steps]
     delay : steps that a sample counts for
     """
-    out = ((samples > ranges) | (samples < -ranges)).any(axis=1)
+    out: Mask = np.any((samples > ranges) | (samples < -ranges), axis=1)
     latest = np.maximum.accumulate(np.where(out, np.arange(len(out)), -1))[ticks]
     first = np.searchsorted(ticks, latest)
     steps = (latest >= 0) & (np.arange(len(ticks)) - first < delay)

@@ -1,7 +1,6 @@
-"""Twin of fourier/white_f32.c: noise of a kind's rows at p, its Cholesky factors, and what follows from its inverse.
+"""Twin of fourier/white_f32.c: noise of a kind's rows at p, and the directions that the test functions leave out.
 
-Rows are those of two families, cosines and sines, that are factored at once: arrays have an axis [2] for them, and the
-sines, of which there are fewer, have empty rows behind them.
+Rows are parts of the sums S_h: real ones of the harmonics 0.., then imaginary ones of the harmonics 1...
 """
 
 from __future__ import annotations
@@ -14,162 +13,140 @@ import numpy.typing as npt
 from pvid.settings.fourier import FourierDesign32
 
 Float32 = npt.NDArray[np.float32]
-Mask = npt.NDArray[np.bool_]
 
 _F = np.float32
 _TURN = _F(6.28318531)
-_FLOOR = _F(1e-10)
-_PIVOT = _F(1e-6)
+_FLOOR, _SPECTRUM_MIN = _F(1e-10), _F(1e-30)
 
 
-class Shapes:
-    """T of a design: the harmonics of its rows, and their factors W_h omega_h^(2 j).
+def total(x: Float32) -> Float32:
+    """0 + x[0] + x[1] + .., in this order, of x [n, ...]."""
+    found: Float32 = np.add.accumulate(x)[-1] + _F(0)
+    return found
+
+
+class Rows:
+    """The rows of a design.
 
     Attributes
     ----------
     harmonics : H + 1
-    rows : of each family
-    power : n
+    cosines : real parts
+    count : with the imaginary parts, K + n
     omega : of h = 1 [rad/s]
+    powers : of omega^2 in the noise
+    harmonic : of each row [rows]
     """
 
     def __init__(self, design: FourierDesign32, dt: np.float32) -> None:
         self.design = design
-        self.power = design.power
         self.harmonics = design.highest + 1
-        cosines = design.functions // 2 + 1
-        self.rows = (cosines, design.functions - cosines)
+        self.cosines = self.harmonics
+        self.count = design.functions + design.power
         self.omega = _TURN / (_F(2) * (_F(design.hop) * dt))
         orders = [one.power for one in design.noise] + [int(one) for one in design.error_order]
         self.powers = max(orders, default=0) + 1
-        self.square = (np.arange(self.harmonics, dtype=np.float32) * self.omega) ** 2  # of numpy: x * x
+        self.harmonic = np.concatenate([np.arange(self.cosines), np.arange(1, 1 + self.count - self.cosines)])
+        rate = np.arange(self.harmonics).astype(np.float32) * self.omega
+        self.square = rate * rate
         self.samples = np.full(self.harmonics, design.hop, np.float32)
         self.samples[0] = _F(2) * _F(design.hop)
 
-    @cached_property
-    def bell(self) -> Float32:
-        """(-1)^d binomial(n, n/2 + d) / 2^n as the core computes it [n/2 + 1]."""
-        n, binomial = self.power, _F(1)
-        for _ in range(n):
-            binomial = binomial * _F(0.5)
-        for i in range(n // 2):
-            binomial = binomial * (_F(n - i) / _F(i + 1))
-        out = np.empty(n // 2 + 1, np.float32)
-        for d in range(n // 2 + 1):
-            out[d] = -binomial if d % 2 else binomial
-            binomial = binomial * (_F(n // 2 - d) / _F(n // 2 + d + 1))
-        return out
-
-    @cached_property
-    def table(self) -> Float32:
-        """T [2, rows, harmonics]."""
-        half = self.power // 2
-        out = np.zeros((2, self.rows[0], self.harmonics), np.float32)
-        for family, rows in enumerate(self.rows):
-            for row in range(rows):
-                frequency = row + family
-                for h in range(family, self.harmonics):
-                    apart, folded = abs(h - frequency), h + frequency
-                    value = self.bell[apart] if apart <= half else _F(0)
-                    if h > 0 and folded <= half:
-                        value = value + (-self.bell[folded] if family else self.bell[folded])
-                    out[family, row, h] = value
-        return out
-
-    @cached_property
-    def first_row(self) -> npt.NDArray[np.int64]:
-        """The first row of each family that has a harmonic [2, harmonics]."""
-        below = np.arange(self.harmonics) - self.power // 2
-        return np.maximum(np.stack([below, below - 1]), 0)
-
-    @cached_property
-    def weights(self) -> Float32:
-        """W_h omega_h^(2 j) [powers, harmonics]."""
-        out = np.empty((self.powers, self.harmonics), np.float32)
-        out[0] = self.samples
-        for j in range(1, self.powers):
-            out[j] = out[j - 1] * self.square
-        return out
+    @property
+    def families(self) -> tuple[slice, slice]:
+        """Places of the real parts and of the imaginary parts."""
+        return slice(0, self.cosines), slice(self.cosines, self.count)
 
 
 class White:
-    """Noise of the rows of a kind at its theta [thetas, lanes], and its factors."""
+    """Noise of the rows of a kind at its theta [thetas, lanes]."""
 
-    def __init__(self, shapes: Shapes, kind: int, theta: Float32) -> None:
-        self.shapes, self.kind, self.theta = shapes, kind, theta
+    def __init__(self, rows: Rows, kind: int, theta: Float32) -> None:
+        self.rows, self.kind, self.theta = rows, kind, theta
+        self._full = np.concatenate([theta, np.full((1, theta.shape[1]), _F(-1))])
         with np.errstate(all="ignore"):
             self.weight = self._weighed()
-            self.spectrum = self._spectrum()
-            self.factor = _factored(_gram(shapes, self.spectrum), shapes)
-
-    @cached_property
-    def _full(self) -> Float32:
-        return np.concatenate([self.theta, np.full((1, self.theta.shape[1]), _F(-1))])
+            self.scale = self._scale()
+            self.basis = self._basis()
 
     def _weighed(self) -> Float32:
-        """c_j [powers, lanes]."""
-        weight = np.zeros((self.shapes.powers, self.theta.shape[1]), np.float32)
-        for one in self.shapes.design.noise_of(self.kind):
+        """c_j of the sensors [powers, lanes]."""
+        weight = np.zeros((self.rows.powers, self.theta.shape[1]), np.float32)
+        for one in self.rows.design.noise_of(self.kind):
             weight[one.power] = weight[one.power] + one.factor * (self._full[one.a] * self._full[one.b])
         return weight
 
-    def _spectrum(self) -> Float32:
-        """D_h [harmonics, lanes]."""
-        shapes, design = self.shapes, self.shapes.design
+    def _scale(self) -> Float32:
+        """1 / sqrt(D_h) [harmonics, lanes]."""
+        rows, design = self.rows, self.rows.design
         own = self.weight.copy()
         order = int(design.error_order[self.kind])
         own[order] = own[order] + _F(design.error_variance[self.kind])
-        total = np.zeros((shapes.harmonics, own.shape[1]), np.float32)
-        for j in reversed(range(shapes.powers)):
-            total = total * shapes.square[:, None] + own[j]
-        spectrum = shapes.samples[:, None] * total
-        mean = np.add.accumulate(spectrum)[-1]
-        least = (_FLOOR * mean) / _F(shapes.harmonics)
-        return np.where(spectrum > least, spectrum, least)
+        spectrum = np.zeros((rows.harmonics, own.shape[1]), np.float32)
+        for j in reversed(range(rows.powers)):
+            spectrum = spectrum * rows.square[:, None] + own[j]
+        spectrum = rows.samples[:, None] * spectrum
+        part = (_FLOOR * total(spectrum)) / _F(rows.harmonics)
+        least = np.where(part > _SPECTRUM_MIN, part, _SPECTRUM_MIN)
+        return np.asarray(_F(1) / np.sqrt(np.where(spectrum > least, spectrum, least)), np.float32)
 
-    def forward(self, x: Float32) -> Float32:
-        """L^-1 x [..., 2, rows, lanes] of columns."""
-        out = np.empty_like(x)
-        band = self.shapes.power
+    def _basis(self) -> list[Float32]:
+        """The directions, each [rows, lanes]: one of the real parts above one of the imaginary parts."""
+        rows = self.rows
+        x = (rows.harmonic.astype(np.float32) / _F(rows.cosines - 1))[:, None]
+        basis: list[Float32] = []
+        for k in range(rows.design.power // 2):
+            if k == 0:
+                scale = self.scale[rows.harmonic]
+                u = np.where(np.arange(rows.count)[:, None] < rows.cosines, scale, x * scale)
+            else:
+                u = (x * x) * basis[-1]
+            for turn in range(2 * k):
+                u = self._without(basis[turn % k], u)
+            for family in rows.families:
+                u[family] = u[family] * (_F(1) / np.sqrt(total(u[family] * u[family])))
+            basis.append(u)
+        return basis
+
+    def _without(self, u: Float32, x: Float32) -> Float32:
+        """x [rows, ..., lanes] less its components along the two vectors in u [rows, lanes]."""
+        out = x.copy()
+        wide = u.reshape(len(u), *(1,) * (x.ndim - 2), u.shape[-1])
+        for family in self.rows.families:
+            out[family] = x[family] - total(wide[family] * x[family]) * wide[family]
+        return out
+
+    def columns(self, sums: Float32) -> Float32:
+        """White columns [columns, rows, lanes] from their sums [columns, 2, harmonics]."""
+        rows = self.rows
         with np.errstate(all="ignore"):
-            for i in range(x.shape[-2]):
-                value = x[..., i, :]
-                for k in range(max(0, i - band), i):
-                    value = value - self.factor[:, i, k] * out[..., k, :]
-                out[..., i, :] = value * self.factor[:, i, i]
-        return out
-
-    def _directions(self) -> Float32:
-        """L^-1 t_h of every harmonic [harmonics, 2, rows, lanes]; 0 where t_h has no row yet, and behind the rows."""
-        shapes = self.shapes
-        band, lanes = shapes.power, self.theta.shape[1]
-        begun = np.arange(shapes.rows[0])[:, None, None] >= shapes.first_row.T  # [rows, harmonics, 2]
-        shape = np.moveaxis(shapes.table, 2, 0)[..., None]  # [harmonics, 2, rows, 1]
-        out = np.zeros((shapes.harmonics, 2, shapes.rows[0], lanes), np.float32)
-        for i in range(shapes.rows[0]):
-            value = np.broadcast_to(shape[:, :, i], out[:, :, i].shape)
-            for k in range(max(0, i - band), i):
-                value = np.where(begun[k][..., None], value - self.factor[:, i, k] * out[:, :, k], value)
-            out[:, :, i] = np.where(begun[i][..., None], value * self.factor[:, i, i], _F(0))
-        out[:, 1, shapes.rows[1] :] = 0
-        return out
+            parts = np.concatenate([sums[:, 0], sums[:, 1, 1 : 1 + rows.count - rows.cosines]], axis=1)
+            x = self.scale[rows.harmonic][:, None] * parts.T[:, :, None]
+            for u in self.basis:
+                x = self._without(u, x)
+        return np.moveaxis(x, 0, 1)
 
     @cached_property
     def share(self) -> Float32:
-        """Q_j [powers, lanes]."""
-        shapes = self.shapes
+        """Q_j = tr(R^-1 dR/dc_j) [powers, lanes]."""
+        rows = self.rows
+        scale = self.scale[rows.harmonic]
+        left = np.ones_like(scale)
         with np.errstate(all="ignore"):
-            y = self._directions()
-            squares = np.add.accumulate(y * y, axis=2)[:, :, -1]  # [harmonics, 2, lanes]
-            each = shapes.weights[:, :, None, None] * squares
-            ordered = np.concatenate([each[:, :, 0], each[:, 1:, 1]], axis=1)  # cosines, then sines
-            return np.add.accumulate(ordered, axis=1)[:, -1]
+            for u in self.basis:
+                left = left - u * u
+            weight = rows.samples[rows.harmonic][:, None] * (left * (scale * scale))
+            share = []
+            for _ in range(rows.powers):
+                share.append(total(weight))
+                weight = weight * rows.square[rows.harmonic][:, None]
+        return np.array(share)
 
     def pull(self) -> Float32:
         """g = 1/2 sum_j dc_j/dtheta Q_j [thetas, lanes]."""
         g = np.zeros_like(self.theta)
         with np.errstate(all="ignore"):
-            for one in self.shapes.design.noise_of(self.kind):
+            for one in self.rows.design.noise_of(self.kind):
                 half = (_F(0.5) * one.factor) * self.share[one.power]
                 if one.a < len(g):
                     g[one.a] = g[one.a] + half * self._full[one.b]
@@ -179,50 +156,5 @@ class White:
 
     def sensors(self) -> Float32:
         """Mean variance of the white rows by the sensors alone [lanes]."""
-        total = np.zeros(self.theta.shape[1], np.float32)
         with np.errstate(all="ignore"):
-            for j in range(self.shapes.powers):
-                total = total + self.weight[j] * self.share[j]
-            return total / _F(self.shapes.design.functions)
-
-
-def _gram(shapes: Shapes, spectrum: Float32) -> Float32:
-    """R = T diag(D) T^T [2, rows, rows, lanes], lower triangle within the band; 1 on the diagonal behind the rows."""
-    half, lanes = shapes.power // 2, spectrum.shape[1]
-    r = np.zeros((2, shapes.rows[0], shapes.rows[0], lanes), np.float32)
-    for family, rows in enumerate(shapes.rows):
-        table = shapes.table[family]
-        i, j = np.tril_indices(rows)
-        near = i - j <= shapes.power
-        i, j = i[near], j[near]
-        begin = np.maximum(i + family - half, family)
-        total = np.zeros((len(i), lanes), np.float32)
-        for step in range(shapes.power + 1):
-            h = begin + step
-            inside = h <= j + family + half
-            at = np.minimum(h, shapes.harmonics - 1)
-            product = (spectrum[at] * table[i, at][:, None]) * table[j, at][:, None]
-            total = np.where(inside[:, None], total + product, total)
-        r[family, i, j] = total
-        behind = np.arange(rows, shapes.rows[0])
-        r[family, behind, behind] = 1
-    return r
-
-
-def _factored(r: Float32, shapes: Shapes) -> Float32:
-    """L of R = L L^T [2, rows, rows, lanes], its diagonal inverted."""
-    low = np.zeros_like(r)
-    for i in range(r.shape[1]):
-        first = max(0, i - shapes.power)
-        diagonal = r[:, i, i]
-        for j in range(first, i):
-            value = r[:, i, j]
-            for k in range(first, j):
-                value = value - low[:, i, k] * low[:, j, k]
-            low[:, i, j] = value * low[:, j, j]
-        pivot = diagonal
-        for k in range(first, i):
-            pivot = pivot - low[:, i, k] * low[:, i, k]
-        least = _PIVOT * diagonal
-        low[:, i, i] = _F(1) / np.sqrt(np.where(pivot > least, pivot, least))
-    return low
+            return total(self.weight * self.share) / _F(self.rows.design.functions)

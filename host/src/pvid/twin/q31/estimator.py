@@ -568,7 +568,7 @@ class EstimatorQ31:
     def judged(self) -> tuple[npt.NDArray[np.void], Mask]:
         """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
         n_p = self.model.n_p
-        out = np.zeros(self.lanes, estimates.Q31)
+        out = np.zeros(self.lanes, estimates.q31_of(n_p))
         out["p"][:, :n_p] = self.p.T
         out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
         out["misfit"] = self._misfit()

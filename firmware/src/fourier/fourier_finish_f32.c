@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-#include "fourier/finish_f32.h"
+#include "fourier/fourier_finish_f32.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -16,13 +16,13 @@ enum {
     /* for each kind of rows */
     STAGE_WEIGH,    /* c_j from a few entries of the noise table */
     STAGE_SPECTRUM, /* D_h */
-    STAGE_FACTOR,   /* 2 K times: a row of R, then the same row of L */
-    STAGE_COLUMN,   /* for each column: its terms, n/2 passes, L^-1 for the cosines, for the sines */
+    STAGE_BASIS,    /* directions that the test functions leave out: white_f32.c */
+    STAGE_COLUMN,   /* for each column: its terms, then n/2 times one direction of each family off it */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
     STAGE_RESIDUAL, /* a few rows of e; at the end the gate accepts or rejects the kind */
-    STAGE_SHARE,    /* for each harmonic of the cosines, then of the sines: its share of R^-1; only if that is needed */
+    STAGE_SHARE,    /* a few rows' share of R^-1; only if that is needed */
     STAGE_PULL,     /* g from a few entries of the noise table */
-    STAGE_ADD,      /* K times: a row to the estimator */
+    STAGE_ADD,      /* K + n times: a row to the estimator */
     /* for the window */
     STAGE_SCORE,   /* C^T (sum N e + g) */
     STAGE_SOLVE,   /* `iterations` solves, several stages each */
@@ -30,12 +30,15 @@ enum {
     STAGE_MEAN,    /* the scores to their means */
     STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
     STAGE_JUDGE,   /* trust.h publishes the estimate or holds it */
-    STAGE_IDLE
+    STAGE_IDLE = PVID_FOURIER_IDLE
 };
 
 /* Entries of the noise table, and products of the residuals, in a stage. */
 #define ENTRIES_PER_STAGE 8u
 #define PRODUCTS_PER_STAGE 48u
+
+/* Rows whose share a stage forms. */
+#define SHARES_PER_STAGE 4u
 
 /* Windows in the average of the gate's scale, which is relative to the weights of the rows and at least 1. */
 #define GATE_MEMORY 4.0f
@@ -74,11 +77,6 @@ pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pv
     return PVID_OK;
 }
 
-bool pvid_fourier_finish_is_busy_f32(const pvid_fourier_finish_f32 *self)
-{
-    return self->stage != (uint8_t)STAGE_IDLE;
-}
-
 static void begin_kind(pvid_fourier_finish_f32 *self)
 {
     self->index = 0;
@@ -106,6 +104,7 @@ void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self)
     self->iteration = 0;
     self->expected = 0.0f;
     self->free = 0.0f;
+    self->square = 0.0f;
     memset(self->score, 0, sizeof self->score);
     begin_kind(self);
 }
@@ -129,61 +128,55 @@ static bool weigh_stage(pvid_fourier_f32 *self)
     return end < self->design->n_noise;
 }
 
-static bool factor_stage(pvid_fourier_f32 *self)
+static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    const size_t row = finish->index / 2u;
-    if ((finish->index % 2u) == 0u) {
-        pvid_fourier_white_gram_f32(&finish->white, self->design, row);
-    } else {
-        pvid_fourier_white_factor_f32(&finish->white, self->design, row);
-    }
+    pvid_fourier_white_basis_f32(&finish->white, self->design, finish->index);
     finish->index++;
-    return finish->index < (2u * (uint16_t)self->design->functions);
+    return finish->index < pvid_fourier_basis_stages(self->design);
 }
 
-/* Terms of the present column; then its passes, its cosines and its sines. */
+/* Terms of the present column; then the column without one direction of each family after the other. */
 static bool column_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_design_f32 *design = self->design;
     const pvid_fourier_kind *kind = kind_of(self);
-    const size_t passes = design->power / 2u;
-    const size_t cosines = finish->white.cosines;
     float *column = finish->column[finish->index];
     if (finish->part == 0u) {
         if ((finish->index == 0u) && (finish->theta == 0u)) {
             finish->term = 0;
         }
-        memset(finish->folded, 0, sizeof finish->folded);
+        memset(finish->sum, 0, sizeof finish->sum);
         const pvid_fourier_term_f32 *term = design->model->term;
         while ((finish->term < kind->end) && (term[finish->term].column == finish->index)) {
             pvid_fourier_columns_add_f32(design, &term[finish->term], self->harmonics, finish->white.omega,
-                                         (const float (*)[2][PVID_MAX_HARMONICS])self->window, finish->folded);
+                                         (const float (*)[2][PVID_MAX_HARMONICS])self->window, finish->sum);
             finish->term++;
         }
-    } else if (finish->part <= passes) {
-        pvid_fourier_columns_pass_f32(self->harmonics, finish->part - 1u, finish->folded);
-    } else if (finish->part == passes + 1u) {
-        pvid_fourier_columns_rows_f32(design, cosines, (const float (*)[PVID_MAX_HARMONICS])finish->folded, column);
-        pvid_fourier_white_forward_f32(&finish->white, design, false, 0, column);
-    } else {
-        pvid_fourier_white_forward_f32(&finish->white, design, true, 0, &column[cosines]);
-        finish->part = 0;
-        finish->index++;
-        return finish->index < columns_of(kind);
+        finish->part = 1;
+        return true;
     }
-    finish->part++;
-    return true;
+    if (finish->part == 1u) {
+        pvid_fourier_white_scale_f32(&finish->white, design, (const float (*)[PVID_MAX_HARMONICS])finish->sum, column);
+    }
+    pvid_fourier_white_remove_f32(&finish->white, design, finish->part - 1u, column);
+    if (finish->part < design->power / 2u) {
+        finish->part++;
+        return true;
+    }
+    finish->part = 0;
+    finish->index++;
+    return finish->index < columns_of(kind);
 }
 
-/* Of each nuisance in order: part 0 its inverse square, then the columns without it, those of theta, Y and the nuisances
- * behind it. */
+/* Of each nuisance in order: part 0 its inverse square, then the columns without it, those of theta, Y and the
+ * nuisances behind it. */
 static bool project_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
-    const size_t functions = self->design->functions;
+    const size_t rows = pvid_fourier_rows(self->design);
     const size_t first = (size_t)kind->thetas + 1u;
     const size_t nuisance = first + finish->index;
     if (finish->index >= kind->nuisances) {
@@ -192,10 +185,10 @@ static bool project_stage(pvid_fourier_f32 *self)
     if (finish->part == 0u) {
         if (finish->index == 0u) {
             for (size_t i = first; i < columns_of(kind); i++) {
-                finish->own[i] = pvid_fourier_columns_square_f32(functions, finish->column[i]);
+                finish->own[i] = pvid_fourier_columns_square_f32(rows, finish->column[i]);
             }
         }
-        const bool kept = pvid_fourier_columns_keep_f32(functions, finish->column[nuisance], finish->own[nuisance],
+        const bool kept = pvid_fourier_columns_keep_f32(rows, finish->column[nuisance], finish->own[nuisance],
                                                         &finish->own[nuisance]);
         finish->live = (uint8_t)(finish->live + (kept ? 1u : 0u));
         finish->part = 1;
@@ -203,14 +196,24 @@ static bool project_stage(pvid_fourier_f32 *self)
     }
     const size_t place = finish->part - 1u;
     const size_t column = (place < first) ? place : (place + finish->index + 1u);
-    pvid_fourier_columns_project_f32(functions, finish->column[nuisance], finish->own[nuisance],
-                                     finish->column[column]);
+    pvid_fourier_columns_project_f32(rows, finish->column[nuisance], finish->own[nuisance], finish->column[column]);
     finish->part++;
     if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
         finish->part = 0;
         finish->index++;
     }
     return finish->index < kind->nuisances;
+}
+
+/* x -= a y */
+static inline void subtract(float a, const float *restrict y, size_t n, float *restrict x)
+{
+    const float *end = &x[n];
+    while (x < end) {
+        *x -= a * *y;
+        x++;
+        y++;
+    }
 }
 
 /* Rows whose residuals a stage forms. */
@@ -225,37 +228,38 @@ static bool residual_stage(pvid_fourier_f32 *self)
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
     const float *theta = &self->estimator.theta[finish->theta];
-    const size_t functions = self->design->functions;
+    const size_t rows = pvid_fourier_rows(self->design);
     const size_t end = (size_t)finish->index + rows_per_stage(kind);
-    const size_t last = (end < functions) ? end : functions;
-    for (size_t k = finish->index; k < last; k++) {
-        float e = finish->column[kind->thetas][k];
-        for (size_t j = 0; j < kind->thetas; j++) {
-            e -= theta[j] * finish->column[j][k];
-        }
-        finish->row[k] = e;
-        finish->rss += e * e;
+    const size_t last = (end < rows) ? end : rows;
+    const size_t first = finish->index;
+    memcpy(&finish->row[first], &finish->column[kind->thetas][first], (last - first) * sizeof(float));
+    for (size_t j = 0; j < kind->thetas; j++) {
+        subtract(theta[j], &finish->column[j][first], last - first, &finish->row[first]);
     }
+    float rss = finish->rss;
+    for (size_t k = first; k < last; k++) {
+        rss += finish->row[k] * finish->row[k];
+    }
+    finish->rss = rss;
     finish->index = (uint16_t)last;
-    return last < functions;
+    return last < rows;
 }
 
-/* Rows of the kind less its nuisances. */
+/* Test functions less nuisances: the dimensions that the rows of the kind span. */
 static float freedom_of(const pvid_fourier_f32 *self)
 {
     return (float)self->design->functions - (float)self->finish.live;
 }
 
-/* A harmonic of the cosines, then of the sines. */
 static bool share_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    const size_t place = finish->index;
-    const bool sines = place >= self->harmonics;
-    pvid_fourier_white_share_f32(&finish->white, self->design, sines,
-                                 sines ? ((place + 1u) - self->harmonics) : place);
-    finish->index++;
-    return finish->index < (2u * (size_t)self->harmonics) - 1u;
+    const size_t rows = pvid_fourier_rows(self->design);
+    const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
+    const size_t last = (end < rows) ? end : rows;
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->index, last);
+    finish->index = (uint16_t)last;
+    return last < rows;
 }
 
 static bool pull_stage(pvid_fourier_f32 *self)
@@ -289,10 +293,12 @@ static bool add_stage(pvid_fourier_f32 *self, pvid_reason *reason)
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
     const size_t k = finish->index;
-    float n[PVID_MAX_THETA] = {0};
+    const float e = finish->row[k];
+    float *score = &finish->score[finish->theta];
+    float n[PVID_MAX_THETA];
     for (size_t j = 0; j < kind->thetas; j++) {
         n[j] = finish->column[j][k];
-        finish->score[finish->theta + j] += n[j] * finish->row[k];
+        score[j] += n[j] * e;
     }
     const pvid_reason added =
         pvid_estimator_add_kind_f32(&self->estimator, finish->kind, n, finish->column[kind->thetas][k]);
@@ -300,7 +306,7 @@ static bool add_stage(pvid_fourier_f32 *self, pvid_reason *reason)
         *reason = added;
     }
     finish->index++;
-    return finish->index < self->design->functions;
+    return finish->index < pvid_fourier_rows(self->design);
 }
 
 /* ---- steps of p and verdict ---- */
@@ -338,11 +344,10 @@ static bool cluster_stage(pvid_fourier_f32 *self)
     const size_t n_p = self->estimator.model->n_p;
     const size_t a = finish->index;
     const float wide = finish->solve.variance * self->estimator.settings.correlation;
-    const float rows = ((float)self->design->functions * (float)self->design->model->kinds) *
+    const float rows = ((float)pvid_fourier_rows(self->design) * (float)self->design->model->kinds) *
                        self->estimator.information.row_weight;
-    const float variance =
-        pvid_fourier_scores_variance_f32(&finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance,
-                                         wide, estimate->weight / rows);
+    const float variance = pvid_fourier_scores_variance_f32(
+        &finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance, wide, estimate->weight / rows);
     /* NaN fails the comparison */
     if ((variance > (estimate->se[a] * estimate->se[a])) && (variance <= VARIANCE_MAX)) {
         estimate->se[a] = sqrtf(variance);
@@ -385,10 +390,14 @@ static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
         return STAGE_SCORE; /* that is, the next kind */
     }
     if (finish->used == 0u) {
-        pvid_information_fade_f32(&self->estimator.information, pvid_trust_fade_factor_f32(&self->trust));
+        const float factor = pvid_trust_fade_factor_f32(&self->trust);
+        if (factor < 1.0f) {
+            pvid_information_fade_f32(&self->estimator.information, factor);
+        }
     }
     finish->used++;
     finish->free += freedom;
+    finish->square += finish->rss;
     if (!finish->shares) {
         finish->expected += 1.0f;
     }
@@ -414,12 +423,24 @@ static void end_kind(pvid_fourier_f32 *self)
 }
 
 /* The stage after one that is complete. */
+static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    switch (self->finish.stage) {
+    case STAGE_RESIDUAL:
+        return gated(self, reason);
+    case STAGE_JUDGE:
+        return STAGE_IDLE;
+    default:
+        return (uint8_t)(self->finish.stage + 1u);
+    }
+}
+
 static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
+    finish->stage = stage_after(self, reason);
     finish->index = 0;
     finish->part = 0;
-    finish->stage = (finish->stage == (uint8_t)STAGE_RESIDUAL) ? gated(self, reason) : (uint8_t)(finish->stage + 1u);
     if (finish->stage == (uint8_t)STAGE_SCORE) {
         end_kind(self);
     } else if (finish->stage == (uint8_t)STAGE_SOLVE) {
@@ -440,11 +461,10 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         repeat = weigh_stage(self);
         break;
     case STAGE_SPECTRUM:
-        pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind,
-                                        self->harmonics);
+        pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind, self->harmonics);
         break;
-    case STAGE_FACTOR:
-        repeat = factor_stage(self);
+    case STAGE_BASIS:
+        repeat = basis_stage(self);
         break;
     case STAGE_COLUMN:
         repeat = column_stage(self);
@@ -474,7 +494,7 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         repeat = !pvid_estimator_assess_advance_f32(&self->estimator, &finish->solve);
         break;
     case STAGE_MEAN:
-        pvid_fourier_scores_add_f32(&finish->scores, self->estimator.model->n_p);
+        pvid_fourier_scores_add_f32(&finish->scores, self->estimator.model->n_p, finish->square / finish->free);
         break;
     case STAGE_CLUSTER:
         repeat = cluster_stage(self);
@@ -501,16 +521,16 @@ static uint32_t parts_of(uint32_t all, uint32_t each)
 static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
 {
     const pvid_fourier_design_f32 *design = self->design;
-    const uint32_t functions = design->functions;
+    const uint32_t rows = (uint32_t)pvid_fourier_rows(design);
     const uint32_t columns = (uint32_t)columns_of(kind);
     const uint32_t entries = parts_of(design->n_noise, ENTRIES_PER_STAGE);
     const uint32_t nuisances = kind->nuisances;
     /* nuisance i: its square, then all columns but itself and those before it */
     const uint32_t project = (nuisances > 0u) ? ((nuisances * columns) - ((nuisances * (nuisances - 1u)) / 2u)) : 1u;
-    uint32_t stages = entries + 1u + (2u * functions) + (columns * ((design->power / 2u) + 3u)) + project;
-    stages += parts_of(functions, (uint32_t)rows_per_stage(kind)) + functions;
+    uint32_t stages = entries + 1u + (uint32_t)pvid_fourier_basis_stages(design) + project;
+    stages += (columns * ((design->power / 2u) + 1u)) + parts_of(rows, (uint32_t)rows_per_stage(kind)) + rows;
     if (self->finish.shares) {
-        stages += ((2u * (uint32_t)self->harmonics) - 1u) + entries;
+        stages += parts_of(rows, SHARES_PER_STAGE) + entries;
     }
     return stages;
 }
