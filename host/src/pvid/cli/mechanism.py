@@ -14,6 +14,7 @@ from pvid.base.console import DONE, NOTHING_IDENTIFIED, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.cli.input import print_notes
+from pvid.oracle.fourier.weights import Weights
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import is_run, read_recording
@@ -27,12 +28,14 @@ def identify_run(
     *,
     as_json: bool,
     figure: Path | None,
+    weights: Weights = "residuals",
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
 
     Parameters
     ----------
+    weights : of the rows, as in pvid.oracle.fourier.identify
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     model = model_of(rig)
@@ -47,7 +50,7 @@ def identify_run(
     recording.refuse_damaged()
     recording = recording.whole()
     print_notes(recording.notes)
-    answer = identify_mechanism(recording, model)
+    answer = identify_mechanism(recording, model, weights)
     if as_json:
         click.echo(json.dumps(answer.as_json()))
     else:
