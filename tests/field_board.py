@@ -96,7 +96,7 @@ def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[i
             yield at, link.Status(session, link.Code.RUNNING, 0, identifier.counters["updates"], *[0] * 7)
         last = min(first + SAMPLES_A_FRAME, field.ticks)
         raw = replace(link.Raw.of_values(phi[first:last], y[first:last]), session=session)
-        sample_hash = fnv.fold_bytes(sample_hash, raw.phi_y)
+        sample_hash = fnv.fold_bytes(sample_hash, raw.data)
         yield at, raw
         for tick in range(first, last):
             reason = int(identifier.run(phi[tick : tick + 1], y[tick : tick + 1], sums=False).reason[0])
@@ -109,12 +109,11 @@ def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[i
 
 
 def _estimate(session: int, updates: int, assessed: npt.NDArray[np.void], reason: int) -> link.Estimate:
-    covariance = assessed["covariance"][np.triu_indices(link.MAX_P)]
     return link.Estimate(
         session=session,
         updates=updates,
-        p=tuple(map(float, assessed["p"])),
-        covariance=tuple(map(float, covariance)),
+        p=(*map(float, assessed["p"]), *[0.0] * (link.MAX_P - len(assessed["p"]))),
+        covariance=link.upper_triangle(assessed["covariance"]),
         kappa=float(assessed["kappa"]),
         residual_sd=float(assessed["residual_sd"]),
         weight=float(assessed["weight"]),

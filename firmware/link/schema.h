@@ -5,23 +5,24 @@
 #define PVID_LINK_VERSION 1u
 
 /* CRC-32 of the text. */
-#define PVID_LINK_SCHEMA 0xE1F24363u
+#define PVID_LINK_SCHEMA 0xEABBFAA1u
 
 #define PVID_LINK_SCHEMA_TEXT \
     "pvid 1\n" \
-    "1 hello form:u8 core:u8 n_p:u8 window:u16 settings:u32 session:u32 sample_rate:f32 phi_lsb:f32 y_lsb:f32 p_unit:f32[6] board:char[16] tick_high:u16\n" \
+    "1 hello form:u8 core:u8 n_p:u8 window:u16 settings:u32 session:u32 sample_rate:f32 phi_lsb:f32 y_lsb:f32 p_unit:f32[8] board:char[16] tick_high:u16 samples:u8\n" \
     "2 schema text:char[]\n" \
-    "3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32 first_tick:u64\n" \
-    "4 sample phi_y:f32[]\n" \
-    "5 raw session:u32 tick_high:u16 phi_y:f32[]\n" \
-    "6 estimate session:u32 updates:u32 p:f32[6] covariance:f32[21] kappa:f32 residual_sd:f32 weight:f32 reason:u8 tick_high:u16\n" \
+    "3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 start:f32[8] start_sd:f32[8] lower:f32[8] upper:f32[8] row_sd:f32 forgetting_s:f32 feedback_hz:f32 first_tick:u64\n" \
+    "4 sample data:f32[]\n" \
+    "5 raw session:u32 tick_high:u16 samples:u8 data:f32[]\n" \
+    "6 estimate session:u32 updates:u32 p:f32[8] covariance:f32[36] kappa:f32 residual_sd:f32 weight:f32 reason:u8 tick_high:u16\n" \
     "7 status session:u32 code:u8 core:u8 updates:u32 rejected:u32 repeated:u32 skipped:u32 missing:u32 malformed:u32 bad_crc:u32 foreign:u32 tick_high:u16\n" \
     "8 hash session:u32 hash:u32 tick_high:u16 sample_hash:u32\n" \
     "9 credit session:u32 room:u32 hash:u32 reason:u8 tick_high:u16 sample_hash:u32\n" \
-    "10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 start:i32[6] start_sd:i32[6] lower:i32[6] upper:i32[6] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 y_offset:i32 first_tick:u64\n" \
-    "11 count phi_y:i32[]\n" \
-    "12 raw_count session:u32 tick_high:u16 phi_y:i32[]\n" \
-    "13 estimate_q31 session:u32 updates:u32 p:i32[6] se:i32[6] correlation:i32[21] kappa:i32 residual_sd:i32 weight:u32 reason:u8 tick_high:u16"
+    "10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 start:i32[8] start_sd:i32[8] lower:i32[8] upper:i32[8] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 y_offset:i32 first_tick:u64\n" \
+    "11 count data:i32[]\n" \
+    "12 raw_count session:u32 tick_high:u16 samples:u8 data:i32[]\n" \
+    "13 estimate_q31 session:u32 updates:u32 p:i32[8] se:i32[8] correlation:i32[36] kappa:i32 residual_sd:i32 weight:u32 reason:u8 tick_high:u16\n" \
+    "14 names text:char[]"
 
 /* Frame types; offsets of their fields and the bytes before an open end. */
 
@@ -35,10 +36,11 @@
 #define PVID_HELLO_SAMPLE_RATE 13u /* f32 */
 #define PVID_HELLO_PHI_LSB 17u /* f32 */
 #define PVID_HELLO_Y_LSB 21u /* f32 */
-#define PVID_HELLO_P_UNIT 25u /* f32[6] */
-#define PVID_HELLO_BOARD 49u /* char[16] */
-#define PVID_HELLO_TICK_HIGH 65u /* u16 */
-#define PVID_HELLO_BYTES 67u
+#define PVID_HELLO_P_UNIT 25u /* f32[8] */
+#define PVID_HELLO_BOARD 57u /* char[16] */
+#define PVID_HELLO_TICK_HIGH 73u /* u16 */
+#define PVID_HELLO_SAMPLES 75u /* u8 */
+#define PVID_HELLO_BYTES 76u
 
 #define PVID_SCHEMA 2u
 #define PVID_SCHEMA_TEXT 0u /* char[] */
@@ -53,37 +55,38 @@
 #define PVID_CONFIGURE_ESTIMATE_EVERY 12u /* u16 */
 #define PVID_CONFIGURE_DIVIDER 14u /* u16 */
 #define PVID_CONFIGURE_LAW 16u /* u8 */
-#define PVID_CONFIGURE_START 17u /* f32[6] */
-#define PVID_CONFIGURE_START_SD 41u /* f32[6] */
-#define PVID_CONFIGURE_LOWER 65u /* f32[6] */
-#define PVID_CONFIGURE_UPPER 89u /* f32[6] */
-#define PVID_CONFIGURE_ROW_SD 113u /* f32 */
-#define PVID_CONFIGURE_FORGETTING_S 117u /* f32 */
-#define PVID_CONFIGURE_FEEDBACK_HZ 121u /* f32 */
-#define PVID_CONFIGURE_FIRST_TICK 125u /* u64 */
-#define PVID_CONFIGURE_BYTES 133u
+#define PVID_CONFIGURE_START 17u /* f32[8] */
+#define PVID_CONFIGURE_START_SD 49u /* f32[8] */
+#define PVID_CONFIGURE_LOWER 81u /* f32[8] */
+#define PVID_CONFIGURE_UPPER 113u /* f32[8] */
+#define PVID_CONFIGURE_ROW_SD 145u /* f32 */
+#define PVID_CONFIGURE_FORGETTING_S 149u /* f32 */
+#define PVID_CONFIGURE_FEEDBACK_HZ 153u /* f32 */
+#define PVID_CONFIGURE_FIRST_TICK 157u /* u64 */
+#define PVID_CONFIGURE_BYTES 165u
 
 #define PVID_SAMPLE 4u
-#define PVID_SAMPLE_PHI_Y 0u /* f32[] */
+#define PVID_SAMPLE_DATA 0u /* f32[] */
 #define PVID_SAMPLE_BYTES 0u
 
 #define PVID_RAW 5u
 #define PVID_RAW_SESSION 0u /* u32 */
 #define PVID_RAW_TICK_HIGH 4u /* u16 */
-#define PVID_RAW_PHI_Y 6u /* f32[] */
-#define PVID_RAW_BYTES 6u
+#define PVID_RAW_SAMPLES 6u /* u8 */
+#define PVID_RAW_DATA 7u /* f32[] */
+#define PVID_RAW_BYTES 7u
 
 #define PVID_ESTIMATE 6u
 #define PVID_ESTIMATE_SESSION 0u /* u32 */
 #define PVID_ESTIMATE_UPDATES 4u /* u32 */
-#define PVID_ESTIMATE_P 8u /* f32[6] */
-#define PVID_ESTIMATE_COVARIANCE 32u /* f32[21] */
-#define PVID_ESTIMATE_KAPPA 116u /* f32 */
-#define PVID_ESTIMATE_RESIDUAL_SD 120u /* f32 */
-#define PVID_ESTIMATE_WEIGHT 124u /* f32 */
-#define PVID_ESTIMATE_REASON 128u /* u8 */
-#define PVID_ESTIMATE_TICK_HIGH 129u /* u16 */
-#define PVID_ESTIMATE_BYTES 131u
+#define PVID_ESTIMATE_P 8u /* f32[8] */
+#define PVID_ESTIMATE_COVARIANCE 40u /* f32[36] */
+#define PVID_ESTIMATE_KAPPA 184u /* f32 */
+#define PVID_ESTIMATE_RESIDUAL_SD 188u /* f32 */
+#define PVID_ESTIMATE_WEIGHT 192u /* f32 */
+#define PVID_ESTIMATE_REASON 196u /* u8 */
+#define PVID_ESTIMATE_TICK_HIGH 197u /* u16 */
+#define PVID_ESTIMATE_BYTES 199u
 
 #define PVID_STATUS 7u
 #define PVID_STATUS_SESSION 0u /* u32 */
@@ -124,40 +127,45 @@
 #define PVID_CONFIGURE_Q31_HASH_EVERY 10u /* u16 */
 #define PVID_CONFIGURE_Q31_ESTIMATE_EVERY 12u /* u16 */
 #define PVID_CONFIGURE_Q31_DIVIDER 14u /* u16 */
-#define PVID_CONFIGURE_Q31_START 16u /* i32[6] */
-#define PVID_CONFIGURE_Q31_START_SD 40u /* i32[6] */
-#define PVID_CONFIGURE_Q31_LOWER 64u /* i32[6] */
-#define PVID_CONFIGURE_Q31_UPPER 88u /* i32[6] */
-#define PVID_CONFIGURE_Q31_ROW_SD 112u /* i32 */
-#define PVID_CONFIGURE_Q31_FORGETTING_GROUPS 116u /* u32 */
-#define PVID_CONFIGURE_Q31_GAIN 120u /* i32 */
-#define PVID_CONFIGURE_Q31_PHI_OFFSET 124u /* i32 */
-#define PVID_CONFIGURE_Q31_Y_OFFSET 128u /* i32 */
-#define PVID_CONFIGURE_Q31_FIRST_TICK 132u /* u64 */
-#define PVID_CONFIGURE_Q31_BYTES 140u
+#define PVID_CONFIGURE_Q31_START 16u /* i32[8] */
+#define PVID_CONFIGURE_Q31_START_SD 48u /* i32[8] */
+#define PVID_CONFIGURE_Q31_LOWER 80u /* i32[8] */
+#define PVID_CONFIGURE_Q31_UPPER 112u /* i32[8] */
+#define PVID_CONFIGURE_Q31_ROW_SD 144u /* i32 */
+#define PVID_CONFIGURE_Q31_FORGETTING_GROUPS 148u /* u32 */
+#define PVID_CONFIGURE_Q31_GAIN 152u /* i32 */
+#define PVID_CONFIGURE_Q31_PHI_OFFSET 156u /* i32 */
+#define PVID_CONFIGURE_Q31_Y_OFFSET 160u /* i32 */
+#define PVID_CONFIGURE_Q31_FIRST_TICK 164u /* u64 */
+#define PVID_CONFIGURE_Q31_BYTES 172u
 
 #define PVID_COUNT 11u
-#define PVID_COUNT_PHI_Y 0u /* i32[] */
+#define PVID_COUNT_DATA 0u /* i32[] */
 #define PVID_COUNT_BYTES 0u
 
 #define PVID_RAW_COUNT 12u
 #define PVID_RAW_COUNT_SESSION 0u /* u32 */
 #define PVID_RAW_COUNT_TICK_HIGH 4u /* u16 */
-#define PVID_RAW_COUNT_PHI_Y 6u /* i32[] */
-#define PVID_RAW_COUNT_BYTES 6u
+#define PVID_RAW_COUNT_SAMPLES 6u /* u8 */
+#define PVID_RAW_COUNT_DATA 7u /* i32[] */
+#define PVID_RAW_COUNT_BYTES 7u
 
 #define PVID_ESTIMATE_Q31 13u
 #define PVID_ESTIMATE_Q31_SESSION 0u /* u32 */
 #define PVID_ESTIMATE_Q31_UPDATES 4u /* u32 */
-#define PVID_ESTIMATE_Q31_P 8u /* i32[6] */
-#define PVID_ESTIMATE_Q31_SE 32u /* i32[6] */
-#define PVID_ESTIMATE_Q31_CORRELATION 56u /* i32[21] */
-#define PVID_ESTIMATE_Q31_KAPPA 140u /* i32 */
-#define PVID_ESTIMATE_Q31_RESIDUAL_SD 144u /* i32 */
-#define PVID_ESTIMATE_Q31_WEIGHT 148u /* u32 */
-#define PVID_ESTIMATE_Q31_REASON 152u /* u8 */
-#define PVID_ESTIMATE_Q31_TICK_HIGH 153u /* u16 */
-#define PVID_ESTIMATE_Q31_BYTES 155u
+#define PVID_ESTIMATE_Q31_P 8u /* i32[8] */
+#define PVID_ESTIMATE_Q31_SE 40u /* i32[8] */
+#define PVID_ESTIMATE_Q31_CORRELATION 72u /* i32[36] */
+#define PVID_ESTIMATE_Q31_KAPPA 216u /* i32 */
+#define PVID_ESTIMATE_Q31_RESIDUAL_SD 220u /* i32 */
+#define PVID_ESTIMATE_Q31_WEIGHT 224u /* u32 */
+#define PVID_ESTIMATE_Q31_REASON 228u /* u8 */
+#define PVID_ESTIMATE_Q31_TICK_HIGH 229u /* u16 */
+#define PVID_ESTIMATE_Q31_BYTES 231u
+
+#define PVID_NAMES 14u
+#define PVID_NAMES_TEXT 0u /* char[] */
+#define PVID_NAMES_BYTES 0u
 
 /* Status.code */
 #define PVID_CODE_WAITING 0u
@@ -171,6 +179,7 @@
 /* Hello.form */
 #define PVID_FORM_STRONG 0u
 #define PVID_FORM_WEAK 1u
+#define PVID_FORM_FOURIER 2u
 
 /* Hello.core */
 #define PVID_CORE_F32 0u

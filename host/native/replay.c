@@ -7,32 +7,11 @@
 
 #include <string.h>
 
+#include "record_tick.h"
+
 const char *pvid_native_build(void)
 {
     return PVID_NATIVE_BUILD;
-}
-
-static void record_tick(const pvid_record_f32 *record, uint32_t tick, const pvid_estimator_f32 *estimator,
-                        pvid_reason reason)
-{
-    const uint32_t n_p = estimator->model->n_p;
-    const uint32_t n_sums = estimator->information.n_moments + estimator->information.n_theta + 2u;
-    if (record->p != NULL) {
-        memcpy(&record->p[(size_t)tick * n_p], estimator->p, n_p * sizeof(float));
-    }
-    if (record->sums != NULL) {
-        pvid_information_read_f32(&estimator->information, &record->sums[(size_t)tick * n_sums]);
-    }
-    if (record->reason != NULL) {
-        record->reason[tick] = (uint8_t)reason;
-    }
-    if (record->hash != NULL) {
-        *record->running_hash = pvid_fnv_estimator_f32(*record->running_hash, estimator, reason);
-        record->hash[tick] = *record->running_hash;
-    }
-    if ((record->estimate != NULL) && ((tick % record->estimate_every) == 0u)) {
-        pvid_estimator_assess_f32(estimator, &record->estimate[tick / record->estimate_every]);
-    }
 }
 
 void pvid_replay_strong_f32(pvid_strong_f32 *self, uint32_t ticks, const float phi[], const float y[],

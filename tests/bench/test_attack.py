@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from bench.attack import KINDS, Outcome, attack, call, complaint
+from bench.attack import HEADER, KINDS, LONGEST_S, Outcome, attack, call, campaign, complaint
 from bench.attack_commands import command_line
 from bench.attack_files import distorted_run, mutated_run, rig_text
 from pvid.base.errors import PvidError
@@ -33,6 +33,17 @@ def test_mutants_get_answers_and_sentences_alone(kind: str, tmp_path: Path) -> N
     assert tally.codes[0] > 0  # some are answered
 
 
+def test_page_counts_every_mutant() -> None:
+    text = (Path(__file__).parents[1] / "ATTACK.md").read_text()
+    lines = text.partition("<!-- attack -->")[2].partition("<!-- /attack -->")[0].strip().splitlines()
+    assert tuple(cell.strip() for cell in lines[0].strip("|").split("|")) == HEADER
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+    assert len(rows) == len(KINDS)
+    for _, mutants, _, answered, nothing, refused, defects, longest_s in rows:
+        assert int(answered) + int(nothing) + int(refused) == int(mutants) >= 500
+        assert int(defects) == 0 and float(longest_s) < LONGEST_S
+
+
 def test_mutants_are_drawn_from_their_seed() -> None:
     run = simulate(duration=1.0).run
     for draw_one in (
@@ -43,6 +54,16 @@ def test_mutants_are_drawn_from_their_seed() -> None:
     ):
         first, again, other = ([draw_one(draw) for _ in range(20)] for draw in map(Random, (1, 1, 2)))
         assert first == again != other
+
+
+def test_a_campaign_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
+    done = tmp_path / "done"
+    first = campaign(["commands"], 3, 5, 1, done=done)
+    assert [one.tried for one in first] == [3] and len(done.read_text().splitlines()) == 1
+    done.write_text(done.read_text().replace('"commands", 3, 5, 0', '"commands", 1000, 5, 0'))
+    rest = campaign(["commands"], 1002, 5, 1, done=done)[0]
+    assert rest.tried == 1002 and sum(rest.codes.values()) == 3 + 2  # the second chunk alone was run
+    assert len(done.read_text().splitlines()) == 2
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bench import recorded_rigs
+from bench.kept_recordings import KEPT
 from bench.recordings import SOURCES
 from pvid.models.drive import Sines
 from pvid.models.simulated_rig import SimulatedRig
@@ -89,4 +90,4 @@ def test_torque_that_is_a_law_of_the_angle_is_taken_for_feedback(tmp_path: Path)
 
 
 def test_every_source_has_a_design() -> None:
-    assert set(recorded_rigs.DESIGNS) == {source.name for source in SOURCES}
+    assert set(recorded_rigs.DESIGNS) == {source.name for source in (*SOURCES, *KEPT)}

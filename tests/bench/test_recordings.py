@@ -21,7 +21,7 @@ def source(name: str) -> Source:
 
 def made(checkouts: Path, one: Source, piece: Piece) -> Path:
     """The place of the piece's file in a checkout, its folders made."""
-    path = checkouts / one.repository / piece.path
+    path = checkouts / one.origin.folder / piece.path
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
 
@@ -40,7 +40,7 @@ def test_two_pieces_differ_and_the_licence_permits_use(name: str) -> None:
     one = source(name)
     assert one.identify != one.predict
     assert one.licence.startswith(("MIT", "BSD"))
-    assert len(one.commit) == 40
+    assert isinstance(one.origin, recordings.Repository) and len(one.origin.commit) == 40
 
 
 def test_table_is_cut_onto_an_even_clock(tmp_path: Path) -> None:
@@ -101,6 +101,4 @@ def test_piece_is_read_back_as_it_was_cut(tmp_path: Path) -> None:
     assert back.sample_rate == pytest.approx(250.0)
     note = written[-1].read_text(encoding="utf-8")
     assert note.startswith("# simple_pendulum\n")
-    assert all(
-        word in note for word in (one.repository, one.commit, one.licence, one.identify.path, "tau [N*m] torque")
-    )
+    assert all(word in note for word in (str(one.origin), one.licence, one.identify.path, "tau [N*m] torque"))

@@ -69,7 +69,11 @@ class Generated:
         self.files = files_of(functions.model, "test")
         for name, text in {**self.files, "loop.c": _LOOP}.items():
             (folder / name).write_text(text, encoding="utf-8")
-        code = [folder / name for name in self.files if name.endswith(".c") and not name.endswith("_test.c")]
+        code = [
+            folder / name
+            for name in self.files
+            if name.endswith(".c") and not name.endswith(("_test.c", "_weak_f32.c"))
+        ]
         core = [source(f"{one}.c") for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
         library = folder / "generated.so"
         options = ["-std=c99", "-O2", "-shared", "-fPIC", "-DPVID_PLAIN_NAMES", *WARNINGS, *INCLUDES, f"-I{folder}"]

@@ -235,6 +235,6 @@ def test_a_row_that_is_integrated_by_parts_is_refused() -> None:
 
 def test_the_header_names_the_sizes_that_it_needs() -> None:
     header = files_strong.header(strong_of("dc_motor"), "test")
-    assert '#error "compile pvid and this file with -DPVID_MAX_P=7 -DPVID_MAX_THETA=9 -DPVID_MAX_MOMENTS=45"' in header
+    assert '#error "compile pvid and this file with -DPVID_MAX_P=7 -DPVID_MAX_THETA=9 -DPVID_MAX_MOMENTS=25"' in header
     for line in ("sample[0]  V    [V]    held until the next", "sample[2]  phi  [rad]", "phi, derivative 2"):
         assert line in header

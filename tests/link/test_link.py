@@ -152,19 +152,22 @@ def test_of_many_corrupted_frames_none_is_accepted_wrong(native: Native) -> None
 def test_messages_survive_the_way() -> None:
     values = np.array([[1.5, -2.0], [np.float32(1e-45), 3e38]], np.float32)
     sample = link.Sample.of_values(values[:, 0], values[:, 1])
-    estimate = link.Estimate(9, 4, (1.0, 2.0, 3.0, 4.0, 0.0, 0.0), tuple(map(float, range(21))), 0.5, 0.25, 8.0, 2)
-    unit = (0.5, 1.0, 1.0, 2.0**-40, 0.0, 0.0)
+    p = (1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, -1.0)
+    estimate = link.Estimate(9, 4, p, tuple(map(float, range(36))), 0.5, 0.25, 8.0, 2)
+    unit = (0.5, 1.0, 1.0, 2.0**-40, 0.0, 0.0, 0.0, 0.0)
     hello = link.Hello(1, 1, 4, 256, 5, 0, 1000.0, 2.0**-11, 2.0**-17, unit, "mps2-an386")
-    extremes = (-(2**31), 2**31 - 1, -1, 0, 1, 2)
+    extremes = (-(2**31), 2**31 - 1, -1, 0, 1, 2, 3, 4)
     fixed = link.ConfigureQ31(7, 5, 1, 2, 500, 0, 1, extremes, extremes, extremes, extremes, 3, 2**32 - 1, 2**30, -5, 6)
-    counts = link.RawCount.of_values(extremes[:3], extremes[3:])
-    sent = [sample, estimate, hello, fixed, counts]
+    counts = link.RawCount.of_values(extremes[:3], extremes[3:6])
+    motor = link.Raw.of_values(*np.arange(12.0).reshape(3, 4))
+    sent = [sample, estimate, hello, fixed, counts, motor]
     data = b"".join(link.encode(m, i, i) for i, m in enumerate(sent))
     got = [item for item in link.Decoder().feed(data) if isinstance(item, link.Frame)]
     assert [frame.message for frame in got] == sent
     assert counts.values.tolist() == [[-(2**31), 0], [2**31 - 1, 1], [-1, 2]]
     assert isinstance(got[0].message, link.Sample)
-    assert np.array_equal(got[0].message.values, values)
+    assert np.array_equal(got[0].message.of_each(2), values)
+    assert motor.samples == 3 and motor.count == 4 and motor.values[1].tolist() == [1.0, 5.0, 9.0]
 
 
 def test_the_schema_describes_itself() -> None:
@@ -214,19 +217,77 @@ def test_decoder_accepts_the_schema_of_another_version() -> None:
     assert link.Decoder().feed(b"".join(sent)) == [link.Loss("foreign", bytes=len(one) - 1) for one in sent]
 
 
+# The schema when a tick had two samples and a mechanism at most six parameters.
+TWO_SAMPLES = """\
+pvid 1
+1 hello form:u8 core:u8 n_p:u8 window:u16 settings:u32 session:u32 sample_rate:f32 phi_lsb:f32 y_lsb:f32 \
+p_unit:f32[6] board:char[16] tick_high:u16
+2 schema text:char[]
+3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 \
+start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32 first_tick:u64
+4 sample phi_y:f32[]
+5 raw session:u32 tick_high:u16 phi_y:f32[]
+6 estimate session:u32 updates:u32 p:f32[6] covariance:f32[21] kappa:f32 residual_sd:f32 weight:f32 reason:u8 \
+tick_high:u16
+7 status session:u32 code:u8 core:u8 updates:u32 rejected:u32 repeated:u32 skipped:u32 missing:u32 malformed:u32 \
+bad_crc:u32 foreign:u32 tick_high:u16
+8 hash session:u32 hash:u32 tick_high:u16 sample_hash:u32
+9 credit session:u32 room:u32 hash:u32 reason:u8 tick_high:u16 sample_hash:u32
+10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 \
+start:i32[6] start_sd:i32[6] lower:i32[6] upper:i32[6] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 \
+y_offset:i32 first_tick:u64
+11 count phi_y:i32[]
+12 raw_count session:u32 tick_high:u16 phi_y:i32[]
+13 estimate_q31 session:u32 updates:u32 p:i32[6] se:i32[6] correlation:i32[21] kappa:i32 residual_sd:i32 weight:u32 \
+reason:u8 tick_high:u16"""
+
+
+def of_schema(text: str, *frames: tuple[int, bytes]) -> list[link.Message]:
+    """What a decoder that learns makes of frames of that schema."""
+    number = zlib.crc32(text.encode())
+    sent = [link.encode_raw(link.Schema.TYPE, 0, 0, text.encode(), number)]
+    sent += [link.encode_raw(kind, i, 9, payload, number) for i, (kind, payload) in enumerate(frames, 1)]
+    read = [one for one in link.Decoder(learns=True).feed(b"".join(sent)) if isinstance(one, link.Frame)]
+    return [one.message for one in read[1:]]
+
+
 def test_frames_of_the_schema_before_ticks_had_48_bits_are_those_of_today() -> None:
-    text = re.sub(r" (tick_high|sample_hash|first_tick):u\d+", "", link.SCHEMA_TEXT)
+    text = re.sub(r" (tick_high|sample_hash|first_tick):u\d+", "", TWO_SAMPLES)
     text = re.sub(r"(raw|raw_count) session:u32", r"\1", text)
-    old = zlib.crc32(text.encode())
-    assert old == 0xA1646BC5
+    assert zlib.crc32(text.encode()) == 0xA1646BC5
     raw = link.Raw.of_values([1.0, 2.0], [3.0, 4.0])
-    sent = [
-        link.encode_raw(link.Schema.TYPE, 0, 0, text.encode(), old),
-        link.encode_raw(link.Raw.TYPE, 1, 9, raw.phi_y, old),
-        link.encode_raw(link.Hash.TYPE, 2, 9, struct.pack("<II", 7, 8), old),
-    ]
-    frames = [one for one in link.Decoder(learns=True).feed(b"".join(sent)) if isinstance(one, link.Frame)]
-    assert [one.message for one in frames[1:]] == [raw, link.Hash(7, hash=8)]
+    found = of_schema(text, (link.Raw.TYPE, raw.data), (link.Hash.TYPE, struct.pack("<II", 7, 8)))
+    assert found == [raw, link.Hash(7, hash=8)]
+
+
+def test_frames_of_two_samples_and_six_parameters_are_those_of_today() -> None:
+    assert zlib.crc32(TWO_SAMPLES.encode()) == 0xE1F24363
+    p = tuple(float(i) for i in range(6))
+    triangle = [10.0 * i + j for i in range(6) for j in range(i, 6)]
+    hello = struct.pack("<BBBHIIf2f6f16sH", 1, 0, 4, 256, 5, 6, 1e3, 0.25, 0.5, *p, b"old", 3)
+    configure = struct.pack("<IIBBHHHB24ffffQ", 6, 5, 1, 1, 50, 60, 1, 0, *p, *p, *p, *p, 0.5, 2.0, 3.0, 1 << 40)
+    estimate = struct.pack("<II6f21f3fBH", 6, 4, *p, *triangle, 0.5, 0.25, 8.0, 2, 3)
+    fixed = struct.pack("<II6i6i21iiiIBH", 6, 4, *range(6), *range(6), *range(21), 1, 2, 3, 2, 3)
+    counted = struct.pack("<IH4i", 6, 0, 1, 2, 3, 4)
+    found = of_schema(TWO_SAMPLES, (1, hello), (3, configure), (6, estimate), (13, fixed), (12, counted), (11, b""))
+    eight = (*p, 0.0, 0.0)
+    assert found[0] == link.Hello(1, 0, 4, 256, 5, 6, 1e3, 0.25, 0.5, eight, "old", tick_high=3, samples=2)
+    assert found[1] == link.Configure(
+        6, 5, 1, 1, 50, 60, 1, 0, eight, eight, eight, eight, 0.5, 2.0, 3.0, first_tick=1 << 40
+    )
+    assert isinstance(found[2], link.Estimate) and found[2].p == eight
+    covariance = found[2].in_si(np.ones(8), 0.0)[1]
+    assert covariance[2, 5] == covariance[5, 2] == 25.0 and covariance[5, 5] == 55.0 and not covariance[6:].any()
+    assert isinstance(found[3], link.EstimateQ31) and found[3].p == (*range(6), 0, 0)
+    assert isinstance(found[4], link.RawCount) and found[4].values.tolist() == [[1, 2], [3, 4]]
+    assert found[5] == link.Count(b"")
+
+
+@pytest.mark.parametrize("samples", [0, 9, 255])
+def test_a_frame_of_no_samples_or_too_many_a_tick_is_damage(samples: int) -> None:
+    payload = struct.pack("<IHB", 1, 0, samples) + bytes(72)
+    items = link.Decoder().feed(link.encode_raw(link.Raw.TYPE, 0, 0, payload))
+    assert [item.why for item in items if isinstance(item, link.Loss)] == ["layout"]
 
 
 def test_a_tick_has_48_bits_where_a_board_sends_it() -> None:

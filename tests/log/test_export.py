@@ -178,15 +178,23 @@ def test_an_export_that_fails_leaves_nothing(tmp_path: Path, log: Path) -> None:
 
 
 def test_fixed_point_is_exported_in_si() -> None:
-    hello = link.Hello(1, 1, 4, 0, 0, 7, 1000.0, 2**-12, 2**-16, (2**-10, 2**-20, 2**-20, 2**-24, 0.0, 0.0), "x")
-    correlation = [0] * 21
-    for place in (0, 6, 11, 15):  # the diagonal
+    hello = link.Hello(1, 1, 4, 0, 0, 7, 1000.0, 2**-12, 2**-16, (2**-10, 2**-20, 2**-20, 2**-24, *[0.0] * 4), "x")
+    correlation = [0] * 36
+    for place in (0, 8, 15, 21):  # the diagonal
         correlation[place] = 2**30
     estimate = link.EstimateQ31(
-        7, 9, (32440, 9305000, 5898000, 64, 0, 0), (11, 22, 33, 44, 0, 0), tuple(correlation), 2**23, 512, 5, 0
+        7,
+        9,
+        (32440, 9305000, 5898000, 64, 0, 0, 0, 0),
+        (11, 22, 33, 44, 0, 0, 0, 0),
+        tuple(correlation),
+        2**23,
+        512,
+        5,
+        0,
     )
     configure = link.ConfigureQ31(
-        7, 0, 1, 1, 1, 1, 1, (0,) * 6, (0,) * 6, (0,) * 6, (0,) * 6, 256, 0, 0, phi_offset=3, y_offset=0
+        7, 0, 1, 1, 1, 1, 1, (0,) * 8, (0,) * 8, (0,) * 8, (0,) * 8, 256, 0, 0, phi_offset=3, y_offset=0
     )
     raw = link.RawCount.of_values([4096, -2048], [1, 2])
     sent = [(0, hello), (0, configure), (0, raw), (2, estimate)]
@@ -313,7 +321,7 @@ def test_the_tee_speaks_teleplot(listener: socket.socket, sent: list[tuple[int, 
 
 
 def test_teleplots_times_have_all_digits_at_any_rate(listener: socket.socket) -> None:
-    hello = link.Hello(1, 0, 4, 0, 0, 7, 16_000.0, 1e-4, 1e-6, (1.0,) * 6, "fast")
+    hello = link.Hello(1, 0, 4, 0, 0, 7, 16_000.0, 1e-4, 1e-6, (1.0,) * 8, "fast")
     raw = link.Raw.of_values(np.arange(40), np.arange(40))
     got = [one for data in teed("teleplot", listener, [(0, hello), (0, raw)]) for one in as_teleplot_reads(data)]
     times = [when for name, when, _, _ in got if name == "samples.phi"]

@@ -642,11 +642,11 @@ def test_cause_of_a_broken_link_is_reported(tmp_path: Path) -> None:
 
 
 def test_the_status_line_shows_the_estimate_of_either_core(tmp_path: Path) -> None:
-    p_unit = (2**-10, 2**-20, 2**-20, 2**-24, 0.0, 0.0)
+    p_unit = (2**-10, 2**-20, 2**-20, 2**-24, *[0.0] * 4)
     hello = link.Hello(1, 1, 4, 0, 0, 7, 1000.0, 2**-12, 2**-16, p_unit, "x")
-    fixed = link.EstimateQ31(7, 9, (32440, 9305000, 5898000, 64, 0, 0), (1,) * 6, (0,) * 21, 2**23, 512, 5, 0)
+    fixed = link.EstimateQ31(7, 9, (32440, 9305000, 5898000, 64, 0, 0, 0, 0), (1,) * 8, (0,) * 36, 2**23, 512, 5, 0)
     p = tuple(count * unit for count, unit in zip(fixed.p, p_unit, strict=True))
-    floating = link.Estimate(7, 9, p, (0.0,) * 21, 0.01, 1.0, 5.0, 0)
+    floating = link.Estimate(7, 9, p, (0.0,) * 36, 0.01, 1.0, 5.0, 0)
     assert StatusLine(io.StringIO()).line(Account(), 0.0) == "the link is not up yet"
     for number, estimate in enumerate((fixed, floating)):
         frames = list(field_board.frames([(0, hello), (0, link.Raw.of_values([1.0], [2.0])), (160, estimate)]))

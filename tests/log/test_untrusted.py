@@ -289,23 +289,42 @@ def test_a_flood_is_recorded_and_what_is_not_decoded_is_counted(
 
 def test_a_tail_reads_what_was_there_and_skips_what_comes_too_fast(tmp_path: Path) -> None:
     path, sent = tmp_path / "log", LyingBoard().honest()
-    path.write_bytes(sent * 20)
-    stream = LogStream()
-    with path.open("rb") as file, path.open("ab") as more:
+    writer, stream = LogWriter(path), LogStream()
+    writer.begin("a port", None)
+    writer.take(sent * 20)
+    there = path.stat().st_size
+    with path.open("rb") as file:
         tail = LogTail(file, stream, most_behind=100_000)
         read = 0
         while data := tail.read():
             read += len(data)
             list(stream.feed(data))
-        assert (read, stream.account.unread) == (len(sent) * 20, 0)
-        more.write(sent * 100)
-        more.flush()
+        assert (read, stream.account.unread) == (there, 0)
+        writer.take(sent * 100)
         while data := tail.read():
             list(stream.feed(data))
+    writer.close()
     account = stream.account
     assert len(sent) * 90 < account.unread < len(sent) * 100 and account.bytes == path.stat().st_size
     assert (account.damaged, account.missing, account.missing_samples) == (0, 0, 0)
     assert account.samples % 20 == 0 and account.samples > 20 * TICKS
+
+
+def test_a_tail_does_not_skip_the_begin_of_a_recording(tmp_path: Path) -> None:
+    """A board floods before the reader has seen more than the log's header: its segment has begun none the less, and
+    with it the recording's duration."""
+    path, sent = tmp_path / "log", LyingBoard().honest()
+    writer, stream = LogWriter(path), LogStream()
+    with path.open("rb") as file:
+        tail = LogTail(file, stream, most_behind=100_000)
+        list(stream.feed(tail.read()))
+        writer.begin("a port", None)
+        writer.take(sent * 100)
+        while data := tail.read():
+            list(stream.feed(data))
+    writer.close()
+    assert stream.account.begun == 1
+    assert stream.account.unread > 100_000
 
 
 def test_segments_and_the_summary_are_of_bounded_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -79,7 +79,7 @@ def _wrong_in(name: str, place: int) -> Callable[[link.Estimate], link.Estimate]
     [
         (_wrong_in("p", 1), "d1"),
         (_wrong_in("covariance", 1), "covariance of w and d1"),
-        (_wrong_in("covariance", 12), "covariance of d2 and c"),
+        (_wrong_in("covariance", 16), "covariance of d2 and c"),
         (lambda message: replace(message, kappa=_flipped(message.kappa)), "kappa"),
         (lambda message: replace(message, residual_sd=_flipped(message.residual_sd)), "residual sd"),
         (lambda message: replace(message, weight=_flipped(message.weight)), "weight"),
@@ -112,7 +112,7 @@ def test_one_wrong_sample_is_found_by_the_hash(tmp_path: Path, sent: Sent) -> No
     assert isinstance(message, link.Raw)
     values = message.values.copy()
     values[3, 0] += np.float32(field_board.rig().sensor.phi_lsb)  # one step of the encoder, once
-    wrong = [*sent[:place], (tick, replace(message, phi_y=values.tobytes())), *sent[place + 1 :]]
+    wrong = [*sent[:place], (tick, replace(message, data=values.tobytes())), *sent[place + 1 :]]
     (stretch,) = verified(tmp_path / "a.pvlog", list(field_board.frames(wrong)))
     found = stretch.difference
     assert found is not None and found.variable == "hash of the samples"
@@ -134,8 +134,8 @@ def test_only_samples_before_an_equal_hash_are_verified(tmp_path: Path, sent: Se
         part = [one for one in sent if one[0] <= kept and not (isinstance(one[1], link.Raw) and one[0] >= kept)]
         place, (tick, message) = [(i, one) for i, one in enumerate(part) if isinstance(one[1], link.Raw)][-1]
         assert isinstance(message, link.Raw)
-        phi_y = bytes([message.phi_y[0] ^ 1]) + message.phi_y[1:]
-        part[place] = tick, replace(message, phi_y=phi_y)
+        data = bytes([message.data[0] ^ 1]) + message.data[1:]
+        part[place] = tick, replace(message, data=data)
         (stretch,) = verified(tmp_path / str(kept), list(field_board.frames(part)))
         if is_open:
             assert (stretch.difference, stretch.verified, stretch.open) == (None, verified_ticks, True)
@@ -186,7 +186,7 @@ def test_board_without_sample_hash_confirms_processed_samples(tmp_path: Path, se
     assert isinstance(message, link.Raw)
     values = message.values.copy()
     values[:, 0] += np.float32(0.01)
-    wrong = [*older[:at], (tick, replace(message, phi_y=values.tobytes())), *older[at + 1 :]]
+    wrong = [*older[:at], (tick, replace(message, data=values.tobytes())), *older[at + 1 :]]
     (changed,) = verified(tmp_path / "b", list(field_board.frames(wrong)))
     assert changed.difference is not None
 
@@ -362,9 +362,9 @@ def _wrong_sample(message: link.Message) -> link.Message | None:
     """The last bit of the first angle."""
     if not isinstance(message, link.Raw | link.RawCount):
         return None
-    phi_y = bytearray(message.phi_y)
-    phi_y[0] ^= 1
-    return replace(message, phi_y=bytes(phi_y))
+    data = bytearray(message.data)
+    data[0] ^= 1
+    return replace(message, data=bytes(data))
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_estimate_outside_the_physical_region_is_reported(sent: list[bytes]) -> 
         assert isinstance(item, link.Frame)
         wild = item.message
         if isinstance(wild, link.Estimate):
-            wild = replace(wild, p=(11.56, 0.25, 0.2, 0.0, 0.0, 0.0))
+            wild = replace(wild, p=(11.56, 0.25, 0.2, *[0.0] * 5))
         frames.append(link.encode(wild, item.sequence, item.tick))
     seen = view_of(frames)
     assert "g*, l2, rho2" in seen and "outside the physical region" in seen and "radius of gyration" not in seen
@@ -215,7 +215,7 @@ def test_the_view_costs_the_same_however_many_frames_come(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(Values, "rows", counted)
     points, n = 50, field_board.SAMPLES_A_FRAME
-    estimate = link.Estimate(7, 1, (31.0, 9.0, 5.0, 0.0, 0.0, 0.0), (1e-6,) * 21, 0.01, 1e-4, 1.0, 0)
+    estimate = link.Estimate(7, 1, (31.0, 9.0, 5.0, *[0.0] * 5), (1e-6,) * 36, 0.01, 1e-4, 1.0, 0)
     spent = []
     for frames in (200, 20_000):
         history = History(MECHANISM, points=points)

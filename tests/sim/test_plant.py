@@ -204,6 +204,15 @@ def test_soft_friction_comes_near_the_sharp_one() -> None:
     assert near < 0.2 * far < 0.2 * np.ptp(sharp)
 
 
+def test_friction_on_a_driven_velocity_reverses_with_it() -> None:
+    """Y is the force that moves a carriage along a given path F: no friction can hold what is driven."""
+    plant = Plant(described([Y - 3 * F.d() - 2 * sgn(F.d())], [Y], force="sampled"))
+    path = Sines(((0.5, 0.7, 0.3),))
+    moved = plant.driven(np.array([]), plant.start({}), {"F": path}, 100.0, 600)
+    rate = path.values(np.arange(600) / 100.0, 1)
+    np.testing.assert_allclose(moved["y"], 3 * rate + 2 * np.sign(rate), atol=1e-6)
+
+
 def test_two_frictions_stick_and_let_go_together() -> None:
     """Two blocks coupled by a stiff damper, pushed as one: they move like one block."""
     pull = 200 * (X.d() - Y.d())

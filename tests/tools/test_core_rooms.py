@@ -11,9 +11,10 @@ import pytest
 
 from pvid.core.sources import INCLUDES, MODEL, SRC, core_sources
 
-# Each room may use itself and those before it; the two forms do not use each other.
-ROOMS = ("number", "solve", MODEL.name, "judge", "strong", "weak", "keep")
-STRANGERS = {("weak", "strong"), ("strong", "weak")}
+# Each room may use itself and those before it; the forms do not use each other.
+ROOMS = ("number", "solve", MODEL.name, "judge", "strong", "weak", "fourier", "keep")
+FORMS = ("strong", "weak", "fourier")
+STRANGERS = {(a, b) for a in FORMS for b in FORMS if a != b}
 
 Graph = dict[str, set[str]]
 

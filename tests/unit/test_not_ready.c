@@ -237,6 +237,8 @@ static void estimators_and_differentiators_do_nothing_either(void **state)
         pvid_estimator_q31 *self_q31 = (i == 0) ? &estimator_q31 : NULL;
         assert_int_equal(pvid_estimator_step_f32(self, n, 0.0f), PVID_NOT_READY);
         assert_int_equal(pvid_estimator_add_f32(self, n, 0.0f), PVID_NOT_READY);
+        assert_int_equal(pvid_estimator_add_kind_f32(self, 0, n, 0.0f), PVID_NOT_READY);
+        assert_int_equal(pvid_estimator_add_to_b_f32(self, n), PVID_NOT_READY);
         assert_int_equal(pvid_estimator_update_f32(self), PVID_NOT_READY);
         assert_int_equal(pvid_estimator_iterate_f32(self), PVID_NOT_READY);
         pvid_estimator_place_f32(self, n);

@@ -323,7 +323,8 @@ static void products_by_pattern_are_those_of_whole_matrices(void **state)
             }
         }
         float force[4];
-        pvid_pattern_transpose_times_f32(model, c, x, force);
+        const pvid_block whole = {0, model->n_theta, 0};
+        pvid_pattern_transpose_times_f32(model, c, &whole, x, force);
         for (size_t a = 0; a < model->n_p; a++) {
             const size_t start = pvid_pattern_start_f32(model, a);
             const size_t end = pvid_pattern_end_f32(model, start);

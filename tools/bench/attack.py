@@ -10,7 +10,9 @@ from __future__ import annotations
 import contextlib
 import io
 import itertools
+import json
 import multiprocessing
+import os
 import random
 import re
 import resource
@@ -170,21 +172,56 @@ def campaign(
     processes: int,
     progress: Callable[[int], None] | None = None,
     keep: Path | None = None,
+    done: Path | None = None,
 ) -> list[Tally]:
-    """Tries `mutants` of each kind, in chunks, in several processes; a tally of each kind."""
+    """Tries `mutants` of each kind, in chunks, in several processes; a tally of each kind.
+
+    Parameters
+    ----------
+    done
+        File of finished chunks, a line each: those in it are counted and left out, the others are added.
+    """
     tallies = {kind: Tally(kind, seed) for kind in kinds}
-    chunks = [
+    chunks: list[Chunk] = [
         (kind, min(_CHUNK, mutants - first), seed, first) for first in range(0, mutants, _CHUNK) for kind in kinds
     ]
+    known = {} if done is None else _finished(done)
+    for chunk in chunks:
+        if chunk in known:
+            tallies[chunk[0]].add(known[chunk])
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")  # matrices of a few rows: more threads only wait for one another
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=context, max_tasks_per_child=1) as pool:
-        running = [pool.submit(_chunk, *chunk, keep) for chunk in chunks]
-        for done in as_completed(running):
-            tally = done.result()
+        running = {pool.submit(_chunk, *chunk, keep): chunk for chunk in chunks if chunk not in known}
+        for one in as_completed(running):
+            tally = one.result()
             tallies[tally.kind].add(tally)
+            if done is not None:
+                _append_finished(done, running[one], tally)
             if progress is not None:
-                progress(sum(one.tried for one in tallies.values()))
+                progress(sum(each.tried for each in tallies.values()))
     return list(tallies.values())
+
+
+Chunk = tuple[str, int, int, int]  # kind, mutants, seed, number of the first
+
+
+def _finished(path: Path) -> dict[Chunk, Tally]:
+    """Tallies of the chunks in a file; none without it."""
+    found = {}
+    for line in path.read_text().splitlines() if path.exists() else ():
+        kind, mutants, seed, first, codes, defects, longest_s, slowest = json.loads(line)
+        found[kind, mutants, seed, first] = Tally(
+            kind, seed, mutants, Counter(dict(codes)), [tuple(one) for one in defects], longest_s, tuple(slowest)
+        )
+    return found
+
+
+def _append_finished(path: Path, chunk: Chunk, tally: Tally) -> None:
+    with path.open("a") as file:
+        line = [*chunk, list(tally.codes.items()), tally.defects, tally.longest_s, tally.slowest]
+        file.write(json.dumps(line) + "\n")
 
 
 def _chunk(kind: str, mutants: int, seed: int, first: int, keep: Path | None) -> Tally:
@@ -264,10 +301,14 @@ def _runs(draw: random.Random, run: Run) -> _Mutants:
 
 
 def _commands(draw: random.Random, run: Run) -> _Mutants:
-    """Command lines; what they wrote is removed."""
-    keep = {"run.csv", "run.toml"}
+    """Command lines, none twice; what they wrote is removed."""
+    keep, drawn = {"run.csv", "run.toml"}, set()
     while True:
-        yield command_line(draw), None
+        line = command_line(draw)
+        if tuple(line) in drawn:
+            continue
+        drawn.add(tuple(line))
+        yield line, None
         for path in Path().iterdir():
             if path.name not in keep and path.is_file():
                 path.unlink()

@@ -6,7 +6,9 @@ import importlib
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -15,6 +17,9 @@ from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
+
+if TYPE_CHECKING:
+    from bench.recorded_rigs import Rig
 
 
 @click.group()
@@ -166,6 +171,41 @@ def bench_compare_methods(update: Path | None) -> int:
     return DONE
 
 
+def _put_rigs(rigs: Sequence[Rig], update: Path | None, prefix: str = "") -> None:
+    """The tables of recorded rigs."""
+    from bench import recorded_rigs
+
+    for name, header, rows_of in (
+        ("recordings", recorded_rigs.HEADER, recorded_rigs.value_rows),
+        ("predictions", recorded_rigs.PREDICTIONS, recorded_rigs.prediction_rows),
+        ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
+    ):
+        put_table(update, prefix + name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
+
+
+@bench.command(name="kept-recordings")
+@click.option("--cut", "archives", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@UPDATE
+def bench_kept_recordings(archives: Path | None, update: Path | None) -> int:
+    """Likewise, the real rigs whose recordings are in tests/data/recordings.
+
+    --cut writes the pieces anew from the unpacked archives ARCHIVES/NAME-VERSION of the packages that hold them.
+    """
+    from bench import kept_recordings, recorded_rigs, recordings
+
+    if archives is not None:
+        for source in kept_recordings.KEPT:
+            for path in recordings.write_source(source, archives, recordings.MECHANISMS):
+                write_stderr(f"{path} written")
+        return DONE
+    rigs = list(recorded_rigs.rigs(recordings.MECHANISMS, kept_recordings.KEPT))
+    _put_rigs(rigs, update, "kept-")
+    faults = [fault for rig in rigs for fault in recorded_rigs.missed(rig)]
+    for fault in faults:
+        write_stderr(f"pvid: {fault}")
+    return DIFFERENT if faults else DONE
+
+
 @bench.command(name="recordings")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False))
@@ -183,12 +223,7 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
                 write_stderr(f"{path} written")
         return DONE
     rigs = list(recorded_rigs.rigs(folder))
-    for name, header, rows_of in (
-        ("recordings", recorded_rigs.HEADER, recorded_rigs.value_rows),
-        ("predictions", recorded_rigs.PREDICTIONS, recorded_rigs.prediction_rows),
-        ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
-    ):
-        put_table(update, name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
+    _put_rigs(rigs, update)
     traps = [row for rig in rigs for row in recorded_rigs.trap_rows(rig.source, folder)]
     put_table(update, "traps", markdown(recorded_rigs.TRAPS, traps))
     faults = [fault for rig in rigs for fault in recorded_rigs.missed(rig)]
@@ -351,16 +386,27 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
 @click.option("--only", type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again.")
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for files that caused a defect.")
+@click.option(
+    "--done",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="File of finished chunks: a run that was stopped continues behind them.",
+)
 @UPDATE
 def bench_attack(
-    mutants: int, seed: int, only: tuple[str, ...], processes: int, keep: Path | None, update: Path | None
+    mutants: int,
+    seed: int,
+    only: tuple[str, ...],
+    processes: int,
+    keep: Path | None,
+    done: Path | None,
+    update: Path | None,
 ) -> int:
     """Runs mutated rig files, runs and command lines, and counts defects."""
     from bench.attack import HEADER, KINDS, campaign
 
     kinds = only or KINDS
     with progress_bar("mutants", mutants * len(kinds)) as advance:
-        tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve())
+        tallies = campaign(kinds, mutants, seed, processes, advance, keep and keep.resolve(), done)
     for tally in tallies:
         for arguments, wrong, number in tally.defects:
             write_stderr(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")

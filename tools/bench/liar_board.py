@@ -67,6 +67,8 @@ Step = bytes | Pause | HangUp | Flood
 def message(kind: type[Kind], **values: Any) -> Kind:
     """A message of these values; 0, no text and no bytes where a field is not named."""
     for one in fields(kind):
+        if one.name == "samples" and one.name not in values:
+            values[one.name] = 2
         if one.name not in values:
             count, of = one.metadata["count"], one.metadata["kind"]
             zero: Any = 0.0 if of == "f32" else 0
@@ -112,8 +114,8 @@ def _honest_run() -> tuple[tuple[int, Message], ...]:
             Estimate,
             session=SESSION,
             updates=identifier.counters["updates"],
-            p=tuple(map(float, assessed["p"])),
-            covariance=tuple(map(float, assessed["covariance"][np.triu_indices(MAX_P)])),
+            p=(*map(float, assessed["p"]), *[0.0] * (MAX_P - len(assessed["p"]))),
+            covariance=link.upper_triangle(assessed["covariance"]),
             kappa=float(assessed["kappa"]),
             residual_sd=float(assessed["residual_sd"]),
             weight=float(assessed["weight"]),
@@ -169,6 +171,7 @@ class LyingBoard:
             "y_lsb": board.y_lsb,
             "p_unit": board.p_unit,
             "board": "liar",
+            "samples": 2,
         }
         return message(Hello, **{**honest, **values})
 
@@ -186,8 +189,8 @@ class LyingBoard:
         plausible = {
             "session": SESSION,
             "updates": 5,
-            "p": (31.0, 8.8, 5.6, 0.0, 0.0, 0.0),
-            "covariance": (1e-6,) * 21,
+            "p": (31.0, 8.8, 5.6, *[0.0] * (MAX_P - 3)),
+            "covariance": (1e-6,) * len(link.upper_triangle([[0.0]])),
             "kappa": 0.01,
             "residual_sd": 1e-4,
             "weight": 10.0,

@@ -40,6 +40,7 @@ from pvid.link.frames import (
     EstimateQ31,
     Hash,
     Hello,
+    Names,
     Raw,
     RawCount,
     Schema,
@@ -53,6 +54,7 @@ NAN, INF, HUGE, TINY = math.nan, math.inf, 3e38, 1e-45
 ABSURD = (NAN, INF, -INF, HUGE, -1.0, 0.0, TINY)
 ESCAPES = "\x1b]0;PWN\x07\x1b[31m"
 LARGEST = 2**31 - 1
+_PAIRS = MAX_P * (MAX_P + 1) // 2  # of parameters
 
 
 @dataclass(frozen=True)
@@ -267,13 +269,13 @@ def _numbers_of_parameters(board: LyingBoard) -> Steps:
 
 @_lie(honest_first=False)
 def _forms_and_cores_that_there_are_not(board: LyingBoard) -> Steps:
-    yield from _hellos(board, "form", (2, 255))
+    yield from _hellos(board, "form", (3, 255))
     yield from _hellos(board, "core", (2, 255))
 
 
 @_lie(honest_first=False)
 def _the_other_form_and_the_other_core(board: LyingBoard) -> Steps:
-    yield from _hellos(board, "form", (0,))
+    yield from _hellos(board, "form", (0, 2))
     yield from _hellos(board, "core", (1,))
 
 
@@ -388,6 +390,59 @@ def _configurations_without_end(board: LyingBoard) -> Steps:
         yield board.say(board.configure(session=i + 1))
 
 
+# ---- names
+
+
+# What a board says about its mechanism; the last three are mechanisms that there can be.
+NAMED = (
+    b"",
+    b"motor",
+    b"motor\np R ohm",
+    b"motor\nsample V V",
+    b"\x1b]0;PWN\x07\nsample V V\np R ohm",
+    b"motor\nsample \x1b[31m V\np R ohm",
+    b"motor\nsample V V\np R \x1b[31m",
+    b"motor\nsample V V\nsample V V\np R ohm",
+    b"motor\nsample t s\np R ohm",
+    b"motor\nsample V V\np R ohm\np R_se ohm",
+    b"motor\nsample V V\np kappa 1",
+    b"motor\nsample V V\np R ohm\n" * 2,
+    b"motor\nsample V V" + b"\np R ohm" * 9,
+    b"motor\n" + b"\n".join(b"sample s%d" % i for i in range(9)) + b"\np R ohm",
+    b"motor\nsample V V\np " + b"R" * 33,
+    b"motor\nsample V V\np R " + b"m" * 25,
+    b"motor\nsample V V\np R o;m:1|2,",
+    b"\xff" * 2000,
+    b"kapitza\nsample y m\nsample phi rad\np w",
+    b"motor\nsample V V\np R ohm",
+    b"pump\nsample V V\nsample i A\nsample q\np a\np b\np c\np d\np e\np f\np g\np h",
+)
+
+
+@_lie(honest_first=False)
+def _names_that_are_none_and_names_of_others(board: LyingBoard) -> Steps:
+    for number, text in enumerate(NAMED):
+        yield board.say(message(Names, text=text))
+        yield board.say(board.samples(), number * PER_FRAME)
+        yield board.say(board.estimate(), (number + 1) * PER_FRAME)
+
+
+@_lie(honest_first=False)
+def _another_mechanism_all_the_time(board: LyingBoard) -> Steps:
+    for number in range(300):
+        yield board.say(message(Names, text=b"m%d\nsample s%d V\np p%d ohm" % (number, number, number)))
+        yield board.say(board.samples(), number * PER_FRAME)
+        yield board.say(board.estimate(), (number + 1) * PER_FRAME)
+
+
+@_lie(1, honest_first=False)
+def _samples_of_any_number_a_tick(board: LyingBoard) -> Steps:
+    for number in range(256):
+        payload = bytes([7, 0, 0, 0, 0, 0, number]) + b"\0" * (4 * PER_FRAME)
+        yield board.raw(Raw.TYPE, payload, number * PER_FRAME)
+    yield from _hellos(board, "samples", (0, 1, 3, 8, 9, 255))
+
+
 # ---- estimates, hashes, credits
 
 
@@ -395,7 +450,7 @@ def _configurations_without_end(board: LyingBoard) -> Steps:
 def _estimates_that_are_no_numbers(board: LyingBoard) -> Steps:
     for p in (*ABSURD, 1e30):
         for variance in (*ABSURD, 1e30):
-            told = {"p": (p,) * MAX_P, "covariance": (variance,) * 21}
+            told = {"p": (p,) * MAX_P, "covariance": (variance,) * _PAIRS}
             yield board.say(board.estimate(**told), TICKS)
             yield board.say(board.estimate(**told, kappa=NAN, residual_sd=INF, weight=-1.0), TICKS)
 
@@ -417,14 +472,16 @@ def _reasons_that_there_are_not(board: LyingBoard) -> Steps:
 @_lie()
 def _estimates_beyond_physics(board: LyingBoard) -> Steps:
     for p in ((31.0, 8.0, 7.0), (-31.0, 8.0, 5.0), (31.0, 0.0, 0.0), (1e-30, 1.0, 1.0), (1e30, 1e30, -1e30)):
-        yield board.say(board.estimate(p=(*p, 0.0, 0.0, 0.0)), TICKS)
+        yield board.say(board.estimate(p=(*p, *[0.0] * (MAX_P - 3))), TICKS)
 
 
 @_lie()
 def _estimates_of_the_other_core(board: LyingBoard) -> Steps:
     for value in (0, LARGEST, -LARGEST - 1):
         told = {name: (value,) * MAX_P for name in ("p", "se")}
-        yield board.say(message(EstimateQ31, **told, correlation=(value,) * 21, kappa=value, residual_sd=value), TICKS)
+        yield board.say(
+            message(EstimateQ31, **told, correlation=(value,) * _PAIRS, kappa=value, residual_sd=value), TICKS
+        )
 
 
 @_lie()
@@ -690,7 +747,7 @@ def _frames_with_a_wrong_crc(board: LyingBoard) -> Steps:
 
 @_lie()
 def _frames_of_the_longest_payload(board: LyingBoard) -> Steps:
-    longest = (MAX_PAYLOAD - len(Raw(b"").payload)) // 8
+    longest = (MAX_PAYLOAD - len(Raw(b"").payload)) // 8  # ticks of two samples
     for tick in range(TICKS, TICKS + 20 * longest, longest):
         yield board.say(board.samples(count=longest), tick)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,6 +68,9 @@ DESIGNS: Mapping[str, Design] = {
     "free_pendulum": Design(1.0, 13, decimation=4),
     "free_double_pendulum": Design(1.0, 13, decimation=4),
     "cell_dmegc": Design(600.0, 12, sensors_only=True),
+    "motor_generator": Design(6.0, 12),
+    "bicycle_fork": Design(4.8, 8),
+    "torso_lift": Design(10.0, 20, rate_taps=5),
 }
 
 
@@ -146,9 +149,9 @@ def rig_of(source: Source, runs: tuple[Recording, Recording], design: Design) ->
     return Rig(source, model, runs, (first, second))
 
 
-def rigs(folder: Path) -> Iterator[Rig]:
-    """Of the pieces that `bench recordings --cut` wrote."""
-    for source in SOURCES:
+def rigs(folder: Path, sources: Sequence[Source] = SOURCES) -> Iterator[Rig]:
+    """Of the pieces that `bench recordings --cut` wrote, or of those kept in tests/data/recordings."""
+    for source in sources:
         first, second = (source.load(folder, piece) for piece in PIECES)
         yield rig_of(source, (first, second), DESIGNS[source.name])
 

@@ -1,8 +1,8 @@
 """Real hardware, recorded by other laboratories: where the recordings are, and how a short piece of each is cut.
 
-The recordings themselves are not in this repository. `./tools/pvid bench recordings FOLDER --cut CHECKOUTS`
-cuts two pieces of each from checkouts CHECKOUTS/OWNER/NAME of the public repositories: one to identify from, one to
-predict. The mechanisms are those of tests/data/recordings.
+The recordings of SOURCES are not in this repository; `./tools/pvid bench recordings FOLDER --cut CHECKOUTS` cuts two
+pieces of each from checkouts CHECKOUTS/OWNER/NAME of the public repositories: one to identify from, one to predict.
+Pieces from packages are kept here, see bench.kept_recordings. The mechanisms are those of tests/data/recordings.
 """
 
 from __future__ import annotations
@@ -48,6 +48,63 @@ class Piece:
 
 
 @dataclass(frozen=True)
+class Repository:
+    """A public repository, whose recordings are not copied into this one.
+
+    Attributes
+    ----------
+    name : owner/name
+    commit : that the figures of the docs are from
+    """
+
+    name: str
+    commit: str
+
+    @property
+    def folder(self) -> str:
+        """Of its checkout."""
+        return self.name
+
+    @property
+    def request(self) -> str:
+        """What a user must do to have it there."""
+        return f"check out {self.name} at {self.commit} there"
+
+    def __str__(self) -> str:
+        """For a table of origins."""
+        return f"{self.name}, commit {self.commit}"
+
+
+@dataclass(frozen=True)
+class Package:
+    """The source archive of a Python package: what is cut from its recordings is kept in tests/data/recordings.
+
+    Attributes
+    ----------
+    name, version : as the package registry has them
+    licence : path of its text
+    """
+
+    name: str
+    version: str
+    licence: str
+
+    @property
+    def folder(self) -> str:
+        """Of the unpacked archive."""
+        return f"{self.name}-{self.version}"
+
+    @property
+    def request(self) -> str:
+        """What a user must do to have it there."""
+        return f"unpack the source archive of the Python package {self.name} {self.version} there"
+
+    def __str__(self) -> str:
+        """For a table of origins."""
+        return f"Python package {self.name} {self.version}, source archive"
+
+
+@dataclass(frozen=True)
 class Source:
     """Two recorded runs of one rig, and what its owners published about it.
 
@@ -55,8 +112,8 @@ class Source:
     ----------
     name : of the rig
     file : of the mechanism
-    repository, commit : owner/name, and the commit the figures of the docs are from
-    licence : of the repository, with its copyright line
+    origin : where the recordings are
+    licence : of the origin, with its copyright line
     read : a file and a part of it -> t [s] and signals of the mechanism in SI, by name
     identify, predict : the two pieces
     rate : samples a second of the pieces [Hz]; the recording's own rate unless given
@@ -65,12 +122,12 @@ class Source:
     published_at : where these stand
     knowns : constants of the mechanism that this rig has, where they differ from those of its file
     traps : further runs of the rig, by the alarm that they must raise: the mechanism cannot be identified from them
+    note : what a reader of the pieces must know, for PROVENANCE.md
     """
 
     name: str
     file: str
-    repository: str
-    commit: str
+    origin: Repository | Package
     licence: str
     read: Callable[[Path, int], Mapping[str, Float]]
     identify: Piece
@@ -82,6 +139,7 @@ class Source:
     published_at: str = ""
     knowns: Mapping[str, float] = field(default_factory=dict)
     traps: Mapping[str, Piece] = field(default_factory=dict)
+    note: str = ""
 
     def model(self) -> CompiledModel:
         """The compiled mechanism, with this rig's constants."""
@@ -95,16 +153,16 @@ class Source:
         return dict(zip(PIECES, (self.identify, self.predict), strict=True)) | dict(self.traps)
 
     def cut(self, checkouts: Path, piece: Piece) -> Recording:
-        """The piece, from a checkout of the repository at CHECKOUTS/OWNER/NAME.
+        """The piece, from a checkout of the repository at CHECKOUTS/OWNER/NAME or an archive at CHECKOUTS/NAME-VERSION.
 
         Raises
         ------
         PvidError
             When there is no such file.
         """
-        path = checkouts / self.repository / piece.path
+        path = checkouts / self.origin.folder / piece.path
         if not path.is_file():
-            raise PvidError(f"{path} does not exist: check out {self.repository} at {self.commit} there")
+            raise PvidError(f"{path} does not exist: {self.origin.request}")
         table = dict(self.read(path, piece.part))
         t = table.pop("t")
         later = np.append(True, np.diff(t) > 0)
@@ -132,6 +190,9 @@ def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
         write_recording(paths[-1], source.cut(checkouts, piece), source.channels)
     paths.append(place / "PROVENANCE.md")
     write_whole(paths[-1], provenance(source).encode())
+    if isinstance(source.origin, Package):
+        paths.append(place / "LICENSE.txt")
+        write_whole(paths[-1], (checkouts / source.origin.folder / source.origin.licence).read_bytes())
     return paths
 
 
@@ -148,20 +209,33 @@ def provenance(source: Source) -> str:
         [
             f"# {source.name}",
             "",
-            f"Recorded by others: {source.repository}, commit {source.commit}.",
-            f"Licence: {source.licence}. Its text is the file LICENSE of that repository.",
+            f"Recorded by others: {source.origin}.",
+            f"Licence: {source.licence}. {_where_licence(source.origin)}",
             "",
             f"Columns: t [s], {columns}. Interpolated onto an even clock, rate: {rate}; rounded below the",
-            "resolution of the sensors. Cut by `./tools/pvid bench recordings FOLDER --cut CHECKOUTS`.",
+            f"resolution of the sensors. Cut by `{_command(source.origin)}`.",
             "",
             "| file | of | part | s |",
             "|---|---|---|---|",
             *pieces,
             "",
             f"Published there ({source.published_at}): {published}." if published else "No parameters are published.",
+            *(("", source.note) if source.note else ()),
             "",
         ]
     )
+
+
+def _where_licence(origin: Repository | Package) -> str:
+    if isinstance(origin, Package):
+        return "Its text is the file LICENSE.txt beside this one."
+    return "Its text is the file LICENSE of that repository."
+
+
+def _command(origin: Repository | Package) -> str:
+    if isinstance(origin, Package):
+        return "./tools/pvid bench kept-recordings --cut ARCHIVES"
+    return "./tools/pvid bench recordings FOLDER --cut CHECKOUTS"
 
 
 # ---- formats
@@ -215,14 +289,14 @@ def _random_discharge(path: Path, part: int) -> dict[str, Float]:
 
 _ANGLES = ("q1", "q2")
 _DFKI = "BSD 3-Clause, Copyright (c) {year}, DFKI RIC Underactuated Robotics Lab"
-_DOUBLE = "dfki-ric-underactuated-lab/double_pendulum"
-_DOUBLE_COMMIT = "1e8544e67f3da72a51ee52fbbb278e131ce2a43f"
-_SWINGS = "dynamicslab/MultiArm-Pendulum"
-_SWINGS_COMMIT = "e99a7e13fe2adc8fc647321a156b6cb59a48a698"
-_SINGLE = "dfki-ric-underactuated-lab/torque_limited_simple_pendulum"
-_SINGLE_COMMIT = "ed17ea2d32a35ad944944ca03ef57693e2986732"
-_CELL = "Silencefrog9305/Digital-Twins-for-Battery-Using-CTA-MTL"
-_CELL_COMMIT = "ec0fe7c0e6ceb8576086d3adc8232b7d14616deb"
+_DOUBLE = Repository("dfki-ric-underactuated-lab/double_pendulum", "1e8544e67f3da72a51ee52fbbb278e131ce2a43f")
+_SWINGS = Repository("dynamicslab/MultiArm-Pendulum", "e99a7e13fe2adc8fc647321a156b6cb59a48a698")
+_SINGLE = Repository(
+    "dfki-ric-underactuated-lab/torque_limited_simple_pendulum", "ed17ea2d32a35ad944944ca03ef57693e2986732"
+)
+_CELL = Repository(
+    "Silencefrog9305/Digital-Twins-for-Battery-Using-CTA-MTL", "ec0fe7c0e6ceb8576086d3adc8232b7d14616deb"
+)
 _TWO_LINK_CHANNELS = (
     Channel("q1", "rad", "angle of the upper link"),
     Channel("q2", "rad", "angle of the lower link to the upper"),
@@ -257,8 +331,7 @@ def _double(
     return Source(
         name=name,
         file="double_pendulum.py",
-        repository=_DOUBLE,
-        commit=_DOUBLE_COMMIT,
+        origin=_DOUBLE,
         licence=_DFKI.format(year=2022),
         read=_two_links,
         identify=Piece(f"{folder}/trajectory_{runs[0]:02d}.csv"),
@@ -296,8 +369,7 @@ SOURCES = (
     Source(
         name="simple_pendulum",
         file="simple_pendulum.py",
-        repository=_SINGLE,
-        commit=_SINGLE_COMMIT,
+        origin=_SINGLE,
         licence=_DFKI.format(year=2021),
         read=_one_link,
         identify=Piece("results/control_method_direct_collocation/data_measured.csv"),
@@ -316,8 +388,7 @@ SOURCES = (
     Source(
         name="free_pendulum",
         file="free_pendulum.py",
-        repository=_SWINGS,
-        commit=_SWINGS_COMMIT,
+        origin=_SWINGS,
         licence="MIT, Copyright (c) 2022 dynamicslab",
         read=_free_swing(("q",)),
         identify=Piece("ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat", part=0),
@@ -330,8 +401,7 @@ SOURCES = (
     Source(
         name="free_double_pendulum",
         file="free_double_pendulum.py",
-        repository=_SWINGS,
-        commit=_SWINGS_COMMIT,
+        origin=_SWINGS,
         licence="MIT, Copyright (c) 2022 dynamicslab",
         read=_free_swing(_ANGLES),
         identify=Piece(
@@ -348,8 +418,7 @@ SOURCES = (
     Source(
         name="cell_dmegc",
         file="cell_dmegc.py",
-        repository=_CELL,
-        commit=_CELL_COMMIT,
+        origin=_CELL,
         licence="MIT, Copyright (c) 2025 Silencefrog9305",
         read=_random_discharge,
         # both to 1.9 A h: a polynomial of the charge must not be extrapolated

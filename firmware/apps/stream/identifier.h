@@ -21,6 +21,7 @@
 #define IDENTIFIER_RAW_BYTES PVID_RAW_COUNT_BYTES /* before the samples */
 #define IDENTIFIER_RAW_SESSION PVID_RAW_COUNT_SESSION
 #define IDENTIFIER_RAW_TICK_HIGH PVID_RAW_COUNT_TICK_HIGH
+#define IDENTIFIER_RAW_SAMPLES PVID_RAW_COUNT_SAMPLES
 #define IDENTIFIER_ESTIMATE PVID_ESTIMATE_Q31
 #define IDENTIFIER_ESTIMATE_BYTES PVID_ESTIMATE_Q31_BYTES
 #define IDENTIFIER_ESTIMATE_TICK_HIGH PVID_ESTIMATE_Q31_TICK_HIGH
@@ -33,16 +34,17 @@
 #define IDENTIFIER_RAW_BYTES PVID_RAW_BYTES /* before the samples */
 #define IDENTIFIER_RAW_SESSION PVID_RAW_SESSION
 #define IDENTIFIER_RAW_TICK_HIGH PVID_RAW_TICK_HIGH
+#define IDENTIFIER_RAW_SAMPLES PVID_RAW_SAMPLES
 #define IDENTIFIER_ESTIMATE PVID_ESTIMATE
 #define IDENTIFIER_ESTIMATE_BYTES PVID_ESTIMATE_BYTES
 #define IDENTIFIER_ESTIMATE_TICK_HIGH PVID_ESTIMATE_TICK_HIGH
 #endif
 
-#define SAMPLE_BYTES 8u /* phi and y in a frame */
-#define LINK_MAX_P 6u   /* places for parameters in a frame */
+#define SAMPLE_BYTES (4u * STREAM_SAMPLES) /* the samples of a tick in a frame */
+#define LINK_MAX_P 8u                      /* places for parameters in a frame */
 
-#if PVID_MAX_P > 6
-#error "the frames hold six parameters"
+#if PVID_MAX_P > 8
+#error "the frames hold eight parameters"
 #endif
 
 /* Faults of the arithmetic that the bits hang on; 0 where there are none. */
@@ -51,8 +53,8 @@ uint32_t identifier_arithmetic_faults(void);
 /* Starts over with the settings of a Configure frame. */
 pvid_status identifier_start(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES]);
 
-/* What a sample of the board's own sensor is to the identifier, as in a frame. */
-void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES]);
+/* What counts of the board's own sensors are to the identifier, as in a frame. */
+void identifier_sample(const int32_t counts[STREAM_SAMPLES], uint8_t sample[SAMPLE_BYTES]);
 
 pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES]);
 

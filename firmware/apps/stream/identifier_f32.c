@@ -35,7 +35,7 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
     return STREAM_INIT(&identifier, &config);
 }
 
-void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES])
+void identifier_sample(const int32_t counts[STREAM_SAMPLES], uint8_t sample[SAMPLE_BYTES])
 {
     pvid_put_f32(sample, (float)counts[0] * STREAM_PHI_LSB);
     pvid_put_f32(&sample[4], (float)counts[1] * STREAM_Y_LSB);

@@ -37,7 +37,7 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_Q31_BYTES])
     return STREAM_INIT(&identifier, &config);
 }
 
-void identifier_sample(const int32_t counts[2], uint8_t sample[SAMPLE_BYTES])
+void identifier_sample(const int32_t counts[STREAM_SAMPLES], uint8_t sample[SAMPLE_BYTES])
 {
     pvid_put_i32(sample, counts[0]);
     pvid_put_i32(&sample[4], counts[1]);

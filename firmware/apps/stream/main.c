@@ -26,9 +26,9 @@
 #include "pvid/little_endian.h"
 #include "sensor.h"
 
-#define WINDOW 256u      /* samples that may be in transit */
-#define RAW_SAMPLES 32u  /* samples in a frame to the PC */
-#define ANSWER_ROOM 640u /* bytes of all answers to one sample or request, without announcements */
+#define WINDOW (512u / STREAM_SAMPLES)   /* ticks that may be in transit */
+#define RAW_TICKS (64u / STREAM_SAMPLES) /* ticks in a frame to the PC */
+#define ANSWER_ROOM 640u                 /* bytes of all answers to one sample or request, without announcements */
 #define CHUNK 64u
 #define ANNOUNCE_S 4u
 
@@ -49,9 +49,10 @@ typedef char configurations_begin_alike[((PVID_CONFIGURE_SESSION == PVID_CONFIGU
 /* What is still to be announced, in this order. */
 #define DUE_HELLO 1u
 #define DUE_SCHEMA 2u
-#define DUE_CONFIGURATION 4u
-#define DUE_STATUS 8u
-#define DUE_ALL 15u
+#define DUE_NAMES 4u
+#define DUE_CONFIGURATION 8u
+#define DUE_STATUS 16u
+#define DUE_ALL 31u
 
 static struct {
     answers out;
@@ -81,7 +82,7 @@ static struct {
     uint32_t clock_us; /* when the clock was last read */
     uint32_t due_ns;   /* elapsed time whose samples are still due */
     uint32_t count;    /* samples in `frame`: the last ones before stream.ticks */
-    uint8_t frame[IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * RAW_SAMPLES)]; /* payload of a frame of samples */
+    uint8_t frame[IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * RAW_TICKS)]; /* payload of a frame of samples */
 } field;
 
 /* ---- answers */
@@ -113,6 +114,7 @@ static void answer_hello(void)
         payload[PVID_HELLO_BOARD + i] = (uint8_t)board[i];
     }
     pvid_put_u16(&payload[PVID_HELLO_TICK_HIGH], stream.tick_high);
+    payload[PVID_HELLO_SAMPLES] = STREAM_SAMPLES;
     answer(PVID_HELLO, payload, sizeof payload);
 }
 
@@ -172,6 +174,7 @@ static void answer_raw(void)
         const bool wrapped = stream.ticks < field.count; /* since the first of these samples */
         pvid_put_u32(&field.frame[IDENTIFIER_RAW_SESSION], stream.session);
         pvid_put_u16(&field.frame[IDENTIFIER_RAW_TICK_HIGH], (uint16_t)(stream.tick_high - (wrapped ? 1u : 0u)));
+        field.frame[IDENTIFIER_RAW_SAMPLES] = STREAM_SAMPLES;
         answers_put(&stream.out, IDENTIFIER_RAW, stream.ticks - field.count, field.frame,
                     IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * field.count));
         field.count = 0;
@@ -192,8 +195,16 @@ static bool sampling(void)
 static void announce(void)
 {
     static const char schema[] = PVID_LINK_SCHEMA_TEXT;
+    static const char names[] = STREAM_NAMES;
     const uint8_t first = (uint8_t)(stream.due & (0u - stream.due));
-    const size_t room = (first == DUE_SCHEMA) ? PVID_LINK_ENCODED_BYTES(sizeof schema - 1u) : ANSWER_ROOM;
+    size_t room = ANSWER_ROOM;
+    if (first == DUE_SCHEMA) {
+        room = PVID_LINK_ENCODED_BYTES(sizeof schema - 1u);
+    } else if (first == DUE_NAMES) {
+        room = PVID_LINK_ENCODED_BYTES(sizeof names - 1u);
+    } else {
+        /* short frames */
+    }
     if ((first == 0u) || !answers_fit(&stream.out, room)) {
         return;
     }
@@ -202,6 +213,8 @@ static void announce(void)
         answer_hello();
     } else if (first == DUE_SCHEMA) {
         answer(PVID_SCHEMA, (const uint8_t *)schema, sizeof schema - 1u);
+    } else if (first == DUE_NAMES) {
+        answer(PVID_NAMES, (const uint8_t *)names, sizeof names - 1u);
     } else if (first == DUE_STATUS) {
         answer_raw(); /* first: its ticks are before that of the status */
         answer_status();
@@ -230,7 +243,7 @@ static void step(const uint8_t sample[SAMPLE_BYTES])
     }
     const bool hash_due = (stream.hash_every != 0u) && ((stream.ticks % stream.hash_every) == 0u);
     const bool estimate_due = (stream.estimate_every != 0u) && ((stream.ticks % stream.estimate_every) == 0u);
-    if (hash_due || estimate_due || (field.count == RAW_SAMPLES)) {
+    if (hash_due || estimate_due || (field.count == RAW_TICKS)) {
         answer_raw();
     }
     if (hash_due) {
@@ -252,13 +265,14 @@ static void step_sent(void)
     }
 }
 
-/* Processes the next sample of the board's own sensor. */
+/* Processes the next sample of the board's own sensor, if it has one. */
 static void step_field(void)
 {
-    int32_t counts[2];
     uint8_t *sample = &field.frame[IDENTIFIER_RAW_BYTES + (SAMPLE_BYTES * field.count)];
-    sensor_read(counts);
-    identifier_sample(counts, sample);
+    if (!sensor_read(sample)) {
+        answer_raw();
+        return;
+    }
     field.count++;
     step(sample);
     if ((stream.ticks % ANNOUNCE_TICKS) == 0u) {
@@ -412,7 +426,7 @@ int main(void)
     pvid_port_init();
     pvid_receiver_init();
     pvid_link_decoder_init(&stream.decoder);
-    stream.due = DUE_HELLO | DUE_SCHEMA;
+    stream.due = DUE_HELLO | DUE_SCHEMA | DUE_NAMES;
     for (;;) {
         answers_pump(&stream.out);
         announce();

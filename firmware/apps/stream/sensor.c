@@ -73,8 +73,9 @@ static void advance(void)
     }
 }
 
-void sensor_read(int32_t counts[2])
+bool sensor_read(uint8_t sample[SAMPLE_BYTES])
 {
+    int32_t counts[2];
     float y = 0.0f;
     for (uint32_t k = 0; k < TONES; k++) {
         y = y + rig.position[k];
@@ -84,4 +85,6 @@ void sensor_read(int32_t counts[2])
     for (uint16_t step = 0; step < constants.steps; step++) {
         advance();
     }
+    identifier_sample(counts, sample);
+    return true;
 }

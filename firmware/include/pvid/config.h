@@ -98,8 +98,25 @@
 #ifndef PVID_MAX_THETA_Q31
 #define PVID_MAX_THETA_Q31 11
 #endif
-#if PVID_MAX_THETA_Q31 < 5 || PVID_MAX_THETA_Q31 > 12
-#error "PVID_MAX_THETA_Q31 must lie in 5..12"
+#if PVID_MAX_THETA_Q31 < 5 || PVID_MAX_THETA_Q31 > 31
+#error "PVID_MAX_THETA_Q31 must lie in 5..31"
+#endif
+
+/* Largest number of entries of M in the fixed-point core: the sum of n (n + 1) / 2 over the kinds of rows, of n theta
+ * each (66: the strong form). RAM: 12 bytes each. */
+#ifndef PVID_MAX_MOMENTS_Q31
+#define PVID_MAX_MOMENTS_Q31 66
+#endif
+#if PVID_MAX_MOMENTS_Q31 < 1 || PVID_MAX_MOMENTS_Q31 > 496
+#error "PVID_MAX_MOMENTS_Q31 must lie in 1..496"
+#endif
+
+/* Largest number of non-zeros of d theta / d p in the fixed-point core (22: the strong form). RAM: 6 bytes each. */
+#ifndef PVID_MAX_C_Q31
+#define PVID_MAX_C_Q31 22
+#endif
+#if PVID_MAX_C_Q31 < 1 || PVID_MAX_C_Q31 > 248
+#error "PVID_MAX_C_Q31 must lie in 1..248"
 #endif
 
 /* Qualifier of the fixed-point tables; empty where flash is addressed like RAM. On an AVR __flash (with
@@ -115,6 +132,81 @@
 #endif
 #if PVID_FULL_ANGLE != 0 && PVID_FULL_ANGLE != 1
 #error "PVID_FULL_ANGLE must be 0 or 1"
+#endif
+
+/* ---- sizes of pvid/fourier.h ---- */
+
+/* Most samples of a tick. */
+#ifndef PVID_MAX_SAMPLES
+#define PVID_MAX_SAMPLES 8
+#endif
+#if PVID_MAX_SAMPLES < 1 || PVID_MAX_SAMPLES > 32
+#error "PVID_MAX_SAMPLES must lie in 1..32"
+#endif
+
+/* Numbers in the ring of signals: signals times (2 half + decimation), half that of the longest filter. RAM: 4 bytes
+ * each. */
+#ifndef PVID_MAX_RING
+#define PVID_MAX_RING 256
+#endif
+#if PVID_MAX_RING < 8 || PVID_MAX_RING > 8192
+#error "PVID_MAX_RING must lie in 8..8192"
+#endif
+
+/* Most jets, runs and signs together. */
+#ifndef PVID_MAX_INPUTS
+#define PVID_MAX_INPUTS 16
+#endif
+#if PVID_MAX_INPUTS < 1 || PVID_MAX_INPUTS > 32
+#error "PVID_MAX_INPUTS must lie in 1..32"
+#endif
+
+/* Most channels that are summed, and most gains. RAM: 24 bytes each and 24 for each harmonic. */
+#ifndef PVID_MAX_CHANNELS
+#define PVID_MAX_CHANNELS 14
+#endif
+#if PVID_MAX_CHANNELS < 1 || PVID_MAX_CHANNELS > 64
+#error "PVID_MAX_CHANNELS must lie in 1..64"
+#endif
+
+/* Most integrands; most runs; most signs. RAM: 48 bytes each. */
+#ifndef PVID_MAX_INTEGRANDS
+#define PVID_MAX_INTEGRANDS 3
+#endif
+#if PVID_MAX_INTEGRANDS < 1 || PVID_MAX_INTEGRANDS > 32
+#error "PVID_MAX_INTEGRANDS must lie in 1..32"
+#endif
+
+/* Most harmonics of a window's sums, K/2 + n/2 + 1. */
+#ifndef PVID_MAX_HARMONICS
+#define PVID_MAX_HARMONICS 13
+#endif
+#if PVID_MAX_HARMONICS < 4 || PVID_MAX_HARMONICS > 40
+#error "PVID_MAX_HARMONICS must lie in 4..40"
+#endif
+
+/* Most kinds of rows: equations of a mechanism. */
+#ifndef PVID_MAX_KINDS
+#define PVID_MAX_KINDS 3
+#endif
+#if PVID_MAX_KINDS < 1 || PVID_MAX_KINDS > 8
+#error "PVID_MAX_KINDS must lie in 1..8"
+#endif
+
+/* Most columns of a kind: theta's, Y and nuisances. RAM: 4 bytes for each and each function. */
+#ifndef PVID_MAX_COLUMNS
+#define PVID_MAX_COLUMNS 12
+#endif
+#if PVID_MAX_COLUMNS < 2 || PVID_MAX_COLUMNS > 48
+#error "PVID_MAX_COLUMNS must lie in 2..48"
+#endif
+
+/* Largest n of the test functions sin^n. RAM: 4 bytes for each and each function. */
+#ifndef PVID_MAX_POWER
+#define PVID_MAX_POWER 8
+#endif
+#if PVID_MAX_POWER < 2 || PVID_MAX_POWER > 12
+#error "PVID_MAX_POWER must lie in 2..12"
 #endif
 
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your

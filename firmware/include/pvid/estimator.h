@@ -101,8 +101,21 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
 /* Adds a row to the current group. Returns PVID_ACCUMULATED. Fails iff
  *   - n or y is not finite: PVID_REJECTED_NOT_FINITE, or
  *   - the row exceeds PVID_ROW_LIMIT: PVID_REJECTED_SATURATED.
- * A failure changes nothing but the counter. Cost: n_theta^2 / 2 multiplications. */
+ * A failure changes nothing but the counter. Cost: n_theta^2 / 2 multiplications. A model of several kinds takes it as
+ * a row of kind 0. */
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y);
+
+/* The same for a row of this kind (model.h): n contains the entries of this kind alone. Fails also iff the model has no
+ * such kind: PVID_NOT_READY. */
+pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y);
+
+/* Adds g[n_theta] to b (of a model with its own `project` to B), the theta of all kinds at once: compensates the error
+ * that noise in N causes in sum N e. While g < 1 the step takes it as it takes the rows of the group. Returns
+ * PVID_ACCUMULATED. Fails iff
+ *   - g is not finite: PVID_REJECTED_NOT_FINITE, or
+ *   - |g_i| exceeds PVID_ROW_LIMIT^2: PVID_REJECTED_SATURATED.
+ * A failure changes nothing but the counter. */
+pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[]);
 
 /* Ends a group of rows; every `divider` groups it solves and moves p. Returns PVID_UPDATED, PVID_ACCUMULATED (no
  * solve due), PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT; the last two leave p unchanged. */

@@ -8,6 +8,14 @@
  *   static const pvid_model_f32 mine = { .n_theta = 2, .n_p = 2, .n_moments = 3, .n_c = 3,
  *       .c_row = row, .c_column = column, .theta = my_theta, .jacobian = my_jacobian };
  *
+ * Kinds of rows. A mechanism with several equations has a kind of rows for each; their theta follow each other:
+ *
+ *   static const uint8_t end[] = {5, 11};         the rows of kind 0 have theta[0..4], those of kind 1 theta[5..10]
+ *   ... .n_theta = 11, .n_kinds = 2, .kind_end = end, .n_moments = 15 + 21
+ *
+ * M then has a block for each kind and no entries between them. C has all theta: a parameter may occur in several
+ * kinds. Every row has the same variance, so rows of different units are divided by their standard deviations.
+ *
  * Optional functions: `accumulate` if entries of M repeat (fewer sums than n_theta (n_theta + 1) / 2); `project`
  * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set; `take_row` may
  * be added to them. `noise` enables the noise check (noise_margin of estimator.h).
@@ -33,11 +41,15 @@ struct pvid_model_f32 {
     uint8_t n_p;     /* free parameters, 1..PVID_MAX_P; kappa refers to p[0] */
     uint8_t n_gated; /* the first n_gated parameters are checked for excitation, the others are nuisance parameters; 0:
                         all are checked */
-    uint16_t n_moments; /* distinct entries of M, 1..PVID_MAX_MOMENTS */
+    uint8_t n_kinds; /* kinds of rows; 0 or 1: all rows have all theta. A model with its own accumulate has one kind */
+    uint16_t n_moments; /* distinct entries of M, 1..PVID_MAX_MOMENTS; without accumulate the sum of n (n + 1) / 2 over
+                           the kinds, of n theta each */
     uint16_t n_c;       /* structural non-zeros of C */
     uint32_t positive;  /* bit i set: p[i] > 0; steps and start_sd are relative to p[i] */
 
-    const uint8_t *c_row;    /* [n_c] row in theta of each non-zero of C, ascending in a column */
+    const uint8_t
+        *kind_end;        /* [n_kinds] one past the last theta of each kind, ascending, at last n_theta; NULL for one */
+    const uint8_t *c_row; /* [n_c] row in theta of each non-zero of C, ascending in a column */
     const uint8_t *c_column; /* [n_c] its column (index in p), ascending */
 
     /* theta[n_theta] = f(p) */
@@ -46,7 +58,7 @@ struct pvid_model_f32 {
     void (*jacobian)(const float p[], float c[]);
 
     /* Adds a row to the sums (layout: information.h) at low[] and writes sums[k] = high[k] + low[k]. NULL: all
-     * products N_i N_j, upper triangle by rows. */
+     * products N_i N_j of a kind, upper triangle by rows. */
     void (*accumulate)(const float n[], float y, const float high[], float low[], float sums[]);
     /* From moments m[n_moments] and b[n_theta] = sum N Y at p: s[i][j] = (C^T M C)_ij for i <= j < n_p, f[n_p] =
      * C^T (b - M theta(p)). Returns theta^T M theta - 2 theta^T b. NULL: by the pattern of C, with b relative to

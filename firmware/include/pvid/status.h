@@ -9,7 +9,7 @@
  * variable before its init is not zero; this misuse is not detected.) */
 typedef enum {
     PVID_OK = 0,
-    PVID_BAD_MODEL,         /* NULL, or larger than the PVID_MAX_ bounds */
+    PVID_BAD_MODEL,         /* NULL, larger than the PVID_MAX_ bounds, or its kinds do not divide theta */
     PVID_BAD_SAMPLE_RATE,   /* not finite or outside 1e-3..1e6 Hz */
     PVID_BAD_BANK,          /* weights of a bank: NULL, or one that is not finite */
     PVID_BAD_LENGTH,        /* l1 not finite or not positive */
@@ -74,7 +74,8 @@ typedef enum {
     PVID_HELD_OUT_OF_RANGE,   /* window dropped: the angle exceeded the range of the equations */
     PVID_MISFIT, /* p was updated, but the residuals exceed the sensors' noise: the model does not fit the mechanism */
     PVID_HELD_FROZEN, /* row or window not used: the identifier is frozen */
-    PVID_NOT_READY    /* not initialised, init refused, or NULL instead of an object: nothing was done */
+    PVID_NOT_READY    /* not initialised, init refused, NULL instead of an object, or a kind of rows that the model does
+                         not have: nothing was done */
 } pvid_reason;
 
 /* The law by which an estimator moves p; see estimator.h. */

@@ -99,7 +99,7 @@ static inline float sum_of_squares_strong(const float n[], float y)
 pvid_reason pvid_kapitza_take_row_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
                                       const float gradient[], bool ends_group)
 {
-    pvid_reason reason = pvid_row_accept_f32(self, n, y, sum_of_squares_strong(n, y));
+    pvid_reason reason = pvid_row_accept_f32(self, PVID_KAPITZA_STRONG_THETA, n, y, sum_of_squares_strong(n, y));
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }

@@ -84,7 +84,7 @@ pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], 
                                      const float gradient[], bool ends_group)
 {
     const size_t n_theta = self->model->n_theta;
-    pvid_reason reason = pvid_row_accept_f32(self, n, y, pvid_row_squares_f32(n_theta, n, y));
+    pvid_reason reason = pvid_row_accept_f32(self, n_theta, n, y, pvid_row_squares_f32(n_theta, n, y));
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
@@ -93,7 +93,7 @@ pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], 
     }
     pvid_count_up(&self->counters.rows);
     float sums[PVID_MAX_SUMS];
-    pvid_information_add_f32(&self->information, self->model, n, y, sums);
+    self->model->accumulate(n, y, self->information.high, self->information.low, sums);
     if (ends_group) {
         if (pvid_solve_is_due(&self->phase, self->divider)) {
             reason = solve_at_once(self, self->settings.gain, sums);

@@ -7,10 +7,14 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/count.h"
 #include "number/init.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
 #include "solve/direct_f32.h"
+#include "solve/kinds.h"
+#include "solve/pattern_f32.h"
+#include "solve/row_f32.h"
 #include "solve/state_f32.h"
 #include "solve/staged_f32.h"
 
@@ -36,8 +40,9 @@ static bool model_is_valid(const pvid_model_f32 *model)
            ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
            ((model->take_row == NULL) || (model->project != NULL)) &&
-           ((model->accumulate != NULL) ||
-            (model->n_moments == ((uint16_t)model->n_theta * (model->n_theta + 1u)) / 2u));
+           ((model->accumulate != NULL)
+                ? (model->n_kinds <= 1u)
+                : (model->n_moments == pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end)));
 }
 
 static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config)
@@ -193,7 +198,52 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
         return PVID_NOT_READY;
     }
     return (self->settings.engine == PVID_ENGINE_DIRECT) ? take_row(self, n, y, false)
-                                                         : pvid_staged_add_f32(self, n, y);
+                                                         : pvid_staged_add_f32(self, 0, n, y);
+}
+
+pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y)
+{
+    if (!pvid_estimator_is_ready_f32(self)) {
+        return PVID_NOT_READY;
+    }
+    const bool exists = kind < pvid_kinds_count(self->model->n_kinds);
+    PVID_ASSERT(exists);
+    if (!exists) {
+        return PVID_NOT_READY;
+    }
+    return (self->settings.engine == PVID_ENGINE_DIRECT) ? take_row(self, n, y, false)
+                                                         : pvid_staged_add_f32(self, kind, n, y);
+}
+
+pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[])
+{
+    if (!pvid_estimator_is_ready_f32(self)) {
+        return PVID_NOT_READY;
+    }
+    const pvid_model_f32 *model = self->model;
+    bool finite = true;
+    bool fits = true;
+    for (size_t i = 0; i < model->n_theta; i++) {
+        finite = finite && pvid_finite_f32(g[i]);
+        fits = fits && pvid_within_f32(g[i], -PVID_ROW_LIMIT * PVID_ROW_LIMIT, PVID_ROW_LIMIT * PVID_ROW_LIMIT);
+    }
+    if (!fits) {
+        pvid_count_up(finite ? &self->counters.rejected_saturated : &self->counters.rejected_not_finite);
+        return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
+    }
+    float *b = &self->information.low[model->n_moments];
+    for (size_t i = 0; i < model->n_theta; i++) {
+        b[i] += g[i];
+    }
+    if (self->settings.gain < 1.0f) {
+        float c[PVID_MAX_THETA * PVID_MAX_P];
+        float gradient[PVID_MAX_P];
+        const pvid_block whole = {0, model->n_theta, 0};
+        model->jacobian(self->p, c);
+        pvid_pattern_transpose_times_f32(model, c, &whole, g, gradient);
+        pvid_row_accumulate_innovation_f32(self, model->n_p, gradient, 1.0f);
+    }
+    return PVID_ACCUMULATED;
 }
 
 /* All stages of a solve. */
@@ -229,7 +279,7 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
     if (self->settings.engine == PVID_ENGINE_DIRECT) {
         return take_row(self, n, y, true);
     }
-    const pvid_reason added = pvid_staged_add_f32(self, n, y);
+    const pvid_reason added = pvid_staged_add_f32(self, 0, n, y);
     return (added == PVID_ACCUMULATED) ? pvid_estimator_update_f32(self) : added;
 }
 

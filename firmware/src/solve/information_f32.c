@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-#include "pvid/information.h"
+#include "solve/information_f32.h"
 
 #include <stddef.h>
 
@@ -42,26 +42,40 @@ void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 
     }
 }
 
+void pvid_information_block_f32(const pvid_model_f32 *model, size_t i, pvid_block *block)
+{
+    block->first = 0;
+    block->n = model->n_theta;
+    block->moment = 0;
+    if (model->n_kinds > 1u) {
+        pvid_block_among_kinds(model->n_kinds, model->kind_end, i, block);
+    }
+}
+
 static size_t number_of_sums(const pvid_information_f32 *self)
 {
     return (size_t)self->n_moments + self->n_theta + 2u;
 }
 
-/* All products of a row, the packed upper triangle by rows, then N y, y^2 and the weight. */
-static inline void accumulate_any(size_t n_theta, const float *restrict n, float y, float row_weight,
-                                  float *restrict low)
+/* All products of a row of a kind: the packed upper triangle by rows, then N y, y^2 and the weight. */
+static inline void accumulate_block(const pvid_model_f32 *model, const pvid_block *block, const float *restrict n,
+                                    float y, float row_weight, float *restrict sums)
 {
-    for (size_t i = 0; i < n_theta; i++) {
-        for (size_t j = i; j < n_theta; j++) {
+    const size_t n_own = block->n;
+    float *restrict low = &sums[block->moment];
+    for (size_t i = 0; i < n_own; i++) {
+        for (size_t j = i; j < n_own; j++) {
             *low += n[i] * n[j];
             low++;
         }
     }
-    for (size_t i = 0; i < n_theta; i++) {
+    low = &sums[model->n_moments + block->first];
+    for (size_t i = 0; i < n_own; i++) {
         low[i] += y * n[i];
     }
-    low[n_theta] += y * y;
-    low[n_theta + 1u] += row_weight;
+    low = &sums[model->n_moments + model->n_theta];
+    low[0] += y * y;
+    low[1] += row_weight;
 }
 
 #define EIGHT 8u
@@ -85,17 +99,25 @@ static inline void accumulate_eight(const float *restrict n, float y, float row_
     low[EIGHT + 1u] += row_weight;
 }
 
+void pvid_information_add_block_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const pvid_block *block,
+                                    const float n[], float y)
+{
+    if ((block->n == EIGHT) && (model->n_theta == EIGHT)) {
+        accumulate_eight(n, y, self->row_weight, self->low);
+    } else {
+        accumulate_block(model, block, n, y, self->row_weight, self->low);
+    }
+}
+
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS])
 {
     if (model->accumulate != NULL) {
         model->accumulate(n, y, self->high, self->low, sums);
     } else {
-        if (model->n_theta == EIGHT) {
-            accumulate_eight(n, y, self->row_weight, self->low);
-        } else {
-            accumulate_any(model->n_theta, n, y, self->row_weight, self->low);
-        }
+        pvid_block block;
+        pvid_information_block_f32(model, 0, &block);
+        pvid_information_add_block_f32(self, model, &block, n, y);
         if (sums != NULL) {
             pvid_information_read_f32(self, sums);
         }

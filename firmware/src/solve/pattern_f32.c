@@ -2,7 +2,10 @@
 
 #include "solve/pattern_f32.h"
 
-void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const float x[], float out[])
+#include "solve/information_f32.h"
+
+void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const pvid_block *block,
+                                      const float x[], float out[])
 {
     const uint8_t *c_row = model->c_row;
     const uint8_t *c_column = model->c_column;
@@ -10,7 +13,10 @@ void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c
     const size_t n_p = model->n_p;
     float sum[PVID_MAX_P] = {0.0f};
     for (size_t k = 0; k < n_c; k++) {
-        sum[c_column[k]] += c[k] * x[c_row[k]];
+        const size_t i = (size_t)c_row[k] - block->first; /* beyond n also for a row before the block */
+        if (i < block->n) {
+            sum[c_column[k]] += c[k] * x[i];
+        }
     }
     for (size_t a = 0; a < n_p; a++) {
         out[a] = sum[a];
@@ -56,9 +62,12 @@ void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], 
                                   const float m[], float t[])
 {
     const uint8_t *c_row = model->c_row;
-    const size_t n_theta = model->n_theta;
+    pvid_block block = {0, 0, 0};
     for (size_t k = first; k < last; k++) {
-        add_column(n_theta, m, c_row[k], c[k], t);
+        if (c_row[k] >= (block.first + block.n)) { /* they ascend */
+            pvid_information_block_f32(model, c_row[k], &block);
+        }
+        add_column(block.n, &m[block.moment], c_row[k] - block.first, c[k], &t[block.first]);
     }
 }
 

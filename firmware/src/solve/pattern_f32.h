@@ -1,14 +1,16 @@
-/* Products with C and M: C is given by its non-zeros (model.h), M as its packed upper triangle by rows. Private to the
- * core; every function is a few loops of fixed length. */
+/* Products with C and M: C is given by its non-zeros (model.h), M as the packed upper triangles of its blocks by rows,
+ * a block for each kind of rows (kinds.h). Private to the core; every function is a few loops of fixed length. */
 #ifndef PVID_PATTERN_F32_H
 #define PVID_PATTERN_F32_H
 
 #include <stddef.h>
 
 #include "pvid/model.h"
+#include "solve/kinds.h"
 
-/* out[n_p] = C^T x for the non-zeros c of C. */
-void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const float x[], float out[]);
+/* out[n_p] = C^T x for the non-zeros c of C and a vector that is x[block->n] in this block and 0 outside. */
+void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const pvid_block *block,
+                                      const float x[], float out[]);
 
 /* The first non-zero of column a of C. */
 size_t pvid_pattern_start_f32(const pvid_model_f32 *model, size_t a);
@@ -27,13 +29,13 @@ void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], 
 /* c_a^T x, x[n_theta]. */
 float pvid_pattern_dot_f32(const pvid_model_f32 *model, const float c[], size_t start, const float x[]);
 
-/* Place of M_ii in the packed M. */
+/* Place of M_ii in a packed block of order n. */
 static inline size_t pvid_pattern_diagonal_f32(size_t n, size_t i)
 {
     return (i * ((2u * n) + 1u - i)) / 2u;
 }
 
-/* Entry i of M x, x[n]. */
+/* Entry i of M x for a packed block M of order n, x[n]. */
 float pvid_pattern_times_f32(size_t n, const float m[], size_t i, const float x[]);
 
 #endif

@@ -6,25 +6,26 @@
 #include "number/finite_f32.h"
 #include "solve/state_f32.h"
 
-/* y^2 + N^T N, in the order of the entries. */
-static inline float pvid_row_squares_f32(size_t n_theta, const float n[], float y)
+/* y^2 + N^T N, in the order of the n_own entries. */
+static inline float pvid_row_squares_f32(size_t n_own, const float n[], float y)
 {
     float squares = y * y;
-    for (size_t i = 0; i < n_theta; i++) {
+    for (size_t i = 0; i < n_own; i++) {
         squares += n[i] * n[i];
     }
     return squares;
 }
 
-/* Accepts a row or counts it as rejected. One comparison of the sum of squares checks all entries; the reason is sought
- * only after a rejection. */
-static inline pvid_reason pvid_row_accept_f32(pvid_estimator_f32 *self, const float n[], float y, float squares)
+/* Accepts a row of n_own entries or counts it as rejected. One comparison of the sum of squares checks all entries; the
+ * reason is sought only after a rejection. */
+static inline pvid_reason pvid_row_accept_f32(pvid_estimator_f32 *self, size_t n_own, const float n[], float y,
+                                              float squares)
 {
     if (squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {
         return PVID_ACCUMULATED;
     }
     bool finite = pvid_finite_f32(y);
-    for (size_t i = 0; i < self->model->n_theta; i++) {
+    for (size_t i = 0; i < n_own; i++) {
         finite = finite && pvid_finite_f32(n[i]);
     }
     pvid_count_up(finite ? &self->counters.rejected_saturated : &self->counters.rejected_not_finite);

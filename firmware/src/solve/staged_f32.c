@@ -13,6 +13,7 @@
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
 #include "solve/direct_f32.h"
+#include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
 #include "solve/step_f32.h"
@@ -42,40 +43,45 @@ enum {
 
 /* ---- rows ---- */
 
-/* e = y - N^T theta and, while g < 1, gradient = C^T N, by theta and the pattern of C. */
-static inline float innovate(const pvid_estimator_f32 *self, const float n[], float y, float gradient[])
+/* e = y - N^T theta and, while g < 1, gradient = C^T N, by theta and the pattern of C, for a row of this block. */
+static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *block, const float n[], float y,
+                             float gradient[])
 {
     const pvid_model_f32 *model = self->model;
     if (self->settings.gain < 1.0f) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         model->jacobian(self->p, c);
-        pvid_pattern_transpose_times_f32(model, c, n, gradient);
+        pvid_pattern_transpose_times_f32(model, c, block, n, gradient);
     }
+    const float *theta = &self->theta[block->first];
     float e = y;
-    for (size_t i = 0; i < model->n_theta; i++) {
-        e -= n[i] * self->theta[i];
+    for (size_t i = 0; i < block->n; i++) {
+        e -= n[i] * theta[i];
     }
     return e;
 }
 
-pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float y)
+pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y)
 {
-    const pvid_reason reason = pvid_row_accept_f32(self, n, y, pvid_row_squares_f32(self->model->n_theta, n, y));
+    const pvid_model_f32 *model = self->model;
+    pvid_block block;
+    pvid_information_block_f32(model, pvid_kind_first(model->kind_end, kind), &block);
+    const pvid_reason reason = pvid_row_accept_f32(self, block.n, n, y, pvid_row_squares_f32(block.n, n, y));
     if (reason != PVID_ACCUMULATED) {
         return reason;
     }
     float gradient[PVID_MAX_P];
-    const float e = innovate(self, n, y, gradient);
+    const float e = innovate(self, &block, n, y, gradient);
     if (!((e * e) <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT))) {
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
     if (self->settings.gain < 1.0f) {
-        pvid_row_accumulate_innovation_f32(self, self->model->n_p, gradient, e);
+        pvid_row_accumulate_innovation_f32(self, model->n_p, gradient, e);
     }
     self->group_rss += e * e;
     self->group_weight += self->information.row_weight;
-    pvid_information_add_f32(&self->information, self->model, n, e, NULL);
+    pvid_information_add_block_f32(&self->information, model, &block, n, e);
     pvid_count_up(&self->counters.rows);
     return PVID_ACCUMULATED;
 }
@@ -209,10 +215,14 @@ static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
     const float *b = &solve->sums[self->model->n_moments];
     const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
     for (size_t i = first; i < last; i++) {
-        const float moved = pvid_pattern_times_f32(n, solve->sums, i, solve->theta_step);
+        pvid_block block;
+        pvid_information_block_f32(self->model, i, &block);
+        const float *m = &solve->sums[block.moment];
+        const size_t row = i - block.first;
+        const float moved = pvid_pattern_times_f32(block.n, m, row, &solve->theta_step[block.first]);
         solve->product[i] = moved;
         solve->fall += solve->theta_step[i] * (b[i] + (b[i] - moved));
-        solve->scale += solve->sums[pvid_pattern_diagonal_f32(n, i)] * (solve->theta_step[i] * solve->theta_step[i]);
+        solve->scale += m[pvid_pattern_diagonal_f32(block.n, row)] * (solve->theta_step[i] * solve->theta_step[i]);
     }
     return last;
 }

@@ -4,8 +4,8 @@
 
 #include "solve/state_f32.h"
 
-/* pvid_estimator_add_f32 for b = B - M theta and rr. */
-pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, const float n[], float y);
+/* pvid_estimator_add_kind_f32 for b = B - M theta and rr, of a kind that the model has. */
+pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y);
 
 /* Sets the variance of the current group's rows by the sensors' noise. Call it when the group is complete, before its
  * solve begins. */

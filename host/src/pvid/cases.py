@@ -17,6 +17,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.design.weak_sizing import raised_bounds
 from pvid.link import frames
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.settings.bounds import MAX_MOMENTS
@@ -35,6 +36,8 @@ from pvid.twin.weak_q31 import WeakTwinQ31
 
 Float = npt.NDArray[np.float64]
 Samples = npt.NDArray[Any]  # float32 [rad], [m], or int32 counts
+
+_MOST_P = len(MODELS[DEFAULT].parameters)
 
 # Fields of the settings that a Configure frame has for every parameter.
 _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
@@ -241,7 +244,7 @@ class _Float(Case):
         return settings_header(config, name, made_by, self.umbrella)
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
-        more = {"PVID_MAX_P": str(frames.MAX_P), "PVID_MAX_MOMENTS": str(MAX_MOMENTS)}
+        more = {"PVID_MAX_P": str(_MOST_P), "PVID_MAX_MOMENTS": str(MAX_MOMENTS)}
         return super().sizes(config, exact) | (more if len(config.estimator.start) > 4 else {})
 
     def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:
@@ -307,7 +310,12 @@ class _Fixed(Case):
         return [*super().facts(config), f"bits to spare at full scale: {spare}"]
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
-        more = {"PVID_MAX_THETA_Q31": str(len(config.estimator.n_bits))}
+        n_theta = len(config.estimator.n_bits)
+        more = {
+            "PVID_MAX_THETA_Q31": str(n_theta),
+            "PVID_MAX_MOMENTS_Q31": str(n_theta * (n_theta + 1) // 2),
+            "PVID_MAX_C_Q31": str(2 * n_theta),
+        }
         return super().sizes(config, exact) | (more if exact else {})
 
     def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from rich.console import Console
@@ -13,12 +15,17 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, progress_bar
 from pvid.cli.input import form_options, read_input, with_overrides
 from pvid.core.native import Native
+from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
 from pvid.run.survey import fitted
+
+if TYPE_CHECKING:
+    from pvid.board.compare_on import Outcome
 
 
 @click.command(name="compare")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
 @form_options
 @click.option(
     "--core", type=click.Choice(["f32", "q31", "all"]), help="Arithmetic: f32, q31 or both.  [default: the rig file's]"
@@ -32,6 +39,7 @@ from pvid.run.survey import fitted
 )
 def command(
     run_path: Path,
+    model: str | None,
     rig_path: Path | None,
     settings: tuple[str, ...],
     columns: str | None,
@@ -44,10 +52,19 @@ def command(
 
     Start and tables are those of identify. With --on the run is also streamed to targets, and their running hashes are
     compared with the host's.
+
+    With --model, or a rig file with [model], the run is one of another mechanism (host/docs/models.md), and the C core
+    is compiled for it.
     """
-    from pvid.board.compare_on import Outcome, compare_here, compare_there
+    from pvid.board.compare_on import compare_here, compare_there
     from pvid.board.target import targets_of
 
+    described = mechanism_rig(run_path, rig_path, settings, model)
+    if described is not None:
+        from pvid.cli.mechanism import compare_recording  # loads SymPy
+
+        given = {"core": core, "form": form, "law": law, "on": targets[0] if targets else None}
+        return _shown([compare_recording(run_path, described, columns, **given)])
     rig = with_overrides(rig_for(run_path, rig_path, settings), form=form)
     run = read_input(run_path, rig, columns)
     rig = fitted(rig, run)
@@ -61,6 +78,11 @@ def command(
             for target in targets_of(targets):
                 with progress_bar(f"{one} law, {arithmetic} on {target}", len(run.t)) as advance:
                     outcomes.append(compare_there(target, chosen, run, native, advance))
+    return _shown(outcomes)
+
+
+def _shown(outcomes: Sequence[Outcome]) -> int:
+    """Prints the table; the exit code."""
     table = Table("target", "core", "form", "law", "ticks", "hash", "verdict")
     for outcome in outcomes:
         table.add_row(*outcome.cells)

@@ -8,8 +8,7 @@ import click
 
 from pvid.base.console import DONE
 from pvid.cli.input import log_argument, log_rig
-from pvid.log.rig import rig_of_log
-from pvid.log.values import UNKNOWN_RIG
+from pvid.log.rig import mechanism_of_log
 from pvid.rig.file import load
 
 
@@ -27,7 +26,7 @@ def command(log: Path, rig_path: Path | None, form: str, out: Path | None) -> in
     """
     from pvid.log.export import export_log
 
-    rig = load(rig_path) if rig_path is not None else rig_of_log(log)
-    for path in export_log(log, form, out or log.with_suffix(""), UNKNOWN_RIG if rig is None else rig.mechanism):
+    mechanism = load(rig_path).mechanism if rig_path is not None else mechanism_of_log(log)
+    for path in export_log(log, form, out or log.with_suffix(""), mechanism):
         click.echo(path)
     return DONE

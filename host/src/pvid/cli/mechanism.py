@@ -3,22 +3,43 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.console import DONE, NOTHING_IDENTIFIED, write_stderr
+from pvid.base.console import DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
+from pvid.board.compare_on import Outcome
 from pvid.cli.input import print_notes
 from pvid.oracle.fourier.weights import Weights
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
-from pvid.rig.run import is_run, read_recording
-from pvid.run.mechanism import MechanismAnswer, identify_mechanism, model_of
+from pvid.rig.run import Recording, is_run, read_recording
+from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
+
+if TYPE_CHECKING:
+    from pvid.model.compiled import CompiledModel
+    from pvid.run.mechanism_f32 import CoreAnswer
+
+_POSSIBLE = (("core", "f64"), ("core", "f32"), ("form", "weak"))
+
+
+def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Recording, CompiledModel]:
+    """The longest stretch of a recording without a missing sample, and the model with the values of the rig."""
+    model = model_of(rig)
+    if not is_run(path):
+        raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals")
+    recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
+    recording.refuse_damaged()
+    recording = recording.whole()
+    print_notes(recording.notes)
+    return recording, model
 
 
 def identify_run(
@@ -38,21 +59,27 @@ def identify_run(
     weights : of the rows, as in pvid.oracle.fourier.identify
     only_in_c : options that the C core alone has, by name; a value is refused
     """
-    model = model_of(rig)
+    name = model_of(rig).name
     for option, value in only_in_c.items():
-        if value is not None and (option, value) not in (("core", "f64"), ("form", "weak")):
+        if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
-                f"--{option} {value}: {model.name} is identified in float64 by the weak form; omit --{option}"
+                f"--{option} {value}: {name} is identified in float64, or in float32 by --core f32, by the weak form; "
+                f"omit --{option}"
             )
-    if not is_run(path):
-        raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals")
-    recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
-    recording.refuse_damaged()
-    recording = recording.whole()
-    print_notes(recording.notes)
+    if weights != "residuals" and only_in_c.get("core") == "f32":
+        raise PvidError(f"--weights {weights} is for float64; omit --core f32")
+    recording, model = recording_of(path, rig, columns)
     answer = identify_mechanism(recording, model, weights)
+    core: CoreAnswer | None = None
+    if only_in_c.get("core") == "f32":
+        from pvid.run.mechanism_f32 import identify_in_c
+
+        core = identify_in_c(answer)
+    shown = core or answer
     if as_json:
-        click.echo(json.dumps(answer.as_json()))
+        click.echo(json.dumps(shown.as_json()))
+    elif core is not None:
+        _print_core(core)
     else:
         _print(answer)
     if figure is not None:
@@ -62,27 +89,62 @@ def identify_run(
         click.echo(f"figure: {figure}")
     for one in answer.found.verdict.reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
-    if not answer.identified:
-        write_stderr("pvid: nothing identified")
+    if not shown.identified:
+        reason = f": {core.reason.text}" if core is not None and not core.published else ""
+        write_stderr(f"pvid: nothing identified{reason}")
         return NOTHING_IDENTIFIED
     return DONE
+
+
+def compare_recording(path: Path, rig: MechanismRig, columns: str | None, **given: str | None) -> Outcome:
+    """The C core against its twin on a recording of a described mechanism.
+
+    Parameters
+    ----------
+    given : options, by name; a value that the weak engine in float32 does not have is refused
+    """
+    from pvid.run.mechanism_compare import compare_recording as compared
+
+    name = model_of(rig).name
+    for option, value in given.items():
+        if value is not None and (option, value) not in (("core", "f32"), ("form", "weak")):
+            raise PvidError(
+                f"--{option} {value}: {name} is compared in float32 by the weak form on this computer; omit --{option}"
+            )
+    recording, model = recording_of(path, rig, columns)
+    with progress_bar("f32", len(recording)) as advance:
+        found = compared(model, recording, advance)
+    verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
+    return Outcome("host", "f32", "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict)
 
 
 def _print(answer: MechanismAnswer) -> None:
     found = answer.found
     if answer.identified:
-        table = Table(
-            "parameter", "estimate", "standard error", "of it noise", title=f"{answer.model.title}: weak form, float64"
-        )
-        for column in table.columns[1:]:
-            column.justify = "right"
-        for name, one in answer.values.items():
-            assert one.value is not None and one.se is not None and one.se_noise is not None
-            label = escape(f"{name} [{one.unit}]" if one.unit else name)
-            table.add_row(label, *with_error(one.value, one.se), f"{one.se_noise:.2g}")
-        Console().print(table)
+        _table(answer.values, f"{answer.model.title}: weak form, float64")
     explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
     click.echo(
         f"status {found.verdict.status}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "
         f"{found.design.window_s:.3g} s; R^2 {explained}"
     )
+
+
+def _print_core(core: CoreAnswer) -> None:
+    if core.identified:
+        _table(core.values, f"{core.oracle.model.title}: weak form, C in float32")
+    misfit = "not judged" if core.misfit is None else f"{core.misfit:.2g}"
+    click.echo(
+        f"status {core.oracle.found.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
+        f"windows of {2 * core.config.hop_s:.3g} s; hash {core.hash:08x}"
+    )
+
+
+def _table(values: Mapping[str, Value], title: str) -> None:
+    table = Table("parameter", "estimate", "standard error", "of it noise", title=title)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for name, one in values.items():
+        assert one.value is not None and one.se is not None and one.se_noise is not None
+        label = escape(f"{name} [{one.unit}]" if one.unit else name)
+        table.add_row(label, *with_error(one.value, one.se), f"{one.se_noise:.2g}")
+    Console().print(table)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from rich.console import Console
@@ -12,6 +13,12 @@ from rich.table import Table
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
+from pvid.cli.input import columns_option
+
+if TYPE_CHECKING:  # SymPy takes a third of a second to load
+    from pvid.model.compiled import CompiledModel
+    from pvid.rig.mechanism_file import MechanismRig
+    from pvid.settings.fourier import FourierConfig
 
 _MODEL = click.argument("model", metavar="MODEL")
 _ABOVE_0 = click.FloatRange(min=0.0, min_open=True)
@@ -126,6 +133,10 @@ def predict(
 @click.option(
     "--window", type=_ABOVE_0, default=2.0, show_default=True, help="Fixed point: of integrals since its start [s]."
 )
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file, whose values are the model's.")
+@click.option("--run", "run_path", type=click.Path(path_type=Path), help="A recording of the rig, for its design.")
+@columns_option
+@click.option("--functions", type=click.IntRange(4, 64), help="Test functions of the design.  [default: chosen]")
 def build(
     model: str,
     out: Path,
@@ -135,23 +146,33 @@ def build(
     reaches: tuple[str, ...],
     bandwidth: float,
     window: float,
+    rig_path: Path | None,
+    run_path: Path | None,
+    columns: str | None,
+    functions: int | None,
 ) -> int:
     """Writes the C of MODEL, its numpy twin, a header with every name and unit, a CMake target and a test.
 
     In the CMakeLists.txt of your firmware: add_subdirectory(OUT) and target_link_libraries(my_firmware PRIVATE NAME).
+
+    NAME_design_f32.h has the tables and settings of the weak form for the rig of --run, or for the shipped rig of a
+    shipped mechanism.
     """
     from pvid.codegen import build as generated
     from pvid.codegen.reaches import Reaches
-    from pvid.models.mechanisms import compiled_of
 
-    compiled = compiled_of(model)
+    compiled, rig = _of_rig(model, rig_path, run_path)
+    design = _design_of(compiled, rig, model, run_path, columns, functions)
     limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
-    options = generated.Options(limits, _numbers(soft_signs, "--soft-sign"), strong)
+    options = generated.Options(limits, _numbers(soft_signs, "--soft-sign"), strong, design)
     given = [*(["--strong"] if strong else []), *(f"--soft-sign {one}" for one in soft_signs)]
     given += [f"--reach {one}" for one in reaches]
     usual = Reaches()
     given += [f"--bandwidth {bandwidth:g}"] if bandwidth != usual.bandwidth_hz else []
     given += [f"--window {window:g}"] if window != usual.window_s else []
+    given += [f"--rig {rig_path.name}"] if rig_path is not None else []
+    given += [f"--run {run_path.name}"] if run_path is not None else []
+    given += [f"--functions {functions}"] if functions is not None else []
     title = " ".join(["pvid model build", compiled.name, *given])
     if not only_check:
         for path in generated.build(compiled, out, title, options):
@@ -159,6 +180,11 @@ def build(
         reason = generated.fixed_point_refusal(compiled, options)
         if reason is not None:
             write_stderr(f"pvid: no fixed point: {reason}")
+        reason = generated.weak_refusal(compiled)
+        if reason is not None:
+            write_stderr(f"pvid: no weak form in C: {reason}")
+        elif design is None:
+            write_stderr("pvid: no design of a rig: give a recording of it with --run")
         return DONE
     try:
         generated.check(compiled, out, title, options)
@@ -207,6 +233,50 @@ def simulate(
     settings = write_simulated_run(out, run, simulation)
     write_stderr(f"{out}: {simulation.samples} samples of {', '.join(run)}; rig file {settings}")
     return DONE
+
+
+def _of_rig(model: str, rig_path: Path | None, run_path: Path | None) -> tuple[CompiledModel, MechanismRig | None]:
+    """The model with the values of a rig file, and that file; the one beside a run counts."""
+    from pvid.log.mechanism_settings import mechanism_rig
+    from pvid.models.mechanisms import compiled_of
+
+    if rig_path is None and run_path is None:
+        return compiled_of(model), None
+    rig = mechanism_rig(run_path, rig_path, (), model)
+    if rig is None:
+        raise PvidError(f"{model} takes no rig file of a described mechanism: omit --rig and --run")
+    return rig.applied(compiled_of(model)), rig
+
+
+def _design_of(
+    compiled: CompiledModel,
+    rig: MechanismRig | None,
+    model: str,
+    run_path: Path | None,
+    columns: str | None,
+    functions: int | None,
+) -> FourierConfig | None:
+    from pvid.codegen.build import weak_refusal
+    from pvid.models.mechanisms import names as names_of_shipped
+    from pvid.rig.columns import parsed
+    from pvid.rig.mechanism_file import channels_of
+    from pvid.rig.run import read_recording
+    from pvid.run.engine_design import config_for_recording, config_for_simulated_rig
+
+    if columns is not None and run_path is None:
+        raise PvidError("--columns needs --run")
+    if weak_refusal(compiled) is not None:
+        return None
+    if run_path is not None:
+        rate = None if rig is None else rig.sample_rate
+        recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
+        recording.refuse_damaged()
+        return config_for_recording(compiled, recording.whole(), functions)
+    if model in names_of_shipped():
+        return config_for_simulated_rig(compiled, functions)
+    if functions is not None:
+        raise PvidError("--functions needs --run: there is no rig to make a design for")
+    return None
 
 
 def _numbers(given: tuple[str, ...], option: str) -> dict[str, float]:

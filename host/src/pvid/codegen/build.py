@@ -9,15 +9,19 @@ from pathlib import Path
 
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
-from pvid.codegen import files_f32, files_q31, files_strong, self_test, twin_file
+from pvid.codegen import files_design, files_f32, files_fourier, files_q31, files_strong, self_test, twin_file
 from pvid.codegen.banner import banner
 from pvid.codegen.fixed_model import fixed_model
+from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches, reaches_of
 from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
+from pvid.settings.fourier import FourierConfig
+from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
 
 _CMAKE = """\
 # {banner}
@@ -48,6 +52,12 @@ if({upper}_STRONG AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_f32.c)
   target_sources({name} PRIVATE {name}_strong_f32.c)
 endif()
 
+# {name}_weak.h, the model for pvid/fourier.h: needs a pvid of the sizes that its header names.
+option({upper}_WEAK "Build the weak form of {name}" OFF)
+if({upper}_WEAK AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_weak_f32.c)
+  target_sources({name} PRIVATE {name}_weak_f32.c)
+endif()
+
 # The generated functions against the bits of their twin: ctest.
 option({upper}_TEST "Build the test of {name}" ${{PROJECT_IS_TOP_LEVEL}})
 if({upper}_TEST)
@@ -69,11 +79,13 @@ class Options:
     reaches : of the inputs, for the fixed-point formats
     soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
     strong : the strong form as well, an identifier from derivatives of the signals
+    design : of the weak form for a rig; None: no NAME_design_f32.h
     """
 
     reaches: Reaches = field(default_factory=Reaches)
     soft_signs: Mapping[str, float] = field(default_factory=dict)
     strong: bool = False
+    design: FourierConfig | None = None
 
 
 def files_of(compiled: CompiledModel, command: str, options: Options | None = None) -> dict[str, str]:
@@ -97,7 +109,9 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         fixed = fixed_model(functions, chosen.reaches)
         files[f"{name}_q31.h"] = files_q31.header(fixed, command)
         files[f"{name}_q31.c"] = files_q31.source(fixed, command)
-    apart = [f"{name}_test.c"]
+    apart = [f"{name}_test.c", f"{name}_weak_f32.c"]
+    if weak_refusal(compiled) is None:
+        files |= _weak_files(compiled, command, chosen.design)
     if chosen.strong:
         named = renamed(strong_functions_of(strong_form(compiled)))
         files[f"{name}_strong.h"] = files_strong.header(named, command)
@@ -110,6 +124,28 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         banner="\n# ".join(banner(functions, command)), name=name, upper=name.upper(), sources=sources
     )
     return files
+
+
+def _weak_files(compiled: CompiledModel, command: str, design: FourierConfig | None) -> dict[str, str]:
+    made, model = fourier_functions_of(compiled), fourier_model_of(compiled)
+    files = {
+        f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), command),
+        f"{made.name}_weak_f32.c": files_fourier.source(made, model, command),
+    }
+    if design is not None:
+        names = [f"{one.name} [{one.unit or '1'}]" for one in compiled.unknowns]
+        needed = sizes_of_design(design.design)
+        files[f"{made.name}_design_f32.h"] = files_design.header(design, needed, command, compiled.title, names)
+    return files
+
+
+def weak_refusal(compiled: CompiledModel) -> str | None:
+    """Why a model gets no files for the weak engine; None where it gets them."""
+    try:
+        fourier_model_of(compiled)
+    except PvidError as error:
+        return str(error)
+    return None
 
 
 def _functions(compiled: CompiledModel, options: Options) -> ModelFunctions:

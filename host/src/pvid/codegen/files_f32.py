@@ -78,8 +78,8 @@ def header(functions: ModelFunctions, command: str) -> str:
     ]
     declared = [
         *_prototypes(functions),
-        "/* theta and C of all rows for the estimator: n_theta counts the theta of every row; a row of one kind has 0",
-        " * in the places of the others. */",
+        "/* theta and C of all rows for the estimator, which is given each row with its kind:",
+        " * pvid_estimator_add_kind_f32. */",
         f"extern const pvid_model_f32 {name}_model_f32;",
         "",
     ]
@@ -133,18 +133,22 @@ def model_struct(functions: ModelFunctions, theta: str, jacobian: str) -> str:
     """The pattern and NAME_model_f32, with these functions."""
     name, upper = functions.name, functions.name.upper()
     positive = sum(1 << k for k, one in enumerate(functions.model.unknowns) if one.positive)
-    n_theta = len(functions.theta.labels)
+    several = len(functions.kinds) > 1
+    ends = ", ".join(map(str, functions.kind_end))
     return "\n".join(
         [
+            *([f"static const uint8_t kind_end[{upper}_KINDS] = {{{ends}}};"] if several else []),
             f"static const uint8_t c_row[{upper}_C] = {{{', '.join(map(str, functions.c_row))}}};",
             f"static const uint8_t c_column[{upper}_C] = {{{', '.join(map(str, functions.c_column))}}};",
             "",
             f"const pvid_model_f32 {name}_model_f32 = {{",
             f"    .n_theta = {upper}_THETA,",
             f"    .n_p = {upper}_P,",
-            f"    .n_moments = {n_theta * (n_theta + 1) // 2},",
+            *([f"    .n_kinds = {upper}_KINDS,"] if several else []),
+            f"    .n_moments = {functions.moments},",
             f"    .n_c = {upper}_C,",
             f"    .positive = {positive}u,",
+            *(["    .kind_end = kind_end,"] if several else []),
             "    .c_row = c_row,",
             "    .c_column = c_column,",
             f"    .theta = {theta},",

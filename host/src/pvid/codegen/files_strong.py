@@ -24,7 +24,7 @@ typedef struct {{
     pvid_estimator_f32 estimator; /* p and counters; assess with pvid_estimator_assess_f32 */
 }} {name}_f32;
 
-/* theta and C of all rows: a row of one kind has 0 in the places of the others. */
+/* theta and C of all rows. */
 extern const pvid_model_f32 {name}_model_f32;
 
 /* Initialises `self`. Fails iff
@@ -157,13 +157,14 @@ pvid_reason {name}_step_f32({name}_f32 *self, const float sample[{upper}_SIGNALS
     row(in, column);
     static const uint8_t theta_of[{upper}_KINDS + 1] = {{{ranges}}};
     size_t at = 0;
-    for (size_t k = 0; k < {upper}_KINDS; k++) {{
-        float n[{upper}_THETA] = {{0.0f}};
-        for (size_t j = theta_of[k]; j < theta_of[k + 1u]; j++) {{
-            n[j] = column[at] * self->inverse_sd[k];
-            at++;
+    for (uint8_t k = 0; k < {upper}_KINDS; k++) {{
+        const size_t entries = (size_t)theta_of[k + 1u] - theta_of[k];
+        float n[{upper}_THETA];
+        for (size_t j = 0; j < entries; j++) {{
+            n[j] = column[at + j] * self->inverse_sd[k];
         }}
-        (void)pvid_estimator_add_f32(&self->estimator, n, column[at] * self->inverse_sd[k]);
+        at += entries;
+        (void)pvid_estimator_add_kind_f32(&self->estimator, k, n, column[at] * self->inverse_sd[k]);
         at++;
     }}
     return pvid_estimator_update_f32(&self->estimator);
@@ -178,7 +179,7 @@ def header(strong: StrongFunctions, command: str) -> str:
     needed = {
         "PVID_MAX_P": n_p,
         "PVID_MAX_THETA": n_theta,
-        "PVID_MAX_MOMENTS": n_theta * (n_theta + 1) // 2,
+        "PVID_MAX_MOMENTS": functions.moments,
     }
     samples = [
         (f"sample[{k}]", one.name, f"[{one.unit or '1'}]", "held until the next" if one.hold == "zoh" else "")

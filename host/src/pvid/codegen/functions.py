@@ -129,6 +129,16 @@ class ModelFunctions:
         return self.kinds[-1].columns.stop
 
     @property
+    def kind_end(self) -> tuple[int, ...]:
+        """One past the last theta of each kind."""
+        return tuple(one.theta.stop for one in self.kinds)
+
+    @property
+    def moments(self) -> int:
+        """Distinct entries of M, which has a block for each kind."""
+        return sum(len(one.theta) * (len(one.theta) + 1) // 2 for one in self.kinds)
+
+    @property
     def top(self) -> int:
         """Highest order of a term."""
         return max(one.order for one in self.terms)

@@ -77,13 +77,11 @@ class StrongModelTwin:
     def _take(self, columns: Float32) -> int:
         """The rows of an instant [columns]; the reason of the solve."""
         functions = self._strong.functions
-        for kind, weight in zip(functions.kinds, self._inverse_sd, strict=True):
-            n = np.zeros((len(functions.theta.labels), 1), np.float32)
-            first = kind.columns.start
+        for number, (kind, weight) in enumerate(zip(functions.kinds, self._inverse_sd, strict=True)):
             with np.errstate(all="ignore"):
-                n[kind.theta.start : kind.theta.stop, 0] = columns[first : kind.known] * weight
+                n = columns[kind.columns.start : kind.known, None] * weight
                 y = columns[kind.known : kind.known + 1] * weight
-            self.estimator.add(n, y)
+            self.estimator.add(n, y, number)
         *_, reason = self.estimator.solve(True)
         assert reason is not None
         return int(reason[0])

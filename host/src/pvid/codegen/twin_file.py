@@ -88,10 +88,9 @@ class TwinF32:
     integrands: Callable[[Float32], Float32] | None = None
 
 
-def loaded(functions: ModelFunctions) -> TwinF32:
-    """The text of the module, run."""
-    space = namespace(text(functions, "loaded"), functions.name)
-    pattern = PatternModel(
+def pattern_of(functions: ModelFunctions, space: dict[str, Any]) -> PatternModel:
+    """The estimator's model, with theta_f32 and jacobian_f32 of a module that is run."""
+    return PatternModel(
         n_theta=len(functions.theta.labels),
         n_p=len(functions.model.unknowns),
         positive=tuple(one.positive for one in functions.model.unknowns),
@@ -99,7 +98,14 @@ def loaded(functions: ModelFunctions) -> TwinF32:
         c_column=functions.c_column,
         theta=space["theta_f32"],
         jacobian=space["jacobian_f32"],
+        kind_end=functions.kind_end if len(functions.kinds) > 1 else (),
     )
+
+
+def loaded(functions: ModelFunctions) -> TwinF32:
+    """The text of the module, run."""
+    space = namespace(text(functions, "loaded"), functions.name)
+    pattern = pattern_of(functions, space)
     return TwinF32(
         channels=space["channels_f32"],
         theta=space["theta_f32"],

@@ -153,9 +153,18 @@ class Headers:
             if name in _FILLED_LATER:
                 continue
             value, kind = getattr(settings, _NAMES.get(name, name)), field.type.kind
+            if kind == "pointer" and value is None:
+                continue
             if kind == "pointer" and isinstance(value, np.ndarray):
                 whole.tables[name] = np.ascontiguousarray(value, self.dtype(field.type.item))
+                whole.owners.append(whole.tables[name])  # an array of structs has several tables of one name
                 setattr(struct, name, self.pointer(whole.tables[name]))
+            elif kind == "pointer" and isinstance(value, tuple):
+                owner = self.ffi.new(f"{field.type.item.cname}[]", max(len(value), 1))
+                whole.owners.append(owner)
+                setattr(struct, name, owner)
+                for place, one in enumerate(value):
+                    self._fill(whole, owner[place], one)
             elif kind == "pointer":
                 owner = self.ffi.new(field.type)
                 whole.owners.append(owner)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -246,7 +246,13 @@ class Stepper:
         """
         sample = self._arithmetic.sample
         samples = [np.ascontiguousarray(x, sample) for x in (first, second)]
-        ticks = len(samples[1])
+        return self._recorded(len(samples[1]), samples, sums, hashes, estimate_every)
+
+    def _recorded(
+        self, ticks: int, samples: Sequence[npt.NDArray[Any]], sums: bool, hashes: bool, estimate_every: int
+    ) -> Record:
+        """Replays arrays of one entry a tick."""
+        sample = self._arithmetic.sample
         published = (ticks if self.publishes else 0, self.n_p)
         record = Record(
             p=np.empty((ticks, self.n_p), sample),
@@ -293,16 +299,8 @@ class Stepper:
         return out
 
 
-class Identifier(Stepper):
-    """The identifier of a form and core: phi [rad], y [m], in fixed point counts of them."""
-
-    def __init__(self, native: Native, config: Settings) -> None:
-        self.form = config.form
-        given = {}
-        kind = f"pvid_{config.form}_config_{config.core}"
-        if "angle" in dict(native.headers.ffi.typeof(kind).fields):  # storage of the correction for large angles
-            self._angle = given["angle"] = native.headers.ffi.new("pvid_weak_angle_f32 *")
-        super().__init__(native, config.form, config.core, config, replay=config.form, **given)
+class Publisher(Stepper):
+    """An identifier that publishes: the weak form's state in C."""
 
     @property
     def estimator(self) -> Any:
@@ -312,7 +310,7 @@ class Identifier(Stepper):
     @property
     def publishes(self) -> bool:
         """Whether it publishes trusted estimates only."""
-        return FORMS[self.form].publishes
+        return True
 
     @property
     def is_published(self) -> bool:
@@ -341,3 +339,20 @@ class Identifier(Stepper):
     def gap(self) -> None:
         """Samples are missing before the next call of `run`."""
         self._call("gap")
+
+
+class Identifier(Publisher):
+    """The identifier of a form and core: phi [rad], y [m], in fixed point counts of them."""
+
+    def __init__(self, native: Native, config: Settings) -> None:
+        self.form = config.form
+        given = {}
+        kind = f"pvid_{config.form}_config_{config.core}"
+        if "angle" in dict(native.headers.ffi.typeof(kind).fields):  # storage of the correction for large angles
+            self._angle = given["angle"] = native.headers.ffi.new("pvid_weak_angle_f32 *")
+        super().__init__(native, config.form, config.core, config, replay=config.form, **given)
+
+    @property
+    def publishes(self) -> bool:
+        """Whether it publishes trusted estimates only."""
+        return FORMS[self.form].publishes

@@ -178,9 +178,7 @@ class WeakDesign:
 
     def _second_response(self, points: int) -> tuple[Float, Float]:
         """Frequencies up to half the sample rate [Hz] and the response of `second` there [1/s^2]."""
-        f = (np.arange(points) + 0.5) * self.sample_rate / (2 * points)
-        phase = 2 * math.pi * np.outer(f, np.arange(1, len(self.second) + 1)) / self.sample_rate
-        return f, np.asarray(2 * (np.cos(phase) - 1) @ self.second * self.sample_rate**2)
+        return _response(self.second.tobytes(), self.sample_rate, points)
 
     @property
     def flash_bytes(self) -> int:
@@ -202,6 +200,15 @@ class WeakDesign:
             float(np.float32(self.overlap)),
             self.lag,
         )
+
+
+@lru_cache(maxsize=64)
+def _response(second: bytes, sample_rate: float, points: int) -> tuple[Float, Float]:
+    """`WeakDesign._second_response` of a table in float64; kept, since designs with other p have the same table."""
+    taps = np.frombuffer(second)
+    f = (np.arange(points) + 0.5) * sample_rate / (2 * points)
+    phase = 2 * math.pi * np.outer(f, np.arange(1, len(taps) + 1)) / sample_rate
+    return _frozen(f), _frozen(np.asarray(2 * (np.cos(phase) - 1) @ taps * sample_rate**2))
 
 
 def design(
@@ -232,9 +239,25 @@ def design(
         Naming the setting that makes no sense or exceeds the core's bounds.
     """
     nominal = _checked_rig(l1, sample_rate, nominal_p)
+    sizes = sizes or Sizes()
+    return _designed(l1, sample_rate, tuple(nominal.tolist()), sizes, disturbance, exponent, bounds)
+
+
+@lru_cache(maxsize=16)
+def _designed(
+    l1: float,
+    sample_rate: float,
+    nominal_p: tuple[float, ...],
+    sizes: Sizes,
+    disturbance: float,
+    exponent: int,
+    bounds: Bounds,
+) -> WeakDesign:
+    """`design`; the last ones are kept: a run's rows are made, judged and shifted with one design."""
+    nominal = np.array(nominal_p)
     if not _MIN_EXPONENT <= exponent <= _MAX_EXPONENT:
         raise PvidError(f"exponent must be {_MIN_EXPONENT} to {_MAX_EXPONENT}, not {exponent}")
-    size = sized(nominal, sample_rate, sizes or Sizes(), bounds)
+    size = sized(nominal, sample_rate, sizes, bounds)
     window, functions, decimation = size.window, size.functions, size.decimation
     dt = decimation / sample_rate
     chi = _whitened(_test_functions(window, functions, exponent, dt), nominal)

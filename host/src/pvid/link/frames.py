@@ -39,7 +39,8 @@ VERSION = 1
 MAX_PAYLOAD = 2048
 Float = npt.NDArray[np.float64]
 
-MAX_P = 6  # places for parameters; those that a model lacks are 0
+MAX_P = 8  # places for parameters; those that a model lacks are 0
+MAX_SAMPLES = 8  # of a tick
 MAX_FIELDS = 64  # of a payload that a schema text describes
 MAX_LEARNT = 16  # schemas that a decoder keeps of those that a line brought
 _HEADER = struct.Struct("<BBIHI")
@@ -181,6 +182,7 @@ class Form(IntEnum):
 
     STRONG = 0
     WEAK = 1
+    FOURIER = 2  # the weak form of any mechanism (fourier.h)
 
 
 class Core(IntEnum):
@@ -232,11 +234,12 @@ class Hello(Message):
     p_unit: tuple[float, ...] = wire("f32", MAX_P)
     board: str = wire("char", 16)
     tick_high: int = wire("u16", absent=0)
+    samples: int = wire("u8", absent=2)  # of a tick
 
     @property
     def form_name(self) -> Literal["weak", "strong"]:
         """The form in words; "strong" for a number that none has."""
-        return "weak" if self.form == Form.WEAK else "strong"
+        return "weak" if self.form in (Form.WEAK, Form.FOURIER) else "strong"
 
 
 @dataclass(frozen=True)
@@ -244,6 +247,14 @@ class Schema(Message):
     """Board to PC beside Hello: the schema text."""
 
     TYPE = 2
+    text: bytes = wire("char", None)
+
+
+@dataclass(frozen=True)
+class Names(Message):
+    """Board to PC behind Schema: the mechanism, its samples and its parameters with their units (link.names)."""
+
+    TYPE = 14
     text: bytes = wire("char", None)
 
 
@@ -299,89 +310,110 @@ class ConfigureQ31(Configuration):
 
 
 @dataclass(frozen=True)
-class Samples(Message):
-    """phi [rad], y [m] of consecutive ticks for the float32 core, exactly as it gets them; the first of them is the
-    header's tick."""
+class _Ticks(Message):
+    """What is measured at consecutive ticks, tick after tick; the first of them is the header's tick."""
 
-    phi_y: bytes = wire("f32", None)
+    NUMBER: ClassVar[str] = "<f4"
 
-    @property
-    def count(self) -> int:
-        """How many ticks."""
-        return len(self.phi_y) // 8
-
-    @property
-    def values(self) -> npt.NDArray[np.float32]:
-        """float32 [n, 2]: phi, y."""
-        return np.frombuffer(self.phi_y[: 8 * self.count], "<f4").astype(np.float32).reshape(self.count, 2)
-
-    def in_si(self, lsb: Float) -> Float:
-        """[n, 2]: phi [rad], y [m], whatever a count of the board's sensors is worth."""
-        return self.values.astype(np.float64)
+    def of_each(self, samples: int) -> npt.NDArray[Any]:
+        """[ticks, samples], of so many samples a tick; what is left over is left out."""
+        data: bytes = self.data  # type: ignore[attr-defined]
+        ticks = len(data) // (4 * samples)
+        return np.frombuffer(data[: 4 * samples * ticks], self.NUMBER).reshape(ticks, samples)
 
     @classmethod
-    def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:
-        """From phi [n] and y [n], rounded to float32 as a board would read them."""
-        return cls(np.stack([np.asarray(phi, "<f4"), np.asarray(y, "<f4")], axis=1).tobytes())
+    def of_values(cls, *columns: npt.ArrayLike) -> Self:
+        """From the samples of each sensor [ticks], rounded to what a board would read."""
+        data = np.stack([np.asarray(one, cls.NUMBER) for one in columns], axis=1).tobytes()
+        known = {f.name for f in fields(cls)}
+        values: dict[str, Any] = {"data": data, "samples": len(columns)}
+        return cls(**{name: value for name, value in values.items() if name in known})
 
 
 @dataclass(frozen=True)
-class Sample(Samples):
-    """PC to board, to be identified with."""
-
-    TYPE = 4
-
-
-@dataclass(frozen=True)
-class Raw(Samples):
-    """Board to PC: what its own sensor gave the identifier. Every sample up to the tick of an Estimate or a Hash has
+class _Measured(_Ticks):
+    """Board to PC: what its own sensors gave the identifier. Every sample up to the tick of an Estimate or a Hash has
     been sent before it."""
 
-    TYPE = 5
-    session: int = wire("u32", absent=0)
-    tick_high: int = wire("u16", absent=0)
+    def __post_init__(self) -> None:
+        if not 0 < self._samples <= MAX_SAMPLES:
+            raise PvidError(f"a frame of {self._samples} samples a tick, and there are 1 to {MAX_SAMPLES}")
 
-
-@dataclass(frozen=True)
-class Counts(Message):
-    """phi, y [counts] of consecutive ticks for the fixed-point core; the first of them is the header's tick."""
-
-    phi_y: bytes = wire("i32", None)
+    @property
+    def _samples(self) -> int:
+        number: int = self.samples  # type: ignore[attr-defined]
+        return number
 
     @property
     def count(self) -> int:
         """How many ticks."""
-        return len(self.phi_y) // 8
+        return len(self.values)
 
     @property
-    def values(self) -> npt.NDArray[np.int32]:
-        """int32 [n, 2]: phi, y."""
-        return np.frombuffer(self.phi_y[: 8 * self.count], "<i4").astype(np.int32).reshape(self.count, 2)
-
-    def in_si(self, lsb: Float) -> Float:
-        """[n, 2]: phi [rad], y [m], a count being worth `lsb` [2]."""
-        return self.values.astype(np.float64) * lsb
-
-    @classmethod
-    def of_values(cls, phi: npt.ArrayLike, y: npt.ArrayLike) -> Self:
-        """From counts phi [n] and y [n]."""
-        return cls(np.stack([np.asarray(phi, "<i4"), np.asarray(y, "<i4")], axis=1).tobytes())
+    def values(self) -> npt.NDArray[Any]:
+        """float32 or int32 [ticks, samples]."""
+        return self.of_each(self._samples)
 
 
 @dataclass(frozen=True)
-class Count(Counts):
-    """PC to board, to be identified with."""
+class Sample(_Ticks):
+    """PC to board, to be identified with: float32 in the units of the model, exactly as the identifier gets them."""
 
-    TYPE = 11
+    TYPE = 4
+    data: bytes = wire("f32", None)
 
 
 @dataclass(frozen=True)
-class RawCount(Counts):
-    """Board to PC: what its own sensor counted, as Raw."""
+class Raw(_Measured):
+    """Board to PC: float32 in the units of the model, exactly as the identifier got them."""
 
-    TYPE = 12
+    TYPE = 5
+    data: bytes = wire("f32", None)
     session: int = wire("u32", absent=0)
     tick_high: int = wire("u16", absent=0)
+    samples: int = wire("u8", absent=2)  # of a tick
+
+    def in_si(self, lsb: Float) -> Float:
+        """[ticks, samples] in the units of the model, whatever a count of the board's sensors is worth."""
+        return self.values.astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Count(_Ticks):
+    """PC to board, to be identified with: counts for the fixed-point core."""
+
+    TYPE = 11
+    NUMBER: ClassVar[str] = "<i4"
+    data: bytes = wire("i32", None)
+
+
+@dataclass(frozen=True)
+class RawCount(_Measured):
+    """Board to PC: what its own sensors counted, as Raw."""
+
+    TYPE = 12
+    NUMBER: ClassVar[str] = "<i4"
+    data: bytes = wire("i32", None)
+    session: int = wire("u32", absent=0)
+    tick_high: int = wire("u16", absent=0)
+    samples: int = wire("u8", absent=2)
+
+    def in_si(self, lsb: Float) -> Float:
+        """[ticks, 2]: phi [rad], y [m], a count being worth `lsb` [2]; NaN for another number of samples."""
+        if self.samples != len(lsb):
+            return np.full(self.values.shape, np.nan)
+        return self.values.astype(np.float64) * lsb
+
+
+_UPPER = MAX_P * (MAX_P + 1) // 2
+
+
+def upper_triangle(matrix: npt.ArrayLike) -> tuple[Any, ...]:
+    """The upper triangle by rows of a matrix [n, n], n at most MAX_P, filled up with zeros: as in a frame."""
+    given = np.asarray(matrix)
+    whole = np.zeros((MAX_P, MAX_P), given.dtype)
+    whole[: len(given), : len(given)] = given
+    return tuple(whole[np.triu_indices(MAX_P)].tolist())
 
 
 def _symmetric(upper: tuple[float, ...]) -> Float:
@@ -402,7 +434,7 @@ class Estimate(Message):
     session: int = wire("u32")
     updates: int = wire("u32")
     p: tuple[float, ...] = wire("f32", MAX_P)
-    covariance: tuple[float, ...] = wire("f32", MAX_P * (MAX_P + 1) // 2)  # upper triangle by rows, of all MAX_P
+    covariance: tuple[float, ...] = wire("f32", _UPPER)  # upper triangle by rows, of all MAX_P
     kappa: float = wire("f32")
     residual_sd: float = wire("f32")
     weight: float = wire("f32")
@@ -425,7 +457,7 @@ class EstimateQ31(Message):
     updates: int = wire("u32")
     p: tuple[int, ...] = wire("i32", MAX_P)
     se: tuple[int, ...] = wire("i32", MAX_P)
-    correlation: tuple[int, ...] = wire("i32", MAX_P * (MAX_P + 1) // 2)  # Q30, upper triangle by rows
+    correlation: tuple[int, ...] = wire("i32", _UPPER)  # Q30, upper triangle by rows
     kappa: int = wire("i32")
     residual_sd: int = wire("i32")
     weight: int = wire("u32")
@@ -465,8 +497,8 @@ class Status(Message):
 class Hash(Message):
     """Board to PC: the running hashes (FNV-1a, 32 bits) after the header's tick.
 
-    `hash` covers what the identifier made of the samples (fnv.h), `sample_hash` the samples themselves: the eight bytes
-    of each, as they stand in a frame, since the session began. 0: the board does not compute it.
+    `hash` covers what the identifier made of the samples (fnv.h), `sample_hash` the samples themselves: the bytes of
+    each tick, as they stand in a frame, since the session began. 0: the board does not compute it.
     """
 
     TYPE = 8
@@ -575,9 +607,50 @@ def _extends(layout: Layout, today: Layout, absent: Mapping[str, int]) -> bool:
     return (layout.name, layout.fields) == (today.name, kept)
 
 
+# Frames that had other fields when a tick had two samples and a mechanism at most six parameters.
+_OF_TWO_SAMPLES = """\
+pvid 1
+1 hello form:u8 core:u8 n_p:u8 window:u16 settings:u32 session:u32 sample_rate:f32 phi_lsb:f32 y_lsb:f32 \
+p_unit:f32[6] board:char[16] tick_high:u16
+3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 \
+start:f32[6] start_sd:f32[6] lower:f32[6] upper:f32[6] row_sd:f32 forgetting_s:f32 feedback_hz:f32 first_tick:u64
+4 sample phi_y:f32[]
+5 raw session:u32 tick_high:u16 phi_y:f32[]
+6 estimate session:u32 updates:u32 p:f32[6] covariance:f32[21] kappa:f32 residual_sd:f32 weight:f32 reason:u8 \
+tick_high:u16
+10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 \
+start:i32[6] start_sd:i32[6] lower:i32[6] upper:i32[6] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 \
+y_offset:i32 first_tick:u64
+11 count phi_y:i32[]
+12 raw_count session:u32 tick_high:u16 phi_y:i32[]
+13 estimate_q31 session:u32 updates:u32 p:i32[6] se:i32[6] correlation:i32[21] kappa:i32 residual_sd:i32 weight:u32 \
+reason:u8 tick_high:u16"""
+_FORMER = parse_schema(_OF_TWO_SAMPLES)
+_FORMER_P = 6
+
+
+def _of_two_samples(kind: type[Message], values: Mapping[str, Any]) -> Message:
+    """The message of today of a frame as it was then."""
+    places = {f.name: f.metadata["count"] for f in fields(kind)}
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        wanted = places.get(name)
+        if name == "phi_y":
+            found["data"] = value
+        elif wanted == MAX_P:
+            found[name] = (*value, *(0,) * (MAX_P - _FORMER_P))
+        elif wanted == _UPPER:
+            matrix = np.zeros((_FORMER_P, _FORMER_P), np.asarray(value).dtype)
+            matrix[np.triu_indices(_FORMER_P)] = value
+            found[name] = upper_triangle(matrix)
+        else:
+            found[name] = value
+    return kind(**found)
+
+
 def described_readers(text: str) -> Readers:
     """What a decoder reads frames with that `text` describes: a message of today where the layout is the same, or was
-    before fields were added that may be absent.
+    before fields were added that may be absent, or more samples and parameters.
 
     Raises
     ------
@@ -591,6 +664,9 @@ def described_readers(text: str) -> Readers:
             return known.of
         if known is not None and _extends(layout, LAYOUTS[layout.type], known.absent()):
             return lambda payload: known(**layout.unpack(payload))
+        former = _FORMER.get(layout.type)
+        if known is not None and former is not None and _extends(layout, former, known.absent()):
+            return lambda payload: _of_two_samples(known, layout.unpack(payload))
         return lambda payload: Described(layout.name, layout.unpack(payload))
 
     return {number: reader(layout) for number, layout in parse_schema(text).items()}

@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Raw, RawCount
+from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Names, Raw, RawCount
 from pvid.log.file import Segment
 from pvid.log.reader import Account, Record, Restart
 from pvid.log.values import UNKNOWN_RIG, Rows, Values
@@ -97,7 +97,7 @@ class History:
     def __init__(self, mechanism: Mechanism = UNKNOWN_RIG, points: int = 400, window_s: float = 10.0) -> None:
         self.window_s = window_s
         self.hello: Hello | None = None
-        self._values = Values(mechanism)
+        self._values = Values(mechanism, follows=mechanism is UNKNOWN_RIG)
         self._aside: list[Record | _Point] = []
         self._aside_samples = 0
         self._estimates: Thinned[_Point] = Thinned(points)
@@ -109,23 +109,26 @@ class History:
 
     def know(self, mechanism: Mechanism) -> None:
         """That of the rig, once it is known."""
-        self._values.mechanism = mechanism
+        self._values.follows = False
+        self._change(mechanism)
 
     @property
     def model(self) -> Model:
         """The mechanism's."""
+        self._work_off()
         return self._values.mechanism.model
 
     @property
     def numbers(self) -> tuple[str, ...]:
         """Names of the estimates' columns that hold numbers, but for the time."""
+        self._work_off()
         columns = self._values.tables["estimates"].items()
         return tuple(name for name, column in columns if column.kind == "f8" and name != "t")
 
     @property
     def has_physical(self) -> bool:
         """Whether the physical parameters can be computed."""
-        return self._values.mechanism.constants is not None
+        return self._values.mechanism.constants is not None and bool(self.model.physical)
 
     @property
     def is_physical(self) -> bool:
@@ -159,7 +162,7 @@ class History:
             case Hello() as hello:
                 self.hello = hello
                 self._aside.append(record)
-            case Configuration() | Segment() | Restart():
+            case Configuration() | Names() | Segment() | Restart():
                 self._aside.append(record)
             case _:
                 return
@@ -170,7 +173,7 @@ class History:
         """A column of the estimates' history: "t" [s] or one of `numbers`, [n]."""
         self._work_off()
         at = 0 if name == "t" else 1 + self.numbers.index(name)
-        return np.array([point.row[at] for point in self._estimates.rows], np.float64)
+        return np.array([point.row[at] for point in self._estimates.rows if point.row], np.float64)
 
     def samples(self) -> Float:
         """The last `window_s` of t [s] and the channels: [1 + channels, n]."""
@@ -189,11 +192,28 @@ class History:
         wanted = (one for one in aside if not isinstance(one, _Point) or one in kept)
         for one in _joined(wanted):
             record = one.record if isinstance(one, _Point) else one
+            model = self.model
             for rows in self._values.rows(record):
                 if rows.table == "samples":
                     self._take_samples(rows)
                 elif isinstance(one, _Point):
                     self._take_estimate(one, rows)
+            if self.model is not model:
+                self._forget()
+
+    def _change(self, mechanism: Mechanism) -> None:
+        self._work_off()
+        model, self._values.mechanism = self.model, mechanism
+        if self.model.p_names != model.p_names or len(self.model.channels) != len(model.channels):
+            self._forget()
+
+    def _forget(self) -> None:
+        """What was computed of another mechanism."""
+        self._samples.clear()
+        self._count = 0
+        self._newest, self._reason = {}, ""
+        for point in self._estimates.rows:
+            point.row = ()
 
     def _since_began(self, log_time: npt.NDArray[Any]) -> Float:
         if self._began is None:
@@ -229,12 +249,13 @@ def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:
     for one in aside:
         raw = None if isinstance(one, _Point) else one.item
         if not isinstance(one, _Point) and isinstance(raw, Raw | RawCount):
-            if first is not None and (type(first.item), first.segment, following) != (type(raw), one.segment, one.tick):
+            this = type(raw), raw.samples, one.segment, one.tick
+            if first is not None and (*_kind(first), first.segment, following) != this:
                 yield _of_parts(first, parts)
                 first = None
             if first is None:
                 first, parts = one, []
-            parts.append(raw.phi_y[: 8 * raw.count])
+            parts.append(raw.values.tobytes())
             following = one.tick + raw.count
             continue
         if first is not None:
@@ -245,9 +266,14 @@ def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:
         yield _of_parts(first, parts)
 
 
+def _kind(record: Record) -> tuple[type[Any], int]:
+    assert isinstance(record.item, Raw | RawCount)
+    return type(record.item), record.item.samples
+
+
 def _of_parts(first: Record, parts: list[bytes]) -> Record:
     assert isinstance(first.item, Raw | RawCount)
-    return replace(first, item=replace(first.item, phi_y=b"".join(parts)))
+    return replace(first, item=replace(first.item, data=b"".join(parts)))
 
 
 def envelope(t: Float, x: Float, bins: int) -> tuple[Float, Float]:

@@ -57,7 +57,7 @@ class LiveStream:
             raise PvidError(f"{address!r} is no address to send to: udp://host:port or teleplot://host:port")
         found = addresses(host, port, socket.SOCK_DGRAM, f"cannot send to {address}")[0]
         self._teleplot = scheme == "teleplot"
-        self._values = Values(mechanism)
+        self._values = Values(mechanism, follows=mechanism is UNKNOWN_RIG)
         self._socket = socket.socket(found[0], socket.SOCK_DGRAM)
         self._to = found[1]
 

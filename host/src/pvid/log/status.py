@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from typing import TextIO
 
-from pvid.link.frames import Estimate, EstimateQ31, Hello
+from pvid.base.errors import PvidError
+from pvid.link.frames import Estimate, EstimateQ31, Hello, Names
+from pvid.log.board_model import mechanism_of
 from pvid.log.reader import Account, Record
 from pvid.log.values import UNKNOWN_RIG, in_si
 from pvid.models.model import Model
@@ -20,6 +23,7 @@ class StatusLine:
 
     def __init__(self, to: TextIO, model: Model = UNKNOWN_RIG.model) -> None:
         self._model = model
+        self._follows = model is UNKNOWN_RIG.model
         self._to = to
         self._terminal = to.isatty()
         self._period = _ON_TERMINAL_S if self._terminal else _ELSEWHERE_S
@@ -32,6 +36,9 @@ class StatusLine:
         """See logreader.Observer."""
         if isinstance(record.item, Estimate | EstimateQ31):
             self._estimate, self._tick = record.item, record.tick
+        elif isinstance(record.item, Names) and self._follows:
+            with suppress(PvidError):
+                self._model, self._estimate = mechanism_of(record.item.text).model, None
 
     def idle(self, account: Account) -> None:
         """See logreader.Observer."""

@@ -14,8 +14,9 @@ _CHUNK = 1 << 16
 class LogTail:
     """Reads a log behind its writer.
 
-    Bytes that are in the file at the start are all read. After that, if the reader is more than `most_behind` bytes
-    behind the writer, it skips bytes (LogStream.skip).
+    Bytes that are in the file at the start are all read, and those up to the first segment, without which a recording
+    has not begun. After that, if the reader is more than `most_behind` bytes behind the writer, it skips bytes
+    (LogStream.skip).
     """
 
     def __init__(self, file: BinaryIO, stream: LogStream, most_behind: int = MOST_BEHIND) -> None:
@@ -28,7 +29,8 @@ class LogTail:
         """The next bytes for the stream, b"" if there are none yet; hurried: skips to the last 64 kB of the file."""
         at, size = self._file.tell(), os.fstat(self._file.fileno()).st_size
         behind = size - at
-        if behind > _CHUNK and (hurried or (at >= self._there and behind > self._most_behind)):
+        begun = at >= self._there and self._stream.account.begun > 0
+        if behind > _CHUNK and (hurried or (begun and behind > self._most_behind)):
             self._stream.skip(behind - _CHUNK)
             self._file.seek(size - _CHUNK)
         return self._file.read(_CHUNK)

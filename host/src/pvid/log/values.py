@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.errors import PvidError
 from pvid.link.frames import (
     MAX_P,
     Code,
@@ -29,10 +31,12 @@ from pvid.link.frames import (
     Hello,
     Loss,
     Message,
+    Names,
     Raw,
     RawCount,
     Status,
 )
+from pvid.log.board_model import mechanism_of
 from pvid.log.file import Close, Segment
 from pvid.log.reader import Gap, Record, Restart
 from pvid.models.model import Mechanism, Model, Quantity
@@ -88,7 +92,7 @@ def _number(of: Quantity, what: str) -> Column:
 TABLE_NAMES = ("samples", "estimates", "status", "events")
 
 
-@cache
+@lru_cache(maxsize=64)
 def tables_of(model: Model) -> Tables:
     """The tables of a model's logs."""
     estimated = (*model.published, *model.physical)
@@ -125,10 +129,15 @@ class Values:
         Of the rig file; without its constants no physical parameters are computed.
     hello
         Who the board is, where that is known before its records; without it times are NaN until it has said so.
+    follows
+        Take the mechanism that the board names, from there on; the tables change with it.
     """
 
-    def __init__(self, mechanism: Mechanism = UNKNOWN_RIG, hello: Hello | None = None) -> None:
+    def __init__(
+        self, mechanism: Mechanism = UNKNOWN_RIG, hello: Hello | None = None, *, follows: bool = False
+    ) -> None:
         self.mechanism = mechanism
+        self.follows = follows
         self._hello = hello
         self._row_sd = math.nan
         self._offset = 0.0  # of the angle in fixed point [rad]
@@ -161,6 +170,9 @@ class Values:
         match item:
             case Hello():
                 self._hello = item
+            case Names() if self.follows:
+                with suppress(PvidError):  # a board that names nothing that there can be
+                    self.mechanism = mechanism_of(item.text)
             case Configure() | ConfigureQ31():
                 self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
                 self._offset = getattr(item, "phi_offset", 0) * (self._hello.phi_lsb if self._hello else 0.0)
@@ -227,10 +239,12 @@ class Values:
     @np.errstate(all="ignore")  # a board may send any number
     def _samples(self, record: Record, item: Raw | RawCount) -> Rows:
         hello = self._hello
-        phi_y = item.in_si(np.array([np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]))
-        columns = self._where(record, record.tick + np.arange(len(phi_y), dtype=np.int64))
-        names = (one.name for one in self.mechanism.model.channels)
-        return Rows("samples", {**columns, **dict(zip(names, phi_y.T, strict=True))})
+        measured = item.in_si(np.array([np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]))
+        columns = self._where(record, record.tick + np.arange(len(measured), dtype=np.int64))
+        channels = self.mechanism.model.channels
+        if measured.shape[1] != len(channels):  # samples of something else
+            measured = np.full((len(measured), len(channels)), np.nan)
+        return Rows("samples", {**columns, **dict(zip((one.name for one in channels), measured.T, strict=True))})
 
     @np.errstate(all="ignore")
     def _estimate(self, record: Record, item: Estimate | EstimateQ31) -> Rows:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
-from pvid.link.frames import Code, Core, Form, Hello, Status
+from pvid.base.errors import PvidError
+from pvid.link.frames import Code, Core, Form, Hello, Names, Status
+from pvid.log.board_model import mechanism_of
 from pvid.log.reader import Account
 from pvid.settings.enums import Reason
 from pvid.settings.forms import FORMS
@@ -39,11 +42,21 @@ def board_words(hello: Hello | None, account: Account) -> str:
         kinds(number).name.lower() if number in list(kinds) else str(number)
         for kinds, number in ((Form, hello.form), (Core, hello.core))
     )
-    text = f"{hello.board}: {form} form, core {core}, {hello.sample_rate:g} samples per second"
+    of = f"weak form of {_mechanism(account)}" if hello.form == Form.FOURIER else f"{form} form"
+    text = f"{hello.board}: {of}, core {core}, {hello.sample_rate:g} samples per second"
     status = account.lasting.get(Status)
     if isinstance(status, Status) and status.code != Code.RUNNING and status.code in list(Code):
         text += f"; {Code(status.code).name.lower().replace('_', ' ')}"
     return text
+
+
+def _mechanism(account: Account) -> str:
+    """As the board named it last."""
+    names = account.lasting.get(Names)
+    with suppress(PvidError):
+        if isinstance(names, Names):
+            return mechanism_of(names.text).model.name
+    return "an unnamed mechanism"
 
 
 def link_words(account: Account) -> tuple[bool, str]:
@@ -102,5 +115,7 @@ def kappa_share(kappa: float) -> float:
 
 def residual_words(hello: Hello | None) -> str:
     """What the residuals are so many times of."""
+    if hello is not None and hello.form == Form.FOURIER:
+        return "times the noise of the sensors"
     weak = hello is not None and FORMS[hello.form_name].uses_windows
     return "times the encoder's noise" if weak else "times the row_sd that was configured"

@@ -32,7 +32,7 @@ def slopes(model: CompiledModel) -> dict[tuple[str, str], sp.Expr]:
     held = [one for one in model.signals if one.kind == "input" and one.hold == "zoh"]
     hidden = {jet.of for jet in model.hidden}
     names = [one.name for one in model.signals if one.kind == "sensor" and not one.driven]
-    first = [name for name in names if max(order_of(one, [name]) for one in model.equations) == 1]
+    first = [name for name in names if max((order_of(one, [name]) for one in model.equations), default=0) == 1]
     found = {}
     for name in first:
         rate = Jet(name, 1)

@@ -23,10 +23,10 @@ _EVALUATIONS = 40
 
 
 def self_consistent(
-    p: Float, damping: Float, columns: Float, phi: Float, u: Float, design: WeakDesign, full_angle: bool
+    p: Float, damping: Float | None, columns: Float, phi: Float, u: Float, design: WeakDesign, full_angle: bool
 ) -> Remainder | None:
     """Neglected terms of the window with `columns` [11, K], angle phi [W, rad] and u [W, 1/s^2], at p = (w, d1, d2, c),
-    with friction `damping` [2].
+    with friction `damping` [2]; None: without friction, and k is 0.
 
     None if no motion is consistent with its neglected terms.
 
@@ -37,10 +37,11 @@ def self_consistent(
         return None
 
     def ends_with(known: Remainder) -> Float:
-        return boundary(p, columns, known.y + damping @ known.k)
+        return boundary(p, columns, known.y if damping is None else known.y + damping @ known.k)
 
     def remainder_at(ends: Float) -> Remainder:
-        return remainder_of_motion(p, internal_motion(p, ends, phi, u, design), phi, u, design, full_angle)
+        motion = internal_motion(p, ends, phi, u, design)
+        return remainder_of_motion(p, motion, phi, u, design, full_angle, friction=damping is not None)
 
     with np.errstate(over="ignore", invalid="ignore"):
         out, moved = none, np.inf

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,9 +29,14 @@ def _layout(n_sums: int) -> tuple[int, int]:
     return _SHARED_MOMENTS.get(n_sums) or next(own)
 
 
-def sum_name(index: int, n_sums: int) -> str:
-    """Name of a sum by its place among `n_sums`: M[i], B[i], yy or weight."""
-    moments, n_theta = _layout(n_sums)
+def sum_name(index: int, n_sums: int, layout: tuple[int, int] | None = None) -> str:
+    """Name of a sum by its place among `n_sums`: M[i], B[i], yy or weight.
+
+    Parameters
+    ----------
+    layout : number of moments and of entries of B; None: by the number of sums
+    """
+    moments, n_theta = layout or _layout(n_sums)
     if index < moments:
         return f"M[{index}]"
     return f"B[{index - moments}]" if index < moments + n_theta else ("yy", "weight")[index - moments - n_theta]
@@ -68,14 +73,23 @@ class Comparison:
         return self.difference is None and self.core_hash == self.twin_hash
 
 
-def first_difference(core: Record, twin: Record) -> Difference | None:
-    """The first difference between a replay of the core and a lane of its twin: p, sums, status, published p."""
+def first_difference(
+    core: Record, twin: Record, p_names: Sequence[str] = P_NAMES, moments: int = 0
+) -> Difference | None:
+    """The first difference between a replay of the core and a lane of its twin: p, sums, status, published p.
+
+    Parameters
+    ----------
+    p_names : of the parameters
+    moments : entries of M among the sums; 0: by the number of sums
+    """
+    layout = (moments, core.sums.shape[1] - moments - 2) if moments else None
     names: dict[str, Callable[[int], str]] = {
-        "p": P_NAMES.__getitem__,
-        "sums": lambda place: sum_name(place, core.sums.shape[1]),
+        "p": p_names.__getitem__,
+        "sums": lambda place: sum_name(place, core.sums.shape[1], layout),
         "exponent": lambda _: "exponent of the sums",
         "status": lambda _: "status",
-        "published": lambda place: f"published {P_NAMES[place]}",
+        "published": lambda place: f"published {p_names[place]}",
     }
     found, twins = [], twin.words()
     for order, (part, own) in enumerate(core.words().items()):

@@ -113,30 +113,47 @@ def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
 
 
 def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
-    gains = np.array(given(model, found.by_gain, found.by_known)).reshape(-1, len(found.p))
+    gains = gains_of(model, found)
     # Of noise: the correlations of the rows, with the published standard errors but for gains and constants.
     noise = np.sqrt(np.maximum(found.se**2 - np.sum(gains**2, axis=0), 0.0))
     widened = noise / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
+    return values_of(model, found.p, covariance, gains, identified=found.verdict.identified)
+
+
+def gains_of(model: CompiledModel, found: Identified) -> Float:
+    """What p is off by for one standard deviation of each gain and of each constant that has any [gains, n_p]."""
+    return np.array(given(model, found.by_gain, found.by_known)).reshape(-1, len(found.p))
+
+
+def values_of(model: CompiledModel, p: Float, covariance: Float, gains: Float, *, identified: bool) -> dict[str, Value]:
+    """Outputs of the model, then p, by name.
+
+    Parameters
+    ----------
+    covariance : of p by noise [n_p, n_p]
+    gains : see gains_of
+    identified : whether values are shown
+    """
     whole = covariance + gains.T @ gains
 
     def shown(unit: str, value: float, slope: Float) -> Value:
-        if not found.verdict.identified:
+        if not identified:
             return Value(unit, None, None, None)
         return Value(unit, value, *(float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance)))
 
-    values = {one.name: shown(one.unit, *_output(model, found, one)) for one in model.outputs}
+    values = {one.name: shown(one.unit, *_output(model, p, one)) for one in model.outputs}
     for k, one in enumerate(model.unknowns):
-        values[one.name] = shown(one.unit, float(found.p[k]), np.eye(len(found.p))[k])
+        values[one.name] = shown(one.unit, float(p[k]), np.eye(len(p))[k])
     return values
 
 
-def _output(model: CompiledModel, found: Identified, output: Output) -> tuple[float, Float]:
+def _output(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:
     """Value at p and its gradient [n_p]; NaN where it does not exist at p."""
     value = model.with_knowns(output.value)
     gradient = sp.lambdify(model.p, [value, *(value.diff(symbol) for symbol in model.p)], "numpy")
     with np.errstate(all="ignore"):
-        at, *slopes = (complex(one) for one in gradient(*found.p.astype(complex)))
+        at, *slopes = (complex(one) for one in gradient(*p.astype(complex)))
     if abs(at.imag) > 0:
-        return float("nan"), np.full(len(found.p), np.nan)
+        return float("nan"), np.full(len(p), np.nan)
     return at.real, np.array(slopes).real

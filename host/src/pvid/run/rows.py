@@ -31,6 +31,7 @@ _WHITENINGS = 3
 _STEPS = 40
 _LONGEST_STEP = 0.5  # of log w, log d1, log d2
 _DONE = 1e-8
+_FAR = math.log(1e3)  # a search that moved w, d1 or d2 so far to implausible values diverges
 # Fewer windows are not evaluated.
 FEWEST = 4
 _MAPPED, _CORE = MODEL.n_mapped, len(MODEL.published)  # without the offset, with it; friction adds two
@@ -67,10 +68,9 @@ class Fit:
         """
         windows = len(self.scores)
         inverse = np.linalg.pinv(self.information, hermitian=True)
-        own = self.scores.T @ self.scores
-        shared = self.scores[:-1].T @ self.scores[1:]
-        variance = np.diag(inverse @ own @ inverse)
-        with_neighbours = np.diag(inverse @ (own + shared + shared.T) @ inverse)
+        moved = self.scores @ inverse  # by each window; a sum of squares, which rounding cannot make negative
+        variance = np.sum(moved**2, axis=0)
+        with_neighbours = variance + 2 * np.sum(moved[:-1] * moved[1:], axis=0)
         few = windows / max(windows - 2, 1)
         return np.asarray(np.sqrt(np.maximum(variance, with_neighbours) * few))
 
@@ -145,7 +145,7 @@ class RunRows:
         """Rows with the remainder of large angles at p subtracted from Y, and with the columns of friction if p has its
         two coefficients. `sound`: windows in which the remainder was found; the others remain linear."""
         friction = len(p) > _CORE
-        damping = p[_CORE:] if friction else np.zeros(2)
+        damping = p[_CORE:] if friction else None
         y = np.zeros((len(self.phi), self.design.functions))
         k = np.zeros((len(self.phi), 2, self.design.functions))
         sound = np.zeros(len(self.phi), np.bool_)
@@ -190,12 +190,14 @@ class RunRows:
 
     def fitted(self, p: Float, disturbance: float = 0.0) -> Fit:
         """The least squares from p on, whitened at the estimate itself; windows with a jolt are left out."""
-        kept = np.ones(len(self.columns), np.bool_)
+        kept, begun = np.ones(len(self.columns), np.bool_), p
         for _ in range(_WHITENINGS):
             white = self.whitened(p, disturbance)
             energy = np.sum(_residuals(white, p) ** 2, axis=1)
             kept = energy <= JOLT * np.median(energy)
             p = least_squares(np.einsum("wik,wjk->ij", white[kept], white[kept]), p)
+            if _diverges(p, begun):
+                break
         return self.judged(p, disturbance, kept)
 
     def judged(self, p: Float, disturbance: float = 0.0, kept: npt.NDArray[np.bool_] | None = None) -> Fit:
@@ -241,47 +243,59 @@ def _whole(present: npt.NDArray[np.bool_], design: WeakDesign, windows: int) -> 
 
 def energy_at(moments: Float, p: Float) -> Float:
     """Sum of squares of Y - N^T theta(p), from the moments of (Y, N) [..., n, n]: [...]."""
-    weights = np.append(1.0, -_theta(p))
+    weights = np.empty(moments.shape[-1])
+    weights[0], weights[1:] = 1.0, -_theta(p)
     return np.asarray(moments @ weights @ weights)
 
 
 def least_squares(moments: Float, p: Float) -> Float:
     """Constrained least squares of theta(p) by damped Gauss-Newton steps in (log w, log d1, log d2, c and friction),
-    from p on."""
-    m, b = moments[1:, 1:], moments[1:, 0]
+    from p on; a search that diverges ends where it is."""
+    m, b, begun = moments[1:, 1:], moments[1:, 0], p
     damping, energy = 1e-3, float(energy_at(moments, p))
-    units = np.ones(len(p))
+    units, one = np.ones(len(p)), np.eye(len(p))
     for _ in range(_STEPS):
         units[:_MAPPED] = p[:_MAPPED]
         c = _jacobian(p) * units
         information, force = c.T @ m @ c, c.T @ (b - m @ _theta(p))
-        scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-        normal = information * np.outer(scale, scale)
-        step, there, better = np.zeros(len(p)), p, False
-        while not better and damping < 1e12:
-            step = scale * np.linalg.solve(normal + damping * np.eye(len(p)), scale * force)
-            step[:_MAPPED] = np.clip(step[:_MAPPED], -_LONGEST_STEP, _LONGEST_STEP)
-            there = np.append(p[:_MAPPED] * np.exp(step[:_MAPPED]), p[_MAPPED:] + step[_MAPPED:])
+        scale = 1 / np.sqrt(np.maximum(information.diagonal(), 1e-300))
+        normal = information * (scale[:, None] * scale)
+        force = scale * force
+        longest, there, better = math.inf, p, False
+        while not better and damping < 1e12 and longest >= _DONE:  # a shorter step is below what rounding resolves
+            step = scale * np.linalg.solve(normal + damping * one, force)
+            step[:_MAPPED] = np.minimum(np.maximum(step[:_MAPPED], -_LONGEST_STEP), _LONGEST_STEP)
+            longest = float(np.abs(step[:_MAPPED]).max())
+            there = p + step
+            there[:_MAPPED] = p[:_MAPPED] * np.exp(step[:_MAPPED])
             now = float(energy_at(moments, there))
             better = math.isfinite(now) and now <= energy
             damping *= 1 / 8 if better else 4
         if not better:
             break
-        p, energy = there, float(energy_at(moments, there))
-        if np.abs(step[:_MAPPED]).max() < _DONE:
+        p, energy = there, now
+        if longest < _DONE or _diverges(p, begun):
             break
     return p
 
 
+def _diverges(p: Float, begun: Float) -> bool:
+    far = np.abs(np.log(p[:_MAPPED] / begun[:_MAPPED])).max() > _FAR
+    return bool(far) and not MODEL.is_plausible(p)
+
+
 def _theta(p: Float) -> Float:
     """theta(p), friction last."""
-    return np.append(theta(p[:_CORE]), p[_CORE:])
+    core = theta(p[:_CORE])
+    return core if len(p) <= _CORE else np.concatenate([core, p[_CORE:]])
 
 
 def _jacobian(p: Float) -> Float:
     """d theta / d p, friction last."""
     core = jacobian(p[:_CORE])
     (rows, columns), friction = core.shape, len(p) - _CORE
+    if friction <= 0:
+        return core
     out = np.zeros((rows + friction, columns + friction))
     out[:rows, :columns] = core
     out[rows:, columns:] = np.eye(friction)

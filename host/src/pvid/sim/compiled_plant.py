@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import os
-import shutil
 import subprocess
 import tempfile
 from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.base.user_cache import built_under
+from pvid.core.host_compiler import host_compiler
 from pvid.core.sources import ROOT
 
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w")
@@ -25,21 +24,13 @@ def loaded(code: str) -> ctypes.CDLL:
     PvidError
         When there is no compiler, or it refuses the text.
     """
-    compiler = _compiler()
+    compiler = host_compiler("a simulation")
     name = hashlib.sha256("\n".join((compiler, *_FLAGS, code)).encode()).hexdigest()[:24]
     place = built_under(ROOT / "build") / "cache" / "plants" / f"{name}.so"
     if not place.exists():
         place.parent.mkdir(parents=True, exist_ok=True)
         _build(compiler, code, place)
     return ctypes.CDLL(str(place))
-
-
-def _compiler() -> str:
-    for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
-        found = shutil.which(name) if name else None
-        if found:
-            return found
-    raise PvidError("a simulation needs a C compiler (cc, gcc or clang, or the one that CC names), and there is none")
 
 
 def _build(compiler: str, code: str, place: Path) -> None:

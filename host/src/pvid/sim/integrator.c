@@ -156,13 +156,15 @@ static int broken_mode(plant *of, const double *x, const double *u)
     return -1;
 }
 
-/* At an argument of 0: it sticks, or goes the way that the forces push it; a friction of 0 goes any way. */
+/* At an argument of 0: it sticks, or goes the way that the forces push it. Where no friction holds it, because it is
+ * 0 or a drive sets the argument, it reverses. */
 static void decide(plant *of, double *x, const double *u, int i)
 {
     double s[AT_LEAST_1(NS)];
+    const int reversed = of->m[i] > 0 ? -1 : 1;
     of->m[i] = 0;
     if (signs(of, x, u, s) == BROKEN)
-        of->m[i] = 1;
+        of->m[i] = reversed;
     else if (fabs(s[i]) > of->breakaway)
         of->m[i] = s[i] > 0.0 ? 1 : -1;
     else if (STATE_OF[i] >= 0)

@@ -138,6 +138,24 @@ class NoiseModel:
                 out[mn] = out.get(mn, 0.0) + float(sums[place])
         return out
 
+    def of_harmonics(self, kind: int) -> Float:
+        """P [powers, columns, columns] with D_h = sum_j omega_h^(2 j) theta^T P_j theta, theta = -1 for Y's column.
+
+        D_h is the variance a step of the noise at harmonic h. It is that of `covariance`, because gram(m, n) is
+        (-1)^((m - n)/2) times the one of m + n halved, and those of odd sums cancel.
+        """
+        top = max((int(np.max(one.orders)) for one in self._sensors), default=0)
+        out = np.zeros((top + 1, self._columns, self._columns))
+        for one in self._sensors:
+            own = np.flatnonzero(one.kinds == kind)
+            for i in own:
+                for j in own:
+                    m, n = int(one.orders[i]), int(one.orders[j])
+                    if (m + n) % 2 == 0:
+                        sign = (-1.0) ** ((m - n) // 2)
+                        out[(m + n) // 2, one.columns[i], one.columns[j]] += sign * one.products[i, j]
+        return out
+
     def gram(self, m: int, n: int) -> Float:
         """Of the test functions."""
         if (m, n) not in self._gram:

@@ -82,7 +82,8 @@ class Estimator:
         self.phase = np.zeros(len(configs), np.int64)
         self.gain = np.array([self._gain(c, rate) for c in configs], np.float32)
         self.innovation = np.zeros_like(self.p)
-        self.information = Information(n_sums, _lanes([c.forgetting_s for c in configs]) * rate)
+        self.forgetting_s = _lanes([c.forgetting_s for c in configs])
+        self.information = Information(n_sums, self.forgetting_s * rate)
         self.sums = self.information.read()
         self.counters = {name: np.zeros(len(configs), np.int64) for name in COUNTERS}
         self.size = np.zeros(len(configs), np.float32)
@@ -253,7 +254,7 @@ class Estimator:
         covariance = cholesky.inverse(f) * wide
         se = np.sqrt(np.stack([covariance[a, a] for a in range(n_p)]))
         known = f.ok & np.isfinite(covariance).all(axis=(0, 1)) & np.isfinite(se).all(axis=0)
-        out = np.zeros(self.p.shape[1], estimates.F32)
+        out = np.zeros(self.p.shape[1], estimates.f32_of(n_p))
         out["p"][:, :n_p] = self.p.T
         out["kappa"] = np.where(kappa.ok, kappa.first_pivot, np.float32(0))
         out["least_pivot"] = np.where(kappa.ok, np.float32(1) / most, np.float32(0))
@@ -295,33 +296,55 @@ class RelativeEstimator(Estimator):
         self.expected = np.zeros(len(configs), np.float32)
         self.everywhere = np.ones(len(configs), np.bool_)
         self.was_due = True
+        self.judged_variance = self.row_variance
 
     @property
     def is_rate(self) -> bool:
         """Whether the law is a rate (g < 1) that does not iterate."""
         return bool(self.gain[0] < 1)
 
-    def add(self, n: Float32, y: Float32) -> npt.NDArray[np.uint8]:
-        """One row of a group: N [n_theta, lanes], Y [lanes]."""
+    def add(self, n: Float32, y: Float32, kind: int = 0) -> npt.NDArray[np.uint8]:
+        """One row of a group: N [theta of this kind, lanes], Y [lanes]."""
+        block = self.model.blocks.of_kind[kind]
         with np.errstate(all="ignore"):
             fits = _squares(n, y) <= ROW_LIMIT * ROW_LIMIT
             not_finite = ~fits & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
             e = y
-            for entry, theta in zip(n, self.theta, strict=True):
+            for entry, theta in zip(n, self.theta[block], strict=True):
                 e = e - entry * theta
             fits = fits & (e * e <= ROW_LIMIT * ROW_LIMIT)
             if self.is_rate:
-                gradient = self.model.transpose_times(self.model.jacobian(self.p), n)
+                gradient = self.model.transpose_times(self.model.jacobian(self.p), n, kind)
                 self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
             self.rss = np.where(fits, self.rss + e * e, self.rss)
             self.group_weight = np.where(fits, self.group_weight + self.row_weight, self.group_weight)
-            self.sums = self.information.add(self.model.terms(n, e, self.row_weight), fits)
+            self.sums = self.information.add(self.model.terms(kind, n, e, self.row_weight), fits)
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
         reason[not_finite] = Reason.REJECTED_NOT_FINITE
         self.counters["rows"] += fits
         self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
         self.counters["rejected_not_finite"] += not_finite
+        return reason
+
+    def add_to_b(self, g: Float32) -> npt.NDArray[np.uint8]:
+        """pvid_estimator_add_to_b_f32: g [n_theta, lanes]."""
+        finite = np.isfinite(g).all(axis=0)
+        fits = finite & (np.abs(g) <= ROW_LIMIT * ROW_LIMIT).all(axis=0)
+        places = slice(self.model.moments, -2)
+        with np.errstate(all="ignore"):
+            low = self.information.low.copy()
+            low[places] = np.where(fits, low[places] + g, low[places])
+            self.information.low = low
+            if self.is_rate:
+                gradient = self.model.transpose_times(self.model.jacobian(self.p), g)
+                self.innovation = np.where(fits, self.innovation + gradient, self.innovation)
+            self.sums = self.information.read()
+        reason = np.full(g.shape[1], Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
+        reason[~finite] = Reason.REJECTED_NOT_FINITE
+        self.counters["rejected_saturated"] += finite & ~fits
+        self.counters["rejected_not_finite"] += ~finite
         return reason
 
     def solve(
@@ -375,7 +398,7 @@ class RelativeEstimator(Estimator):
         """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
         sums = self.information.read()
         s, residual = self._assessed(sums)
-        variance = self._variance(sums, residual)
+        variance = self.judged_variance = self._variance(sums, residual)
         return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
 
     def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:

@@ -34,7 +34,7 @@ class Trust(TrustTwin):
         memory = np.where((information.retention < 1) & (memory < longest), memory, longest)
         singles = {name: np.float32(getattr(config, name)) for name in _SINGLES}
         long_memory = np.maximum(memory, np.float32(LONG)).astype(np.int64)
-        super().__init__(replace(config, **singles), estimator, long_memory, estimates.F32)  # type: ignore[arg-type]
+        super().__init__(replace(config, **singles), estimator, long_memory, estimates.f32_of(len(estimator.p)))  # type: ignore[arg-type]
         for a, sd in enumerate(estimator.start_sd):
             self.estimate["covariance"][:, a, a] = sd * sd
 

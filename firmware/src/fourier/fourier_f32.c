@@ -1,0 +1,285 @@
+#include "number/uncontracted.h"
+
+#include "pvid/fourier.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "fourier/fourier_finish_f32.h"
+#include "fourier/fourier_front_f32.h"
+#include "fourier/schedule.h"
+#include "fourier/step_f32.h"
+#include "fourier/sums_f32.h"
+#include "fourier/valid_f32.h"
+#include "fourier/watch_f32.h"
+#include "fourier/white_f32.h"
+#include "judge/publication.h"
+#include "number/count.h"
+#include "number/finite_f32.h"
+#include "number/init.h"
+#include "number/unroll.h"
+#include "number/unroll.h"
+
+static inline bool all_finite(const float values[], size_t n)
+{
+    const float *end = &values[n];
+    bool finite = true;
+    for (const float *value = values; value < end; value++) {
+        finite = finite && pvid_finite_f32(*value);
+    }
+    return finite;
+}
+
+static pvid_status limits_are_valid(const pvid_fourier_config_f32 *config)
+{
+    for (size_t i = 0; i < config->design->model->samples; i++) {
+        if ((config->range != NULL) && !pvid_within_f32(config->range[i], 1.0e-30f, 3.4e38f)) {
+            return PVID_BAD_ANGLE_LIMIT;
+        }
+        if ((config->drive_min != NULL) && !pvid_within_f32(config->drive_min[i], 0.0f, 1.0e9f)) {
+            return PVID_BAD_DRIVE_MIN;
+        }
+    }
+    return PVID_OK;
+}
+
+static pvid_status init_estimator(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
+{
+    const pvid_fourier_design_f32 *design = config->design;
+    const pvid_fourier_model_f32 *model = design->model;
+    float nuisances = 0.0f;
+    for (size_t i = 0; i < model->kinds; i++) {
+        nuisances += (float)model->kind[i].nuisances;
+    }
+    const float functions = (float)design->functions * (float)model->kinds;
+    const float rows = (float)pvid_fourier_rows(design) * (float)model->kinds;
+    pvid_estimator_config_f32 estimator = config->estimator;
+    estimator.model = model->model;
+    estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)design->hop);
+    estimator.row_weight = (functions - nuisances) / rows;
+    estimator.correlation = design->overlap;
+    return pvid_estimator_init_f32(&self->estimator, &estimator);
+}
+
+/* Channels that are summed: up to the last one that is not the constant. */
+static uint8_t summed_channels(const pvid_fourier_model_f32 *model)
+{
+    uint8_t channels = 0;
+    for (size_t i = 0; i < model->channels; i++) {
+        channels = (model->channel[i].gain != PVID_FOURIER_NONE) ? (uint8_t)(i + 1u) : channels;
+    }
+    return channels;
+}
+
+/* Steps from a sample to the last step that contains it: that of the newest half of the filter, and the next two. */
+static uint16_t delay_of(const pvid_fourier_design_f32 *design)
+{
+    const uint32_t ticks = (2u * (uint32_t)pvid_fourier_front_half_f32(design)) + 4u;
+    return (uint16_t)((ticks / design->decimation) + 4u);
+}
+
+/* Returns whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_fourier_f32 *self)
+{
+    const bool ready = (self != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static void restart(pvid_fourier_f32 *self)
+{
+    pvid_fourier_front_reset_f32(&self->front, self->design);
+    pvid_fourier_step_reset_f32(&self->history);
+    pvid_fourier_sums_reset_f32(&self->sums, self->harmonics);
+    pvid_fourier_watch_reset_f32(&self->watch);
+    pvid_fourier_finish_skip_f32(&self->finish);
+    self->warm = false;
+}
+
+static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
+{
+    const pvid_fourier_design_f32 *design = config->design;
+    if (!pvid_within_f32(config->sample_rate_hz, 1.0e-3f, 1.0e6f)) {
+        return PVID_BAD_SAMPLE_RATE;
+    }
+    pvid_status status = pvid_fourier_valid_f32(design);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = limits_are_valid(config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    memset(self, 0, sizeof *self);
+    status = init_estimator(self, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_trust_init_f32(&self->trust, &config->trust, &self->estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if ((config->iterations < 1u) || (config->iterations > PVID_MAX_ITERATIONS)) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->dt = (float)design->decimation / config->sample_rate_hz;
+    status = pvid_fourier_finish_init_f32(&self->finish, config, self->dt);
+    if (status != PVID_OK) {
+        return status;
+    }
+    self->design = design;
+    self->harmonics = (uint8_t)((design->functions / 2u) + (design->power / 2u) + 1u);
+    self->channels = summed_channels(design->model);
+    self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
+    pvid_fourier_front_init_f32(&self->front, design, config->sample_rate_hz);
+    pvid_fourier_step_init_f32(&self->history,
+                               (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
+    pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
+    const uint32_t free_ticks = pvid_fourier_free_ticks(
+        design->decimation, pvid_fourier_job_ticks(design->decimation, pvid_fourier_front_pairs_f32(design)));
+    self->items_per_tick = pvid_fourier_items_per_tick(free_ticks, self->harmonics);
+    self->stages_per_tick =
+        pvid_fourier_stages_per_tick(pvid_fourier_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
+    if (self->stages_per_tick == 0u) {
+        return PVID_BAD_ITERATIONS;
+    }
+    restart(self);
+    return PVID_OK;
+}
+
+pvid_status pvid_fourier_init_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
+{
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
+}
+
+void pvid_fourier_gap_f32(pvid_fourier_f32 *self)
+{
+    if (is_ready(self)) {
+        restart(self);
+    }
+}
+
+void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen)
+{
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
+}
+
+/* The reason why a complete window is dropped; PVID_ACCUMULATED if it is used. */
+static pvid_reason drop_reason(pvid_fourier_f32 *self)
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    if (pvid_fourier_watch_beyond_f32(&self->watch)) {
+        pvid_count_up(&self->estimator.counters.held_out_of_range);
+        return PVID_HELD_OUT_OF_RANGE;
+    }
+    if (pvid_fourier_watch_still_f32(&self->watch, design->model->samples, self->sums.target, design->hop)) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    return PVID_ACCUMULATED;
+}
+
+/* A step: its channels to the present block. If it completes a window that is dropped, returns the reason; else
+ * PVID_ACCUMULATED. */
+PVID_SELDOM static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    const uint16_t index = self->sums.index;
+    const size_t half = self->sums.half;
+    if (!pvid_fourier_step_take_f32(&self->history, design, self->channels, self->dt, self->front.jet_value, index,
+                                    pvid_fourier_sums_place_f32(&self->sums))) {
+        return PVID_ACCUMULATED;
+    }
+    pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
+    if (!pvid_fourier_sums_count_f32(&self->sums, design->hop) || (self->sums.halves < 2u)) {
+        return PVID_ACCUMULATED;
+    }
+    self->warm = true;
+    const pvid_reason reason = drop_reason(self);
+    if (reason == PVID_ACCUMULATED) {
+        pvid_fourier_sums_join_f32(&self->sums, self->history.edge);
+    } else {
+        pvid_fourier_finish_skip_f32(&self->finish);
+    }
+    return reason;
+}
+
+/* Harmonics of the last block; a window that is joined begins. */
+PVID_SELDOM static void advance_sums(pvid_fourier_f32 *self)
+{
+    for (uint8_t i = 0; i < self->items_per_tick; i++) {
+        if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
+                                          self->window)) {
+            pvid_fourier_finish_begin_f32(&self->finish);
+        }
+    }
+}
+
+PVID_SELDOM static void advance_finish(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    for (uint8_t left = self->stages_per_tick; left > 0u; left--) {
+        pvid_fourier_finish_step_f32(self, reason);
+    }
+}
+
+/* A sample that is not finite. */
+PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
+{
+    restart(self);
+    pvid_count_up(&self->estimator.counters.rejected_not_finite);
+    return PVID_REJECTED_NOT_FINITE;
+}
+
+/* Work on the sums, else on the last whole window. */
+static inline void work(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        advance_sums(self);
+    } else if (pvid_fourier_finish_is_busy_f32(&self->finish)) {
+        advance_finish(self, reason);
+    } else {
+        /* free */
+    }
+}
+
+pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
+{
+    if (!is_ready(self) || (sample == NULL)) {
+        return PVID_NOT_READY;
+    }
+    const pvid_fourier_design_f32 *design = self->design;
+    if (!all_finite(sample, design->model->samples)) {
+        return reject(self);
+    }
+    if (self->watch.range != NULL) {
+        pvid_fourier_watch_sample_f32(&self->watch, design->model->samples, sample);
+    }
+    const bool steps = pvid_fourier_front_step_f32(&self->front, design, sample);
+    const pvid_reason dropped = steps ? next_step(self, sample) : PVID_ACCUMULATED;
+    const bool works = (self->front.wait <= self->front.work_wait) || !self->front.begun;
+    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+    if ((works && !steps) || (design->decimation == 1u)) {
+        work(self, &reason);
+    }
+    return (dropped != PVID_ACCUMULATED) ? dropped : reason;
+}
+
+const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self)
+{
+    return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_fourier_read_f32(const pvid_fourier_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_f32 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
+}

@@ -1,0 +1,548 @@
+#include "number/uncontracted.h"
+
+#include "fourier/fourier_finish_f32.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "fourier/columns_f32.h"
+#include "fourier/scores_f32.h"
+#include "fourier/white_f32.h"
+#include "number/count.h"
+#include "solve/staged_f32.h"
+
+enum {
+    /* for each kind of rows */
+    STAGE_WEIGH,    /* c_j from a few entries of the noise table */
+    STAGE_SPECTRUM, /* D_h */
+    STAGE_BASIS,    /* directions that the test functions leave out: white_f32.c */
+    STAGE_COLUMN,   /* for each column: its terms, then n/2 times one direction of each family off it */
+    STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
+    STAGE_RESIDUAL, /* a few rows of e; at the end the gate accepts or rejects the kind */
+    STAGE_SHARE,    /* a few rows' share of R^-1; only if that is needed */
+    STAGE_PULL,     /* g from a few entries of the noise table */
+    STAGE_ADD,      /* K + n times: a row to the estimator */
+    /* for the window */
+    STAGE_SCORE,   /* C^T (sum N e + g) */
+    STAGE_SOLVE,   /* `iterations` solves, several stages each */
+    STAGE_ASSESS,  /* several stages */
+    STAGE_MEAN,    /* the scores to their means */
+    STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
+    STAGE_JUDGE,   /* trust.h publishes the estimate or holds it */
+    STAGE_IDLE = PVID_FOURIER_IDLE
+};
+
+/* Entries of the noise table, and products of the residuals, in a stage. */
+#define ENTRIES_PER_STAGE 8u
+#define PRODUCTS_PER_STAGE 48u
+
+/* Rows whose share a stage forms. */
+#define SHARES_PER_STAGE 4u
+
+/* Windows in the average of the gate's scale, which is relative to the weights of the rows and at least 1. */
+#define GATE_MEMORY 4.0f
+
+/* Largest variance of a parameter from the scatter: a covariance of two such is finite. */
+#define VARIANCE_MAX 1.0e36f
+
+static const pvid_fourier_kind *kind_of(const pvid_fourier_f32 *self)
+{
+    return &self->design->model->kind[self->finish.kind];
+}
+
+static size_t columns_of(const pvid_fourier_kind *kind)
+{
+    return (size_t)kind->thetas + 1u + kind->nuisances;
+}
+
+pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pvid_fourier_config_f32 *config, float dt)
+{
+    const pvid_fourier_design_f32 *design = config->design;
+    const float windows_hz = 1.0f / (dt * (float)design->hop);
+    for (size_t i = 0; i < design->model->kinds; i++) {
+        const pvid_status status = pvid_gate_init_f32(&self->gate[i], &config->gate, windows_hz, GATE_MEMORY, 1.0f);
+        if (status != PVID_OK) {
+            return status;
+        }
+    }
+    self->compensation = config->compensation;
+    self->shares = self->compensation;
+    for (size_t i = 0; i < design->model->kinds; i++) {
+        self->shares = self->shares || (design->error_variance[i] > 0.0f);
+    }
+    pvid_fourier_white_init_f32(&self->white, design, dt);
+    pvid_fourier_scores_init_f32(&self->scores, config->estimator.forgetting_s * windows_hz);
+    self->stage = STAGE_IDLE;
+    return PVID_OK;
+}
+
+static void begin_kind(pvid_fourier_finish_f32 *self)
+{
+    self->index = 0;
+    self->part = 0;
+    self->live = 0;
+    self->rss = 0.0f;
+    self->stage = STAGE_WEIGH;
+}
+
+void pvid_fourier_finish_skip_f32(pvid_fourier_finish_f32 *self)
+{
+    self->alone = true;
+}
+
+void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self)
+{
+    if (self->alone) {
+        pvid_fourier_scores_skip_f32(&self->scores);
+    }
+    self->alone = false;
+    self->kind = 0;
+    self->theta = 0;
+    self->term = 0;
+    self->used = 0;
+    self->iteration = 0;
+    self->expected = 0.0f;
+    self->free = 0.0f;
+    self->square = 0.0f;
+    memset(self->score, 0, sizeof self->score);
+    begin_kind(self);
+}
+
+/* ---- rows of a kind ---- */
+
+/* The next few entries of the noise table; returns one past them. */
+static size_t entries_end(const pvid_fourier_f32 *self)
+{
+    const size_t end = (size_t)self->finish.index + ENTRIES_PER_STAGE;
+    return (end < self->design->n_noise) ? end : self->design->n_noise;
+}
+
+static bool weigh_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const size_t end = entries_end(self);
+    pvid_fourier_white_weigh_f32(&finish->white, self->design, finish->kind, &self->estimator.theta[finish->theta],
+                                 finish->index, end);
+    finish->index = (uint16_t)end;
+    return end < self->design->n_noise;
+}
+
+static bool basis_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_fourier_white_basis_f32(&finish->white, self->design, finish->index);
+    finish->index++;
+    return finish->index < pvid_fourier_basis_stages(self->design);
+}
+
+/* Terms of the present column; then the column without one direction of each family after the other. */
+static bool column_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_design_f32 *design = self->design;
+    const pvid_fourier_kind *kind = kind_of(self);
+    float *column = finish->column[finish->index];
+    if (finish->part == 0u) {
+        if ((finish->index == 0u) && (finish->theta == 0u)) {
+            finish->term = 0;
+        }
+        memset(finish->sum, 0, sizeof finish->sum);
+        const pvid_fourier_term_f32 *term = design->model->term;
+        while ((finish->term < kind->end) && (term[finish->term].column == finish->index)) {
+            pvid_fourier_columns_add_f32(design, &term[finish->term], self->harmonics, finish->white.omega,
+                                         (const float (*)[2][PVID_MAX_HARMONICS])self->window, finish->sum);
+            finish->term++;
+        }
+        finish->part = 1;
+        return true;
+    }
+    if (finish->part == 1u) {
+        pvid_fourier_white_scale_f32(&finish->white, design, (const float (*)[PVID_MAX_HARMONICS])finish->sum, column);
+    }
+    pvid_fourier_white_remove_f32(&finish->white, design, finish->part - 1u, column);
+    if (finish->part < design->power / 2u) {
+        finish->part++;
+        return true;
+    }
+    finish->part = 0;
+    finish->index++;
+    return finish->index < columns_of(kind);
+}
+
+/* Of each nuisance in order: part 0 its inverse square, then the columns without it, those of theta, Y and the
+ * nuisances behind it. */
+static bool project_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_kind *kind = kind_of(self);
+    const size_t rows = pvid_fourier_rows(self->design);
+    const size_t first = (size_t)kind->thetas + 1u;
+    const size_t nuisance = first + finish->index;
+    if (finish->index >= kind->nuisances) {
+        return false;
+    }
+    if (finish->part == 0u) {
+        if (finish->index == 0u) {
+            for (size_t i = first; i < columns_of(kind); i++) {
+                finish->own[i] = pvid_fourier_columns_square_f32(rows, finish->column[i]);
+            }
+        }
+        const bool kept = pvid_fourier_columns_keep_f32(rows, finish->column[nuisance], finish->own[nuisance],
+                                                        &finish->own[nuisance]);
+        finish->live = (uint8_t)(finish->live + (kept ? 1u : 0u));
+        finish->part = 1;
+        return true;
+    }
+    const size_t place = finish->part - 1u;
+    const size_t column = (place < first) ? place : (place + finish->index + 1u);
+    pvid_fourier_columns_project_f32(rows, finish->column[nuisance], finish->own[nuisance], finish->column[column]);
+    finish->part++;
+    if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
+        finish->part = 0;
+        finish->index++;
+    }
+    return finish->index < kind->nuisances;
+}
+
+/* x -= a y */
+static inline void subtract(float a, const float *restrict y, size_t n, float *restrict x)
+{
+    const float *end = &x[n];
+    while (x < end) {
+        *x -= a * *y;
+        x++;
+        y++;
+    }
+}
+
+/* Rows whose residuals a stage forms. */
+static size_t rows_per_stage(const pvid_fourier_kind *kind)
+{
+    const size_t rows = PRODUCTS_PER_STAGE / (kind->thetas + 1u);
+    return (rows > 0u) ? rows : 1u;
+}
+
+static bool residual_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_kind *kind = kind_of(self);
+    const float *theta = &self->estimator.theta[finish->theta];
+    const size_t rows = pvid_fourier_rows(self->design);
+    const size_t end = (size_t)finish->index + rows_per_stage(kind);
+    const size_t last = (end < rows) ? end : rows;
+    const size_t first = finish->index;
+    memcpy(&finish->row[first], &finish->column[kind->thetas][first], (last - first) * sizeof(float));
+    for (size_t j = 0; j < kind->thetas; j++) {
+        subtract(theta[j], &finish->column[j][first], last - first, &finish->row[first]);
+    }
+    float rss = finish->rss;
+    for (size_t k = first; k < last; k++) {
+        rss += finish->row[k] * finish->row[k];
+    }
+    finish->rss = rss;
+    finish->index = (uint16_t)last;
+    return last < rows;
+}
+
+/* Test functions less nuisances: the dimensions that the rows of the kind span. */
+static float freedom_of(const pvid_fourier_f32 *self)
+{
+    return (float)self->design->functions - (float)self->finish.live;
+}
+
+static bool share_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const size_t rows = pvid_fourier_rows(self->design);
+    const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
+    const size_t last = (end < rows) ? end : rows;
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->index, last);
+    finish->index = (uint16_t)last;
+    return last < rows;
+}
+
+static bool pull_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const size_t end = entries_end(self);
+    if (finish->index == 0u) {
+        memset(finish->pull, 0, sizeof finish->pull);
+    }
+    if (finish->compensation) {
+        pvid_fourier_white_pull_f32(&finish->white, self->design, finish->kind, &self->estimator.theta[finish->theta],
+                                    finish->index, end, &finish->pull[finish->theta]);
+    }
+    finish->index = (uint16_t)end;
+    if (end < self->design->n_noise) {
+        return true;
+    }
+    const size_t thetas = kind_of(self)->thetas;
+    for (size_t j = finish->theta; j < finish->theta + thetas; j++) {
+        finish->score[j] += finish->pull[j];
+    }
+    if (finish->compensation) {
+        (void)pvid_estimator_add_to_b_f32(&self->estimator, finish->pull);
+    }
+    finish->expected += pvid_fourier_white_sensors_f32(&finish->white, self->design);
+    return false;
+}
+
+static bool add_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_kind *kind = kind_of(self);
+    const size_t k = finish->index;
+    const float e = finish->row[k];
+    float *score = &finish->score[finish->theta];
+    float n[PVID_MAX_THETA];
+    for (size_t j = 0; j < kind->thetas; j++) {
+        n[j] = finish->column[j][k];
+        score[j] += n[j] * e;
+    }
+    const pvid_reason added =
+        pvid_estimator_add_kind_f32(&self->estimator, finish->kind, n, finish->column[kind->thetas][k]);
+    if (added != PVID_ACCUMULATED) {
+        *reason = added;
+    }
+    finish->index++;
+    return finish->index < pvid_fourier_rows(self->design);
+}
+
+/* ---- steps of p and verdict ---- */
+
+static void begin_solves(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_estimator_set_expected_f32(&self->estimator, finish->expected / (float)finish->used);
+    pvid_estimator_begin_f32(&self->estimator, &finish->solve, true);
+    finish->solve.fallback = pvid_trust_fallback_f32(&self->trust);
+}
+
+static bool solve_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    if (!pvid_estimator_advance_f32(&self->estimator, &finish->solve)) {
+        return true;
+    }
+    finish->iteration++;
+    finish->reason = finish->solve.reason;
+    finish->size = finish->solve.size;
+    /* ACCUMULATED: the divider allows no solve after this window */
+    if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED)) {
+        return false;
+    }
+    pvid_estimator_begin_f32(&self->estimator, &finish->solve, false);
+    return true;
+}
+
+/* The larger of the two standard errors of a parameter; the covariance grows with it. */
+static bool cluster_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_estimate_f32 *estimate = &finish->candidate;
+    const size_t n_p = self->estimator.model->n_p;
+    const size_t a = finish->index;
+    const float wide = finish->solve.variance * self->estimator.settings.correlation;
+    const float rows = ((float)pvid_fourier_rows(self->design) * (float)self->design->model->kinds) *
+                       self->estimator.information.row_weight;
+    const float variance = pvid_fourier_scores_variance_f32(
+        &finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance, wide, estimate->weight / rows);
+    /* NaN fails the comparison */
+    if ((variance > (estimate->se[a] * estimate->se[a])) && (variance <= VARIANCE_MAX)) {
+        estimate->se[a] = sqrtf(variance);
+    }
+    finish->index++;
+    return finish->index < n_p;
+}
+
+static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_estimate_f32 *estimate = &finish->candidate;
+    const size_t n_p = self->estimator.model->n_p;
+    float growth[PVID_MAX_P];
+    for (size_t a = 0; a < n_p; a++) {
+        const float before = estimate->covariance[a][a];
+        growth[a] = (before > 0.0f) ? (estimate->se[a] / sqrtf(before)) : 1.0f;
+    }
+    for (size_t a = 0; a < n_p; a++) {
+        for (size_t b = 0; b < n_p; b++) {
+            estimate->covariance[a][b] *= growth[a] * growth[b];
+        }
+    }
+    const float expected = finish->expected / (float)finish->used;
+    const float variance_ratio = finish->solve.group_rss / (finish->free * expected);
+    *reason = pvid_trust_judge_f32(&self->trust, &self->estimator, finish->reason, finish->size,
+                                   finish->solve.above_noise, variance_ratio, estimate);
+}
+
+/* ---- the order of the stages ---- */
+
+/* Behind the residuals: the gate. Returns the next stage. */
+static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const float freedom = freedom_of(self);
+    if (!pvid_gate_passes_f32(&finish->gate[finish->kind], finish->rss / freedom)) {
+        pvid_count_up(&self->estimator.counters.rejected_outlier);
+        *reason = PVID_REJECTED_OUTLIER;
+        return STAGE_SCORE; /* that is, the next kind */
+    }
+    if (finish->used == 0u) {
+        const float factor = pvid_trust_fade_factor_f32(&self->trust);
+        if (factor < 1.0f) {
+            pvid_information_fade_f32(&self->estimator.information, factor);
+        }
+    }
+    finish->used++;
+    finish->free += freedom;
+    finish->square += finish->rss;
+    if (!finish->shares) {
+        finish->expected += 1.0f;
+    }
+    return finish->shares ? (uint8_t)STAGE_SHARE : (uint8_t)STAGE_ADD;
+}
+
+/* Behind a kind: the next kind, or the solves; nothing if no kind has been added. */
+static void end_kind(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_kind *kind = kind_of(self);
+    finish->theta = (uint8_t)(finish->theta + kind->thetas);
+    finish->term = kind->end;
+    finish->kind++;
+    if (finish->kind < self->design->model->kinds) {
+        begin_kind(finish);
+    } else if (finish->used == 0u) {
+        pvid_fourier_scores_skip_f32(&finish->scores);
+        finish->stage = STAGE_IDLE;
+    } else {
+        finish->stage = STAGE_SCORE;
+    }
+}
+
+/* The stage after one that is complete. */
+static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    switch (self->finish.stage) {
+    case STAGE_RESIDUAL:
+        return gated(self, reason);
+    case STAGE_JUDGE:
+        return STAGE_IDLE;
+    default:
+        return (uint8_t)(self->finish.stage + 1u);
+    }
+}
+
+static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    finish->stage = stage_after(self, reason);
+    finish->index = 0;
+    finish->part = 0;
+    if (finish->stage == (uint8_t)STAGE_SCORE) {
+        end_kind(self);
+    } else if (finish->stage == (uint8_t)STAGE_SOLVE) {
+        begin_solves(self);
+    } else if (finish->stage == (uint8_t)STAGE_ASSESS) {
+        pvid_estimator_begin_assessment_f32(&self->estimator, &finish->solve, &finish->candidate);
+    } else {
+        /* nothing to begin */
+    }
+}
+
+void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    bool repeat = false;
+    switch (finish->stage) {
+    case STAGE_WEIGH:
+        repeat = weigh_stage(self);
+        break;
+    case STAGE_SPECTRUM:
+        pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind, self->harmonics);
+        break;
+    case STAGE_BASIS:
+        repeat = basis_stage(self);
+        break;
+    case STAGE_COLUMN:
+        repeat = column_stage(self);
+        break;
+    case STAGE_PROJECT:
+        repeat = project_stage(self);
+        break;
+    case STAGE_RESIDUAL:
+        repeat = residual_stage(self);
+        break;
+    case STAGE_SHARE:
+        repeat = share_stage(self);
+        break;
+    case STAGE_PULL:
+        repeat = pull_stage(self);
+        break;
+    case STAGE_ADD:
+        repeat = add_stage(self, reason);
+        break;
+    case STAGE_SCORE:
+        pvid_fourier_scores_take_f32(&finish->scores, &self->estimator, finish->score);
+        break;
+    case STAGE_SOLVE:
+        repeat = solve_stage(self);
+        break;
+    case STAGE_ASSESS:
+        repeat = !pvid_estimator_assess_advance_f32(&self->estimator, &finish->solve);
+        break;
+    case STAGE_MEAN:
+        pvid_fourier_scores_add_f32(&finish->scores, self->estimator.model->n_p, finish->square / finish->free);
+        break;
+    case STAGE_CLUSTER:
+        repeat = cluster_stage(self);
+        break;
+    case STAGE_JUDGE:
+        judge_stage(self, reason);
+        break;
+    default:
+        return;
+    }
+    if (!repeat) {
+        next_stage(self, reason);
+    }
+}
+
+/* ---- their number ---- */
+
+static uint32_t parts_of(uint32_t all, uint32_t each)
+{
+    const uint32_t parts = (all + (each - 1u)) / each;
+    return (parts > 0u) ? parts : 1u;
+}
+
+static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    const uint32_t rows = (uint32_t)pvid_fourier_rows(design);
+    const uint32_t columns = (uint32_t)columns_of(kind);
+    const uint32_t entries = parts_of(design->n_noise, ENTRIES_PER_STAGE);
+    const uint32_t nuisances = kind->nuisances;
+    /* nuisance i: its square, then all columns but itself and those before it */
+    const uint32_t project = (nuisances > 0u) ? ((nuisances * columns) - ((nuisances * (nuisances - 1u)) / 2u)) : 1u;
+    uint32_t stages = entries + 1u + (uint32_t)pvid_fourier_basis_stages(design) + project;
+    stages += (columns * ((design->power / 2u) + 1u)) + parts_of(rows, (uint32_t)rows_per_stage(kind)) + rows;
+    if (self->finish.shares) {
+        stages += parts_of(rows, SHARES_PER_STAGE) + entries;
+    }
+    return stages;
+}
+
+uint32_t pvid_fourier_finish_stages_f32(const pvid_fourier_f32 *self)
+{
+    const pvid_fourier_model_f32 *model = self->design->model;
+    uint32_t stages = 3u + model->model->n_p; /* SCORE, MEAN, JUDGE; CLUSTER */
+    for (size_t i = 0; i < model->kinds; i++) {
+        stages += stages_of_kind(self, &model->kind[i]);
+    }
+    const uint32_t first = pvid_estimator_stages_f32(&self->estimator, true);
+    const uint32_t more = pvid_estimator_stages_f32(&self->estimator, false);
+    return stages + first + ((self->iterations - 1u) * more) + pvid_estimator_assessment_stages_f32(&self->estimator);
+}

@@ -1,0 +1,166 @@
+#include "number/uncontracted.h"
+
+/* Signs need the arguments of both neighbours, and an integral the next step's integrand. So with the jets of step k
+ * the gains and integrands of step k - 1 follow, and with those the channels of step k - 2:
+ *
+ *   sign        width > 0:  tanh(v / width);   width 0: the mean of sgn over the step, v linear there,
+ *               2 v_k / |g| within -1..1, g = (v_(k+1) - v_(k-1)) / 2  (at the first step v_1 - v_0)
+ *   run         + dt/2 (r_(k-1) + r_k), r its derivative, with what rounding takes off kept (Kahan); from the first
+ *               sample to the first step r stays that of the first step
+ *   I^1_k       I^1_(k-1) + dt/24 (-f_(k-2) + 13 f_(k-1) + 13 f_k - f_(k+1))
+ *   I^2_k       I^2_(k-1) + dt/2 (I^1_(k-1) + I^1_k) - dt^2/12 (f_k - f_(k-1))
+ *   of 1:       t and t^2/2
+ *
+ * Both integrals are 0 at the first step of a half window; their values there without that are the `edge`. */
+#include "fourier/step_f32.h"
+
+#include <stddef.h>
+
+#include "pvid/elementary.h"
+
+void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, float lead)
+{
+    self->lead = lead;
+    pvid_fourier_step_reset_f32(self);
+}
+
+void pvid_fourier_step_reset_f32(pvid_fourier_history_f32 *self)
+{
+    self->known = 0;
+}
+
+/* Mean of sgn over a step, v linear there with this difference to the next step. */
+static float mean_sign(float v, float slope)
+{
+    const float twice = 2.0f * v;
+    const float size = pvid_magnitude_f32(slope);
+    float sign = 0.0f;
+    if (twice > size) {
+        sign = 1.0f;
+    } else if (twice < -size) {
+        sign = -1.0f;
+    } else if (size > 0.0f) {
+        sign = twice / size;
+    } else {
+        sign = 0.0f;
+    }
+    return sign;
+}
+
+/* Signs of the step whose arguments are v[0]; `next`: those of the step behind it. */
+static void find_signs(const pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, const float next[],
+                       float sign[])
+{
+    for (size_t i = 0; i < design->model->signs; i++) {
+        const float v = self->v[0][i];
+        const float width = design->sign_width[i];
+        const float slope = (self->known > 1u) ? (0.5f * (next[i] - self->v[1][i])) : (next[i] - v);
+        sign[i] = (width > 0.0f) ? pvid_tanh_f32(v / width) : mean_sign(v, slope);
+    }
+}
+
+/* Moves the runs by a step; rate: their derivatives at its end. */
+static void move_runs(pvid_fourier_history_f32 *self, size_t runs, float half_dt, const float rate[])
+{
+    for (size_t i = 0; i < runs; i++) {
+        const float rise = (half_dt * (self->rate[i] + rate[i])) + self->run_low[i];
+        const float moved = self->run[i] + rise;
+        self->run_low[i] = rise - (moved - self->run[i]);
+        self->run[i] = moved;
+    }
+}
+
+/* Integrals at the step whose integrands are `now`; `next`: those of the step behind it. */
+static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float dt, bool begins, const float now[],
+                      const float next[])
+{
+    const float part = dt / 24.0f;
+    const float half = 0.5f * dt;
+    const float end = (dt * dt) / 12.0f;
+    for (size_t i = 0; i < integrands; i++) {
+        const float last = self->f[0][i];
+        float once = 0.0f;
+        float twice = 0.0f;
+        if (self->known > 2u) {
+            const float before = (self->known > 3u) ? self->f[1][i] : ((2.0f * last) - now[i]);
+            const float rise = part * (((-before + (13.0f * last)) + (13.0f * now[i])) - next[i]);
+            once = self->once[i] + rise;
+            twice = self->twice[i] + ((half * (self->once[i] + once)) - (end * (now[i] - last)));
+        }
+        if (begins) {
+            self->edge[0][i] = once;
+            self->edge[1][i] = twice;
+            once = 0.0f;
+            twice = 0.0f;
+        }
+        self->once[i] = once;
+        self->twice[i] = twice;
+        self->f[1][i] = last;
+        self->f[0][i] = now[i];
+    }
+}
+
+/* Values of the channels at a step with these gains, at this time since the start of its half. */
+static inline void find_channels(const pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model,
+                                 size_t channels, float t, const float gain[], float channel[])
+{
+    for (size_t c = 0; c < channels; c++) {
+        const pvid_fourier_channel *one = &model->channel[c];
+        if (one->gain != PVID_FOURIER_NONE) {
+            float value = gain[one->gain];
+            if (one->fold == 1u) {
+                value *= (one->integrand == PVID_FOURIER_NONE) ? t : self->once[one->integrand];
+            } else if (one->fold == 2u) {
+                value *= (one->integrand == PVID_FOURIER_NONE) ? (0.5f * (t * t)) : self->twice[one->integrand];
+            } else {
+                /* the gain alone */
+            }
+            channel[c] = value;
+        }
+    }
+}
+
+static inline void copy(size_t n, const float *restrict from, float *restrict to)
+{
+    for (size_t i = 0; i < n; i++) {
+        to[i] = from[i];
+    }
+}
+
+bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
+                                float dt, const float jet[], uint16_t index, float channel[])
+{
+    const pvid_fourier_model_f32 *model = design->model;
+    float arguments[PVID_MAX_INPUTS]; /* of the newest step: derivatives of the runs, then arguments of sgn */
+    const float *v = &arguments[model->runs];
+    const bool complete = self->known > 1u;
+    if (model->prepare != NULL) {
+        model->prepare(jet, arguments);
+    }
+    if (self->known > 0u) {
+        find_signs(self, design, v, &self->now[model->jets + model->runs]);
+        const float *now = self->out[self->latest];
+        self->latest ^= 1u;
+        float *next = self->out[self->latest];
+        model->values(self->now, next);
+        if (complete) {
+            integrate(self, model->integrands, dt, index == 0u, &now[model->gains], &next[model->gains]);
+            find_channels(self, model, channels, dt * (float)index, now, channel);
+        }
+        move_runs(self, model->runs, 0.5f * dt, arguments);
+    } else if (!self->ran) {
+        for (size_t i = 0; i < model->runs; i++) {
+            self->run[i] = self->lead * arguments[i];
+        }
+        self->ran = true;
+    } else {
+        /* a gap: the runs stay */
+    }
+    copy(model->signs, self->v[0], self->v[1]);
+    copy(model->signs, v, self->v[0]);
+    copy(model->runs, arguments, self->rate);
+    copy(model->jets, jet, self->now);
+    copy(model->runs, self->run, &self->now[model->jets]);
+    self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
+    return complete;
+}

@@ -1,0 +1,150 @@
+#include "number/uncontracted.h"
+
+/* A_h and B_h = sum_k channel(t_k) (cos + i sin)(2 pi h k / (2 hop)), k = 0..hop - 1, of the two halves of a window.
+ *
+ * A block of four steps is complete every four steps; while the next one fills it is added, one harmonic after the
+ * other. The circle has all the factors: cos(pi j / hop) at j = h k mod 2 hop, the sine a quarter turn before. Behind
+ * the last block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral I = E_1 + I'
+ * (E_1 + E_2 of the first half at its end) gets what I' from the second half's own start lacks:
+ *
+ *   fold 1:  B + E_1 B[plain]        fold 2:  (B + E_2 B[plain]) + E_1 B[ramp]
+ *
+ * The next window's first block is added afterwards, to the place of A: two halves of sums suffice. */
+#include "fourier/sums_f32.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "number/unroll.h"
+
+void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
+{
+    self->half = 0;
+    self->halves = 0;
+    self->filling = 0;
+    self->index = 0;
+    self->harmonic = harmonics;
+    self->joined = harmonics;
+}
+
+float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self)
+{
+    return self->block[self->filling][self->index % (uint16_t)PVID_FOURIER_BLOCK];
+}
+
+bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop)
+{
+    self->index++;
+    if ((self->index % (uint16_t)PVID_FOURIER_BLOCK) != 0u) {
+        return false;
+    }
+    self->start = (uint16_t)(self->index - (uint16_t)PVID_FOURIER_BLOCK);
+    self->target = self->half;
+    self->harmonic = 0;
+    self->filling ^= 1u;
+    if (self->index < hop) {
+        return false;
+    }
+    self->index = 0;
+    self->half ^= 1u;
+    self->halves = (uint8_t)((self->halves < 2u) ? (self->halves + 1u) : 2u);
+    return true;
+}
+
+void pvid_fourier_sums_join_f32(pvid_fourier_sums_f32 *self, float edge[2][PVID_MAX_INTEGRANDS])
+{
+    memcpy(self->edge, edge, sizeof self->edge);
+    self->joined = 0;
+}
+
+/* Adds the four steps of the block to one harmonic of all channels. */
+static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
+{
+    const uint32_t h = self->harmonic;
+    const uint32_t turn = 2u * (uint32_t)design->hop;
+    const uint32_t quarter = (uint32_t)design->hop / 2u;
+    const float *circle = design->circle;
+    uint32_t at = (h * self->start) % turn;
+    float cosine[PVID_FOURIER_BLOCK];
+    float sine[PVID_FOURIER_BLOCK];
+    PVID_UNROLL
+    for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
+        cosine[k] = circle[at];
+        sine[k] = circle[(at >= quarter) ? (at - quarter) : ((at + turn) - quarter)];
+        at += h;
+        at = (at >= turn) ? (at - turn) : at;
+    }
+    float (*sum)[2] = self->sum[self->target][h];
+    if (self->start == 0u) {
+        for (size_t c = 0; c < channels; c++) {
+            sum[c][0] = 0.0f;
+            sum[c][1] = 0.0f;
+        }
+    }
+    const float *x = self->block[self->filling ^ 1u][0];
+    for (size_t c = 0; c < channels; c++) {
+        float re = sum[c][0];
+        float im = sum[c][1];
+        PVID_UNROLL
+        for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
+            const float value = x[(k * PVID_MAX_CHANNELS) + c];
+            re += cosine[k] * value;
+            im += sine[k] * value;
+        }
+        sum[c][0] = re;
+        sum[c][1] = im;
+    }
+}
+
+/* I^1 or I^2 of an integrand at the end of the window's first half. */
+static float edge_of(const pvid_fourier_sums_f32 *self, const pvid_fourier_channel *one, size_t fold, float half_time)
+{
+    if (one->integrand == PVID_FOURIER_NONE) {
+        return (fold == 1u) ? half_time : (0.5f * (half_time * half_time));
+    }
+    return self->edge[fold - 1u][one->integrand];
+}
+
+/* One harmonic of all channels of the window whose second half is the last one. */
+static void join(const pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
+                 float half_time, float window[][2][PVID_MAX_HARMONICS])
+{
+    const size_t h = self->joined;
+    const float (*a)[2] = (const float (*)[2])self->sum[self->target ^ 1u][h];
+    const float (*b)[2] = (const float (*)[2])self->sum[self->target][h];
+    for (size_t c = 0; c < channels; c++) {
+        const pvid_fourier_channel *one = &design->model->channel[c];
+        float re = b[c][0];
+        float im = b[c][1];
+        if (one->fold == 1u) {
+            const float once = edge_of(self, one, 1, half_time);
+            re += once * b[one->plain][0];
+            im += once * b[one->plain][1];
+        } else if (one->fold == 2u) {
+            const float once = edge_of(self, one, 1, half_time);
+            const float twice = edge_of(self, one, 2, half_time);
+            re = (re + (twice * b[one->plain][0])) + (once * b[one->ramp][0]);
+            im = (im + (twice * b[one->plain][1])) + (once * b[one->ramp][1]);
+        } else {
+            /* no integral */
+        }
+        window[c][0][h] = ((h % 2u) != 0u) ? (a[c][0] - re) : (a[c][0] + re);
+        window[c][1][h] = ((h % 2u) != 0u) ? (a[c][1] - im) : (a[c][1] + im);
+    }
+}
+
+bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
+                                   uint8_t harmonics, uint8_t channels, float dt, float window[][2][PVID_MAX_HARMONICS])
+{
+    /* a window's harmonic is joined right behind the addition to it */
+    if (self->joined < self->harmonic) {
+        join(self, design, channels, dt * (float)design->hop, window);
+        self->joined++;
+        return self->joined == harmonics;
+    }
+    if (self->harmonic < harmonics) {
+        add_block(self, design, channels);
+        self->harmonic++;
+    }
+    return false;
+}

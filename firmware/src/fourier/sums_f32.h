@@ -1,0 +1,33 @@
+/* Sums of the half windows, a block of steps at a time, and their join. Private to the core. */
+#ifndef PVID_FOURIER_SUMS_F32_H
+#define PVID_FOURIER_SUMS_F32_H
+
+#include <stdbool.h>
+
+#include "pvid/fourier.h"
+
+/* Empty halves; the block that is being added is forgotten. */
+void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics);
+
+/* Where the values of the next step belong. */
+float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self);
+
+/* Counts that step. Returns true if it completes a half; index 0 then follows. */
+bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop);
+
+/* Joins the window that the last two halves form, as soon as the last block is added. edge: I^1 and I^2 of the window's
+ * first half at its end. */
+void pvid_fourier_sums_join_f32(pvid_fourier_sums_f32 *self, float edge[2][PVID_MAX_INTEGRANDS]);
+
+/* Returns whether a block is being added or a window is being joined. */
+static inline bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *self, uint8_t harmonics)
+{
+    return (self->harmonic < harmonics) || (self->joined < harmonics);
+}
+
+/* Adds the block to one harmonic, or joins one harmonic to `window`. Returns true if this completes the window. */
+bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
+                                   uint8_t harmonics, uint8_t channels, float dt,
+                                   float window[][2][PVID_MAX_HARMONICS]);
+
+#endif

@@ -1,0 +1,42 @@
+/* Sums of half windows, a block of steps and some harmonics at a time, and their join. Private to the core. */
+#ifndef PVID_FOURIER_SUMS_Q31_H
+#define PVID_FOURIER_SUMS_Q31_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "pvid/fourier_q31.h"
+
+/* H + 1, H = K/2 + n/2. */
+static inline uint8_t pvid_fourier_harmonics_q31(const pvid_fourier_design_q31 *design)
+{
+    return (uint8_t)((design->functions / 2u) + (design->power / 2u) + 1u);
+}
+
+/* No block, no half. */
+void pvid_fourier_sums_reset_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design);
+
+/* Where the channels of the next step go: step `index` of a half. */
+static inline int32_t *pvid_fourier_sums_place_q31(pvid_fourier_sums_q31 *self, uint16_t index)
+{
+    return self->block[self->filling][index % (uint16_t)PVID_FOURIER_BLOCK_Q31];
+}
+
+/* After they are written. A full block begins to be added; the one before it must be done. A half behind another one
+ * completes a window. */
+void pvid_fourier_sums_next_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design, uint16_t index,
+                                uint8_t half);
+
+/* Whether a block is being added. */
+static inline bool pvid_fourier_sums_are_busy_q31(const pvid_fourier_sums_q31 *self,
+                                                  const pvid_fourier_design_q31 *design)
+{
+    return self->slice < pvid_fourier_harmonics_q31(design);
+}
+
+/* Adds the block to the sums of the next harmonic. Where it completes a window the two halves are joined; where it is
+ * the first block of a half the sums begin anew. */
+void pvid_fourier_sums_slice_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design,
+                                 const pvid_fourier_values_q31 *values, pvid_fourier_window_q31 *window);
+
+#endif

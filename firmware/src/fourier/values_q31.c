@@ -1,0 +1,169 @@
+/* As in step_f32.c: with the jets of step k the gains and integrands of step k - 1 follow, and with those the channels
+ * of step k - 2.
+ *
+ *   sgn_(k-1)  from the arguments v at k - 2, k - 1, k: the mean of sgn over the step, v linear there
+ *   I^1        I_j = I_(j-1) + (-f_(j-2) + 13 f_(j-1) + 13 f_j - f_(j+1)) dt/24, the integral of a cubic
+ *   I^2        its trapezoids with end correction: += dt/2 (I_j + I_(j-1)) - dt^2/12 (f_j - f_(j-1))
+ *
+ * In dt/24 and dt^2/48 both are exact integers. Before the first step v and f go on in a straight line. */
+#include "fourier/values_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "fourier/rescale_q31.h"
+#include "pvid/elementary_q31.h"
+
+void pvid_fourier_values_init_q31(pvid_fourier_values_q31 *self)
+{
+    memset(self, 0, sizeof *self);
+}
+
+void pvid_fourier_values_reset_q31(pvid_fourier_values_q31 *self)
+{
+    self->known = 0;
+    self->index = 0;
+    self->half = 0;
+}
+
+/* Mean of sgn over a step: v 2/|g| within +-1, with the slope g = (after - before)/2; 0 for 0. Q30. */
+static int32_t mean_sign(int64_t before, int32_t v, int32_t after)
+{
+    const int64_t part = 4 * (int64_t)pvid_fixed_magnitude_q31(v);
+    const int64_t whole = (int64_t)pvid_magnitude_q31(after - before);
+    if (part >= whole) {
+        return pvid_sign_q31(v);
+    }
+    const int32_t mean = (int32_t)((part * PVID_ONE_Q30) / whole);
+    return (v < 0) ? -mean : mean;
+}
+
+/* Signs and runs at the step before the newest, whose arguments and derivatives are `newest`; then moves on. */
+static void complete_inputs(pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design,
+                            const int32_t newest[])
+{
+    const pvid_fourier_model_q31 *model = design->model;
+    int32_t *run = &self->now[model->jets];
+    int32_t *sign = &run[model->runs];
+    for (size_t i = 0; i < model->runs; i++) {
+        run[i] = pvid_fourier_rescaled_q31(self->run[i], &design->run[i]);
+    }
+    for (size_t i = 0; i < model->signs; i++) {
+        const int32_t v = self->v[0][i];
+        const int32_t width = design->sign_width[i];
+        const int32_t next = newest[model->runs + i];
+        const int64_t before = (self->known > 1u) ? self->v[1][i] : ((2 * (int64_t)v) - next);
+        sign[i] = (width > 0) ? pvid_soft_sign_q31(v, width) : mean_sign(before, v, next);
+    }
+}
+
+static void take_newest(pvid_fourier_values_q31 *self, const pvid_fourier_model_q31 *model, const int32_t jet[],
+                        const int32_t newest[])
+{
+    for (size_t i = 0; i < model->runs; i++) {
+        const int64_t rise = (self->known > 0u) ? ((int64_t)self->rate[i] + newest[i]) : 0;
+        self->run[i] = pvid_clamp_q31(self->run[i] + rise, PVID_WIDE);
+        self->rate[i] = newest[i];
+    }
+    for (size_t i = 0; i < model->signs; i++) {
+        self->v[1][i] = self->v[0][i];
+        self->v[0][i] = newest[model->runs + i];
+    }
+    memcpy(self->now, jet, model->jets * sizeof jet[0]);
+}
+
+/* Integrals at the step before that of the integrands f; at the first step of a half they begin anew. */
+static void integrate(pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design, const int32_t f[])
+{
+    const size_t ended = (size_t)self->half ^ 1u;
+    for (size_t i = 0; i < design->model->integrands; i++) {
+        const pvid_fourier_integral_q31 shift = design->integral[i];
+        const int64_t now = self->f[0][i];
+        const int64_t last = self->f[1][i];
+        const int64_t before = (self->known > 3u) ? self->f[2][i] : ((2 * last) - now);
+        int64_t once = 0;
+        int64_t twice = 0;
+        if (self->known > 2u) {
+            once = self->once[i] + ((13 * (last + now)) - (before + f[i]));
+            twice = self->twice[i] + ((self->once[i] + once) - (4 * (now - last)));
+        }
+        if (self->index == 0u) {
+            self->edge[ended][0][i] = (int32_t)pvid_round_shift_q31(once, shift.once);
+            self->edge[ended][1][i] = (int32_t)pvid_round_shift_q31(twice, shift.twice);
+            once = 0;
+            twice = 0;
+        }
+        self->once[i] = once;
+        self->twice[i] = twice;
+    }
+}
+
+/* I^fold of a channel at the present step, rounded; that of 1 in dt/2, dt^2/48. */
+static int32_t integral_of(const pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design,
+                           const pvid_fourier_channel *channel)
+{
+    const int32_t steps = (int32_t)self->index;
+    const bool first = channel->fold == 1u;
+    const size_t i = channel->integrand;
+    if (i == PVID_FOURIER_NONE) {
+        return first ? (2 * steps) : (24 * steps * steps);
+    }
+    return (int32_t)(first ? pvid_round_shift_q31(self->once[i], design->integral[i].once)
+                           : pvid_round_shift_q31(self->twice[i], design->integral[i].twice));
+}
+
+static void write_channels(const pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design,
+                           int32_t channel[])
+{
+    const size_t summed = pvid_fourier_summed_q31(design->model);
+    for (size_t k = 0; k < summed; k++) {
+        const pvid_fourier_channel *one = &design->model->channel[k];
+        const int32_t gain = self->gain[one->gain];
+        const uint32_t shift = design->format[k].value;
+        if (one->fold == 0u) { /* |gain| <= 2^30: its shift is 2 at least */
+            channel[k] = pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(gain, shift - 1u) + 1, 1);
+        } else {
+            const int64_t value = pvid_product_q31(gain, integral_of(self, design, one));
+            channel[k] = (int32_t)pvid_round_shift_q31(value, shift);
+        }
+    }
+}
+
+pvid_fourier_outcome pvid_fourier_values_step_q31(pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design,
+                                                  const int32_t jet[], int32_t channel[])
+{
+    const pvid_fourier_model_q31 *model = design->model;
+    int32_t newest[2 * PVID_MAX_INTEGRANDS] = {0};
+    int32_t out[PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS] = {0};
+    if ((model->prepare != NULL) && !model->prepare(jet, newest)) {
+        return PVID_FOURIER_BEYOND;
+    }
+    const bool complete = self->known > 1u;
+    if (self->known > 0u) {
+        complete_inputs(self, design, newest);
+        if (!model->values(self->now, out)) {
+            return PVID_FOURIER_BEYOND;
+        }
+        const int32_t *f = &out[model->gains];
+        if (complete) {
+            integrate(self, design, f);
+            write_channels(self, design, channel);
+            memcpy(self->f[2], self->f[1], sizeof self->f[2]);
+            memcpy(self->f[1], self->f[0], sizeof self->f[1]);
+        }
+        memcpy(self->gain, out, model->gains * sizeof out[0]);
+        memcpy(self->f[0], f, model->integrands * sizeof f[0]);
+    }
+    take_newest(self, model, jet, newest);
+    self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
+    return complete ? PVID_FOURIER_CHANNELS : PVID_FOURIER_NO_CHANNELS;
+}
+
+void pvid_fourier_values_next_q31(pvid_fourier_values_q31 *self, uint16_t hop)
+{
+    self->index++;
+    if (self->index == hop) {
+        self->index = 0;
+        self->half ^= 1u;
+    }
+}

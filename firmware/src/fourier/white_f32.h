@@ -1,0 +1,57 @@
+/* Noise of a kind's rows: its spectrum, the directions that the test functions leave out, and what follows from its
+ * inverse. Private to the core. */
+#ifndef PVID_FOURIER_WHITE_F32_H
+#define PVID_FOURIER_WHITE_F32_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "pvid/fourier.h"
+
+/* Rows of a window, K + n: real parts of the harmonics 0.., then imaginary parts of the harmonics 1.. */
+static inline size_t pvid_fourier_rows(const pvid_fourier_design_f32 *design)
+{
+    return (size_t)design->functions + design->power;
+}
+
+/* Stages of the basis. */
+static inline size_t pvid_fourier_basis_stages(const pvid_fourier_design_f32 *design)
+{
+    const size_t vectors = design->power / 2u;
+    return vectors * vectors;
+}
+
+/* Requires a valid design. dt: between steps [s]. */
+void pvid_fourier_white_init_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, float dt);
+
+/* Adds entries first..last-1 of the noise table to the weights c_j, those of this kind, at its theta. */
+void pvid_fourier_white_weigh_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, uint8_t kind,
+                                  const float theta[], size_t first, size_t last);
+
+/* 1 / sqrt(D_h) from the weights and the equation's own error. */
+void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, uint8_t kind,
+                                     uint8_t harmonics);
+
+/* The next of the basis' stages, counted from 0. */
+void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, size_t stage);
+
+/* A column in standard deviations from its sums, real and imaginary parts. */
+void pvid_fourier_white_scale_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
+                                  const float sum[2][PVID_MAX_HARMONICS], float column[]);
+
+/* Takes the vectors of this place in the basis, one of each family, off a column. */
+void pvid_fourier_white_remove_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
+                                   size_t place, float column[]);
+
+/* The share of rows first..last-1 in Q_j. */
+void pvid_fourier_white_share_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, size_t first,
+                                  size_t last);
+
+/* g += 1/2 sum_j dc_j/dtheta Q_j by entries first..last-1 of the noise table. */
+void pvid_fourier_white_pull_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
+                                 uint8_t kind, const float theta[], size_t first, size_t last, float g[]);
+
+/* Mean variance of the white rows by the sensors alone. */
+float pvid_fourier_white_sensors_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design);
+
+#endif

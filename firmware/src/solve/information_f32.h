@@ -1,0 +1,16 @@
+/* The sums of the float estimator: what information.h does not show. Private to the core. */
+#ifndef PVID_INFORMATION_F32_H
+#define PVID_INFORMATION_F32_H
+
+#include "pvid/information.h"
+#include "solve/kinds.h"
+
+/* The block of M that contains entry i of theta. */
+void pvid_information_block_f32(const pvid_model_f32 *model, size_t i, pvid_block *block);
+
+/* Adds a row of the kind with this block: n[block->n]. For models without their own accumulate. Cost: one product and
+ * one addition per sum of the kind. */
+void pvid_information_add_block_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const pvid_block *block,
+                                    const float n[], float y);
+
+#endif

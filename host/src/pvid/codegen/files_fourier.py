@@ -1,0 +1,157 @@
+"""The float32 files of a model's weak form for pvid/fourier.h: header and source."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from pvid.codegen import c_f32, describe
+from pvid.codegen.banner import banner, c_comment
+from pvid.codegen.files_f32 import UNCONTRACTED, for_cpp, guarded, includes_of, model_struct
+from pvid.codegen.fourier import FourierFunctions
+from pvid.codegen.fourier_twin import functions_in
+from pvid.codegen.functions import Function
+from pvid.core.sizes import raised
+from pvid.design.c_tables import float_literal
+from pvid.settings.fourier import NONE, FourierModel, Source
+
+_SOURCES = {Source.SAMPLED: "", Source.HELD: "held until the next", Source.JUMP: ""}
+
+
+def header(made: FourierFunctions, model: FourierModel, needed: Mapping[str, int], command: str) -> str:
+    """NAME_weak.h.
+
+    Parameters
+    ----------
+    needed : sizes of the core that the model needs (pvid.setup.fourier_sizes)
+    """
+    name, upper = made.name, made.name.upper()
+    about = [
+        f"{name}_weak.h - {made.model.title}: the weak form for pvid/fourier.h, float32.",
+        "",
+        *banner(made.functions, command),
+        "",
+        f'  #include "{name}_design_f32.h"          or a design of your own',
+        "  static pvid_fourier_f32 identifier;",
+        f"  if (pvid_fourier_init_f32(&identifier, &{name}_config_f32) != PVID_OK) ...",
+        "  each tick: reason = pvid_fourier_step_f32(&identifier, sample);",
+        "",
+        "Samples of a tick:",
+        *describe.table(_samples(made)),
+        "",
+        *describe.everything(made.functions),
+    ]
+    counts = {
+        "P": model.model.n_p,
+        "THETA": model.model.n_theta,
+        "C": len(made.functions.c_row),
+        "KINDS": model.kinds,
+        "SAMPLES": model.samples,
+        "SIGNALS": model.signals,
+        "JETS": model.jets,
+        "RUNS": model.runs,
+        "SIGNS": model.signs,
+        "GAINS": model.gains,
+        "INTEGRANDS": model.integrands,
+        "CHANNELS": model.channels,
+        "TERMS": len(model.term),
+    }
+    body = [
+        '#include "pvid/fourier.h"',
+        "",
+        *size_check(needed),
+        "",
+        *(f"#define {upper}_WEAK_{what} {count}" for what, count in counts.items()),
+        "",
+        *for_cpp(
+            [
+                "/* Tables of channels and terms, and the functions of the equations. */",
+                f"extern const pvid_fourier_model_f32 {name}_fourier_f32;",
+                "",
+            ]
+        ),
+    ]
+    return guarded(f"{name}_weak", about, body)
+
+
+def size_check(needed: Mapping[str, int]) -> list[str]:
+    """An error for a library of smaller arrays."""
+    options = " ".join(f"-D{macro}={size}" for macro, size in (raised(needed) or needed).items())
+    checks = " || \\\n    ".join(" || ".join(one) for one in _pairs([f"{k} < {v}" for k, v in needed.items()]))
+    return [f"#if {checks}", f'#error "compile pvid and this file with {options}"', "#endif"]
+
+
+def _pairs(checks: list[str]) -> list[list[str]]:
+    return [checks[k : k + 3] for k in range(0, len(checks), 3)]
+
+
+def _samples(made: FourierFunctions) -> list[tuple[str, ...]]:
+    signals = {one.name: one for one in made.model.signals}
+    held = {one.sample for one in made.signal if one.source is Source.HELD}
+    return [
+        (f"sample[{k}]", name, f"[{signals[name].unit or '1'}]", "held until the next" if k in held else "")
+        for k, name in enumerate(made.samples)
+    ]
+
+
+def source(made: FourierFunctions, model: FourierModel, command: str) -> str:
+    """NAME_weak_f32.c."""
+    name, upper = made.name, f"{made.name.upper()}_WEAK"
+    own = replace(made.functions, name=f"{name}_weak")
+    parts = [
+        c_comment(banner(made.functions, command)),
+        UNCONTRACTED,
+        includes_of(f"{name}_weak.h", functions_in(made), ("stddef.h",)),
+        *(c_f32.function(_signature(one), one.program) for one in functions_in(made)),
+        model_struct(own, "theta", "jacobian").replace("\nconst ", "\nstatic const ", 1),
+        *_tables(model, upper),
+        _struct(model, name, upper),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _signature(function: Function) -> str:
+    return f"static void {function.name}(const float in[], float out[])"
+
+
+def _tables(model: FourierModel, upper: str) -> list[str]:
+    signals = [f"{{{one.sample}, PVID_SIGNAL_{one.source.name}}}" for one in model.signal]
+    jets = [f"{{{one.signal}, {one.order}}}" for one in model.jet]
+    channels = [
+        f"{{{_place(one.gain)}, {_place(one.integrand)}, {one.fold}, {_place(one.plain)}, {_place(one.ramp)}}}"
+        for one in model.channel
+    ]
+    terms = [f"{{{one.channel}, {one.order}, {one.column}, {float_literal(one.factor)}}}" for one in model.term]
+    kinds = [f"{{{one.thetas}, {one.nuisances}, {one.first}, {one.end}}}" for one in model.kind]
+    return [
+        table("pvid_fourier_signal", "signal", f"{upper}_SIGNALS", signals),
+        table("pvid_fourier_jet", "jet", f"{upper}_JETS", jets),
+        table("pvid_fourier_channel", "channel", f"{upper}_CHANNELS", channels),
+        table("pvid_fourier_term_f32", "term", f"{upper}_TERMS", terms),
+        table("pvid_fourier_kind", "kind", f"{upper}_KINDS", kinds),
+    ]
+
+
+def _place(place: int) -> str:
+    return "PVID_FOURIER_NONE" if place == NONE else str(place)
+
+
+def table(kind: str, name: str, size: str, entries: list[str]) -> str:
+    """A constant array of structs."""
+    lines = [f"    {one}," for one in entries]
+    return "\n".join([f"static const {kind} {name}[{size}] = {{", *lines, "};"])
+
+
+def _struct(model: FourierModel, name: str, upper: str) -> str:
+    counts = ("samples", "signals", "jets", "runs", "signs", "gains", "integrands", "channels", "kinds")
+    return "\n".join(
+        [
+            f"const pvid_fourier_model_f32 {name}_fourier_f32 = {{",
+            *(f"    .{one} = {upper}_{one.upper()}," for one in counts),
+            *(f"    .{one} = {one}," for one in ("signal", "jet", "channel", "term", "kind")),
+            f"    .prepare = {'prepare' if model.prepare else 'NULL'},",
+            "    .values = values,",
+            f"    .model = &{name}_weak_model_f32,",
+            "};",
+        ]
+    )

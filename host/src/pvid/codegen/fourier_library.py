@@ -1,0 +1,30 @@
+"""The weak form of a mechanism in C, on this computer: generated, compiled, loaded."""
+
+from __future__ import annotations
+
+from pvid.codegen import files_fourier
+from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.fourier_native import FourierNative
+from pvid.core.model_library import model_library
+from pvid.core.sizes import raised
+from pvid.model.compiled import CompiledModel
+from pvid.settings.fourier import FourierDesign32
+from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+
+
+def fourier_native(compiled: CompiledModel, design: FourierDesign32 | None = None) -> FourierNative:
+    """The library of a model, with arrays that hold a design.
+
+    Raises
+    ------
+    PvidError
+        When there is no compiler, or the engine does not have what the model needs.
+    """
+    made, model = fourier_functions_of(compiled), fourier_model_of(compiled)
+    needed = sizes_of_model(model) if design is None else sizes_of_design(design)
+    texts = {
+        f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), "identification"),
+        f"{made.name}_weak_f32.c": files_fourier.source(made, model, "identification"),
+    }
+    return FourierNative(made.name, model_library(made.name, texts, raised(needed)))

@@ -1,0 +1,127 @@
+"""A library of the C core with the generated C of a mechanism, compiled for this computer; kept in the cache of builds.
+
+The core's arrays get the sizes that the mechanism needs. Flags are those of tools/pvid's own library.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import tempfile
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from pathlib import Path
+
+from pvid.base.errors import PvidError
+from pvid.base.user_cache import built_under
+from pvid.core.headers import HEADERS
+from pvid.core.host_compiler import host_compiler
+from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, core_sources
+
+NATIVE = ROOT / "host" / "native"
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
+_ROOMS = ("number", "solve", "judge", "fourier", "keep")
+_NOT = ("_q31", "_strong_f32", "_weak_f32", "fingerprint_f32")  # ends of names that the weak engine does without
+_STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
+_WHAT = "identification in C of a described mechanism"
+
+
+def model_library(name: str, texts: Mapping[str, str], sizes: Mapping[str, int]) -> Path:
+    """The shared library, beside it what cffi reads.
+
+    Parameters
+    ----------
+    name : of the mechanism, for the file's name
+    texts : file name -> generated C
+    sizes : PVID_MAX_ macro -> value
+
+    Raises
+    ------
+    PvidError
+        When there is no compiler, or it refuses the code.
+    """
+    compiler = host_compiler(_WHAT)
+    definitions = [f"-D{macro}={size}" for macro, size in sorted(sizes.items())]
+    key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
+    folder = built_under(ROOT / "build") / "cache" / "models" / f"{name}-{key.hexdigest()[:20]}"
+    library = folder / f"lib{name}.so"
+    if not library.exists():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        _build(compiler, texts, definitions, library)
+    return library
+
+
+def _flat(texts: Mapping[str, str]) -> Iterable[str]:
+    for name in sorted(texts):
+        yield from (name, texts[name])
+
+
+def _sources() -> list[Path]:
+    found = [
+        path for path in core_sources() if path.parent.parent == SRC and path.parent.name in _ROOMS and _used(path.stem)
+    ]
+    return [*found, NATIVE / "replay_fourier.c"]
+
+
+def _used(stem: str) -> bool:
+    return not stem.endswith(_NOT) or stem.endswith("fourier_f32")
+
+
+@cache
+def _core_hash() -> str:
+    """Of everything in the core that may be compiled or included."""
+    whole = hashlib.sha256()
+    paths = sorted([*FIRMWARE.glob("include/**/*.h"), *FIRMWARE.glob("src/**/*.[ch]"), *FIRMWARE.glob("models/**/*.h")])
+    for path in [*paths, *sorted(NATIVE.glob("*.[ch]"))]:
+        whole.update(path.name.encode())
+        whole.update(path.read_bytes())
+    return whole.hexdigest()
+
+
+def _build(compiler: str, texts: Mapping[str, str], definitions: list[str], library: Path) -> None:
+    """Whole or not at all: several processes may build the same."""
+    with tempfile.TemporaryDirectory(dir=library.parent.parent) as made:
+        folder = Path(made) / "library"
+        folder.mkdir()
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}", f"-I{folder}"]
+        code = [folder / name for name in sorted(texts) if name.endswith(".c")]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            objects = list(pool.map(lambda path: _object(compiler, options, path, Path(made)), [*code, *_sources()]))
+        _run([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
+        (folder / HEADERS).write_text(_declarations(compiler, texts, options, Path(made)), encoding="utf-8")
+        try:
+            folder.rename(library.parent)
+        except OSError:
+            if not library.exists():
+                raise
+
+
+def _object(compiler: str, options: list[str], source: Path, folder: Path) -> str:
+    made = str(folder / f"{source.stem}.o")
+    _run([compiler, *options, "-c", str(source), "-o", made])
+    return made
+
+
+def _declarations(compiler: str, texts: Mapping[str, str], options: list[str], folder: Path) -> str:
+    """The headers, preprocessed: cffi knows the types of the standard ones."""
+    empty = folder / "no_standard_headers"
+    empty.mkdir()
+    for name in _STANDARD:
+        (empty / f"{name}.h").write_text("", encoding="utf-8")
+    own = [f'#include "{name}"' for name in sorted(texts) if name.endswith(".h")]
+    top = folder / "native.h"
+    top.write_text("\n".join(['#include "replay_fourier.h"', *own, ""]), encoding="utf-8")
+    return _run([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])
+
+
+def _run(command: list[str]) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
+        told = (lines or done.stderr.splitlines() or ["no output"])[0]
+        raise PvidError(f"{command[0]} refused the code of the mechanism: {told.strip()[:300]}")
+    return done.stdout

@@ -1,0 +1,76 @@
+"""What a board says about its mechanism (frames.Names): a text of few lines.
+
+    dc_motor
+    sample V V
+    sample phi rad
+    p R ohm
+    p d1
+
+The mechanism's name, then its samples and its parameters in order, each with its name and, except for a pure number,
+its unit. A board is not trusted: names are those of a program's variables, units are few printable characters, and
+nothing is read of a text that breaks a rule.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from pvid.base.errors import PvidError
+from pvid.base.wording import shown
+from pvid.link.frames import MAX_P, MAX_SAMPLES
+from pvid.models.model import Model
+
+_NAME = "[A-Za-z_][A-Za-z0-9_]{0,31}"
+_LINE = re.compile(rf"(sample|p) ({_NAME})(?: ([A-Za-z0-9/*^()%.+-]{{1,24}}))?")
+MOST = 1200  # characters of a text
+
+
+@dataclass(frozen=True)
+class BoardNames:
+    """A mechanism by the names and units of its samples and of its parameters; a unit of "" is that of a number."""
+
+    mechanism: str
+    samples: tuple[tuple[str, str], ...]
+    parameters: tuple[tuple[str, str], ...]
+
+    @property
+    def text(self) -> str:
+        """As in a frame."""
+        lines = [("sample", *one) for one in self.samples] + [("p", *one) for one in self.parameters]
+        return "\n".join([self.mechanism, *(" ".join(line).rstrip() for line in lines)])
+
+    @classmethod
+    def parse(cls, text: bytes) -> BoardNames:
+        """From what a board sent.
+
+        Raises
+        ------
+        PvidError
+            Where it is not of this form, names something twice, or names too much or nothing.
+        """
+        if len(text) > MOST:
+            raise PvidError(f"names of {len(text)} characters, and {MOST} are the most")
+        mechanism, *lines = text.decode("ascii", "replace").split("\n")
+        if not re.fullmatch(_NAME, mechanism):
+            raise PvidError(f"{shown(mechanism, 40)} is no name of a mechanism")
+        found: dict[str, list[tuple[str, str]]] = {"sample": [], "p": []}
+        for line in lines:
+            match = _LINE.fullmatch(line)
+            if match is None:
+                raise PvidError(f"{shown(line, 60)} names no sample and no parameter")
+            found[match[1]].append((match[2], match[3] or ""))
+        for what, most in (("sample", MAX_SAMPLES), ("p", MAX_P)):
+            named = [name for name, _ in found[what]]
+            if not 0 < len(named) <= most or len(set(named)) < len(named):
+                raise PvidError(f"{mechanism}: {len(named)} names of {what}, where 1 to {most} different ones belong")
+        return cls(mechanism, tuple(found["sample"]), tuple(found["p"]))
+
+
+def names_of(model: Model) -> BoardNames:
+    """What the image of a mechanism of the library says about it."""
+    return BoardNames(
+        model.name,
+        tuple((one.name, one.unit) for one in model.channels),
+        tuple((one.name, one.unit) for one in model.parameters),
+    )

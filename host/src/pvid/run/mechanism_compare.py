@@ -1,0 +1,48 @@
+"""The C core against its twin on a recording of a described mechanism, bit for bit, after every tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy.typing as npt
+
+from pvid.codegen.fourier_library import fourier_native
+from pvid.model.compiled import CompiledModel
+from pvid.rig.run import Recording
+from pvid.run.compare import Comparison, first_difference
+from pvid.run.engine_design import config_for_recording, samples_of
+from pvid.settings.fourier import FourierConfig
+from pvid.setup.fourier_sizes import sizes_of_model
+from pvid.twin import fnv
+from pvid.twin.fourier import FourierTwin
+
+Progress = Callable[[int], None]
+
+
+def compare_recording(compiled: CompiledModel, recording: Recording, progress: Progress | None = None) -> Comparison:
+    """Runs a recording through the engine and its twin, with the design that `identify` chooses.
+
+    Raises
+    ------
+    PvidError
+        When there is no C compiler, or the engine does not have what the model needs.
+    """
+    config = config_for_recording(compiled, recording)
+    return compare_samples(compiled, config, samples_of(config, recording.signals), progress)
+
+
+def compare_samples(
+    compiled: CompiledModel, config: FourierConfig, samples: npt.ArrayLike, progress: Progress | None = None
+) -> Comparison:
+    """The same for samples [ticks, samples] and settings."""
+    identifier = fourier_native(compiled, config.design).identifier_of(config)
+    record = identifier.run_samples(samples)
+    twin = FourierTwin(config).run(samples, progress=progress).lane()
+    hashes = fnv.running_hashes(twin)
+    moments = sizes_of_model(config.design.model)["PVID_MAX_MOMENTS"]
+    return Comparison(
+        ticks=len(record.reason),
+        core_hash=identifier.running_hash,
+        twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
+        difference=first_difference(record, twin, compiled.p_names, moments),
+    )

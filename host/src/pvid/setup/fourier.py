@@ -1,0 +1,152 @@
+"""Tables of the weak engine for a rig, from a design of the float64 oracle and the rows of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.front import weights_of
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.fourier.rows import EquationError, WeakRows
+from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
+from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierModel, FourierNoise
+
+HIGHEST_POWER = 8  # n of sin^n
+_STEPS_OF_A_BLOCK = 4  # half a window is a whole number of blocks
+
+# An entry whose share is below this part of the noise at every harmonic is left out.
+_SHARE = 1e-6
+
+# The outlier gate: as the pendulum's weak form, whose windows are few and alike.
+_GATE = GateConfig(sigmas=4.0, patience_s=0.0)
+_PATIENCE_WINDOWS = 100
+
+
+def for_engine(design: FourierDesign) -> FourierDesign:
+    """The nearest design that the engine has: half windows of whole blocks, kinds of rows one by one, signs averaged.
+
+    A soft sign stays one. The engine does not locate reversals.
+    """
+    block = _STEPS_OF_A_BLOCK
+    least = -(-(design.highest + 1) // block) * block
+    hop = max(round(design.hop / block) * block, least)
+    found = replace(design, window_s=2 * hop * design.dt, joint=False)
+    return found if design.reversals == "soft" else replace(found, reversals="averaged")
+
+
+def design_tables(
+    model: FourierModel, rows: WeakRows, p: Float, errors: Sequence[EquationError] | None = None
+) -> FourierDesign32:
+    """The tables of a design.
+
+    Parameters
+    ----------
+    model : of the mechanism that the rows are of
+    rows : of a recorded or simulated run, with the design: their noise depends on the motion
+    p : parameters near those of the rig [n_p]
+    errors : of the equations themselves, of each kind; None by default
+    """
+    design = rows.record.grid.design
+    _check(design, rows)
+    found = list(errors or [EquationError()] * rows.kinds)
+    return FourierDesign32(
+        model=model,
+        functions=design.functions,
+        power=design.power,
+        decimation=design.decimation,
+        hop=design.hop,
+        filter=tuple(_filter(design, one.order) for one in model.jet),
+        circle=_as_float32(np.cos(np.pi * np.arange(2 * design.hop) / design.hop)),
+        noise=tuple(entry for kind in range(rows.kinds) for entry in _noise(rows, kind, p)),
+        error_order=np.array([one.order for one in found], np.uint8),
+        error_variance=_as_float32([one.variance for one in found]),
+        sign_width=np.full(model.signs, design.soft if design.reversals == "soft" else 0.0, np.float32),
+        overlap=float(np.float32(overlap_of(rows, p, found))),
+    )
+
+
+def _check(design: FourierDesign, rows: WeakRows) -> None:
+    name = rows.compiled.model.name
+    if design.hop % _STEPS_OF_A_BLOCK or design.joint or design.reversals == "located":
+        raise PvidError(f"{name}: this design is none of the engine's: see for_engine")
+    top = rows.compiled.channels.top
+    if not top + 2 <= design.power <= HIGHEST_POWER:
+        raise PvidError(
+            f"{name}: a power of {design.power} for rows of order {top}: the engine has at least 2 more than the order "
+            f"and at most {HIGHEST_POWER}"
+        )
+
+
+def _filter(design: FourierDesign, order: int) -> FourierFilter:
+    weights = weights_of(design, order)
+    return FourierFilter(_as_float32(weights[len(weights) // 2 + 1 :]))
+
+
+def _noise(rows: WeakRows, kind: int, p: Float) -> list[FourierNoise]:
+    """Entries that matter at some harmonic at p."""
+    theta = np.append(rows.compiled.parameters.theta(p)[kind], -1.0)
+    count = len(theta)
+    shares = rows.noise.of_harmonics(kind)[:, :count, :count]
+    rates = rows.functions.rates[rows.functions.highest :] ** 2
+    powers = rates[np.newaxis, :] ** np.arange(len(shares))[:, np.newaxis]
+    sized = np.abs(shares * np.outer(theta, theta))
+    whole = np.einsum("jab,jh->h", shares * np.outer(theta, theta), powers)
+    entries = []
+    for power in range(len(shares)):
+        for a in range(count):
+            for b in range(a, count):
+                factor = float(shares[power, a, b]) * (1 if a == b else 2)
+                share = 2 * sized[power, a, b] * powers[power]
+                if factor and np.any(share > _SHARE * whole):
+                    entries.append(FourierNoise(kind, power, a, b, np.float32(factor)))
+    return entries
+
+
+def overlap_of(rows: WeakRows, p: Float, errors: Sequence[EquationError]) -> float:
+    """Inflation of variances because windows that overlap by half share noise: a bound for motion that repeats.
+
+    As that of the pendulum's weak form (pvid.design.weak): 1 + 2 lambda_max of the whitened covariance of neighbours.
+    """
+    theta = rows.compiled.parameters.theta(p)
+    found = 1.0
+    for kind in range(rows.kinds):
+        base = rows.whitener((kind,), theta, errors).base
+        shared = base @ rows.with_next((kind,), theta, errors) @ base.T
+        found = max(found, 1 + 2 * float(np.linalg.eigvalsh((shared + shared.T) / 2).max()))
+    return found
+
+
+def config_of(
+    design: FourierDesign32, sample_rate: float, parameters: Parameters, start: Float | None = None
+) -> FourierConfig:
+    """Settings ready for the engine: the guesses, their standard deviations and bounds, defaults of trust and gate."""
+    p = parameters.checked(start)
+    unknowns = parameters.model.unknowns
+    # The prior of the oracle, in units of p.
+    unit = parameters.unit(p)
+    start_sd = np.abs(unit) / np.sqrt(parameters.prior(p))
+    hop_s = design.hop * design.decimation / sample_rate
+    return FourierConfig(
+        sample_rate=sample_rate,
+        design=design,
+        estimator=EstimatorConfig(
+            start=_as_float32(p),
+            start_sd=_as_float32(start_sd),
+            lower=_as_float32([min(one.low, value) for one, value in zip(unknowns, p, strict=True)]),
+            upper=_as_float32([max(one.high, value) for one, value in zip(unknowns, p, strict=True)]),
+            row_sd=1.0,
+        ),
+        trust=TrustConfig(),
+        gate=replace(_GATE, patience_s=_PATIENCE_WINDOWS * hop_s),
+    )
+
+
+def _as_float32(values: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    out = np.ascontiguousarray(values, np.float32)
+    out.setflags(write=False)
+    return out

@@ -1,0 +1,207 @@
+"""Twin of fourier/fourier_finish_f32.c: from the sums of a whole window to rows, steps of p, the published estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.settings.enums import Reason
+from pvid.settings.fourier import FourierConfig
+from pvid.twin.f32.estimator import RelativeEstimator
+from pvid.twin.f32.fourier_columns import projected, sums_of_columns
+from pvid.twin.f32.fourier_scores import Scores
+from pvid.twin.f32.fourier_white import Rows, White
+from pvid.twin.f32.gate import Gate
+from pvid.twin.f32.trust import Trust
+from pvid.twin.record import Mask, Reasons, of_all_lanes
+from pvid.twin.trust import Candidate
+
+Float32 = npt.NDArray[np.float32]
+Stages = Iterator[Reasons | None]
+
+_F = np.float32
+_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 48, 4
+_GATE_MEMORY = _F(4)
+_VARIANCE_MAX = _F(1e36)
+
+
+def _parts(whole: int, each: int) -> int:
+    return max(1, -(-whole // each))
+
+
+class Finish:
+    """What processes the windows of an identifier, in several lanes.
+
+    Attributes
+    ----------
+    alone : the next window has no neighbour before it
+    """
+
+    def __init__(self, config: FourierConfig, dt: np.float32, estimator: RelativeEstimator, trust: Trust) -> None:
+        design = self.design = config.design
+        self.estimator, self.trust = estimator, trust
+        self.rows = Rows(design, dt)
+        self.compensation = config.compensation
+        self.shares = config.compensation or bool((np.asarray(design.error_variance) > 0).any())
+        self.iterations = 1 if estimator.is_rate else config.iterations
+        windows_hz = _F(1) / (dt * _F(design.hop))
+        lanes = estimator.p.shape[1]
+        self.gates = [
+            Gate(config.gate, windows_hz, _GATE_MEMORY, np.ones(lanes, np.float32)) for _ in range(design.model.kinds)
+        ]
+        self.scores = Scores(len(estimator.p), estimator.forgetting_s * windows_hz)
+        self.alone = False
+
+    # ---- number of stages
+
+    def _entries(self) -> int:
+        return _parts(len(self.design.noise), _ENTRIES_PER_STAGE)
+
+    def _stages_of_rows(self, kind: int) -> int:
+        """Stages of a kind up to its gate."""
+        own = self.design.model.kind[kind]
+        vectors, nuisances = self.design.power // 2, own.nuisances
+        project = nuisances * own.columns - nuisances * (nuisances - 1) // 2 if nuisances else 1
+        residual = _parts(self.rows.count, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
+        return self._entries() + 1 + vectors * vectors + own.columns * (vectors + 1) + project + residual
+
+    @property
+    def _stages_of_shares(self) -> int:
+        return _parts(self.rows.count, _SHARES_PER_STAGE) + self._entries() if self.shares else 0
+
+    @property
+    def stages(self) -> int:
+        """Of a window with all its solves."""
+        estimator = self.estimator
+        of_kinds = sum(
+            self._stages_of_rows(kind) + self._stages_of_shares + self.rows.count
+            for kind in range(self.design.model.kinds)
+        )
+        solves = estimator.solve_stages(True) + (self.iterations - 1) * estimator.solve_stages(False)
+        return of_kinds + 3 + len(estimator.p) + solves + estimator.assessment_stages
+
+    # ---- a window
+
+    def process(self, window: Float32) -> Stages:
+        """Processes the sums of a window [channels, 2, harmonics]: a stage a step; yields the reason to report [lanes],
+        or None."""
+        if self.alone:
+            self.scores.skip()
+        self.alone = False
+        estimator = self.estimator
+        lanes = estimator.p.shape[1]
+        score = np.zeros((estimator.model.n_theta, lanes), np.float32)
+        nothing = np.zeros(lanes, np.float32)
+        expected, free, square, used = nothing, nothing, nothing, 0
+        first = 0
+        for kind, own in enumerate(self.design.model.kind):
+            block = slice(first, first + own.thetas)
+            first += own.thetas
+            theta = estimator.theta[block]
+            white = White(self.rows, kind, theta)
+            columns, live = projected(white.columns(sums_of_columns(self.rows, kind, window)), own.thetas)
+            e, rss = _residuals(columns, theta)
+            for _ in range(self._stages_of_rows(kind) - 1):
+                yield None
+            freedom = _F(self.design.functions) - live
+            with np.errstate(all="ignore"):
+                passes = of_all_lanes(self.gates[kind].passes(rss / freedom))
+            if not passes:
+                estimator.counters["rejected_outlier"] += 1
+                yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
+                continue
+            if used == 0:
+                with np.errstate(all="ignore"):
+                    estimator.information.fade(self.trust.next_fade_factor())
+                estimator.sums = estimator.information.read()
+            used += 1
+            free, square = free + freedom, square + rss
+            yield None
+            if self.shares:
+                yield from self._share(white, block, score)
+                expected = expected + white.sensors()
+            else:
+                expected = expected + _F(1)
+            for k in range(self.rows.count):
+                n = columns[: own.thetas, k]
+                with np.errstate(all="ignore"):
+                    score[block] = score[block] + n * e[k]
+                added = estimator.add(n, columns[own.thetas, k], kind)
+                yield None if (added == Reason.ACCUMULATED).all() else added
+        if used == 0:
+            self.scores.skip()
+            return
+        yield from self._steps(score, expected / _F(used), free, square)
+
+    def _share(self, white: White, block: slice, score: Float32) -> Stages:
+        """The stages of the noise's share, the last of which adds the compensation."""
+        estimator = self.estimator
+        for _ in range(self._stages_of_shares - 1):
+            yield None
+        pull = np.zeros_like(score)
+        if self.compensation:
+            pull[block] = white.pull()
+        with np.errstate(all="ignore"):
+            score[block] = score[block] + pull[block]
+        if self.compensation:
+            estimator.add_to_b(pull)
+        yield None
+
+    def _steps(self, score: Float32, expected: Float32, free: Float32, square: Float32) -> Stages:
+        """From the rows in the sums to the verdict."""
+        estimator = self.estimator
+        self.scores.take(estimator.model, estimator.p, score)
+        estimator.set_expected(expected)
+        yield None
+        reason = np.full(score.shape[1], Reason.ACCUMULATED, np.uint8)
+        for iteration in range(self.iterations):
+            fallback = self.trust.fallback if iteration == 0 else None
+            for solved in estimator.solve(ends_group=iteration == 0, fallback=fallback):
+                yield None
+                if solved is not None:
+                    reason = solved
+            if not estimator.was_due:
+                break
+        size, group_rss = estimator.size, estimator.group_rss
+        for _ in range(estimator.assessment_stages + 1 + len(estimator.p)):
+            yield None
+        with np.errstate(all="ignore"):
+            candidate, above_noise = estimator.judged()
+            self.scores.add(square / free)
+            self._cluster(candidate)
+            variance_ratio = group_rss / (free * expected)
+        yield self.trust.judge(reason, size, above_noise, variance_ratio, candidate)
+
+    def _cluster(self, candidate: Candidate) -> None:
+        """The larger of the two standard errors of each parameter; the covariance grows with it."""
+        estimator = self.estimator
+        n_p = len(estimator.p)
+        covariance = np.moveaxis(candidate["covariance"], 0, 2)[:n_p, :n_p].copy()
+        wide = estimator.judged_variance * estimator.correlation
+        rows = (_F(self.rows.count) * _F(self.design.model.kinds)) * estimator.row_weight
+        windows = candidate["weight"] / rows
+        growth = np.ones((n_p, len(wide)), np.float32)
+        for a in range(n_p):
+            variance = self.scores.variance(a, covariance, wide, windows)
+            se = candidate["se"][:, a]
+            wider: Mask = (variance > se * se) & (variance <= _VARIANCE_MAX)
+            candidate["se"][:, a] = np.where(wider, np.sqrt(variance), se)
+            before = covariance[a, a]
+            growth[a] = np.where(before > 0, candidate["se"][:, a] / np.sqrt(before), _F(1))
+        for a in range(n_p):
+            for b in range(n_p):
+                candidate["covariance"][:, a, b] = covariance[a, b] * (growth[a] * growth[b])
+
+
+def _residuals(columns: Float32, theta: Float32) -> tuple[Float32, Float32]:
+    """e [rows, lanes] of the columns of thetas and Y at theta, and the sum of its squares [lanes]."""
+    with np.errstate(all="ignore"):
+        e = columns[-1]
+        for j, one in enumerate(theta):
+            e = e - one * columns[j]
+        rss = np.zeros(e.shape[1], np.float32)
+        for square in e * e:
+            rss = rss + square
+    return e, rss

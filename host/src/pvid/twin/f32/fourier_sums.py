@@ -1,0 +1,58 @@
+"""Twin of fourier/sums_f32.c: sums of all half windows of a stretch, and their join to windows."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.settings.fourier import NONE, FourierDesign32, FourierModel
+from pvid.twin.f32.fourier_step import Values
+
+Float32 = npt.NDArray[np.float32]
+
+_F = np.float32
+
+
+def half_sums(channels: Float32, circle: Float32, hop: int, harmonics: int) -> Float32:
+    """A_h of every whole half window: channels [steps, channels], time counts from each half's start.
+
+    Returns float32 [halves, channels, 2, harmonics]: real and imaginary parts.
+    """
+    halves = len(channels) // hop
+    of_halves = channels[: halves * hop].reshape(halves, hop, channels.shape[1], 1, 1)
+    turn, h = 2 * hop, np.arange(harmonics)
+    total = np.zeros((halves, channels.shape[1], 2, harmonics), np.float32)
+    with np.errstate(all="ignore"):
+        for k in range(hop):
+            at = (h * k) % turn
+            factors = np.stack([circle[at], circle[(at - hop // 2) % turn]])
+            total = total + factors * of_halves[:, k]
+    return total
+
+
+def joined(halves: Float32, edges: Float32, model: FourierModel, dt: np.float32, hop: int) -> Float32:
+    """S_h = A_h + (-1)^h B_h of every two neighbouring halves [windows, channels, 2, harmonics]."""
+    a, b = halves[:-1], halves[1:]
+    second = b.copy()
+    half_time = dt * _F(hop)
+    with np.errstate(all="ignore"):
+        for place, one in enumerate(one for one in model.channel if one.gain != NONE):
+            if not one.fold:
+                continue
+            if one.integrand == NONE:
+                once, twice = half_time, _F(0.5) * (half_time * half_time)
+            else:
+                once, twice = edges[: len(a), :, one.integrand].T[:, :, None, None]
+            if one.fold == 1:
+                second[:, place] = b[:, place] + once * b[:, one.plain]
+            else:
+                second[:, place] = (b[:, place] + twice * b[:, one.plain]) + once * b[:, one.ramp]
+        odd = np.arange(halves.shape[-1]) % 2 == 1
+        return np.where(odd, a - second, a + second)
+
+
+def windows(values: Values, design: FourierDesign32, dt: np.float32) -> Float32:
+    """S_h of every whole window of a stretch [windows, channels, 2, harmonics]; window m begins with half m."""
+    circle = np.asarray(design.circle, np.float32)
+    halves = half_sums(values.channels, circle, design.hop, design.highest + 1)
+    return joined(halves, values.edges, design.model, dt, design.hop)

@@ -1,0 +1,91 @@
+"""The weak forms of all shipped mechanisms: their designs, and their C in one library."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+from pvid.codegen import files_design, files_fourier
+from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.fourier_native import FourierNative
+from pvid.core.model_library import model_library
+from pvid.core.sizes import raised
+from pvid.models import mechanisms
+from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.rows import WeakRows
+from pvid.settings.fourier import FourierConfig, FourierModel
+from pvid.setup.fourier import config_of, design_tables, for_engine
+from pvid.setup.fourier_sizes import sizes_of_design
+from pvid.sim.simulated_run import RigSimulation
+
+NAMES = mechanisms.names()
+
+
+@dataclass(frozen=True)
+class WeakForm:
+    """A shipped mechanism with the design of its rig.
+
+    Attributes
+    ----------
+    run : samples of its simulated rig
+    rows : of the oracle, with the engine's design
+    config : the tables, and settings
+    """
+
+    made: FourierFunctions
+    model: FourierModel
+    run: dict[str, Float]
+    rows: WeakRows
+    truth: Float
+    config: FourierConfig
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Name -> text of the generated C."""
+        name, needed = self.made.name, sizes_of_design(self.config.design)
+        title, units = self.made.model.title, self.made.model.p_names
+        return {
+            f"{name}_weak.h": files_fourier.header(self.made, self.model, needed, "test"),
+            f"{name}_weak_f32.c": files_fourier.source(self.made, self.model, "test"),
+            f"{name}_design_f32.h": files_design.header(self.config, needed, "test", title, units),
+        }
+
+
+@cache
+def weak_form(name: str) -> WeakForm:
+    """Of a shipped mechanism."""
+    compiled, rig = mechanisms.compiled_of(name), simulated_rig(name)
+    simulation = RigSimulation.of(compiled, rig)
+    run = simulation.run()
+    model = ready(compiled)
+    design = for_engine(FourierDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
+    rows = WeakRows.of(model, run, design)
+    tables = design_tables(fourier_model_of(compiled), rows, simulation.truth)
+    return WeakForm(
+        fourier_functions_of(compiled),
+        fourier_model_of(compiled),
+        run,
+        rows,
+        simulation.truth,
+        config_of(tables, rig.sample_rate, model.parameters),
+    )
+
+
+@cache
+def sizes_of_all() -> dict[str, int]:
+    """That hold every shipped design."""
+    every = [sizes_of_design(weak_form(name).config.design) for name in NAMES]
+    return {macro: max(one[macro] for one in every) for macro in every[0]}
+
+
+@cache
+def native(name: str) -> FourierNative:
+    """A mechanism in the library of all."""
+    texts = {
+        file: text for one in NAMES for file, text in weak_form(one).files.items() if not file.endswith("_design_f32.h")
+    }
+    return FourierNative(name, model_library("all", texts, raised(sizes_of_all())))

@@ -1,0 +1,74 @@
+"""The library of a described mechanism: compiled once, found again, and one sentence where there is no compiler."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pvid.base.errors import PvidError
+from pvid.core import model_library
+from pvid.core.fourier_native import FourierNative
+from pvid.core.sizes import default_sizes, raised
+from pvid.core.sources import FIRMWARE
+
+MODEL = """
+#include <stddef.h>
+#include "pvid/fourier.h"
+extern const pvid_fourier_model_f32 tiny_fourier_f32;
+static void values(const float in[], float out[]) {{ out[0] = {factor} * in[0]; }}
+const pvid_fourier_model_f32 tiny_fourier_f32 = {{.samples = 1, .jets = 1, .gains = 1, .values = values}};
+"""
+HEADER = '#include "pvid/fourier.h"\nextern const pvid_fourier_model_f32 tiny_fourier_f32;\n'
+
+
+def texts(factor: str) -> dict[str, str]:
+    return {"tiny.h": HEADER, "tiny.c": MODEL.format(factor=factor)}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def built_here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """The cache is an empty one, and the compiler is quick."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(model_library, "built_under", lambda _: folder)
+        patch.setattr(model_library, "_FLAGS", [one for one in model_library._FLAGS if one != "-O2"])
+        yield
+
+
+def test_it_is_compiled_once_for_the_same_content() -> None:
+    first = model_library.model_library("tiny", texts("2.0f"), {})
+    made = first.stat().st_mtime_ns
+    assert model_library.model_library("tiny", texts("2.0f"), {}) == first
+    assert first.stat().st_mtime_ns == made
+    other = model_library.model_library("tiny", texts("3.0f"), {})
+    assert other != first
+    wider = model_library.model_library("tiny", texts("2.0f"), {"PVID_MAX_P": 8})
+    assert wider not in (first, other)
+    assert np.array_equal(FourierNative("tiny", first).values([[1.5]]), [[3.0]])
+    assert FourierNative("tiny", wider).headers.ffi.sizeof("pvid_estimate_f32") > FourierNative(
+        "tiny", first
+    ).headers.ffi.sizeof("pvid_estimate_f32")
+
+
+def test_code_that_does_not_compile_is_one_sentence() -> None:
+    with pytest.raises(PvidError, match="refused the code of the mechanism: .*error"):
+        model_library.model_library("tiny", texts("2.0f +"), {})
+
+
+def test_without_a_compiler_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    with pytest.raises(PvidError, match="needs a C compiler .cc, gcc or clang, or the one that CC names., and there"):
+        model_library.model_library("tiny", texts("2.0f"), {})
+
+
+def test_sizes_that_exceed_the_defaults_are_the_ones_of_config_h() -> None:
+    usual = default_sizes()
+    text = (FIRMWARE / "include" / "pvid" / "config.h").read_text(encoding="utf-8")
+    assert set(usual) == set(re.findall(r"#ifndef (PVID_MAX_\w+)", text))
+    assert usual["PVID_MAX_P"] == 4
+    assert raised({"PVID_MAX_P": 7, "PVID_MAX_THETA": 3}) == {"PVID_MAX_P": 7}

@@ -1,0 +1,383 @@
+"""Fixed-point weak engines of the shipped mechanisms: formats, runs as counts, and their C as a library."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.files_fourier_q31 import configuration
+from pvid.codegen.files_fourier_q31 import source as tables_source
+from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.codegen.parameters_q31 import fixed_parameters
+from pvid.core.sources import INCLUDES, sources_of
+from pvid.design.fourier_q31 import CIRCLE, DOWN, Sensing, fixed_design
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.rows import WeakRows, record_of
+from pvid.settings.fourier import NONE
+from pvid.settings.fourier_q31 import FourierConfigQ31, FourierDesignQ31
+from pvid.settings.record import Record
+from pvid.setup.fourier import design_tables, for_engine
+from pvid.setup.fourier_q31 import config_of_q31, row_formats
+from pvid.sim.imperfections import Imperfections
+from pvid.sim.simulated_run import RigSimulation
+from pvid.twin.q31.fourier_front import jets
+from pvid.twin.q31.fourier_values import steps
+from pvid.twin.q31.scaled import Scaled
+
+Float = npt.NDArray[np.float64]
+Int = npt.NDArray[np.int64]
+
+# Designs that the engine has; those of the rigs but for long windows, which would make the tests slow.
+DESIGNS = {
+    "kapitza": FourierDesign(
+        1000.0,
+        1.28,
+        9,
+        6,
+        decimation=16,
+        taps=41,
+        degree=6,
+        rate_taps=41,
+        rate_degree=6,
+    ),
+    "dc_motor": FourierDesign(1000.0, 0.4, 16, 6, rate_taps=21, rate_degree=3),
+    "cart_pendulum": FourierDesign(1000.0, 0.96, 12, 6, decimation=4, taps=41, rate_taps=41, rate_degree=4),
+    "furuta": FourierDesign(1000.0, 0.96, 12, 6, decimation=4, taps=41, rate_taps=41, rate_degree=4),
+    "two_link_arm": FourierDesign(1000.0, 0.96, 12, 6, decimation=8, taps=61, rate_taps=61, rate_degree=6),
+    "two_mass_drive": FourierDesign(1000.0, 0.48, 16, 8, decimation=2, rate_taps=31, rate_degree=4),
+    "rigid_body": FourierDesign(1000.0, 0.96, 12, 6, decimation=8, taps=31, degree=4),
+    "battery_2rc": FourierDesign(1.0, 1200.0, 16, 6),
+}
+_HIGHEST = 2.0  # reach of a jet over the largest of the run
+
+
+class Rig:
+    """A mechanism, its run in counts, and its fixed-point weak form."""
+
+    def __init__(self, name: str, samples: int, seed: int = 0) -> None:
+        simulation = RigSimulation.of(compiled_of(name), simulated_rig(name))
+        run = simulation.run(seed, Imperfections())
+        compiled = compiled_of(name)
+        self.name, self.compiled = name, ready(compiled)
+        self.oracle_design = for_engine(DESIGNS[name])
+        self.run = {key: np.asarray(x, np.float64)[:samples] for key, x in run.items()}
+        self.made = fourier_functions_of(compiled)
+        known = {one.name: one for one in compiled.signals}
+        # inputs are known exactly: as counts of 16 bits
+        self.lsb = tuple(known[one].resolution or known[one].reach / 2**15 for one in self.made.samples)
+        self.counts = np.array(
+            [np.rint(self.run[one] / lsb) for one, lsb in zip(self.made.samples, self.lsb, strict=True)]
+        ).astype(np.int64)
+        # what the integers are made of, for float64
+        self.exact = dict(
+            zip(
+                self.made.samples,
+                self.counts * np.array(self.lsb)[:, np.newaxis],
+                strict=True,
+            )
+        )
+        self.record = record_of(self.compiled, self.exact, self.oracle_design)
+        of_jets = {str(one): x for one, x in self.record.grid.jets.items()}
+        reaches = {one: _HIGHEST * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in self.made.jet_names}
+        hours = len(next(iter(self.run.values()))) / self.oracle_design.sample_rate
+        self.fixed: FixedFourier = fixed_fourier(self.made, JetReaches(run_s=2 * hours, of=reaches))
+        full = tuple(round(1.5 * known[one].reach / lsb) for one, lsb in zip(self.made.samples, self.lsb, strict=True))
+        self.rows = WeakRows(self.compiled, self.record)
+        # one of the shipped mechanisms may have an unknown that its rig does not set: a sensor's offset
+        truth = dict(zip(simulation.model.p_names, simulation.truth, strict=True))
+        self.truth = np.array([truth.get(one, 0.0) for one in self.compiled.model.p_names])
+        self.tables = design_tables(fourier_model_of(compiled), self.rows, self.truth)
+        self.sensing = Sensing(self.lsb, full, self.oracle_design.sample_rate)
+        unknowns = self.compiled.parameters.model.unknowns
+        guess = self.compiled.parameters.guess
+        bounds = [(min(one.low, x), max(one.high, x)) for one, x in zip(unknowns, guess, strict=True)]
+        self.parameters = fixed_parameters(self.made.functions, bounds)
+        self.design: FourierDesignQ31 = fixed_design(self.fixed.model, self.tables, self.sensing, self.fixed.formats)
+
+    @cached_property
+    def config(self) -> FourierConfigQ31:
+        """Starts at half or one and a half times the truth."""
+        known = self.compiled.parameters
+        wide = np.where(np.arange(len(self.truth)) % 2, 0.6, 1.4)
+        start = np.where(known.positive, self.truth * wide, known.guess)
+        formats = row_formats(self.rows, self.truth)
+        offset = (0,) * len(self.lsb)
+        return config_of_q31(self.design, known, formats, self.parameters.p_bits, offset, start)
+
+    def oracle_sums(self) -> dict[int, Float]:
+        """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
+        functions = self.oracle_design.test_functions
+        sums = self.record.sums(functions)
+        out = {}
+        first = 0
+        for row in self.record.channels.rows:
+            ordered = sorted(row.terms, key=lambda one: (one.column, one.order, one.channel))
+            for mine, theirs in zip(self.made.term[first:], ordered, strict=False):
+                whole = np.zeros((sums.shape[1], functions.highest + 1, 2))
+                whole[:, 0, 0] = sums[theirs.channel, :, 0]
+                whole[:, 1:, 0], whole[:, 1:, 1] = (
+                    sums[theirs.channel, :, 1::2],
+                    sums[theirs.channel, :, 2::2],
+                )
+                out[mine.channel] = whole
+            first += len(row.terms)
+        return out
+
+    def sizes(self) -> dict[int, float]:
+        """Largest sum of |channel| over a window, integrals counted from the start of the window, by place."""
+        design = self.design
+        made = steps(jets(self.counts, design), design, np.zeros(design.model.runs, np.int64))
+        out = {}
+        for place, one in enumerate(design.model.channel):
+            if one.gain == NONE:
+                out[place] = 2.0 * design.hop
+                continue
+            whole = np.abs(made.channels[place]).astype(np.float64)
+            window = np.convolve(whole, np.ones(2 * design.hop), "valid").max()
+            down = 2.0 ** (DOWN + design.sum_shift + design.format[place].own)
+            out[place] = 4.0**one.fold * window * CIRCLE / down * design.units[place]
+        return out
+
+
+@cache
+def rig(name: str, samples: int) -> Rig:
+    """Made once."""
+    return Rig(name, samples)
+
+
+_DRIVER = """
+#include <string.h>
+
+#include "fourier/collect_q31.h"
+#include "fourier/columns_q31.h"
+#include "fourier/direction_q31.h"
+#include "fourier/sums_q31.h"
+#include "fourier/white_q31.h"
+
+extern const pvid_fourier_design_q31 rig_design_q31;
+unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[]);
+
+/* S_h of the windows of a run, channel by channel; returns their number. */
+unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[])
+{
+    static pvid_fourier_collect_q31 self;
+    const pvid_fourier_model_q31 *model = rig_design_q31.model;
+    const unsigned harmonics = (rig_design_q31.functions / 2u) + (rig_design_q31.power / 2u) + 1u;
+    unsigned windows = 0;
+    pvid_fourier_collect_init_q31(&self, &rig_design_q31);
+    for (unsigned k = 0; k < ticks; k++) {
+        const pvid_fourier_tick tick = pvid_fourier_collect_step_q31(&self, &counts[k * model->samples]);
+        outcome[k] = (uint8_t)tick;
+        if ((tick == PVID_FOURIER_WINDOW) && (windows < most)) {
+            for (unsigned c = 0; c < model->channels; c++) {
+                for (unsigned h = 0; h < harmonics; h++) {
+                    *window++ = self.window.s[c][h][0];
+                    *window++ = self.window.s[c][h][1];
+                }
+            }
+            windows++;
+        }
+    }
+    return windows;
+}
+
+extern const pvid_fourier_config_q31 rig_config_q31;
+int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
+             uint8_t exponent[], uint8_t reason[], unsigned ticks);
+
+/* The state after every tick; returns the status of init. */
+int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
+             uint8_t exponent[], uint8_t reason[], unsigned ticks)
+{
+    static pvid_fourier_q31 self;
+    const size_t samples = rig_design_q31.model->samples;
+    const pvid_status status = pvid_fourier_init_q31(&self, &rig_config_q31);
+    for (unsigned k = 0; (status == PVID_OK) && (k < ticks); k++) {
+        pvid_fourier_freeze_q31(&self, frozen[k] != 0u);
+        reason[k] = (uint8_t)pvid_fourier_step_q31(&self, &readings[k * samples]);
+        const pvid_information_q31 *information = &self.estimator.information;
+        const size_t n_p = self.estimator.model->n_p;
+        memcpy(&p[k * n_p], self.estimator.p, n_p * sizeof p[0]);
+        memcpy(&published[k * n_p], pvid_fourier_estimate_q31(&self)->p, n_p * sizeof p[0]);
+        memcpy(&sums[k * information->n_sums], information->sums, information->n_sums * sizeof sums[0]);
+        exponent[k] = information->exponent;
+    }
+    return (int)status;
+}
+
+unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t window[], int32_t x[], int32_t exponent[]);
+
+/* White columns of a kind from the S_h of a window; returns how many nuisances were projected out. */
+unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t window[], int32_t x[], int32_t exponent[])
+{
+    static pvid_fourier_window_q31 sums;
+    static pvid_fourier_white_q31 white;
+    static pvid_fourier_columns_q31 made;
+    const pvid_fourier_design_q31 *design = &rig_design_q31;
+    const pvid_fourier_kind *own = &design->model->kind[kind];
+    const size_t harmonics = pvid_fourier_harmonics_q31(design);
+    const size_t rows = pvid_fourier_rows_q31(design);
+    const size_t used = own->thetas + 1u;
+    const size_t count = used + own->nuisances;
+    uint64_t whole[PVID_MAX_COLUMNS];
+    unsigned live = 0;
+    size_t term = own->first;
+    for (size_t c = 0; c < design->model->channels; c++) {
+        for (size_t h = 0; h < harmonics; h++) {
+            sums.s[c][h][0] = *window++;
+            sums.s[c][h][1] = *window++;
+        }
+    }
+    pvid_fourier_white_init_q31(&white, design);
+    pvid_fourier_white_weigh_q31(&white, design, (uint8_t)kind, theta, 0, design->n_noise);
+    pvid_fourier_white_spectrum_q31(&white, design, (uint8_t)kind, 0, harmonics);
+    const pvid_scaled_q31 least = pvid_fourier_white_floor_q31(&white, design);
+    pvid_fourier_white_invert_q31(&white, least, 0, harmonics);
+    for (size_t k = 0; k < pvid_fourier_basis_stages_q31(design); k++) {
+        pvid_fourier_white_basis_q31(&white, design, k);
+    }
+    for (size_t j = 0; j < count; j++) {
+        size_t end = term;
+        while ((end < own->end) && (design->model->term[end].column == j)) {
+            end++;
+        }
+        for (size_t part = 0; part < pvid_fourier_column_parts_q31(&white); part++) {
+            pvid_fourier_columns_make_q31(&made, design, &white, &sums, j, term, end, part);
+        }
+        term = end;
+        for (size_t k = 0; k < design->power / 2u; k++) {
+            pvid_fourier_white_remove_q31(&white, design, k, made.x[j]);
+        }
+        whole[j] = pvid_fourier_columns_square_q31(design, made.x[j]);
+    }
+    for (size_t j = used; j < count; j++) {
+        live += pvid_fourier_columns_keep_q31(design, whole[j], made.x[j]) ? 1u : 0u;
+        for (size_t i = 0; i < count; i++) {
+            if ((i < used) || (i > j)) {
+                pvid_fourier_take_off_q31(made.x[j], 0, rows, made.x[i]);
+            }
+        }
+    }
+    for (size_t j = 0; j < used; j++) {
+        memcpy(&x[j * rows], made.x[j], rows * sizeof x[0]);
+        exponent[j] = made.exponent[j];
+    }
+    return live;
+}
+"""
+SIZES = (
+    "PVID_MAX_P=8",
+    "PVID_MAX_THETA=12",
+    "PVID_MAX_THETA_Q31=16",
+    "PVID_MAX_MOMENTS_Q31=78",
+    "PVID_MAX_C_Q31=48",
+    "PVID_MAX_CHANNELS=24",
+    "PVID_MAX_HARMONICS=25",
+    "PVID_MAX_RING=1024",
+    "PVID_MAX_INPUTS=24",
+)
+# Not -O1: with -fsanitize=undefined the compiler of Debian 12 (gcc 12.2) then takes the sign off a negative sine.
+_OPTIONS = (
+    *(
+        "-std=c99",
+        "-O2",
+        "-fPIC",
+        "-DPVID_PLAIN_NAMES",
+        "-fsanitize=undefined",
+        "-fsanitize-undefined-trap-on-error",
+    ),
+    *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wvla"),
+    *(f"-D{one}" for one in SIZES),
+    *INCLUDES,
+)
+
+
+class Core:
+    """The C of the engine, compiled once; signed overflow ends the program."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "driver.c").write_text(_DRIVER, encoding="utf-8")
+        rooms = ("fourier", "number", "solve", "judge")
+        core = [str(one) for one in sources_of("q31") if one.parent.name in rooms]
+        self._run([*_OPTIONS, "-c", *core, str(folder / "driver.c")])
+        self.libraries: dict[str, ctypes.CDLL] = {}
+
+    def _run(self, arguments: list[str]) -> None:
+        subprocess.run(["gcc", *arguments], check=True, cwd=self.folder)
+
+    def library(self, one: Rig, config: FourierConfigQ31 | None = None) -> ctypes.CDLL:
+        """With the tables of a rig, and this configuration or its own."""
+        tables = tables_source(one.fixed, one.parameters, one.design, "rig")
+        text = tables + "\n\n" + configuration(config or one.config, "rig")
+        if text not in self.libraries:
+            name = f"{one.name}_{len(self.libraries)}"
+            code = self.folder / f"{name}.tables.c"
+            code.write_text(text, encoding="utf-8")
+            library = self.folder / f"{name}.so"
+            objects = [str(path) for path in self.folder.glob("*.o")]
+            self._run([*_OPTIONS, "-shared", str(code), *objects, "-o", str(library)])
+            self.libraries[text] = ctypes.CDLL(str(library))
+        return self.libraries[text]
+
+    def windows(self, one: Rig, counts: Int) -> tuple[Int, Int]:
+        """S_h [windows, channels, H + 1, 2] of counts [samples, ticks], and what each tick did."""
+        design = one.design
+        given = np.ascontiguousarray(counts.T, np.int32)
+        size = len(design.model.channel) * (design.highest + 1) * 2
+        most = given.shape[0] // (design.hop * design.decimation) + 1
+        out, outcome = np.zeros((most, size), np.int32), np.zeros(len(given), np.uint8)
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, out, outcome)]
+        count = self.library(one).run(pointers[0], len(given), pointers[1], most, pointers[2])
+        shape = (count, len(design.model.channel), design.highest + 1, 2)
+        return out[:count].reshape(shape).astype(np.int64), outcome.astype(np.int64)
+
+    def columns(self, one: Rig, kind: int, theta: Scaled, window: Int) -> tuple[Int, Int, int]:
+        """White columns [thetas + 1, rows] of a kind, their exponents, and how many nuisances were projected out.
+
+        theta : [thetas]; window : S_h [channels, H + 1, 2]
+        """
+        design = one.design
+        count = design.model.kind[kind].thetas + 1
+        given = np.ascontiguousarray(np.stack([theta.m, theta.e], axis=-1), np.int32)
+        sums = np.ascontiguousarray(window, np.int32)
+        x, exponent = np.zeros((count, design.rows), np.int32), np.zeros(count, np.int32)
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, sums, x, exponent)]
+        live = self.library(one).columns(kind, *pointers)
+        return x.astype(np.int64), exponent.astype(np.int64), int(live)
+
+    def identify(
+        self, one: Rig, config: FourierConfigQ31, readings: Int, frozen: npt.NDArray[np.uint8] | None = None
+    ) -> tuple[int, Record]:
+        """The status of init, and the state after every tick of readings [samples, ticks]."""
+        given = np.ascontiguousarray(readings.T, np.int32)
+        ticks, model = len(given), one.parameters.model
+        still = np.zeros(ticks, np.uint8) if frozen is None else np.ascontiguousarray(frozen, np.uint8)
+        record = Record(
+            p=np.zeros((ticks, model.n_p), np.int32),
+            sums=np.zeros((ticks, model.n_sums), np.int64),
+            reason=np.zeros(ticks, np.uint8),
+            exponent=np.zeros(ticks, np.uint8),
+            published=np.zeros((ticks, model.n_p), np.int32),
+        )
+        arrays = (given, still, record.p, record.published, record.sums, record.exponent, record.reason)
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
+        status = self.library(one, config).identify(*pointers, ticks)
+        return int(status), record
+
+
+@cache
+def core_in(folder: Path) -> Core:
+    """Compiled once for all tests of a session."""
+    folder.mkdir()
+    return Core(folder)
