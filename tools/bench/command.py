@@ -40,6 +40,16 @@ def bench_demo(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="answer")
+@UPDATE
+def bench_answer(update: Path | None) -> int:
+    """What `model simulate` and `identify` print, as the page on mechanisms shows it."""
+    from bench.mechanism_pages import printed_answer
+
+    put_table(update, "answer", f"```text\n{printed_answer()}\n```")
+    return DONE
+
+
 @bench.command(name="pages")
 @click.argument("names", nargs=-1)
 @click.option("--docs", type=click.Path(path_type=Path, exists=True), default="host/docs", show_default=True)
