@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,10 @@ import numpy.typing as npt
 
 from pvid.core.native import Native
 from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.q31 import EstimatorConfigQ31
 from pvid.twin.f32.pattern import PatternModel
+from pvid.twin.kapitza.weak_q31 import ModelQ31
+from pvid.twin.q31.integer import Int, round_shift
 
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
@@ -97,6 +101,65 @@ class BlockModel:
         )
 
 
+@dataclass(frozen=True)
+class BlockModelQ31:
+    """The same without factors in fixed point: theta_i = +-p_a in format p_bits + 15, or +-p_a p_b 2^-16."""
+
+    real: BlockModel
+
+    @classmethod
+    def random(cls, random: np.random.Generator, kind_end: tuple[int, ...], n_p: int) -> BlockModelQ31:
+        """As BlockModel.random."""
+        real = BlockModel.random(random, kind_end, n_p)
+        return cls(replace(real, factor=np.sign(real.factor)))
+
+    def _signs(self) -> Int:
+        return self.real.factor.astype(np.int64)
+
+    def theta(self, p: Int) -> Int:
+        """theta int64 [n_theta, ...] of p int64 [n_p, ...]."""
+        return np.stack(
+            [
+                sign * (p[a] << 15 if b < 0 else round_shift(p[a] * p[b], 16))
+                for sign, (a, b) in zip(self._signs(), self.real.factors, strict=True)
+            ]
+        )
+
+    def jacobian(self, p: Int) -> Int:
+        """Non-zeros of C int64 [n_c, ...]."""
+        out = []
+        for column, row in self.real.non_zeros:
+            a, b = self.real.factors[row]
+            other = (p[b] if column == a else p[a]) << 15
+            slope = np.full_like(p[0], 1 << 45) if b < 0 else (2 * other if a == b else other)
+            out.append(self._signs()[row] * slope)
+        return np.stack(out)
+
+    def formats(self, bits: Sequence[int]) -> tuple[list[int], list[int]]:
+        """Formats of theta and of the non-zeros of C."""
+        theta = [bits[a] + (15 if b < 0 else bits[b] - 16) for a, b in self.real.factors]
+        c = []
+        for column, row in self.real.non_zeros:
+            a, b = self.real.factors[row]
+            c.append(45 if b < 0 else (bits[b] if column == a else bits[a]) + 15)
+        return theta, c
+
+    def twin(self) -> ModelQ31:
+        """For the fixed-point twin."""
+        real = self.real
+        return ModelQ31(
+            n_theta=real.n_theta,
+            n_p=real.n_p,
+            positive=(True,) * real.n_p,
+            c_row=tuple(row for _, row in real.non_zeros),
+            c_column=tuple(column for column, _ in real.non_zeros),
+            theta=self.theta,
+            jacobian=self.jacobian,
+            formats=self.formats,
+            kind_end=real.kind_end if len(real.kind_end) > 1 else (),
+        )
+
+
 class EstimatorInC:
     """pvid_estimator_f32 on a block model."""
 
@@ -169,6 +232,93 @@ class EstimatorInC:
         n = self.n_moments + self.n_theta + 2
         information = self.state.information
         return np.array([list(information.high)[:n], list(information.low)[:n]], np.float32)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """By name."""
+        counters = self.state.counters
+        return {name: int(getattr(counters, name)) for name, _ in self.ffi.typeof(counters).fields}
+
+
+class EstimatorQ31InC:
+    """pvid_estimator_q31 on a block model; all entries of N have the same format."""
+
+    def __init__(self, native: Native, model: BlockModelQ31, config: EstimatorConfigQ31) -> None:
+        ffi = native.headers.ffi
+        self.native, self.ffi, self.library = native, ffi, native.library
+        real = model.real
+        self.n_p, self.n_theta = real.n_p, real.n_theta
+
+        def filled(function: Any) -> Any:
+            def call(p: Any, out: Any) -> None:
+                for i, value in enumerate(function(np.array([p[a] for a in range(real.n_p)], np.int64))):
+                    out[i] = int(value)
+
+            return ffi.callback("void(const int32_t *, int64_t *)", call)
+
+        def formats(p_bits: Any, theta_bits: Any, c_bits: Any) -> None:
+            theta, c = model.formats([p_bits[a] for a in range(real.n_p)])
+            for i, bits in enumerate(theta):
+                theta_bits[i] = bits
+            for k, bits in enumerate(c):
+                c_bits[k] = bits
+
+        columns, rows = zip(*real.non_zeros, strict=True)
+        several = len(real.kind_end) > 1
+        self._owned = [
+            ffi.new("uint8_t[]", list(rows)),
+            ffi.new("uint8_t[]", list(columns)),
+            ffi.new("uint8_t[]", list(real.kind_end)),
+            filled(model.theta),
+            filled(model.jacobian),
+            ffi.callback("void(const int8_t *, int16_t *, int16_t *)", formats),
+        ]
+        self.model = ffi.new("pvid_model_q31 *")
+        self.model.n_theta, self.model.n_p, self.model.n_c = real.n_theta, real.n_p, len(rows)
+        self.model.positive = 2**real.n_p - 1
+        self.model.n_kinds = len(real.kind_end) if several else 0
+        row, column, kind_end, self.model.theta, self.model.jacobian, self.model.formats = self._owned
+        self.model.c_row, self.model.c_column = row, column
+        self.model.kind_end = kind_end if several else ffi.NULL
+        self._filled = native.headers.filled("pvid_estimator_config_q31", config)
+        self._filled.struct.model = self.model
+        self.state = ffi.new("pvid_estimator_q31 *")
+        assert self.library.pvid_estimator_init_q31(self.state, ffi.addressof(self._filled.struct)) == 0
+
+    def add(self, kind: int, n: Int, y: int) -> int:
+        """Adds a row of a kind; returns the reason."""
+        row = self.ffi.new("int32_t[]", [int(x) for x in n])
+        return int(self.library.pvid_estimator_add_kind_q31(self.state, kind, row, int(y)))
+
+    def add_to_b(self, m: Int, e: Int) -> int:
+        """Adds m 2^e [n_theta] to b; returns the reason."""
+        g = self.ffi.new("pvid_scaled_q31[]", [{"m": int(a), "e": int(b)} for a, b in zip(m, e, strict=True)])
+        return int(self.library.pvid_estimator_add_to_b_q31(self.state, g))
+
+    def update(self) -> int:
+        """Ends a group; returns the reason."""
+        return int(self.library.pvid_estimator_update_q31(self.state))
+
+    def iterate(self) -> int:
+        """A further step; returns the reason."""
+        return int(self.library.pvid_estimator_iterate_q31(self.state))
+
+    def assess(self) -> npt.NDArray[np.void]:
+        """pvid_estimate_q31, shape ()."""
+        out = np.empty((), self.native.headers.dtype("pvid_estimate_q31"))
+        self.library.pvid_estimator_assess_q31(self.state, self.native.headers.pointer(out))
+        return out
+
+    @property
+    def p(self) -> Int:
+        """[n_p]"""
+        return np.array(list(self.state.p)[: self.n_p], np.int64)
+
+    @property
+    def sums(self) -> Int:
+        """[n_sums]"""
+        information = self.state.information
+        return np.array(list(information.sums)[: information.n_sums], np.int64)
 
     @property
     def counters(self) -> dict[str, int]:

@@ -63,6 +63,7 @@ ESTIMATOR = (
     *(
         "src/solve/assess_q31.c",
         "src/solve/information_q31.c",
+        "src/solve/kinds.c",
         "models/kapitza/kapitza_weak_q31.c",
         "models/kapitza/kapitza_strong_q31.c",
     ),
@@ -75,7 +76,7 @@ def in_stages(program: str) -> tuple[str, ...]:
     return (
         *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
         "-eva-slevel-function",
-        "main:200,checks_noise:5,eliminate_part:30,above_noise_stage:30,factor_stage:60,advance_shared:60,solve_stage:30,"
+        "main:200,checks_noise:5,pvid_system_eliminate_q31:30,above_noise_stage:30,factor_stage:60,advance_shared:60,solve_stage:30,"
         "pvid_estimator_advance_q31:100,pvid_estimator_assess_advance_q31:100,kappa_stage:60,widen_stage:60,"
         f"pvid_assess_invert_q31:20,pvid_cholesky_eliminate_q31:20,{program}:5000",
     )
@@ -171,20 +172,20 @@ PROOFS = (
     ),
     Proof(
         "estimator_q31",
-        "start and rows for the three models: any configuration, any row on top of any state",
+        "start and rows for the three models and one of three kinds: any configuration, any row on top of any state",
         ESTIMATOR,
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             "-eva-slevel-function",
-            "main:50,any_configuration:50,any_row:50,config_is_valid:100,model_is_valid:50,parameters_are_valid:200,"
-            "prepare:200,pvid_estimator_init_q31:200,pvid_estimator_add_q31:20,pvid_estimator_innovation_q31:200,"
+            "main:50,any_configuration:50,any_row:50,any_compensation:50,config_is_valid:100,model_is_valid:50,parameters_are_valid:200,"
+            "prepare:200,pvid_estimator_init_q31:200,pvid_estimator_add_kind_q31:20,pvid_estimator_add_to_b_q31:20,pvid_estimator_innovation_q31:200,"
             "pvid_estimator_terms_q31:200",
         ),
         taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_information_init_q31"),
     ),
     Proof(
         "estimator_solve_q31",
-        "every stage of a solve from any state of the three models, which leaves such a state",
+        "every stage of a solve from any state of these models, which leaves such a state",
         ESTIMATOR,
         in_stages("any_solve"),
         taken=TAKEN_IN_STAGES,
@@ -260,7 +261,7 @@ PROOFS = (
     Proof(
         "information_q31",
         "a group of rows within their limit on top of any sums within 2^60",
-        ("src/solve/information_q31.c", "src/number/integer_q31.c"),
+        ("src/solve/information_q31.c", "src/solve/kinds.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "1100", "-eva-min-loop-unroll", "13"),
     ),
     Proof(

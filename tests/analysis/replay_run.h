@@ -9,7 +9,9 @@
 
 #define REPLAY_TYPE STREAM_TYPE
 #define REPLAY_INIT STREAM_INIT
-#define REPLAY_STEP STREAM_STEP
+#define REPLAY_STEP(self, sample) STREAM_STEP(self, (sample)[0], (sample)[1])
+#define REPLAY_COUNT int16_t
+#define REPLAY_CHANNELS 2u
 #define REPLAY_HASH STREAM_HASH
 #define REPLAY_IS_FLOAT (STREAM_CORE == 0)
 #define REPLAY_FORM "some"
@@ -21,16 +23,14 @@
 #if REPLAY_IS_FLOAT
 #define REPLAY_SAMPLE float
 #define REPLAY_FAULTS pvid_arithmetic_faults_f32()
-#define replay_phi_lsb 3.8e-4f
-#define replay_y_lsb 5.0e-6f
+static const float replay_lsb[REPLAY_CHANNELS] = {3.8e-4f, 5.0e-6f};
 #else
 #define REPLAY_SAMPLE int32_t
 #define REPLAY_FAULTS 0u
-#define replay_phi_lsb 1
-#define replay_y_lsb 1
+static const int32_t replay_lsb[REPLAY_CHANNELS] = {1, 1};
 #endif
 
-extern const int16_t replay_samples[REPLAY_TICKS][2];
+extern const REPLAY_COUNT replay_samples[REPLAY_TICKS][REPLAY_CHANNELS];
 
 extern const STREAM_CONFIG replay_config;
 

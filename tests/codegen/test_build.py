@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import ROOT
 from described import CHAIN, MOTOR
@@ -13,8 +14,13 @@ from described import CHAIN, MOTOR
 from pvid.base.errors import PvidError
 from pvid.codegen.build import Options, build, check, files_of, fixed_point_refusal
 from pvid.codegen.reaches import Reaches
+from pvid.core.sizes import raised
 from pvid.core.sources import source
 from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.run.engine_design import config_for_simulated_rig
+from pvid.setup.fourier_sizes import sizes_of_design
+from pvid.sim.simulated_run import RigSimulation
 
 USER = """
 cmake_minimum_required(VERSION 3.20)
@@ -41,6 +47,34 @@ cmake_minimum_required(VERSION 3.20)
 project(user LANGUAGES C)
 add_subdirectory({root} pvid EXCLUDE_FROM_ALL)
 add_subdirectory(rigid_body)
+"""
+WEAK = """
+cmake_minimum_required(VERSION 3.20)
+project(user LANGUAGES C)
+add_subdirectory({root} pvid EXCLUDE_FROM_ALL)
+add_subdirectory(rigid_body)
+add_executable(user main.c)
+target_link_libraries(user PRIVATE rigid_body)
+"""
+WEAK_PROGRAM = """
+#include <stdio.h>
+#include "rigid_body_design_f32.h"
+static pvid_fourier_f32 identifier;
+int main(int count, char **names)
+{
+    float sample[RIGID_BODY_WEAK_SAMPLES];
+    FILE *file = fopen(names[count - 1], "rb");
+    if (pvid_fourier_init_f32(&identifier, &rigid_body_config_f32) != PVID_OK) {
+        return 1;
+    }
+    while (fread(sample, sizeof sample, 1, file) == 1) {
+        (void)pvid_fourier_step_f32(&identifier, sample);
+    }
+    for (int k = 0; k < RIGID_BODY_WEAK_P; k++) {
+        printf("%.9g ", (double)pvid_fourier_estimate_f32(&identifier)->p[k]);
+    }
+    return 0;
+}
 """
 PROGRAM = """
 #include "chain.h"
@@ -83,6 +117,27 @@ def test_the_strong_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
     run(*command, "-DPVID_MAX_P=5")
     done = subprocess.run(compiled, capture_output=True, text=True, check=False)
     assert done.returncode != 0 and "compile pvid and this file with -DPVID_MAX_P=6" in done.stdout
+
+
+def test_the_weak_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
+    """With the sizes that its design names, and a program that takes it from init to an estimate."""
+    compiled = compiled_of("rigid_body")
+    design = config_for_simulated_rig(compiled)
+    options = Options(design=design)
+    build(compiled, tmp_path / "rigid_body", options=options)
+    check(compiled, tmp_path / "rigid_body", options=options)
+    (tmp_path / "CMakeLists.txt").write_text(WEAK.format(root=ROOT), encoding="utf-8")
+    (tmp_path / "main.c").write_text(WEAK_PROGRAM, encoding="utf-8")
+    debug = ["-DCMAKE_BUILD_TYPE=Debug"]
+    sizes = [f"-D{macro}={size}" for macro, size in raised(sizes_of_design(design.design)).items()]
+    run("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_WEAK=ON", *debug, *sizes)
+    run("ninja", "-C", tmp_path / "b", "user")
+    samples = RigSimulation.of(compiled, simulated_rig("rigid_body")).run()
+    table = np.stack([samples[name] for name in design.design.model.sample_names], axis=1).astype(np.float32)
+    (tmp_path / "samples").write_bytes(table.tobytes())
+    p = [float(x) for x in run(tmp_path / "b" / "user", tmp_path / "samples").split()]
+    truth = [simulated_rig("rigid_body").truth[name] for name in compiled.p_names]
+    assert np.allclose(p[:3], truth[:3], rtol=1e-3) and np.allclose(p, truth, atol=2e-5)
 
 
 def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:

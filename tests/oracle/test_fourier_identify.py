@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import clustered_variance, uncertainty
 from pvid.oracle.fourier.identify import identify, ready
+from pvid.oracle.fourier.reversals import located
 from pvid.oracle.fourier.rows import EquationError, WeakRows
 from pvid.oracle.fourier.solve import batch, error_of, online
 from pvid.sim.imperfections import Imperfections
@@ -108,6 +110,26 @@ def test_located_reversals_are_worth_ten_times_the_average_of_the_sign() -> None
     k = compiled_of(name).p_names.index("b1")
     assert off["located"][k] < off["averaged"][k] / 5
     assert chi2["located"] < 1.3 and chi2["averaged"] > 10
+
+
+def test_noise_of_a_velocity_in_a_soft_sign_is_in_the_weights() -> None:
+    rig = simulation("two_link_arm").rig
+    model = ready(compiled_of("two_link_arm"))
+    hints: dict[str, Any] = {**rig.design, "reversals": "soft", "soft": rig.friction_width}
+    design = FourierDesign(rig.sample_rate, rig.window_s, **hints)
+    fit = batch(WeakRows.of(model, simulation("two_link_arm").run(0, Imperfections("soft")), design))
+    # Without its slope the residuals have 3.8 times the energy that the sensors explain.
+    assert 0.9 < uncertainty(fit).chi2 < 1.4
+
+
+def test_a_sign_in_doubt_for_long_goes_from_one_side_to_the_other_and_its_pieces_err_together() -> None:
+    v = np.clip(np.arange(-60.0, 61.0), -25, 25)
+    signs = located(v, 10.0 / 3, np.zeros(v.shape), 5)  # in doubt from -10 to 10
+    doubt = signs.stuck
+    assert doubt.sum() == 21 and len(signs.times) == 5
+    assert np.allclose(np.diff(signs.values[49:72]), 2 / 21, atol=1 / 21)
+    assert np.allclose(signs.values, -signs.values[::-1])
+    assert np.isclose(np.sum(signs.variances), 21**2 / 12)
 
 
 def test_noise_of_the_rows_is_what_the_filters_predict() -> None:

@@ -8,16 +8,64 @@
 #include "pvid/estimator_q31.h"
 #include "pvid/kapitza_strong_q31.h"
 #include "pvid/kapitza_weak_q31.h"
+#include "solve/kinds.h"
 
 /* Of every sum: what the end of a group leaves by Cauchy and Schwarz, 2^60, or a step of b and rr, 2^61, and on top of
  * that 16 rows of a group. */
 #define SUM_BOUND ((int64_t)3 << 60)
 #define EXPONENT_BOUND 1000
 
+/* A model of three kinds of rows with the most theta and non-zeros of C, and with any values of them. */
+static const uint8_t blocks_end[3] = {4, 5, PVID_MAX_THETA_Q31};
+static const uint8_t blocks_row[PVID_MAX_C_Q31] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0, 4, 10, 1, 2, 3, 5, 6, 7, 8, 9};
+static const uint8_t blocks_column[PVID_MAX_C_Q31] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 3};
+
+static void blocks_theta(const int32_t p[], int64_t theta[])
+{
+    (void)p;
+    for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
+        theta[i] = any_i64(-((int64_t)1 << 60), (int64_t)1 << 60);
+    }
+}
+
+static void blocks_jacobian(const int32_t p[], int64_t c[])
+{
+    (void)p;
+    for (size_t k = 0; k < PVID_MAX_C_Q31; k++) {
+        c[k] = any_i64(-((int64_t)1 << 60), (int64_t)1 << 60);
+    }
+}
+
+static void blocks_formats(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
+{
+    (void)p_bits;
+    for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
+        theta_bits[i] = (int16_t)any_i32(-500, 500);
+    }
+    for (size_t k = 0; k < PVID_MAX_C_Q31; k++) {
+        c_bits[k] = (int16_t)any_i32(-500, 500);
+    }
+}
+
+static const pvid_model_q31 blocks = {
+    .n_theta = PVID_MAX_THETA_Q31,
+    .n_p = 4,
+    .n_kinds = 3,
+    .n_c = PVID_MAX_C_Q31,
+    .positive = 5u,
+    .kind_end = blocks_end,
+    .c_row = blocks_row,
+    .c_column = blocks_column,
+    .theta = blocks_theta,
+    .jacobian = blocks_jacobian,
+    .formats = blocks_formats,
+};
+
 static inline void any_sums(const pvid_model_q31 *model, pvid_information_q31 *sums)
 {
     sums->n_theta = model->n_theta;
-    sums->n_sums = (uint16_t)(((model->n_theta * (model->n_theta + 1u)) / 2u) + model->n_theta + 2u);
+    const size_t moments = pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end);
+    sums->n_sums = (uint16_t)(moments + model->n_theta + 2u);
     sums->exponent = (uint8_t)any_u32(0, 100);
     sums->block = (uint16_t)any_u32(1, 64);
     sums->age = (uint16_t)any_u32(0, 63);

@@ -126,13 +126,13 @@ int32_t pvid_cholesky_solve_q31(const pvid_cholesky_q31 *self, const int64_t rhs
 
 /* ---- the sums ---- */
 
-/*@ requires 1 <= n_theta <= PVID_MAX_THETA_Q31;
+/*@ requires \valid_read(model) && 1 <= model->n_theta <= PVID_MAX_THETA_Q31;
     requires forgetting_groups == 0 || 4 <= forgetting_groups <= 0x1000000;
-    assigns *self \from n_theta, forgetting_groups, row_weight;
+    assigns *self \from model->n_theta, forgetting_groups, row_weight;
     ensures \initialized(&self->exponent) && self->exponent == 0;
     ensures \initialized(&self->block) && 1 <= self->block <= 64;
     ensures \initialized(&self->retention) && 1 <= self->retention; */
-void pvid_information_init_q31(pvid_information_q31 *self, uint8_t n_theta, uint32_t forgetting_groups,
+void pvid_information_init_q31(pvid_information_q31 *self, const pvid_model_q31 *model, uint32_t forgetting_groups,
                                uint32_t row_weight);
 
 #endif

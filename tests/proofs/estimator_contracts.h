@@ -7,11 +7,13 @@
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
 
-/*@ requires \valid(e) && \valid_read(n + (0 .. self->model->n_theta - 1));
+/*@ requires \valid(e) && \valid_read(block) && block->first + block->n <= self->model->n_theta;
+    requires \valid_read(n + (0 .. block->n - 1));
     assigns *e, \result \from \nothing;
     ensures \result == 0 || \result == 1;
     ensures \initialized(e) && -0x200000000000 <= *e <= 0x200000000000; */
-bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e);
+bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const pvid_block *block, const int32_t n[],
+                                   int32_t y, int64_t *e);
 
 /*@ requires \valid(self) && \valid_read(n + (0 .. self->model->n_theta - 1));
     assigns \result \from \nothing;

@@ -42,4 +42,5 @@ void main(void)
     any_assessment(&pvid_kapitza_strong_q31);
     any_assessment(&pvid_kapitza_weak_q31);
     any_assessment(&pvid_kapitza_weak_zeroed_q31);
+    any_assessment(&blocks);
 }

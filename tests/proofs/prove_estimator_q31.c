@@ -45,7 +45,7 @@ static void any_configuration(const pvid_model_q31 *model, uint8_t placed)
     /*@ assert 1 <= estimator.information.block <= 64 && 1 <= estimator.information.retention; */
 }
 
-static void any_row(const pvid_model_q31 *model)
+static void any_row(const pvid_model_q31 *model, uint8_t kind)
 {
     pvid_estimator_q31 estimator;
     int32_t n[PVID_MAX_THETA_Q31];
@@ -53,19 +53,34 @@ static void any_row(const pvid_model_q31 *model)
     for (size_t i = 0; i < model->n_theta; i++) {
         n[i] = any_i32(INT32_MIN, INT32_MAX);
     }
-    (void)pvid_estimator_add_q31(&estimator, n, any_i32(INT32_MIN, INT32_MAX));
+    (void)pvid_estimator_add_kind_q31(&estimator, kind, n, any_i32(INT32_MIN, INT32_MAX));
     /*@ assert 0 <= estimator.group_rss <= 0x4000000000000000; */
     /*@ assert 0 <= estimator.information.sums[estimator.information.n_sums - 2]; */
 }
 
+static void any_compensation(const pvid_model_q31 *model)
+{
+    pvid_estimator_q31 estimator;
+    pvid_scaled_q31 g[PVID_MAX_THETA_Q31];
+    any_state(model, &estimator);
+    for (size_t i = 0; i < model->n_theta; i++) {
+        g[i].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
+        g[i].e = any_i32(-1000, 1000);
+    }
+    (void)pvid_estimator_add_to_b_q31(&estimator, g);
+}
+
 void main(void)
 {
-    const pvid_model_q31 *const models[3] = {&pvid_kapitza_strong_q31, &pvid_kapitza_weak_q31,
-                                             &pvid_kapitza_weak_zeroed_q31};
-    for (size_t i = 0; i < 3u; i++) {
+    const pvid_model_q31 *const models[4] = {&pvid_kapitza_strong_q31, &pvid_kapitza_weak_q31,
+                                             &pvid_kapitza_weak_zeroed_q31, &blocks};
+    for (size_t i = 0; i < 4u; i++) {
         for (uint8_t placed = 0; placed < models[i]->n_p; placed++) {
             any_configuration(models[i], placed);
         }
-        any_row(models[i]);
+        for (uint8_t kind = 0; kind <= pvid_kinds_count(models[i]->n_kinds); kind++) { /* and one that there is not */
+            any_row(models[i], kind);
+        }
+        any_compensation(models[i]);
     }
 }

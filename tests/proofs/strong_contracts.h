@@ -44,7 +44,8 @@ pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimat
 
 /*@ requires -0x10000000 <= e <= 0x10000000 && 0 <= square <= 0x100000000000000;
     assigns *self \from n[0 .. 10], e, square; */
-void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square);
+void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const pvid_block *block, const int32_t n[], int32_t e,
+                                int64_t square);
 
 /*@ requires 1 <= drive_ticks <= 0x40000000;
     assigns *self \from drive_ticks, forgetting_groups; */

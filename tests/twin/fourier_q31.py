@@ -4,30 +4,35 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.codegen.files_fourier_q31 import configuration
 from pvid.codegen.files_fourier_q31 import source as tables_source
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
-from pvid.core.sources import INCLUDES, core_sources
-from pvid.design.fourier_q31 import CIRCLE, DOWN, Sensing, Sizes, fixed_design
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.codegen.parameters_q31 import fixed_parameters
+from pvid.core.sources import INCLUDES, sources_of
+from pvid.design.fourier_q31 import CIRCLE, DOWN, Sensing, fixed_design
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.front import weights_of
 from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import record_of
+from pvid.oracle.fourier.rows import WeakRows, record_of
 from pvid.settings.fourier import NONE
-from pvid.settings.fourier_q31 import FourierDesignQ31
-from pvid.setup.fourier import for_engine
+from pvid.settings.fourier_q31 import FourierConfigQ31, FourierDesignQ31
+from pvid.settings.record import Record
+from pvid.setup.fourier import design_tables, for_engine
+from pvid.setup.fourier_q31 import config_of_q31, row_formats
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.q31.fourier_front import jets
 from pvid.twin.q31.fourier_values import steps
+from pvid.twin.q31.scaled import Scaled
 
 Float = npt.NDArray[np.float64]
 Int = npt.NDArray[np.int64]
@@ -87,21 +92,27 @@ class Rig:
         hours = len(next(iter(self.run.values()))) / self.oracle_design.sample_rate
         self.fixed: FixedFourier = fixed_fourier(self.made, JetReaches(run_s=2 * hours, of=reaches))
         full = tuple(round(1.5 * known[one].reach / lsb) for one, lsb in zip(self.made.samples, self.lsb, strict=True))
-        design = self.oracle_design
-        self.sizes_of_form = Sizes(
-            functions=design.functions,
-            power=design.power,
-            decimation=design.decimation,
-            hop=design.hop,
-            weights=tuple(_outwards(weights_of(design, jet.order)) for jet in self.made.jet),
-            sign_width=(0.0,) * len(self.made.sign_names),
-        )
-        self.design: FourierDesignQ31 = fixed_design(
-            self.fixed.model,
-            self.sizes_of_form,
-            Sensing(self.lsb, full, design.sample_rate),
-            self.fixed.formats,
-        )
+        self.rows = WeakRows(self.compiled, self.record)
+        # one of the shipped mechanisms may have an unknown that its rig does not set: a sensor's offset
+        truth = dict(zip(simulation.model.p_names, simulation.truth, strict=True))
+        self.truth = np.array([truth.get(one, 0.0) for one in self.compiled.model.p_names])
+        self.tables = design_tables(fourier_model_of(compiled), self.rows, self.truth)
+        self.sensing = Sensing(self.lsb, full, self.oracle_design.sample_rate)
+        unknowns = self.compiled.parameters.model.unknowns
+        guess = self.compiled.parameters.guess
+        bounds = [(min(one.low, x), max(one.high, x)) for one, x in zip(unknowns, guess, strict=True)]
+        self.parameters = fixed_parameters(self.made.functions, bounds)
+        self.design: FourierDesignQ31 = fixed_design(self.fixed.model, self.tables, self.sensing, self.fixed.formats)
+
+    @cached_property
+    def config(self) -> FourierConfigQ31:
+        """Starts at half or one and a half times the truth."""
+        known = self.compiled.parameters
+        wide = np.where(np.arange(len(self.truth)) % 2, 0.6, 1.4)
+        start = np.where(known.positive, self.truth * wide, known.guess)
+        formats = row_formats(self.rows, self.truth)
+        offset = (0,) * len(self.lsb)
+        return config_of_q31(self.design, known, formats, self.parameters.p_bits, offset, start)
 
     def oracle_sums(self) -> dict[int, Float]:
         """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
@@ -138,10 +149,6 @@ class Rig:
         return out
 
 
-def _outwards(weights: Float) -> Float:
-    return weights[len(weights) // 2 + 1 :]
-
-
 @cache
 def rig(name: str, samples: int) -> Rig:
     """Made once."""
@@ -149,7 +156,13 @@ def rig(name: str, samples: int) -> Rig:
 
 
 _DRIVER = """
+#include <string.h>
+
 #include "fourier/collect_q31.h"
+#include "fourier/columns_q31.h"
+#include "fourier/direction_q31.h"
+#include "fourier/sums_q31.h"
+#include "fourier/white_q31.h"
 
 extern const pvid_fourier_design_q31 rig_design_q31;
 unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[]);
@@ -177,8 +190,94 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
     }
     return windows;
 }
+
+extern const pvid_fourier_config_q31 rig_config_q31;
+int identify(const int32_t readings[], unsigned ticks, int32_t p[], int32_t published[], int64_t sums[],
+             uint8_t exponent[], uint8_t reason[]);
+
+/* The state after every tick; returns the status of init. */
+int identify(const int32_t readings[], unsigned ticks, int32_t p[], int32_t published[], int64_t sums[],
+             uint8_t exponent[], uint8_t reason[])
+{
+    static pvid_fourier_q31 self;
+    const size_t samples = rig_design_q31.model->samples;
+    const pvid_status status = pvid_fourier_init_q31(&self, &rig_config_q31);
+    for (unsigned k = 0; (status == PVID_OK) && (k < ticks); k++) {
+        reason[k] = (uint8_t)pvid_fourier_step_q31(&self, &readings[k * samples]);
+        const pvid_information_q31 *information = &self.estimator.information;
+        const size_t n_p = self.estimator.model->n_p;
+        memcpy(&p[k * n_p], self.estimator.p, n_p * sizeof p[0]);
+        memcpy(&published[k * n_p], pvid_fourier_estimate_q31(&self)->p, n_p * sizeof p[0]);
+        memcpy(&sums[k * information->n_sums], information->sums, information->n_sums * sizeof sums[0]);
+        exponent[k] = information->exponent;
+    }
+    return (int)status;
+}
+
+unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t window[], int32_t x[], int32_t exponent[]);
+
+/* White columns of a kind from the S_h of a window; returns how many nuisances were projected out. */
+unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t window[], int32_t x[], int32_t exponent[])
+{
+    static pvid_fourier_window_q31 sums;
+    static pvid_fourier_white_q31 white;
+    static pvid_fourier_columns_q31 made;
+    const pvid_fourier_design_q31 *design = &rig_design_q31;
+    const pvid_fourier_kind *own = &design->model->kind[kind];
+    const size_t harmonics = pvid_fourier_harmonics_q31(design);
+    const size_t rows = pvid_fourier_rows_q31(design);
+    const size_t used = own->thetas + 1u;
+    const size_t count = used + own->nuisances;
+    uint64_t whole[PVID_MAX_COLUMNS];
+    unsigned live = 0;
+    size_t term = own->first;
+    for (size_t c = 0; c < design->model->channels; c++) {
+        for (size_t h = 0; h < harmonics; h++) {
+            sums.s[c][h][0] = *window++;
+            sums.s[c][h][1] = *window++;
+        }
+    }
+    pvid_fourier_white_init_q31(&white, design);
+    pvid_fourier_white_weigh_q31(&white, design, (uint8_t)kind, theta, 0, design->n_noise);
+    pvid_fourier_white_spectrum_q31(&white, design, (uint8_t)kind, 0, harmonics);
+    const pvid_scaled_q31 least = pvid_fourier_white_floor_q31(&white, design);
+    pvid_fourier_white_invert_q31(&white, least, 0, harmonics);
+    for (size_t k = 0; k < pvid_fourier_basis_stages_q31(design); k++) {
+        pvid_fourier_white_basis_q31(&white, design, k);
+    }
+    for (size_t j = 0; j < count; j++) {
+        size_t end = term;
+        while ((end < own->end) && (design->model->term[end].column == j)) {
+            end++;
+        }
+        for (size_t part = 0; part < pvid_fourier_column_parts_q31(&white); part++) {
+            pvid_fourier_columns_make_q31(&made, design, &white, &sums, j, term, end, part);
+        }
+        term = end;
+        for (size_t k = 0; k < design->power / 2u; k++) {
+            pvid_fourier_white_remove_q31(&white, design, k, made.x[j]);
+        }
+        whole[j] = pvid_fourier_columns_square_q31(design, made.x[j]);
+    }
+    for (size_t j = used; j < count; j++) {
+        live += pvid_fourier_columns_keep_q31(design, whole[j], made.x[j]) ? 1u : 0u;
+        for (size_t i = 0; i < count; i++) {
+            if ((i < used) || (i > j)) {
+                pvid_fourier_take_off_q31(made.x[j], 0, rows, made.x[i]);
+            }
+        }
+    }
+    for (size_t j = 0; j < used; j++) {
+        memcpy(&x[j * rows], made.x[j], rows * sizeof x[0]);
+        exponent[j] = made.exponent[j];
+    }
+    return live;
+}
 """
 SIZES = (
+    "PVID_MAX_P=8",
+    "PVID_MAX_THETA=12",
+    "PVID_MAX_THETA_Q31=12",
     "PVID_MAX_CHANNELS=24",
     "PVID_MAX_HARMONICS=25",
     "PVID_MAX_RING=1024",
@@ -206,17 +305,8 @@ class Core:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         (folder / "driver.c").write_text(_DRIVER, encoding="utf-8")
-        names = (
-            "collect_q31",
-            "front_q31",
-            "values_q31",
-            "sums_q31",
-            "integer_q31",
-            "elementary_q31",
-            "scaled_q31",
-        )
-        rooms = ("fourier", "number")
-        core = [str(one) for one in core_sources("*_q31.c") if one.stem in names and one.parent.name in rooms]
+        rooms = ("fourier", "number", "solve", "judge")
+        core = [str(one) for one in sources_of("q31") if one.parent.name in rooms]
         self._run([*_OPTIONS, "-c", *core, str(folder / "driver.c")])
         self.libraries: dict[str, ctypes.CDLL] = {}
 
@@ -227,7 +317,8 @@ class Core:
         """With the tables of a rig."""
         if one.name not in self.libraries:
             code = self.folder / f"{one.name}.tables.c"
-            code.write_text(tables_source(one.fixed, one.design, "rig"), encoding="utf-8")
+            tables = tables_source(one.fixed, one.parameters, one.design, "rig")
+            code.write_text(tables + "\n\n" + configuration(one.config, "rig"), encoding="utf-8")
             library = self.folder / f"{one.name}.so"
             objects = [str(path) for path in self.folder.glob("*.o")]
             self._run([*_OPTIONS, "-shared", str(code), *objects, "-o", str(library)])
@@ -245,3 +336,33 @@ class Core:
         count = self.library(one).run(pointers[0], len(given), pointers[1], most, pointers[2])
         shape = (count, len(design.model.channel), design.highest + 1, 2)
         return out[:count].reshape(shape).astype(np.int64), outcome.astype(np.int64)
+
+    def columns(self, one: Rig, kind: int, theta: Scaled, window: Int) -> tuple[Int, Int, int]:
+        """White columns [thetas + 1, rows] of a kind, their exponents, and how many nuisances were projected out.
+
+        theta : [thetas]; window : S_h [channels, H + 1, 2]
+        """
+        design = one.design
+        count = design.model.kind[kind].thetas + 1
+        given = np.ascontiguousarray(np.stack([theta.m, theta.e], axis=-1), np.int32)
+        sums = np.ascontiguousarray(window, np.int32)
+        x, exponent = np.zeros((count, design.rows), np.int32), np.zeros(count, np.int32)
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, sums, x, exponent)]
+        live = self.library(one).columns(kind, *pointers)
+        return x.astype(np.int64), exponent.astype(np.int64), int(live)
+
+    def identify(self, one: Rig, readings: Int) -> tuple[int, Record]:
+        """The status of init, and the state after every tick of readings [samples, ticks]."""
+        given = np.ascontiguousarray(readings.T, np.int32)
+        ticks, model = len(given), one.parameters.model
+        record = Record(
+            p=np.zeros((ticks, model.n_p), np.int32),
+            sums=np.zeros((ticks, model.n_sums), np.int64),
+            reason=np.zeros(ticks, np.uint8),
+            exponent=np.zeros(ticks, np.uint8),
+            published=np.zeros((ticks, model.n_p), np.int32),
+        )
+        arrays = (record.p, record.published, record.sums, record.exponent, record.reason)
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
+        status = self.library(one).identify(ctypes.c_void_p(given.ctypes.data), ticks, *pointers)
+        return int(status), record

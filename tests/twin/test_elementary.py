@@ -28,6 +28,7 @@ FLOATS(cosine, pvid_cos_f32(x[k]))
 FLOATS(sign, pvid_sign_f32(x[k]))
 FLOATS(magnitude, pvid_magnitude_f32(x[k]))
 FLOATS(soft_sign, pvid_soft_sign_f32(x[k], 0.75f))
+FLOATS(tanh, pvid_tanh_f32(x[k]))
 INTEGERS(sine_7, pvid_sin_q31(x[k], 7))
 INTEGERS(sine_30, pvid_sin_q31(x[k], 30))
 INTEGERS(cosine_0, pvid_cos_q31(x[k], 0))
@@ -75,7 +76,7 @@ def floats() -> npt.NDArray[np.float32]:
         return np.concatenate([sizes, angles, quarters, special]).astype(np.float32)
 
 
-@pytest.mark.parametrize("name", ["sine", "cosine", "sign", "magnitude", "soft_sign"])
+@pytest.mark.parametrize("name", ["sine", "cosine", "sign", "magnitude", "soft_sign", "tanh"])
 def test_floats(name: str, library: ctypes.CDLL, floats: npt.NDArray[np.float32]) -> None:
     with np.errstate(all="ignore"):
         twin = (

@@ -85,7 +85,7 @@ def test_a_quantity_that_does_not_fit_is_named() -> None:
     with pytest.raises(PvidError, match="full scale of sample 0 is 33554432 counts"):
         fixed_design(
             one.design.model,
-            one.sizes_of_form,
+            one.tables,
             Sensing(one.lsb, (2**25, 9), 1000.0),
             one.fixed.formats,
         )

@@ -63,6 +63,22 @@ static void beyond_the_limit_there_is_no_number(void **state)
     assert_false(isnan(pvid_cos_f32(PVID_ANGLE_LIMIT_F32)));
 }
 
+static void tanh_is_that_of_the_library_within_its_error(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int32_t i = -100000; i <= 100000; i++) {
+        const float x = 9.0f * ((float)i / 100000.0f);
+        worst = fmax(worst, fabs((double)pvid_tanh_f32(x) - tanh((double)x)));
+        assert_true(fabsf(pvid_tanh_f32(x)) <= 1.0f);
+    }
+    assert_true(worst < 1.7e-6);
+    assert_true(pvid_tanh_f32(0.0f) == 0.0f);
+    assert_true(pvid_tanh_f32(INFINITY) == 1.0f);
+    assert_true(pvid_tanh_f32(-3.0e38f) == -1.0f);
+    assert_true(isnan(pvid_tanh_f32(NAN)));
+}
+
 static void signs_are_plain_or_soft(void **state)
 {
     (void)state;
@@ -84,6 +100,7 @@ int main(void)
         cmocka_unit_test(errors_are_those_of_the_header),
         cmocka_unit_test(results_never_exceed_one),
         cmocka_unit_test(beyond_the_limit_there_is_no_number),
+        cmocka_unit_test(tanh_is_that_of_the_library_within_its_error),
         cmocka_unit_test(signs_are_plain_or_soft),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -14,19 +14,21 @@
 #define SUMS (6 + 3 + 2)
 #define WEIGHT (SUMS - 1)
 
+static const pvid_model_q31 model = {.n_theta = N};
+static const pvid_block whole = {0, N, 0};
 static pvid_information_q31 information;
 static int64_t fresh[PVID_MAX_THETA_Q31];
 
 static void start(uint32_t groups)
 {
     memset(fresh, 0, sizeof fresh);
-    pvid_information_init_q31(&information, N, groups, 1u << 15);
+    pvid_information_init_q31(&information, &model, groups, 1u << 15);
 }
 
 static void end_group(void)
 {
     for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
-        pvid_information_end_group_q31(&information, part, fresh);
+        pvid_information_end_group_q31(&information, &model, part, fresh);
     }
 }
 
@@ -38,7 +40,7 @@ static void sums_are_exact(void **state)
     const int32_t errors[2] = {-17, PVID_ROW_LIMIT_Q31};
     int64_t expected[SUMS] = {0};
     for (int k = 0; k < 2; k++) {
-        pvid_information_add_q31(&information, rows[k], errors[k], fresh);
+        pvid_information_add_q31(&information, &whole, rows[k], errors[k], fresh);
         size_t at = 0;
         for (int i = 0; i < N; i++) {
             for (int j = i; j < N; j++) {
@@ -53,7 +55,7 @@ static void sums_are_exact(void **state)
         assert_memory_equal(information.sums, expected, sizeof expected);
         assert_memory_equal(fresh, &expected[6], N * sizeof(int64_t));
     }
-    pvid_information_add_q31(&information, rows[0], errors[0], NULL);
+    pvid_information_add_q31(&information, &whole, rows[0], errors[0], NULL);
     assert_memory_equal(fresh, &expected[6], N * sizeof(int64_t));
     assert_true(information.sums[6] != expected[6]);
     assert_int_equal(information.n_sums, SUMS);
@@ -72,7 +74,7 @@ static void the_past_fades_by_exp(void **state)
         const double exact = 2147483648.0 * exp(-(double)blocks[k] / (double)groups[k]);
         assert_true(fabs((double)information.retention - exact) < 8.0); /* twelve roundings of the series */
         const int32_t row[N] = {1 << 20, 0, 0};
-        pvid_information_add_q31(&information, row, 1 << 10, NULL);
+        pvid_information_add_q31(&information, &whole, row, 1 << 10, NULL);
         const pvid_information_q31 before = information;
         for (uint16_t group = 1; group < blocks[k]; group++) {
             end_group();
@@ -87,7 +89,7 @@ static void the_past_fades_by_exp(void **state)
     }
     start(0);
     const int32_t row[N] = {1, 2, 3};
-    pvid_information_add_q31(&information, row, 4, NULL);
+    pvid_information_add_q31(&information, &whole, row, 4, NULL);
     const pvid_information_q31 kept = information;
     for (int group = 0; group < 1000; group++) {
         end_group();
@@ -103,7 +105,7 @@ static void sums_keep_below_their_limit(void **state)
     start(64);
     const int32_t row[N] = {PVID_ROW_LIMIT_Q31, -PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31 - 1};
     for (int group = 0; group < 200; group++) {
-        pvid_information_add_q31(&information, row, PVID_ROW_LIMIT_Q31, fresh);
+        pvid_information_add_q31(&information, &whole, row, PVID_ROW_LIMIT_Q31, fresh);
         end_group();
         for (size_t i = 0; i < (size_t)WEIGHT; i++) {
             assert_true((information.sums[i] <= PVID_SUM_LIMIT) && (information.sums[i] >= -PVID_SUM_LIMIT));
@@ -147,12 +149,12 @@ static void any_sum_of_squares_may_be_the_largest(void **state)
             row[which] = PVID_ROW_LIMIT_Q31;
         }
         for (int k = 0; k < 16; k++) {
-            pvid_information_add_q31(&information, row, (which == N) ? PVID_ROW_LIMIT_Q31 : 1, fresh);
+            pvid_information_add_q31(&information, &whole, row, (which == N) ? PVID_ROW_LIMIT_Q31 : 1, fresh);
         }
         end_group();
         assert_int_equal(information.exponent, 0); /* 2^60: at the limit */
         const pvid_information_q31 before = information;
-        pvid_information_add_q31(&information, row, (which == N) ? PVID_ROW_LIMIT_Q31 : 1, fresh);
+        pvid_information_add_q31(&information, &whole, row, (which == N) ? PVID_ROW_LIMIT_Q31 : 1, fresh);
         end_group();
         assert_int_equal(information.exponent, 1);
         const size_t diagonal[N + 1] = {0, 3, 5, 9};
@@ -163,9 +165,27 @@ static void any_sum_of_squares_may_be_the_largest(void **state)
     }
 }
 
+/* Rows of many kinds add to the residual sum only: it stops at 3 2^60, from which the end of a group divides it. */
+static void residuals_of_many_rows_stop_at_their_limit(void **state)
+{
+    (void)state;
+    start(0);
+    const int32_t row[N] = {0, 0, 0};
+    const int64_t largest = (int64_t)3 << 60;
+    for (int k = 0; k < 100; k++) {
+        pvid_information_add_q31(&information, &whole, row, PVID_ROW_LIMIT_Q31, fresh);
+        const int64_t exact = (int64_t)(k + 1) << 56;
+        assert_int_equal(information.sums[9], (exact < largest) ? exact : largest);
+    }
+    end_group();
+    assert_int_equal(information.exponent, 1);
+    assert_int_equal(information.sums[9], largest / 4);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(residuals_of_many_rows_stop_at_their_limit),
         cmocka_unit_test(sums_are_exact),
         cmocka_unit_test(the_past_fades_by_exp),
         cmocka_unit_test(sums_keep_below_their_limit),

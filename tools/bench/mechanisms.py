@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.identify import Identified, identify
 from pvid.sim.bound import bound
 from pvid.sim.imperfections import Imperfections
@@ -37,6 +38,15 @@ SUMMARY = (
     "longest",
     "warnings",
     "s to identify",
+)
+TWO_WINDOWS = (
+    "mechanism",
+    "friction",
+    "parameter",
+    "runs beyond 5 %",
+    "RMS error there %",
+    "s.e. of two windows %",
+    "bound of two windows %",
 )
 IMPERFECT = (
     "mechanism",
@@ -269,6 +279,35 @@ def summary_row(name: str, friction: str, outcome: Outcome) -> tuple[str, ...]:
     )
 
 
+def two_window_rows(name: str, friction: str, outcome: Outcome) -> Iterator[tuple[str, ...]]:
+    """A row for each parameter that some runs have beyond 5 % at the end of the second window or later.
+
+    Beside it what two windows of these runs can tell: the standard errors that their rows predict, and the Cramer-Rao
+    bound of the same samples (medians of the runs).
+    """
+    simulation = outcome.simulation
+    size, truth = size_of(simulation), simulation.truth
+    off = [np.abs(one.history[1:] - truth) / size for one in outcome.found]
+    beyond = np.array([np.any(one > CLOSE, axis=0) for one in off])
+    if not beyond.any():
+        return
+    rms = np.sqrt(np.mean([one[0] ** 2 for one in off], axis=0))
+    predicted = np.median([uncertainty(one.fit.only(slice(0, 2))).predicted for one in outcome.found], axis=0)
+    lengths = [one.fit.rows.functions.length for one in outcome.found]
+    least = {length: bound(simulation, 1.5 * length, windows=1) for length in set(lengths)}
+    middle = np.median([least[length] for length in lengths], axis=0)
+    for k in np.flatnonzero(beyond.any(axis=0)):
+        yield (
+            name,
+            friction,
+            simulation.model.p_names[k],
+            f"{beyond[:, k].sum()}/{len(off)}",
+            f"{100 * rms[k]:.2g}",
+            f"{100 * predicted[k] / size[k]:.2g}",
+            f"{100 * middle[k] / size[k]:.2g}",
+        )
+
+
 def imperfection_rows(name: str, seeds: int, progress: Progress = int) -> Iterator[tuple[str, ...]]:
     """A row for each imperfection that the mechanism can have."""
     simulation = simulation_of(name)
@@ -302,22 +341,22 @@ Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 
 def tables(names: tuple[str, ...], seeds: int, imperfect: int, progress: Progress = int) -> list[Table]:
     """Marker, header and rows of each table of the page."""
-    accuracy, sharp, summary, cases = [], [], [], []
+    accuracy, sharp, summary, early, cases = [], [], [], [], []
     for name in names:
         soft = smooth(name, seeds, progress)
         accuracy += list(accuracy_rows(name, soft))
         chosen = identified(name, seeds, PERFECT, progress=progress)
         rubs = bool(soft.simulation.rig.friction_width)
         sharp += list(accuracy_rows(name, chosen))
-        summary += [
-            summary_row(name, "soft, of known width" if rubs else "none", soft),
-            summary_row(name, "sharp; design chosen" if rubs else "none; design chosen", chosen),
-        ]
+        own, free = "soft, of known width" if rubs else "none", "sharp; design chosen" if rubs else "none; design chosen"
+        summary += [summary_row(name, own, soft), summary_row(name, free, chosen)]
+        early += [*two_window_rows(name, own, soft), *two_window_rows(name, free, chosen)]
         if imperfect:
             cases += list(imperfection_rows(name, imperfect, progress))
     return [
         ("mechanisms", ACCURACY, accuracy),
         ("mechanisms-chosen", ACCURACY, sharp),
         ("mechanisms-summary", SUMMARY, summary),
+        ("mechanisms-two-windows", TWO_WINDOWS, early),
         ("imperfections", IMPERFECT, cases),
     ]

@@ -15,15 +15,15 @@
 
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
-#define SAMPLE(tick, channel) ((int16_t)pgm_read_word(&replay_samples[tick][channel]))
+#define COUNT(tick, channel) ((int16_t)pgm_read_word(&replay_samples[tick][channel]))
 #else
-#define SAMPLE(tick, channel) (replay_samples[tick][channel])
+#define COUNT(tick, channel) (replay_samples[tick][channel])
 #endif
 
 static REPLAY_TYPE identifier;
 
 /* A count in the identifier's unit: count times step; NaN for a missing sample. */
-static REPLAY_SAMPLE sample_of(int16_t count, REPLAY_SAMPLE lsb)
+static REPLAY_SAMPLE sample_of(REPLAY_COUNT count, REPLAY_SAMPLE lsb)
 {
 #if REPLAY_IS_FLOAT
     if (count == REPLAY_MISSING) {
@@ -59,10 +59,12 @@ static uint32_t play(cost *whole)
     uint32_t hash = PVID_FNV_START;
     const uint32_t reading = overhead();
     for (uint32_t tick = 0; tick < REPLAY_TICKS; tick++) {
-        const REPLAY_SAMPLE phi = sample_of(SAMPLE(tick, 0), replay_phi_lsb);
-        const REPLAY_SAMPLE y = sample_of(SAMPLE(tick, 1), replay_y_lsb);
+        REPLAY_SAMPLE sample[REPLAY_CHANNELS];
+        for (uint32_t channel = 0; channel < REPLAY_CHANNELS; channel++) {
+            sample[channel] = sample_of(COUNT(tick, channel), replay_lsb[channel]);
+        }
         const uint32_t before = pvid_port_instructions();
-        const pvid_reason reason = REPLAY_STEP(&identifier, phi, y);
+        const pvid_reason reason = REPLAY_STEP(&identifier, sample);
         const uint32_t counts = pvid_port_instructions() - before - reading;
         if (tick >= REPLAY_MEASURE_FROM) {
             add(whole, counts);

@@ -98,8 +98,25 @@
 #ifndef PVID_MAX_THETA_Q31
 #define PVID_MAX_THETA_Q31 11
 #endif
-#if PVID_MAX_THETA_Q31 < 5 || PVID_MAX_THETA_Q31 > 12
-#error "PVID_MAX_THETA_Q31 must lie in 5..12"
+#if PVID_MAX_THETA_Q31 < 5 || PVID_MAX_THETA_Q31 > 31
+#error "PVID_MAX_THETA_Q31 must lie in 5..31"
+#endif
+
+/* Largest number of entries of M in the fixed-point core: the sum of n (n + 1) / 2 over the kinds of rows, of n theta
+ * each (66: the strong form). RAM: 12 bytes each. */
+#ifndef PVID_MAX_MOMENTS_Q31
+#define PVID_MAX_MOMENTS_Q31 66
+#endif
+#if PVID_MAX_MOMENTS_Q31 < 1 || PVID_MAX_MOMENTS_Q31 > 496
+#error "PVID_MAX_MOMENTS_Q31 must lie in 1..496"
+#endif
+
+/* Largest number of non-zeros of d theta / d p in the fixed-point core (22: the strong form). RAM: 6 bytes each. */
+#ifndef PVID_MAX_C_Q31
+#define PVID_MAX_C_Q31 22
+#endif
+#if PVID_MAX_C_Q31 < 1 || PVID_MAX_C_Q31 > 248
+#error "PVID_MAX_C_Q31 must lie in 1..248"
 #endif
 
 /* Qualifier of the fixed-point tables; empty where flash is addressed like RAM. On an AVR __flash (with

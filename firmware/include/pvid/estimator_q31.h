@@ -53,12 +53,6 @@ typedef struct {
     uint16_t divider;           /* groups of rows per solve, 1..65535 */
 } pvid_estimator_config_q31;
 
-/* m 2^e: 2^29 <= |m| <= 2^30, or 0. */
-typedef struct {
-    int32_t m;
-    int32_t e;
-} pvid_scaled_q31;
-
 /* An estimate. */
 typedef struct {
     int32_t p[PVID_MAX_P];                       /* in the formats p_bits */
@@ -82,6 +76,16 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
 /* Adds a row to the current group. Returns PVID_ACCUMULATED. Fails iff the row does not fit its limit:
  * PVID_REJECTED_SATURATED; then only the counter changes. */
 pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y);
+
+/* The same for a row of this kind (model.h): n contains the entries of this kind alone, in their formats; y has the
+ * format of all kinds. Fails also iff the model has no such kind: PVID_NOT_READY. (pvid_estimator_add_q31 adds a row of
+ * kind 0.) */
+pvid_reason pvid_estimator_add_kind_q31(pvid_estimator_q31 *self, uint8_t kind, const int32_t n[], int32_t y);
+
+/* Adds g[n_theta] to b, as pvid_estimator_add_to_b_f32. g_i is in units of N_i's integer times Y's, exponents
+ * within +-1000. Returns PVID_ACCUMULATED. Fails iff an entry of b would exceed 2^61 after the division by 4^exponent:
+ * PVID_REJECTED_SATURATED; then only the counter changes. */
+pvid_reason pvid_estimator_add_to_b_q31(pvid_estimator_q31 *self, const pvid_scaled_q31 g[]);
 
 /* Ends a group of rows; every `divider` groups it solves and moves p. Returns PVID_UPDATED, PVID_ACCUMULATED (no
  * solve due), PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT. */

@@ -22,6 +22,8 @@
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/fourier_parts.h"
+#include "pvid/gate_q31.h"
+#include "pvid/trust_q31.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -60,6 +62,7 @@ typedef struct {
     /* From jets, runs and signs (Q30): the gains, then the integrands. Returns false, and writes nothing, iff an input
      * is beyond its reach. */
     bool (*values)(const int32_t in[], int32_t out[]);
+    const pvid_model_q31 *model; /* theta and C of all kinds */
 } pvid_fourier_model_q31;
 
 /* ---- the design: tables and formats for a rig ---- */
@@ -94,6 +97,16 @@ typedef struct {
     uint8_t ramp;  /* of fold 2: of I^1 at the end of the first half times B_h of the channel `ramp` */
 } pvid_fourier_format_q31;
 
+/* Share of the variance D_h of the sums at harmonic h in the rows of a kind by the sensors' noise:
+ * += W_h factor theta_a theta_b h^(2 power), with theta = -1 for the column of Y; W_h: 2 hop at h = 0, else hop. */
+typedef struct {
+    uint8_t kind;
+    uint8_t power;
+    uint8_t a; /* columns of the kind, a <= b; pairs with a < b are counted once, with twice the factor */
+    uint8_t b;
+    pvid_scaled_q31 factor;
+} pvid_fourier_noise_q31;
+
 typedef struct {
     const pvid_fourier_model_q31 *model;
     uint8_t functions;         /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
@@ -109,7 +122,52 @@ typedef struct {
     const pvid_fourier_integral_q31 *integral; /* [integrands] */
     const pvid_fourier_format_q31 *format;     /* [channels] */
     const PVID_TABLE int16_t *circle;          /* [2 hop] 32767 cos(pi j / hop) */
+    const pvid_scaled_q31 *factor; /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
+    const pvid_fourier_noise_q31 *noise; /* [n_noise] */
+    uint16_t n_noise;
+    const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const pvid_scaled_q31
+        *error_variance; /* [kinds] of that noise at a step, times W_h h^(2 order) the share in D_h; or 0 */
 } pvid_fourier_design_q31;
+
+/* ---- the configuration ---- */
+
+typedef struct {
+    const pvid_fourier_design_q31 *design; /* must outlive the identifier, with its tables */
+    const int32_t *offset;                 /* [samples] reading of each sensor at 0 [counts] */
+    const int32_t *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, 0..2^24
+                                 [counts]; NULL: no check */
+    uint8_t iterations;       /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3 */
+    pvid_estimator_config_q31 estimator; /* row_sd 2^(8 + y_bits): rows are in standard deviations. init sets model and
+                                            row_weight */
+    pvid_trust_config_q31 trust;         /* conditions of publication */
+    pvid_gate_config_q31 gate;           /* outlier gate on the residuals of a window, for each kind */
+} pvid_fourier_config_q31;
+
+/* State: detail/fourier_state_q31.h, not API. Only the functions below write to it. */
+typedef struct pvid_fourier_q31 pvid_fourier_q31;
+
+/* Initialises `self`. Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - a field of config, design or model is out of its range (the status names it), or
+ *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS).
+ * The tables must be those of the design tool: it proves that no sum overflows. */
+pvid_status pvid_fourier_init_q31(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config);
+
+/* One tick: the readings [samples], taken at the same time. Returns as pvid_weak_step_q31. */
+pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[]);
+
+/* The published estimate, for the context that calls step; the start before the first one. */
+const pvid_estimate_q31 *pvid_fourier_estimate_q31(const pvid_fourier_q31 *self);
+
+/* Copies the published estimate from any context; as pvid_weak_read_q31. */
+bool pvid_fourier_read_q31(const pvid_fourier_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number);
+
+/* Call this when samples are missing: the windows restart, all other state is kept. */
+void pvid_fourier_gap_q31(pvid_fourier_q31 *self);
+
+/* Freezes the identifier (true) or resumes it (false); as pvid_weak_freeze_q31. */
+void pvid_fourier_freeze_q31(pvid_fourier_q31 *self, bool frozen);
 
 #ifdef __cplusplus
 }

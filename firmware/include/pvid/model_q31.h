@@ -11,12 +11,16 @@
 
 #include "pvid/config.h"
 
-/* Largest number of non-zeros of C. */
-#define PVID_MAX_C_Q31 (2 * PVID_MAX_THETA_Q31)
+/* m 2^e: 2^29 <= |m| <= 2^30, or 0. */
+typedef struct {
+    int32_t m;
+    int32_t e;
+} pvid_scaled_q31;
 
 typedef struct {
     uint8_t n_theta;   /* entries of theta and N, 1..PVID_MAX_THETA_Q31 */
     uint8_t n_p;       /* free parameters, 1..PVID_MAX_P; kappa refers to p[0] */
+    uint8_t n_kinds;   /* kinds of rows, see model.h; 0 or 1: all rows have all theta */
     uint8_t n_c;       /* structural non-zeros of C, 1..PVID_MAX_C_Q31 */
     uint32_t positive; /* bit i set: p[i] > 0; steps are relative to p[i] */
 
@@ -24,7 +28,9 @@ typedef struct {
      * Y adds noise[0], noise[1], noise[2] to their products 00, 01, 11 (see estimator_q31.h). */
     uint8_t noisy[2];
 
-    const uint8_t *c_row;    /* [n_c] row in theta of each non-zero of C, ascending in a column */
+    const uint8_t
+        *kind_end;        /* [n_kinds] one past the last theta of each kind, ascending, at last n_theta; NULL for one */
+    const uint8_t *c_row; /* [n_c] row in theta of each non-zero of C, ascending in a column */
     const uint8_t *c_column; /* [n_c] its column (index in p), ascending */
 
     /* theta[n_theta] = f(p) */

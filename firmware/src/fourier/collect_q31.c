@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-#include "fourier/front_q31.h"
+#include "fourier/fourier_front_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/values_q31.h"
 
@@ -21,7 +21,7 @@ static uint32_t greater(uint32_t a, uint32_t b)
 static uint32_t other_ticks(const pvid_fourier_design_q31 *design)
 {
     const uint32_t ticks = design->decimation;
-    return (ticks < SHARING) ? ticks : ((ticks - (ticks / 2u)) - 1u);
+    return (ticks < SHARING) ? ticks : ((ticks - pvid_fourier_front_job_q31(design)) - 1u);
 }
 
 /* Harmonics a tick, such that half of the other ticks of four blocks suffice. */
@@ -33,7 +33,8 @@ static uint32_t slices(const pvid_fourier_design_q31 *design)
 
 uint32_t pvid_fourier_free_ticks_q31(const pvid_fourier_design_q31 *design)
 {
-    const uint32_t blocks = design->hop / (uint32_t)PVID_FOURIER_BLOCK_Q31;
+    /* but the block in which the next window is joined */
+    const uint32_t blocks = (design->hop / (uint32_t)PVID_FOURIER_BLOCK_Q31) - 1u;
     const uint32_t each = (uint32_t)PVID_FOURIER_BLOCK_Q31 * other_ticks(design);
     const uint32_t adding = (pvid_fourier_harmonics_q31(design) + (slices(design) - 1u)) / slices(design);
     return (design->decimation < SHARING) ? (blocks * each) : (blocks * (each - adding));
@@ -59,9 +60,12 @@ void pvid_fourier_collect_reset_q31(pvid_fourier_collect_q31 *self)
 
 static bool are_within(const pvid_fourier_design_q31 *design, const int32_t counts[])
 {
+    const size_t samples = design->model->samples;
+    const int32_t *full_scale = design->full_scale;
     bool within = true;
-    for (size_t i = 0; i < design->model->samples; i++) {
-        within = within && (counts[i] <= design->full_scale[i]) && (counts[i] >= -design->full_scale[i]);
+    for (size_t i = 0; i < samples; i++) {
+        /* 0..2 full_scale without the sign */
+        within = within && (((uint32_t)counts[i] + (uint32_t)full_scale[i]) <= (2u * (uint32_t)full_scale[i]));
     }
     return within;
 }
@@ -102,7 +106,6 @@ pvid_fourier_tick pvid_fourier_collect_step_q31(pvid_fourier_collect_q31 *self, 
     const bool makes = self->due;
     const bool was_busy = pvid_fourier_front_is_busy_q31(&self->front, design);
     const bool completes = pvid_fourier_front_step_q31(&self->front, design, counts);
-    const bool filters = was_busy || completes || pvid_fourier_front_is_busy_q31(&self->front, design);
     self->due = self->due || completes;
     if (makes || (self->at_once && completes)) {
         if (!make_channels(self)) {
@@ -110,7 +113,7 @@ pvid_fourier_tick pvid_fourier_collect_step_q31(pvid_fourier_collect_q31 *self, 
             return PVID_FOURIER_REJECTED;
         }
     }
-    if (!self->at_once && (filters || makes)) {
+    if (!self->at_once && (makes || was_busy || completes || pvid_fourier_front_is_busy_q31(&self->front, design))) {
         return PVID_FOURIER_BUSY;
     }
     if (pvid_fourier_sums_are_busy_q31(&self->sums, design)) {

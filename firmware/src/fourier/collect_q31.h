@@ -13,7 +13,7 @@ typedef enum {
     PVID_FOURIER_REJECTED /* a count beyond full scale or a jet beyond its reach: restarted */
 } pvid_fourier_tick;
 
-/* Fewest ticks in a half window that are free for a window's work. */
+/* Fewest ticks that are free for a window's work before the next one is joined. */
 uint32_t pvid_fourier_free_ticks_q31(const pvid_fourier_design_q31 *design);
 
 /* Requires a valid design. */

@@ -5,8 +5,8 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "fourier/finish_f32.h"
-#include "fourier/front_f32.h"
+#include "fourier/fourier_finish_f32.h"
+#include "fourier/fourier_front_f32.h"
 #include "fourier/schedule.h"
 #include "fourier/step_f32.h"
 #include "fourier/sums_f32.h"
@@ -18,15 +18,16 @@
 #include "number/finite_f32.h"
 #include "number/init.h"
 #include "number/unroll.h"
+#include "number/unroll.h"
 
-static bool all_finite(const float values[], size_t n)
+static inline bool all_finite(const float values[], size_t n)
 {
-    for (size_t i = 0; i < n; i++) {
-        if (!pvid_finite_f32(values[i])) {
-            return false;
-        }
+    const float *end = &values[n];
+    bool finite = true;
+    for (const float *value = values; value < end; value++) {
+        finite = finite && pvid_finite_f32(*value);
     }
-    return true;
+    return finite;
 }
 
 static pvid_status limits_are_valid(const pvid_fourier_config_f32 *config)
@@ -131,7 +132,8 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->channels = summed_channels(design->model);
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_fourier_front_init_f32(&self->front, design, config->sample_rate_hz);
-    pvid_fourier_step_init_f32(&self->history, (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
+    pvid_fourier_step_init_f32(&self->history,
+                               (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
     const uint32_t free_ticks = pvid_fourier_free_ticks(
         design->decimation, pvid_fourier_job_ticks(design->decimation, pvid_fourier_front_pairs_f32(design)));
@@ -185,7 +187,7 @@ static pvid_reason drop_reason(pvid_fourier_f32 *self)
 
 /* A step: its channels to the present block. If it completes a window that is dropped, returns the reason; else
  * PVID_ACCUMULATED. */
-static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[])
 {
     const pvid_fourier_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
@@ -209,7 +211,7 @@ static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[])
 }
 
 /* Harmonics of the last block; a window that is joined begins. */
-static void advance_sums(pvid_fourier_f32 *self)
+PVID_SELDOM static void advance_sums(pvid_fourier_f32 *self)
 {
     for (uint8_t i = 0; i < self->items_per_tick; i++) {
         if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
@@ -219,10 +221,30 @@ static void advance_sums(pvid_fourier_f32 *self)
     }
 }
 
-static void advance_finish(pvid_fourier_f32 *self, pvid_reason *reason)
+PVID_SELDOM static void advance_finish(pvid_fourier_f32 *self, pvid_reason *reason)
 {
-    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_fourier_finish_is_busy_f32(&self->finish); i++) {
+    for (uint8_t left = self->stages_per_tick; left > 0u; left--) {
         pvid_fourier_finish_step_f32(self, reason);
+    }
+}
+
+/* A sample that is not finite. */
+PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
+{
+    restart(self);
+    pvid_count_up(&self->estimator.counters.rejected_not_finite);
+    return PVID_REJECTED_NOT_FINITE;
+}
+
+/* Work on the sums, else on the last whole window. */
+static inline void work(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        advance_sums(self);
+    } else if (pvid_fourier_finish_is_busy_f32(&self->finish)) {
+        advance_finish(self, reason);
+    } else {
+        /* free */
     }
 }
 
@@ -233,24 +255,17 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
     }
     const pvid_fourier_design_f32 *design = self->design;
     if (!all_finite(sample, design->model->samples)) {
-        restart(self);
-        pvid_count_up(&self->estimator.counters.rejected_not_finite);
-        return PVID_REJECTED_NOT_FINITE;
+        return reject(self);
     }
-    pvid_fourier_watch_sample_f32(&self->watch, design->model->samples, sample);
+    if (self->watch.range != NULL) {
+        pvid_fourier_watch_sample_f32(&self->watch, design->model->samples, sample);
+    }
     const bool steps = pvid_fourier_front_step_f32(&self->front, design, sample);
-    pvid_reason dropped = PVID_ACCUMULATED;
-    if (steps) {
-        dropped = next_step(self, sample);
-    }
-    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+    const pvid_reason dropped = steps ? next_step(self, sample) : PVID_ACCUMULATED;
     const bool works = (self->front.wait <= self->front.work_wait) || !self->front.begun;
+    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
     if ((works && !steps) || (design->decimation == 1u)) {
-        if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
-            advance_sums(self);
-        } else {
-            advance_finish(self, &reason);
-        }
+        work(self, &reason);
     }
     return (dropped != PVID_ACCUMULATED) ? dropped : reason;
 }

@@ -3,7 +3,7 @@
 /* Signs need the arguments of both neighbours, and an integral the next step's integrand. So with the jets of step k
  * the gains and integrands of step k - 1 follow, and with those the channels of step k - 2:
  *
- *   sign        width > 0:  v / (|v| + width);   width 0: the mean of sgn over the step, v linear there,
+ *   sign        width > 0:  tanh(v / width);   width 0: the mean of sgn over the step, v linear there,
  *               2 v_k / |g| within -1..1, g = (v_(k+1) - v_(k-1)) / 2  (at the first step v_1 - v_0)
  *   run         + dt/2 (r_(k-1) + r_k), r its derivative, with what rounding takes off kept (Kahan); from the first
  *               sample to the first step r stays that of the first step
@@ -48,14 +48,14 @@ static float mean_sign(float v, float slope)
 }
 
 /* Signs of the step whose arguments are v[0]; `next`: those of the step behind it. */
-static void find_signs(const pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design,
-                       const float next[], float sign[])
+static void find_signs(const pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, const float next[],
+                       float sign[])
 {
     for (size_t i = 0; i < design->model->signs; i++) {
         const float v = self->v[0][i];
         const float width = design->sign_width[i];
         const float slope = (self->known > 1u) ? (0.5f * (next[i] - self->v[1][i])) : (next[i] - v);
-        sign[i] = (width > 0.0f) ? pvid_soft_sign_f32(v, width) : mean_sign(v, slope);
+        sign[i] = (width > 0.0f) ? pvid_tanh_f32(v / width) : mean_sign(v, slope);
     }
 }
 

@@ -20,7 +20,10 @@ bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop);
 void pvid_fourier_sums_join_f32(pvid_fourier_sums_f32 *self, float edge[2][PVID_MAX_INTEGRANDS]);
 
 /* Returns whether a block is being added or a window is being joined. */
-bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *self, uint8_t harmonics);
+static inline bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *self, uint8_t harmonics)
+{
+    return (self->harmonic < harmonics) || (self->joined < harmonics);
+}
 
 /* Adds the block to one harmonic, or joins one harmonic to `window`. Returns true if this completes the window. */
 bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,

@@ -119,8 +119,13 @@ static void write_channels(const pvid_fourier_values_q31 *self, const pvid_fouri
     for (size_t k = 0; k < summed; k++) {
         const pvid_fourier_channel *one = &design->model->channel[k];
         const int32_t gain = self->gain[one->gain];
-        const int64_t value = (one->fold == 0u) ? gain : pvid_product_q31(gain, integral_of(self, design, one));
-        channel[k] = (int32_t)pvid_round_shift_q31(value, design->format[k].value);
+        const uint32_t shift = design->format[k].value;
+        if (one->fold == 0u) { /* |gain| <= 2^30: its shift is 2 at least */
+            channel[k] = pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(gain, shift - 1u) + 1, 1);
+        } else {
+            const int64_t value = pvid_product_q31(gain, integral_of(self, design, one));
+            channel[k] = (int32_t)pvid_round_shift_q31(value, shift);
+        }
     }
 }
 

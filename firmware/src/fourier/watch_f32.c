@@ -4,8 +4,8 @@
  * that contain it.
  *
  * At every step each sample x adds x - r and (x - r)^2 to its half, r the half's first sample. With d = r_B - r_A the
- * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps is
- * (q - s^2/N) / N of both halves together. */
+ * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps
+ * is (q - s^2/N) / N of both halves together. */
 #include "fourier/watch_f32.h"
 
 void pvid_fourier_watch_init_f32(pvid_fourier_watch_f32 *self, const pvid_fourier_config_f32 *config, uint16_t delay)
@@ -25,12 +25,10 @@ void pvid_fourier_watch_reset_f32(pvid_fourier_watch_f32 *self)
 
 void pvid_fourier_watch_sample_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[])
 {
-    if (self->range != NULL) {
-        for (size_t i = 0; i < samples; i++) {
-            const float limit = self->range[i];
-            if ((sample[i] > limit) || (sample[i] < -limit)) {
-                self->beyond = self->delay;
-            }
+    for (size_t i = 0; i < samples; i++) {
+        const float limit = self->range[i];
+        if ((sample[i] > limit) || (sample[i] < -limit)) {
+            self->beyond = self->delay;
         }
     }
 }

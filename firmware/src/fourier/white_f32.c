@@ -101,20 +101,30 @@ static size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t row)
     return (row < self->cosines) ? row : ((row + 1u) - self->cosines);
 }
 
-static float product(const float x[], const float y[], size_t first, size_t last)
+static inline float product(const float *restrict x, const float *restrict y, size_t first, size_t last)
 {
+    const float *end = &x[last];
     float sum = 0.0f;
-    for (size_t i = first; i < last; i++) {
-        sum += x[i] * y[i];
+    x += first;
+    y += first;
+    while (x < end) {
+        sum += *x * *y;
+        x++;
+        y++;
     }
     return sum;
 }
 
 /* x -= a y */
-static void subtract(float a, const float y[], size_t first, size_t last, float x[])
+static inline void subtract(float a, const float *restrict y, size_t first, size_t last, float *restrict x)
 {
-    for (size_t i = first; i < last; i++) {
-        x[i] -= a * y[i];
+    const float *end = &x[last];
+    x += first;
+    y += first;
+    while (x < end) {
+        *x -= a * *y;
+        x++;
+        y++;
     }
 }
 

@@ -25,6 +25,8 @@ static const uint32_t layout[] = {
     PVID_MAX_WINDOW,
     PVID_MAX_P,
     PVID_MAX_THETA_Q31,
+    PVID_MAX_MOMENTS_Q31,
+    PVID_MAX_C_Q31,
 };
 
 static const uint32_t pointers[] = {PLACE(differentiator.bank.weights), PLACE(estimator.model)};

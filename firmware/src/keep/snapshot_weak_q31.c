@@ -32,6 +32,8 @@ static const uint32_t layout[] = {
     PLACE(trust.copy),
     PVID_MAX_P,
     PVID_MAX_THETA_Q31,
+    PVID_MAX_MOMENTS_Q31,
+    PVID_MAX_C_Q31,
     PVID_MAX_TAPS,
     PVID_MAX_DECIMATION,
     PVID_MAX_FUNCTIONS,

@@ -91,3 +91,23 @@ float pvid_soft_sign_f32(float v, float width)
 {
     return v / (pvid_magnitude_f32(v) + width);
 }
+
+/* 1 - tanh 7 is 1.7e-6. */
+#define TANH_END 7.0f
+
+float pvid_tanh_f32(float x)
+{
+    if ((x > TANH_END) || (x < -TANH_END)) {
+        return (x > 0.0f) ? 1.0f : -1.0f;
+    }
+    const float z = x * x;
+    float above = 3.99569171e-06f;
+    above = (above * z) + 2.29304517e-03f;
+    above = (above * z) + 1.23220012e-01f;
+    above = (above * z) + 9.99998987e-01f;
+    float below = 1.43980025e-04f;
+    below = (below * z) + 2.11513992e-02f;
+    below = (below * z) + 4.56545591e-01f;
+    below = (below * z) + 1.0f;
+    return (x * above) / below;
+}

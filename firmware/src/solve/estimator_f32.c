@@ -206,7 +206,7 @@ pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, 
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    const bool exists = pvid_kind_exists(self->model->n_kinds, kind);
+    const bool exists = kind < pvid_kinds_count(self->model->n_kinds);
     PVID_ASSERT(exists);
     if (!exists) {
         return PVID_NOT_READY;

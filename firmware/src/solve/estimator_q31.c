@@ -22,12 +22,18 @@ static bool format_is_valid(int8_t bits)
     return (bits >= -FORMAT_MAX) && (bits <= FORMAT_MAX);
 }
 
+static bool moments_are_valid(size_t n_moments)
+{
+    return (n_moments >= 1u) && (n_moments <= PVID_MAX_MOMENTS_Q31);
+}
+
 static bool model_is_valid(const pvid_model_q31 *model)
 {
     return !((model == NULL) || (model->theta == NULL) || (model->jacobian == NULL) || (model->formats == NULL) ||
              (model->c_row == NULL) || (model->c_column == NULL) || (model->n_theta < 1u) ||
              (model->n_theta > PVID_MAX_THETA_Q31) || (model->n_p < 1u) || (model->n_p > PVID_MAX_P) ||
-             (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31));
+             (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31)) &&
+           moments_are_valid(pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end));
 }
 
 static bool formats_are_valid(const pvid_estimator_config_q31 *config)
@@ -126,8 +132,7 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
     }
     memset(self, 0, sizeof *self);
     self->model = config->model;
-    pvid_information_init_q31(&self->information, config->model->n_theta, config->forgetting_groups,
-                              config->row_weight);
+    pvid_information_init_q31(&self->information, config->model, config->forgetting_groups, config->row_weight);
     init_formats(self, config);
     for (size_t i = 0; i < config->model->n_p; i++) {
         self->p[i] = config->start[i];
@@ -173,17 +178,59 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
 
 /* ---- rows ---- */
 
-pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
+pvid_reason pvid_estimator_add_kind_q31(pvid_estimator_q31 *self, uint8_t kind, const int32_t n[], int32_t y)
 {
     if (!pvid_estimator_is_ready_q31(self)) {
         return PVID_NOT_READY;
     }
+    const bool exists = kind < pvid_kinds_count(self->model->n_kinds);
+    PVID_ASSERT(exists);
+    if (!exists) {
+        return PVID_NOT_READY;
+    }
+    pvid_block block;
     int64_t e;
-    if (!pvid_estimator_innovation_q31(self, n, y, &e)) {
+    pvid_information_block_q31(self->model, pvid_kind_first(self->model->kind_end, kind), &block);
+    if (!pvid_estimator_innovation_q31(self, &block, n, y, &e)) {
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
-    pvid_estimator_add_row_q31(self, n, (int32_t)e, pvid_square_q31((int32_t)e));
+    pvid_estimator_add_row_q31(self, &block, n, (int32_t)e, pvid_square_q31((int32_t)e));
+    return PVID_ACCUMULATED;
+}
+
+pvid_reason pvid_estimator_add_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t y)
+{
+    return pvid_estimator_add_kind_q31(self, 0, n, y);
+}
+
+pvid_reason pvid_estimator_add_to_b_q31(pvid_estimator_q31 *self, const pvid_scaled_q31 g[])
+{
+    if (!pvid_estimator_is_ready_q31(self)) {
+        return PVID_NOT_READY;
+    }
+    const size_t n = self->model->n_theta;
+    const bool is_rate = self->settings.gain < PVID_ONE_Q30;
+    int64_t *b = &self->information.sums[((size_t)self->information.n_sums - 2u) - n];
+    int64_t added[PVID_MAX_THETA_Q31];
+    bool fits = true;
+    for (size_t i = 0; i < n; i++) {
+        const int64_t exact = pvid_scaled_fixed_q31(g[i], -2 * (int32_t)self->information.exponent);
+        added[i] = pvid_clamp_q31(exact, PVID_CLAMP_LIMIT);
+        const int64_t fresh = is_rate ? self->fresh[i] : 0;
+        fits = fits && (pvid_magnitude_q31(b[i] + added[i]) <= (uint64_t)PVID_CLAMP_LIMIT) &&
+               (pvid_magnitude_q31(fresh + added[i]) <= (uint64_t)PVID_CLAMP_LIMIT);
+    }
+    if (!fits) {
+        pvid_count_up(&self->counters.rejected_saturated);
+        return PVID_REJECTED_SATURATED;
+    }
+    for (size_t i = 0; i < n; i++) {
+        b[i] += added[i];
+        if (is_rate) {
+            self->fresh[i] += added[i];
+        }
+    }
     return PVID_ACCUMULATED;
 }
 

@@ -9,6 +9,8 @@
 #define BLOCK_MAX 64u
 #define SUM_LOW ((int64_t)1 << 54)
 #define KEEP INT32_MAX
+#define RESIDUAL_MAX (3 * PVID_SUM_LIMIT) /* of rr, which the rows of all kinds add to: 16 rows of one stay below it   \
+                                           */
 
 /* exp(-block / groups) in Q31 for block <= groups / 4, by the series of exp. */
 static int32_t decay(uint32_t block, uint32_t groups)
@@ -22,12 +24,23 @@ static int32_t decay(uint32_t block, uint32_t groups)
     return (int32_t)((sum > KEEP) ? KEEP : sum);
 }
 
-void pvid_information_init_q31(pvid_information_q31 *self, uint8_t n_theta, uint32_t forgetting_groups,
+void pvid_information_block_q31(const pvid_model_q31 *model, size_t i, pvid_block *block)
+{
+    block->first = 0;
+    block->n = model->n_theta;
+    block->moment = 0;
+    if (model->n_kinds > 1u) {
+        pvid_block_among_kinds(model->n_kinds, model->kind_end, i, block);
+    }
+}
+
+void pvid_information_init_q31(pvid_information_q31 *self, const pvid_model_q31 *model, uint32_t forgetting_groups,
                                uint32_t row_weight)
 {
     memset(self, 0, sizeof *self);
-    self->n_theta = n_theta;
-    self->n_sums = (uint16_t)(((n_theta * (n_theta + 1u)) / 2u) + n_theta + 2u);
+    self->n_theta = model->n_theta;
+    self->n_sums =
+        (uint16_t)(pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end) + model->n_theta + 2u);
     self->block = BLOCK_MAX;
     self->retention = KEEP;
     self->row_weight = row_weight;
@@ -39,39 +52,49 @@ void pvid_information_init_q31(pvid_information_q31 *self, uint8_t n_theta, uint
     }
 }
 
-void pvid_information_add_q31(pvid_information_q31 *self, const int32_t n[], int32_t e, int64_t fresh[])
+void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *block, const int32_t n[], int32_t e,
+                              int64_t fresh[])
 {
-    const size_t n_theta = self->n_theta;
+    const size_t n_own = block->n;
     int32_t row[PVID_MAX_THETA_Q31];
-    for (size_t i = 0; i < n_theta; i++) {
+    for (size_t i = 0; i < n_own; i++) {
         row[i] = (int32_t)pvid_round_shift_q31(n[i], self->exponent);
     }
     const int32_t error = (int32_t)pvid_round_shift_q31(e, self->exponent);
-    int64_t *sum = self->sums;
-    for (size_t i = 0; i < n_theta; i++) {
-        for (size_t j = i; j < n_theta; j++) {
+    int64_t *sum = &self->sums[block->moment];
+    for (size_t i = 0; i < n_own; i++) {
+        for (size_t j = i; j < n_own; j++) {
             *sum += pvid_product_q31(row[i], row[j]);
             sum++;
         }
     }
-    for (size_t i = 0; i < n_theta; i++) {
+    int64_t *tail = &self->sums[self->n_sums - 2u]; /* rr, weight */
+    sum = &tail[(ptrdiff_t)block->first - (ptrdiff_t)self->n_theta];
+    for (size_t i = 0; i < n_own; i++) {
         const int64_t product = pvid_product_q31(row[i], error);
         sum[i] += product;
         if (fresh != NULL) {
-            fresh[i] += product;
+            fresh[block->first + i] += product;
         }
     }
-    sum[n_theta] += pvid_square_q31(error);
-    sum[n_theta + 1u] += self->row_weight;
+    tail[0] = pvid_clamp_q31(tail[0] + pvid_square_q31(error), RESIDUAL_MAX);
+    tail[1] += self->row_weight;
 }
 
 /* The largest sum of squares: the others cannot be larger. */
-static int64_t largest_of(const pvid_information_q31 *self)
+static int64_t largest_of(const pvid_information_q31 *self, const pvid_model_q31 *model)
 {
     int64_t largest = self->sums[self->n_sums - 2u];
-    for (uint32_t i = 0; i < self->n_theta; i++) {
-        const int64_t own = self->sums[pvid_moment_q31(self->n_theta, i, i)];
-        largest = (own > largest) ? own : largest;
+    const int64_t *diagonal = self->sums;
+    size_t kind = 0;
+    size_t end = pvid_information_end_of_q31(model, 0);
+    for (size_t i = 0; i < model->n_theta; i++) {
+        if (i == end) {
+            kind++;
+            end = pvid_information_end_of_q31(model, kind);
+        }
+        largest = (*diagonal > largest) ? *diagonal : largest;
+        diagonal += end - i; /* entries of row i of its block */
     }
     return largest;
 }
@@ -97,9 +120,9 @@ static int64_t four_times(int64_t x)
     return 4 * pvid_clamp_q31(x, PVID_WIDE / 4);
 }
 
-static void rescale(pvid_information_q31 *self, int64_t fresh[])
+static void rescale(pvid_information_q31 *self, const pvid_model_q31 *model, int64_t fresh[])
 {
-    const int64_t largest = largest_of(self);
+    const int64_t largest = largest_of(self, model);
     const bool less = largest > PVID_SUM_LIMIT;
     if (!less && ((largest >= SUM_LOW) || (self->exponent == 0u))) {
         return;
@@ -113,7 +136,8 @@ static void rescale(pvid_information_q31 *self, int64_t fresh[])
     self->exponent = (uint8_t)(less ? (self->exponent + 1u) : (self->exponent - 1u));
 }
 
-void pvid_information_end_group_q31(pvid_information_q31 *self, size_t part, int64_t fresh[])
+void pvid_information_end_group_q31(pvid_information_q31 *self, const pvid_model_q31 *model, size_t part,
+                                    int64_t fresh[])
 {
     const size_t half = self->n_sums / 2u;
     if (part == 0u) {
@@ -123,7 +147,7 @@ void pvid_information_end_group_q31(pvid_information_q31 *self, size_t part, int
     }
     forget(self, half, self->n_sums);
     self->age = (uint16_t)((self->age < self->block) ? self->age : 0u);
-    rescale(self, fresh);
+    rescale(self, model, fresh);
 }
 
 void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t factor)

@@ -21,10 +21,10 @@ void pvid_block_among_kinds(size_t n_kinds, const uint8_t kind_end[], size_t i, 
  * kind_end is not read. */
 size_t pvid_kinds_moments(size_t n_theta, size_t n_kinds, const uint8_t *kind_end);
 
-/* Whether a row may be of this kind. */
-static inline bool pvid_kind_exists(size_t n_kinds, size_t kind)
+/* Number of kinds: at least 1. */
+static inline size_t pvid_kinds_count(size_t n_kinds)
 {
-    return kind < ((n_kinds > 1u) ? n_kinds : 1u);
+    return (n_kinds > 1u) ? n_kinds : 1u;
 }
 
 /* First entry of theta of a kind that exists. */

@@ -27,32 +27,38 @@ static int64_t term_of(int64_t x, int32_t shift)
                                 : pvid_clamp_q31(pvid_scale_q31(x, shift), TERM_MAX);
 }
 
-bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t term[], int64_t *e)
+bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const pvid_block *block, const int32_t n[], int32_t y,
+                              int64_t term[], int64_t *e)
 {
+    const int32_t *mantissa = &self->mantissa[block->first];
+    const int16_t *shift = &self->shift[block->first];
     bool fits = (y >= -PVID_ROW_LIMIT_Q31) && (y <= PVID_ROW_LIMIT_Q31);
     int64_t rest = y;
-    for (size_t i = 0; i < self->model->n_theta; i++) {
+    for (size_t i = 0; i < block->n; i++) {
         fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
         const int32_t below = (n[i] > PVID_ROW_LIMIT_Q31) ? PVID_ROW_LIMIT_Q31 : n[i];
         const int32_t clamped = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
-        term[i] = term_of(pvid_product_q31(clamped, self->mantissa[i]), self->shift[i]);
+        term[i] = term_of(pvid_product_q31(clamped, mantissa[i]), shift[i]);
         rest -= term[i];
     }
     *e = rest;
     return fits && (*e >= -PVID_ROW_LIMIT_Q31) && (*e <= PVID_ROW_LIMIT_Q31);
 }
 
-bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const int32_t n[], int32_t y, int64_t *e)
+bool pvid_estimator_innovation_q31(const pvid_estimator_q31 *self, const pvid_block *block, const int32_t n[],
+                                   int32_t y, int64_t *e)
 {
     int64_t term[PVID_MAX_THETA_Q31];
-    return pvid_estimator_terms_q31(self, n, y, term, e);
+    return pvid_estimator_terms_q31(self, block, n, y, term, e);
 }
 
-void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const int32_t n[], int32_t e, int64_t square)
+void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const pvid_block *block, const int32_t n[], int32_t e,
+                                int64_t square)
 {
     self->group_rss = pvid_clamp_q31(self->group_rss + square, PVID_WIDE);
     self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
-    pvid_information_add_q31(&self->information, n, e, (self->settings.gain < PVID_ONE_Q30) ? self->fresh : NULL);
+    pvid_information_add_q31(&self->information, block, n, e,
+                             (self->settings.gain < PVID_ONE_Q30) ? self->fresh : NULL);
     pvid_count_up(&self->counters.rows);
 }
 

@@ -31,16 +31,15 @@ enum {
 
 #define ROWS_PER_STAGE 8u
 #define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
-#define PIVOTS_PER_STAGE 2u
-#define REST_BITS 28 /* of F: products with a solution of 30 bits add up in 62 */
+#define REST_BITS 28                /* of F: products with a solution of 30 bits add up in 62 */
 
 /* Returns the next row. */
 static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t row)
 {
     if (row == 0u) {
-        pvid_system_exponents_q31(&self->information, solve->h);
+        pvid_system_exponents_q31(&self->information, self->model, solve->h);
     }
-    return pvid_system_scale_rows_q31(&self->information, solve->h, row, solve->m);
+    return pvid_system_scale_rows_q31(&self->information, self->model, solve->h, row, solve->m);
 }
 
 /* Right-hand side of the step by rows of C, g b + (1 - g) sum N e since the last solve, scaled as these rows. */
@@ -69,28 +68,11 @@ static void project_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q
     solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->c, solve->start, row);
 }
 
-/* S as it is to be factored. */
-static void begin_factor(pvid_estimator_solve_q31 *solve, uint8_t n_p, const int64_t s[][PVID_MAX_P])
-{
-    pvid_system_equilibrate_q31(n_p, s, solve->system.g, solve->system.q);
-    pvid_cholesky_begin_q31(&solve->system.factor, n_p);
-}
-
 /* Parts of a stage that factors: one prepares the matrix, then the parameters are eliminated, from the last, a few at a
  * time. */
 static size_t factor_parts(size_t n_p)
 {
-    return 1u + ((n_p + (PIVOTS_PER_STAGE - 1u)) / PIVOTS_PER_STAGE);
-}
-
-static void eliminate_part(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part)
-{
-    const size_t first = (part - 1u) * PIVOTS_PER_STAGE;
-    const size_t end = ((n_p - first) > PIVOTS_PER_STAGE) ? (first + PIVOTS_PER_STAGE) : n_p;
-    for (size_t eliminated = first; eliminated < end; eliminated++) {
-        pvid_cholesky_eliminate_q31(&solve->system.factor, (const int32_t (*)[PVID_MAX_P])solve->system.q,
-                                    (n_p - 1u) - eliminated);
-    }
+    return 1u + ((n_p + (PVID_PIVOTS_PER_PART - 1u)) / PVID_PIVOTS_PER_PART);
 }
 
 static bool checks_noise(const pvid_estimator_q31 *self)
@@ -108,10 +90,10 @@ static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_sol
     if (part == 0u) {
         int64_t rest[PVID_MAX_P][PVID_MAX_P];
         pvid_system_without_noise_q31(self, solve, rest);
-        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])rest);
+        pvid_system_begin_factor_q31(&solve->system, n_p, (const int64_t (*)[PVID_MAX_P])rest);
         return;
     }
-    eliminate_part(solve, n_p, part);
+    pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
     solve->above_noise = solve->system.factor.positive;
 }
 
@@ -130,10 +112,10 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
         add_prior(self, solve);
-        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
+        pvid_system_begin_factor_q31(&solve->system, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
         return;
     }
-    eliminate_part(solve, n_p, part);
+    pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
     if ((part + 1u) < factor_parts(n_p)) {
         return;
     }
@@ -230,7 +212,7 @@ static void scale_theta_step(const pvid_estimator_q31 *self, pvid_estimator_solv
         const int32_t length = (pvid_length_q31(step[j]) - self->align[j]) + solve->h[j];
         largest = (length > largest) ? length : largest;
     }
-    solve->step_exponent = largest - 29;
+    solve->step_exponent = largest - (29 - pvid_system_guard_bits_q31(n));
     for (size_t j = 0; j < n; j++) {
         const int64_t scaled = pvid_scale_q31(step[j], (solve->step_exponent + self->align[j]) - solve->h[j]);
         solve->theta_step[j] = (int32_t)pvid_clamp_q31(scaled, PVID_ONE_Q30 / 2);
@@ -251,22 +233,34 @@ static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve
     scale_theta_step(self, solve);
 }
 
+/* Entry i of m x for the packed upper triangle m by rows. */
+static inline int64_t row_times(size_t n, const int32_t m[], size_t i, const int32_t x[])
+{
+    size_t at = i;
+    int64_t sum = 0;
+    for (size_t j = 0; j < i; j++) {
+        sum += pvid_product_q31(m[at], x[j]);
+        at += (n - 1u) - j;
+    }
+    for (size_t j = i; j < n; j++) {
+        sum += pvid_product_q31(m[at], x[j]);
+        at++;
+    }
+    return sum;
+}
+
 /* Rows first.. of M dtheta; returns the next row. */
 static size_t move_b_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t first)
 {
     const size_t n = self->model->n_theta;
     const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
+    pvid_block block = {0, 0, 0};
     for (size_t i = first; i < last; i++) {
-        size_t at = i;
-        int64_t sum = 0;
-        for (size_t j = 0; j < i; j++) {
-            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
-            at += (n - 1u) - j;
+        if (i >= (block.first + block.n)) {
+            pvid_information_block_q31(self->model, i, &block);
         }
-        for (size_t j = i; j < n; j++) {
-            sum += pvid_product_q31(solve->m[at], solve->theta_step[j]);
-            at++;
-        }
+        const int64_t sum =
+            row_times(block.n, &solve->m[block.moment], i - block.first, &solve->theta_step[block.first]);
         solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_CLAMP_LIMIT);
     }
     return last;
@@ -450,7 +444,7 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
         commit_stage(self, solve);
         break;
     case STAGE_FOLD:
-        pvid_information_end_group_q31(&self->information, index, self->fresh);
+        pvid_information_end_group_q31(&self->information, self->model, index, self->fresh);
         all = PVID_INFORMATION_END_PARTS;
         break;
     case STAGE_DONE:
@@ -464,11 +458,11 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
 static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
 {
     if (part == 0u) {
-        begin_factor(solve, (uint8_t)n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
+        pvid_system_begin_factor_q31(&solve->system, (uint8_t)n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
         return;
     }
     if (part < factor_parts(n_p)) {
-        eliminate_part(solve, n_p, part);
+        pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
     } else if (solve->system.factor.positive) {
         estimate->kappa = solve->system.factor.first_pivot;
         estimate->least_pivot =
@@ -481,9 +475,9 @@ static void widen_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
         pvid_assess_widen_q31(&solve->system, &self->settings, solve->inverse.wide);
-        begin_factor(solve, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
+        pvid_system_begin_factor_q31(&solve->system, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
     } else {
-        eliminate_part(solve, n_p, part);
+        pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
     }
 }
 
@@ -524,7 +518,7 @@ bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_esti
 /* Number of stages of M, C, S and the noise check. */
 static size_t shared_stages(const pvid_model_q31 *model)
 {
-    return pvid_system_row_stages_q31(model->n_theta) + 1u + model->n_p + factor_parts(model->n_p);
+    return pvid_system_row_stages_q31(model) + 1u + model->n_p + factor_parts(model->n_p);
 }
 
 uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_group)

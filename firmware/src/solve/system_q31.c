@@ -5,33 +5,44 @@
 /* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
 #define ENTRIES_PER_STAGE 18u
 
-void pvid_system_exponents_q31(const pvid_information_q31 *information, int16_t h[])
+void pvid_system_exponents_q31(const pvid_information_q31 *information, const pvid_model_q31 *model, int16_t h[])
 {
-    const uint32_t n = information->n_theta;
-    for (uint32_t i = 0; i < n; i++) {
-        h[i] = (int16_t)pvid_half_exponent_q31(information->sums[pvid_moment_q31(n, i, i)]);
+    const int64_t *diagonal = information->sums;
+    size_t kind = 0;
+    size_t end = pvid_information_end_of_q31(model, 0);
+    for (size_t i = 0; i < model->n_theta; i++) {
+        if (i == end) {
+            kind++;
+            end = pvid_information_end_of_q31(model, kind);
+        }
+        h[i] = (int16_t)pvid_half_exponent_q31(*diagonal);
+        diagonal += end - i; /* entries of row i of its block */
     }
 }
 
-/* One past the last row of a stage that starts with `row`. */
-static size_t rows_end(size_t n_theta, size_t row)
+/* One past the last row of a stage that starts with `row`: some rows of one block. */
+static size_t rows_end(const pvid_block *block, size_t row)
 {
+    const size_t all = block->first + block->n;
     size_t entries = 0;
     size_t end = row;
-    while ((end < n_theta) && (entries < ENTRIES_PER_STAGE)) {
-        entries += n_theta - end;
+    while ((end < all) && (entries < ENTRIES_PER_STAGE)) {
+        entries += all - end;
         end++;
     }
     return end;
 }
 
-size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const int16_t h[], size_t row, int32_t m[])
+size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const pvid_model_q31 *model,
+                                  const int16_t h[], size_t row, int32_t m[])
 {
-    const size_t n = information->n_theta;
-    const size_t end = rows_end(n, row);
-    size_t at = (size_t)pvid_moment_q31((uint32_t)n, (uint32_t)row, (uint32_t)row);
+    pvid_block block;
+    pvid_information_block_q31(model, row, &block);
+    const size_t all = block.first + block.n;
+    const size_t end = rows_end(&block, row);
+    size_t at = block.moment + pvid_moment_q31(block.n, row - block.first, row - block.first);
     for (size_t i = row; i < end; i++) {
-        for (size_t j = i; j < n; j++) {
+        for (size_t j = i; j < all; j++) {
             m[at] = (int32_t)pvid_clamp_q31(pvid_scale_q31(information->sums[at], h[i] + h[j]), PVID_ONE_Q30);
             at++;
         }
@@ -39,13 +50,24 @@ size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const
     return end;
 }
 
-size_t pvid_system_row_stages_q31(size_t n_theta)
+size_t pvid_system_row_stages_q31(const pvid_model_q31 *model)
 {
     size_t stages = 0;
-    for (size_t row = 0; (row < n_theta) && (stages < n_theta); row = rows_end(n_theta, row)) {
-        stages++; /* of a row at least */
+    size_t row = 0;
+    while ((row < model->n_theta) && (stages < model->n_theta)) { /* a row at least each */
+        pvid_block block;
+        pvid_information_block_q31(model, row, &block);
+        row = rows_end(&block, row);
+        stages++;
     }
     return stages;
+}
+
+/* The largest sums are over entries of C and M, C and right-hand sides, steps and b: with 11 theta they are below
+ * 2^63. */
+int32_t pvid_system_guard_bits_q31(size_t n_theta)
+{
+    return (n_theta <= 11u) ? 0 : ((n_theta <= 22u) ? 1 : 2);
 }
 
 void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[], int32_t c[], int16_t f[])
@@ -64,8 +86,9 @@ void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[],
         const size_t a = model->c_column[k];
         largest[a] = (length > largest[a]) ? length : largest[a];
     }
+    const int32_t bits = 29 - pvid_system_guard_bits_q31(model->n_theta);
     for (size_t a = 0; a < model->n_p; a++) {
-        f[a] = (int16_t)(largest[a] - 29);
+        f[a] = (int16_t)(largest[a] - bits);
     }
     for (size_t k = 0; k < model->n_c; k++) {
         c[k] = (int32_t)pvid_clamp_q31(pvid_scale_q31(value[k], f[model->c_column[k]] - exponent[k]), PVID_ONE_Q30 / 2);
@@ -73,7 +96,7 @@ void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[],
 }
 
 /* t += m e_j a for the symmetric m, packed upper triangle by rows. */
-static void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int64_t t[])
+static inline void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int64_t t[])
 {
     size_t at = j;
     for (size_t i = 0; i < j; i++) {
@@ -91,8 +114,13 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
 {
     const size_t end = pvid_column_end_q31(model, start);
     int64_t t[PVID_MAX_THETA_Q31] = {0}; /* m c_a */
+    pvid_block block = {0, 0, 0};
     for (size_t k = start; k < end; k++) {
-        add_column(model->n_theta, m, model->c_row[k], c[k], t);
+        const size_t row = model->c_row[k];
+        if (row >= (block.first + block.n)) { /* they ascend */
+            pvid_information_block_q31(model, row, &block);
+        }
+        add_column(block.n, &m[block.moment], row - block.first, c[k], &t[block.first]);
     }
     for (size_t i = 0; i < model->n_theta; i++) {
         t[i] = pvid_round_shift_q31(t[i], PVID_S_BITS);
@@ -130,6 +158,21 @@ void pvid_system_equilibrate_q31(uint8_t n_p, const int64_t s[][PVID_MAX_P], int
         for (size_t b = a; b < n_p; b++) {
             q[a][b] = (int32_t)pvid_clamp_q31(pvid_scale_q31(s[a][b], g[a] + g[b]), PVID_ONE_Q30);
         }
+    }
+}
+
+void pvid_system_begin_factor_q31(pvid_system_q31 *system, uint8_t n_p, const int64_t s[][PVID_MAX_P])
+{
+    pvid_system_equilibrate_q31(n_p, s, system->g, system->q);
+    pvid_cholesky_begin_q31(&system->factor, n_p);
+}
+
+void pvid_system_eliminate_q31(pvid_system_q31 *system, size_t n_p, size_t part)
+{
+    const size_t first = part * PVID_PIVOTS_PER_PART;
+    const size_t end = ((n_p - first) > PVID_PIVOTS_PER_PART) ? (first + PVID_PIVOTS_PER_PART) : n_p;
+    for (size_t eliminated = first; eliminated < end; eliminated++) {
+        pvid_cholesky_eliminate_q31(&system->factor, (const int32_t (*)[PVID_MAX_P])system->q, (n_p - 1u) - eliminated);
     }
 }
 

@@ -146,13 +146,15 @@ static bool passes(pvid_strong_q31 *self, int64_t square)
     return (self->gate.limit.m == 0) || pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(square, 0));
 }
 
+static const pvid_block whole = {0, PVID_KAPITZA_STRONG_THETA, 0}; /* of M: rows of one kind */
+
 /* Judges a row, adds it if the gate accepts it, and solves. */
 static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
 {
     pvid_estimator_q31 *estimator = &self->estimator;
     int64_t term[PVID_KAPITZA_STRONG_THETA];
     int64_t e;
-    if (!pvid_estimator_terms_q31(estimator, n, y, term, &e)) {
+    if (!pvid_estimator_terms_q31(estimator, &whole, n, y, term, &e)) {
         return refuse(self);
     }
     const int32_t innovation = (int32_t)e;
@@ -164,7 +166,7 @@ static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    pvid_estimator_add_row_q31(estimator, n, innovation, square);
+    pvid_estimator_add_row_q31(estimator, &whole, n, innovation, square);
     const pvid_reason reason = pvid_estimator_update_q31(estimator);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;

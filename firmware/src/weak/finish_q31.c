@@ -414,12 +414,13 @@ static void remove_components(pvid_weak_finish_q31 *self, size_t first, size_t l
 static void add_residuals(pvid_weak_finish_q31 *self, const pvid_estimator_q31 *estimator, size_t first, size_t last,
                           int32_t sums[][PVID_WEAK_TERMS_Q31])
 {
+    const pvid_block whole = {0, estimator->model->n_theta, 0}; /* rows of one kind */
     if (first == 0u) {
         self->rss = 0;
     }
     for (size_t k = first; k < last; k++) {
         int64_t e;
-        (void)pvid_estimator_innovation_q31(estimator, &sums[k][COLUMN_N], sums[k][COLUMN_Y], &e);
+        (void)pvid_estimator_innovation_q31(estimator, &whole, &sums[k][COLUMN_N], sums[k][COLUMN_Y], &e);
         const int64_t within = pvid_clamp_q31(e, COLUMN_LIMIT);
         self->rss = pvid_clamp_q31(self->rss + (within * within), PVID_WIDE);
     }

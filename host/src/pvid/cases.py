@@ -310,7 +310,12 @@ class _Fixed(Case):
         return [*super().facts(config), f"bits to spare at full scale: {spare}"]
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
-        more = {"PVID_MAX_THETA_Q31": str(len(config.estimator.n_bits))}
+        n_theta = len(config.estimator.n_bits)
+        more = {
+            "PVID_MAX_THETA_Q31": str(n_theta),
+            "PVID_MAX_MOMENTS_Q31": str(n_theta * (n_theta + 1) // 2),
+            "PVID_MAX_C_Q31": str(2 * n_theta),
+        }
         return super().sizes(config, exact) | (more if exact else {})
 
     def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:

@@ -4,8 +4,7 @@
 
 #include "pvid/estimator_q31.h"
 
-/* Layout of the sums: n_theta (n_theta + 1) / 2 of M (upper triangle by rows), n_theta of b, rr, weight (Q16). */
-#define PVID_MAX_MOMENTS_Q31 ((PVID_MAX_THETA_Q31 * (PVID_MAX_THETA_Q31 + 1)) / 2)
+/* Layout of the sums: M (the upper triangle of the block of each kind by rows), n_theta of b, rr, weight (Q16). */
 #define PVID_MAX_SUMS_Q31 (PVID_MAX_MOMENTS_Q31 + PVID_MAX_THETA_Q31 + 2)
 
 /* r 2^e, a square root: r of 30 or 31 bits, or 0. */

@@ -9,12 +9,13 @@
 
 /* The front end: signals of the last ticks, and the FIR job of the last complete step in slices. */
 typedef struct {
+    bool plain;                          /* every signal is a sample */
     bool held;                           /* a signal needs the next sample: all signals are those of the tick before */
     bool seen;                           /* a sample since the restart */
     uint8_t jet;                         /* being formed; jets: none */
     uint16_t half;                       /* of the longest filter */
     uint16_t length;                     /* places of the ring in use, 2 half + D: a job may last a whole block */
-    uint16_t pairs_per_tick;             /* such that a job lasts half a block */
+    uint16_t pairs_per_tick;             /* such that a job lasts half a block at most */
     uint16_t head;                       /* place of the next signals */
     uint16_t wait;                       /* ticks until the next job begins */
     uint16_t centre;                     /* place of the job's instant */
@@ -59,6 +60,26 @@ typedef struct {
     int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
 } pvid_fourier_window_q31;
 
+/* Most rows of a window: parts of its sums. */
+#define PVID_FOURIER_ROWS_Q31 (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+
+/* The noise of a kind's rows, and the directions that the test functions leave out. */
+typedef struct {
+    uint8_t cosines;                                          /* real parts; the other rows are imaginary parts */
+    uint8_t powers;                                           /* of h^2 in use */
+    pvid_scaled_q31 weight[PVID_MAX_POWER];                   /* c_j of the sensors, variance at the power j of h^2 */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                /* D_h, then 1 / sqrt(D_h) */
+    int32_t basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* orthonormal, one of each family in a row, Q30 */
+} pvid_fourier_white_q31;
+
+/* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
+typedef struct {
+    int16_t exponent[PVID_MAX_COLUMNS];
+    int32_t longest;                    /* bits of the largest product of the present column */
+    int64_t sum[PVID_FOURIER_ROWS_Q31]; /* the present column while it is made */
+    int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
+} pvid_fourier_columns_q31;
+
 /* From counts to the S_h of windows. */
 typedef struct {
     const pvid_fourier_design_q31 *design;
@@ -70,5 +91,58 @@ typedef struct {
     pvid_fourier_sums_q31 sums;
     pvid_fourier_window_q31 window;
 } pvid_fourier_collect_q31;
+
+/* Sums of a sample over the steps of each half [counts], for the check of the drive. */
+typedef struct {
+    int64_t sum[2][PVID_MAX_SAMPLES];
+    int64_t square[2][PVID_MAX_SAMPLES];
+} pvid_fourier_drive_q31;
+
+/* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
+typedef struct {
+    uint8_t stage;
+    uint8_t kind;
+    uint8_t theta;                                /* first one of the kind */
+    uint8_t used;                                 /* kinds whose rows have been added */
+    uint8_t live;                                 /* nuisances of the kind that are projected out */
+    uint8_t iteration;                            /* solves done for this window */
+    uint8_t part;                                 /* of a column's stages */
+    bool saturated;                               /* a row of the kind does not fit: none of them is used */
+    uint16_t index;                               /* within the stage */
+    uint16_t term;                                /* first one of the present column */
+    uint16_t free;                                /* rows less nuisances of the kinds that were added */
+    pvid_reason reason;                           /* of the last solve, then of the window */
+    int64_t size;                                 /* of the last step, relative, Q22 */
+    int64_t rss;                                  /* of the kind's rows before the steps */
+    int32_t fade_factor;                          /* factor on the sums before this window's rows, Q31; 0: none */
+    pvid_scaled_q31 expected;                     /* variance of a row */
+    pvid_scaled_q31 least;                        /* D_h */
+    pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
+    uint64_t whole[PVID_MAX_COLUMNS];             /* square of each column before nuisances are projected out */
+    int8_t n_bits[PVID_MAX_THETA_Q31];            /* formats of the rows */
+    int8_t y_bits;
+    pvid_gate_q31 gate[PVID_MAX_KINDS];
+    pvid_fourier_white_q31 white;
+    pvid_fourier_columns_q31 columns;
+    pvid_estimator_solve_q31 solve;
+    pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
+} pvid_fourier_finish_q31;
+
+/* Only the functions of fourier_q31.h write to it. */
+struct pvid_fourier_q31 {
+    const pvid_fourier_design_q31 *design;
+    const int32_t *offset;
+    const int32_t *drive_min;
+    uint8_t iterations;
+    uint8_t stages_per_tick; /* stages of a whole window per tick */
+    bool warm;               /* a window has been complete since the restart */
+    bool frozen;             /* complete windows are dropped */
+    bool driven;             /* the last two halves had enough drive */
+    pvid_fourier_drive_q31 drive;
+    pvid_fourier_collect_q31 collect;
+    pvid_fourier_finish_q31 finish;
+    pvid_estimator_q31 estimator;
+    pvid_trust_q31 trust;
+};
 
 #endif

@@ -149,9 +149,11 @@ def header(run: ReplayRun, samples: Path | None = None) -> str:
             "",
             f"#define REPLAY_TYPE pvid_{run.form}_{run.core}",
             f"#define REPLAY_INIT pvid_{run.form}_init_{run.core}",
-            f"#define REPLAY_STEP pvid_{run.form}_step_{run.core}",
+            f"#define REPLAY_STEP(self, sample) pvid_{run.form}_step_{run.core}(self, (sample)[0], (sample)[1])",
             f"#define REPLAY_HASH pvid_fnv_estimator_{run.core}",
             f"#define REPLAY_SAMPLE {'float' if _is_float(run) else 'int32_t'}",
+            "#define REPLAY_COUNT int16_t",
+            "#define REPLAY_CHANNELS 2u",
             f"#define REPLAY_FAULTS {'pvid_arithmetic_faults_f32()' if _is_float(run) else '0u'}",
             f"#define REPLAY_IS_FLOAT {int(_is_float(run))}",
             f'#define REPLAY_FORM "{run.form}"',
@@ -192,11 +194,9 @@ def _packed(run: ReplayRun) -> bytes:
 def _resolutions(run: ReplayRun) -> list[str]:
     """What a count is worth to the core: itself in fixed point."""
     if not _is_float(run):
-        return ["#define replay_phi_lsb 1", "#define replay_y_lsb 1"]
-    return [
-        f"#define replay_phi_lsb {float_literal(run.phi_lsb)}",
-        f"#define replay_y_lsb {float_literal(run.y_lsb)}",
-    ]
+        return ["static const int32_t replay_lsb[REPLAY_CHANNELS] = {1, 1};"]
+    lsb = ", ".join(map(float_literal, (run.phi_lsb, run.y_lsb)))
+    return [f"static const float replay_lsb[REPLAY_CHANNELS] = {{{lsb}}};"]
 
 
 def _is_float(run: ReplayRun) -> bool:

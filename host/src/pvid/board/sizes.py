@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
+from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
 from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
 from pvid.board.stack_bound import stack_bound
+from pvid.models.registry import DEFAULT
 
 TICKS = 5000
 TIMEOUT_S = 300.0
@@ -35,11 +37,12 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Configuration:
-    """A board, the arithmetic and the form of the identifier."""
+    """A board, the arithmetic and the form of the identifier; form "fourier": the weak engine of any mechanism."""
 
     board: Board
     form: str
     core: str = "f32"
+    model: str = DEFAULT
 
     @property
     def name(self) -> str:
@@ -47,6 +50,7 @@ class Configuration:
         return f"{self.board.name} {self.form} {self.core}"
 
 
+ENGINE = "fourier"
 ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
 
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
@@ -92,6 +96,7 @@ def _bytes_of(map_text: str, name: str, source: str) -> int:
 
 
 _CORE = r"libpvid\.a\("
+_MODEL = r"_weak_f32\.c"  # what is generated of a mechanism
 _ARITHMETIC = r"libgcc\.a\(|libm\.a\(|libc\.a\(|freestanding/"
 _CODE = r"\.text|\.s?rodata"
 
@@ -104,6 +109,8 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     PvidError
         When a compiler or emulator is missing, or the image fails.
     """
+    if configuration.form == ENGINE:
+        return _measure_engine(configuration)
     board = configuration.board
     image, tree = build_image(board, standard_run(configuration.form, TICKS, configuration.core))
     map_text = image.with_suffix(".map").read_text(encoding="utf-8")
@@ -126,16 +133,73 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     return footprint, report
 
 
+def _measure_engine(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
+    """The weak engine of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
+    board = configuration.board
+    run = mechanism_run(configuration.model)
+    image, tree = build_mechanism_image(board, run)
+    map_text = image.with_suffix(".map").read_text(encoding="utf-8")
+    report = play(board, image, TIMEOUT_S)
+    code = _bytes_of(map_text, _CODE, _CORE) + _bytes_of(map_text, r"\.text", _MODEL)
+    tables = _bytes_of(map_text, r"\.s?rodata", _MODEL)
+    tables += _bytes_of(map_text, rf"\.s?rodata\.{run.name}_", r"replay")
+    footprint = Footprint(
+        text=code,
+        arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),
+        tables=tables,
+        data=_bytes_of(map_text, r"\.s?data", _CORE),
+        bss=_bytes_of(map_text, r"\.s?bss|COMMON", _CORE) + report.state_bytes,
+        stack_bound=stack_bound(board.tool_prefix, image, tree, board.entry),
+        stack_seen=report.stack_used,
+        mean=round(report.instructions_mean),
+        longest=round(report.instructions_longest),
+    )
+    return footprint, report
+
+
+def configurations_on(boards: Sequence[Board], models: Sequence[str]) -> list[Configuration]:
+    """All forms and cores on some boards; with models the weak engine of each of them instead."""
+    if models:
+        return [Configuration(board, ENGINE, "f32", model) for board in boards for model in models]
+    return [one for one in CONFIGURATIONS if one.board in boards]
+
+
+def as_json(footprints: Mapping[Configuration, Footprint]) -> list[dict[str, object]]:
+    """The list of `sizes --json`."""
+    return [
+        {
+            "target": one.board.name,
+            "model": one.model,
+            "form": one.form,
+            "core": one.core,
+            "text": found.text + found.arithmetic,
+            "tables": found.tables,
+            "data": found.data,
+            "state": found.bss,
+            "stack_bound": found.stack_bound,
+            "mean": found.mean,
+            "longest": found.longest,
+        }
+        for one, found in footprints.items()
+    ]
+
+
 def table_rows(footprints: dict[Configuration, Footprint]) -> list[tuple[str, ...]]:
     """Cells of the table in host/docs/benchmarks/cost.md, as in HEADER."""
     return [
         (
             f"{configuration.board.core} ({configuration.board.name})",
-            f"{configuration.form}, {configuration.core}",
+            _form_of(configuration),
             *(str(getattr(footprint, name)) for name in Footprint.__dataclass_fields__),
         )
         for configuration, footprint in footprints.items()
     ]
+
+
+def _form_of(configuration: Configuration) -> str:
+    """In the table."""
+    model = f"{configuration.model}, " if configuration.form == ENGINE else ""
+    return f"{model}{configuration.form}, {configuration.core}"
 
 
 # ---- the budget

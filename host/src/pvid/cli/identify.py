@@ -48,7 +48,7 @@ def command(
     gaps are interpolated, long gaps stay empty, a non-uniform clock is corrected; each correction is reported.
 
     With --model, or a rig file with [model], the run is one of another mechanism (host/docs/models.md): its columns are
-    t and the signals of the model, and it is identified in float64.
+    t and the signals of the model. It is identified in float64; with --core f32 also by the C core, compiled for it.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
     reported tick and at the end.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -19,24 +20,45 @@ from pvid.cli.page_table import UPDATE, markdown, put_table
 @click.option(
     "--check", type=click.Path(path_type=Path, exists=True), help="Compare the measured figures with this budget file."
 )
+@click.option(
+    "--model", "models", multiple=True, metavar="NAME", help="The weak engine of a mechanism; may be repeated."
+)
+@click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON.")
+@click.argument("targets", nargs=-1, metavar="[TARGET]...")
 @click.option("--profile", "profiled", metavar="BOARD", help="Count the instructions of a tick on BOARD by function.")
-def command(update: Path | None, budget: Path | None, check: Path | None, profiled: str | None) -> int:
-    """Measures flash, RAM, stack and instructions per tick on every board, built and run in its emulator."""
-    from pvid.board import sizes
+def command(
+    update: Path | None,
+    budget: Path | None,
+    check: Path | None,
+    profiled: str | None,
+    models: tuple[str, ...],
+    as_json: bool,
+    targets: tuple[str, ...],
+) -> int:
+    """Measures flash, RAM, stack and instructions per tick, built and run in an emulator: on every board, or on those
+    named as TARGET."""
+    from pvid.board import boards, sizes
 
     if profiled is not None:
         if budget is not None or check is not None:
             raise PvidError("--profile has no budget: omit --budget and --check")
-        from pvid.board import boards, profile
+        from pvid.board import profile
 
         profiles = {form: profile.profile(boards.board(profiled), form) for form in ("strong", "weak")}
         put_table(update, "profile", markdown(profile.HEADER, profile.table_rows(profiles)))
         return DONE
+    if (targets or models) and (update is not None or budget is not None or check is not None):
+        raise PvidError("--update, --budget and --check measure every board: name no TARGET and no --model")
+    named = [boards.board(name) for name in targets] or list(boards.BOARDS.values())
+    chosen = sizes.configurations_on(named, models)
     footprints = {}
-    with progress_bar("boards", len(sizes.CONFIGURATIONS)) as advance:
-        for done, configuration in enumerate(sizes.CONFIGURATIONS):
+    with progress_bar("boards", len(chosen)) as advance:
+        for done, configuration in enumerate(chosen):
             footprints[configuration] = sizes.measure(configuration)[0]
             advance(done + 1)
+    if as_json:
+        click.echo(json.dumps(sizes.as_json(footprints), indent=2))
+        return DONE
     put_table(update, "sizes", markdown(sizes.HEADER, sizes.table_rows(footprints)))
     if budget is not None:
         sizes.write_budget(budget, footprints)

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from pvid.codegen.fourier_q31 import FixedFourier, c_functions
+from pvid.codegen.parameters_q31 import ParametersQ31, c_parameters
 from pvid.settings.fourier import NONE
-from pvid.settings.fourier_q31 import FourierDesignQ31, Rescale
+from pvid.settings.fourier_q31 import FourierConfigQ31, FourierDesignQ31, Rescale
 
 _WIDTH = 12  # numbers a line
 
 
-def source(made: FixedFourier, design: FourierDesignQ31, prefix: str) -> str:
+def source(made: FixedFourier, parameters: ParametersQ31, design: FourierDesignQ31, prefix: str) -> str:
     """Functions, PREFIX_fourier_q31 and PREFIX_design_q31; all static but the design."""
     return "\n\n".join(
         [
             '#include "pvid/fourier_q31.h"\n#include "pvid/elementary_q31.h"\n\n#include <stddef.h>',
             c_functions(made, prefix).rstrip(),
+            c_parameters(parameters, prefix).rstrip(),
             *_model(made, prefix),
             *_design(design, prefix),
         ]
@@ -63,6 +65,7 @@ def _model(made: FixedFourier, prefix: str) -> list[str]:
         *(f"    .{name} = {prefix}_{name}," for name in tables),
         f"    .prepare = {prefix + '_prepare_q31' if made.prepare else 'NULL'},",
         f"    .values = {prefix}_values_q31,",
+        f"    .model = &{prefix}_model_q31,",
         "};",
     ]
     return [
@@ -96,6 +99,14 @@ def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
         "sign_width": _numbers("int32_t", f"{prefix}_sign_width", design.sign_width),
         "integral": _structs("pvid_fourier_integral_q31", f"{prefix}_integral", design.integral),
         "format": _structs("pvid_fourier_format_q31", f"{prefix}_format", formats),
+        "factor": _structs("pvid_scaled_q31", f"{prefix}_factor", design.factor),
+        "noise": _structs(
+            "pvid_fourier_noise_q31",
+            f"{prefix}_noise",
+            [(x.kind, x.power, x.a, x.b, f"{{{x.factor[0]}, {x.factor[1]}}}") for x in design.noise],
+        ),
+        "error_order": _numbers("uint8_t", f"{prefix}_error_order", design.error_order),
+        "error_variance": _structs("pvid_scaled_q31", f"{prefix}_error_variance", design.error_variance),
         "circle": _numbers("PVID_TABLE int16_t", f"{prefix}_circle", design.circle.tolist()),
     }
     sizes = ("functions", "power", "decimation", "sum_shift", "hop")
@@ -104,7 +115,42 @@ def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
         f"const pvid_fourier_design_q31 {prefix}_design_q31 = {{",
         f"    .model = &{prefix}_fourier_q31,",
         *(f"    .{name} = {getattr(design, name)}," for name in sizes),
+        f"    .n_noise = {len(design.noise)},",
         *(f"    .{name} = {prefix}_{name if text else ''}," for name, text in tables.items() if text),
         "};",
     ]
     return [*parts, *(text for text in tables.values() if text), "\n".join(struct)]
+
+
+def configuration(config: FourierConfigQ31, prefix: str) -> str:
+    """PREFIX_config_q31, behind the design."""
+    own, trust, gate = config.estimator, config.trust, config.gate
+    arrays = ("start", "start_sd", "lower", "upper", "p_bits", "n_bits")
+    numbers = ("y_bits", "row_sd", "forgetting_groups", "gain", "correlation", "row_weight", "step_limit")
+    more = ("kappa_min", "noise_margin", "dead_zone", "divider")
+    of_trust = ("kappa_min", "se_max", "misfit_max", "groups_min", "revert_after", "renewal")
+    parts = [_numbers("int32_t", f"{prefix}_offset", config.offset)]
+    if config.drive_min is not None:
+        parts.append(_numbers("int32_t", f"{prefix}_drive_min", config.drive_min))
+    drive = f"{prefix}_drive_min" if config.drive_min is not None else "NULL"
+    struct = [
+        f"extern const pvid_fourier_config_q31 {prefix}_config_q31;",
+        f"const pvid_fourier_config_q31 {prefix}_config_q31 = {{",
+        f"    .design = &{prefix}_design_q31,",
+        f"    .offset = {prefix}_offset,",
+        f"    .drive_min = {drive},",
+        f"    .iterations = {config.iterations},",
+        "    .estimator = {",
+        *(f"        .{name} = {{{', '.join(map(_literal, getattr(own, name)))}}}," for name in arrays),
+        *(f"        .{name} = {getattr(own, name)}," for name in (*numbers, *more)),
+        "    },",
+        "    .trust = {" + ", ".join(f".{name} = {getattr(trust, name)}" for name in of_trust) + "},",
+        f"    .gate = {{.sigmas = {gate.sigmas}, .patience_groups = {gate.patience_groups}}},",
+        "};",
+    ]
+    return "\n\n".join([*parts, "\n".join(struct)])
+
+
+def _literal(value: int) -> str:
+    """Also of the least int32."""
+    return "INT32_MIN" if value == -(2**31) else str(value)

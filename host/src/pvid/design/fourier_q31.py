@@ -13,12 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.settings.fourier import NONE, FourierChannel, FourierJet, Source
+from pvid.settings.fourier import NONE, FourierChannel, FourierDesign32, FourierJet, Source
 from pvid.settings.fourier_q31 import (
     FourierDesignQ31,
     FourierFilterQ31,
     FourierFormatQ31,
     FourierModelQ31,
+    FourierNoiseQ31,
     Rescale,
 )
 
@@ -75,18 +76,6 @@ class Formats:
     integrand_most: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Of the weak form, as in FourierDesign32; weights of each jet's filter are per second^order."""
-
-    functions: int
-    power: int
-    decimation: int
-    hop: int
-    weights: tuple[Float, ...]
-    sign_width: tuple[float, ...]
-
-
 class _Margins(dict[str, float]):
     def take(self, name: str, most: float, bits: int) -> None:
         """Notes the spare bits of a quantity below 2^bits, or refuses it."""
@@ -101,8 +90,14 @@ def shift_to(most: float, bits: float) -> int:
     return max(0, math.ceil(math.log2(most) - bits)) if most > 0 else 0
 
 
-def fixed_design(model: FourierModelQ31, sizes: Sizes, sensing: Sensing, formats: Formats) -> FourierDesignQ31:
+def fixed_design(
+    model: FourierModelQ31, sizes: FourierDesign32, sensing: Sensing, formats: Formats
+) -> FourierDesignQ31:
     """Tables and formats of a weak form for sensors that count.
+
+    Parameters
+    ----------
+    sizes : the float32 design, with its filters, noise and term factors
 
     Raises
     ------
@@ -117,8 +112,8 @@ def fixed_design(model: FourierModelQ31, sizes: Sizes, sensing: Sensing, formats
         raise PvidError(f"half a window has {sizes.hop} steps: the weak engine takes a multiple of {BLOCK}")
     dt = sizes.decimation / sensing.sample_rate
     filters = tuple(
-        _filter(model, jet, np.asarray(weights, np.float64), bits, sensing, margins)
-        for jet, weights, bits in zip(model.jet, sizes.weights, formats.jets, strict=True)
+        _filter(model, jet, np.asarray(one.weights, np.float64), bits, sensing, margins)
+        for jet, one, bits in zip(model.jet, sizes.filter, formats.jets, strict=True)
     )
     runs = tuple(
         _run(reach, rate, bits, dt, margins)
@@ -136,6 +131,8 @@ def fixed_design(model: FourierModelQ31, sizes: Sizes, sensing: Sensing, formats
     sum_shift = max(1, shift_to(sizes.hop * 2.0 ** (CHANNEL_BITS + 15 - DOWN) + sizes.hop, _WORD))
     channels = _Channels(model, sizes.hop, sum_shift, formats, tuple(integral), margins)
     units = tuple(channels.unit(k, dt) for k in range(len(model.channel)))
+    omega = math.pi / (sizes.hop * dt)
+    terms = zip(sizes.model.term, model.term, strict=True)
     return FourierDesignQ31(
         model=model,
         functions=sizes.functions,
@@ -150,9 +147,32 @@ def fixed_design(model: FourierModelQ31, sizes: Sizes, sensing: Sensing, formats
         integral=tuple(integral),
         format=tuple(channels.format(k) for k in range(len(model.channel))),
         circle=np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * sizes.hop) / sizes.hop)).astype(np.int16),
+        factor=tuple(
+            scaled_number(float(theirs.factor) * units[mine.channel] * omega**mine.order) for theirs, mine in terms
+        ),
+        noise=tuple(
+            FourierNoiseQ31(
+                one.kind, one.power, one.a, one.b, scaled_number(float(one.factor) * omega ** (2 * one.power))
+            )
+            for one in sizes.noise
+        ),
+        error_order=tuple(int(one) for one in sizes.error_order),
+        error_variance=tuple(
+            scaled_number(float(one) * omega ** (2 * int(order)))
+            for one, order in zip(sizes.error_variance, sizes.error_order, strict=True)
+        ),
         units=units,
         margins=dict(margins),
     )
+
+
+def scaled_number(x: float) -> tuple[int, int]:
+    """(m, e) with m 2^e the nearest number of 30 digits."""
+    if x == 0:
+        return 0, 0
+    m, e = math.frexp(x)
+    whole = round(m * 2.0**30)
+    return (whole // 2, e - 29) if abs(whole) == 2**30 else (whole, e - 30)
 
 
 def rescale_to(most: float, gain: float, name: str) -> Rescale:
@@ -243,8 +263,8 @@ class _Channels:
         return gain * self.edge(one, one.fold) if one.fold else gain
 
     def value(self, k: int) -> int:
-        """Shift from there to the channel."""
-        return shift_to(self.most(k), CHANNEL_BITS - 1e-6)
+        """Shift from there to the channel, at least 1."""
+        return max(1, shift_to(self.most(k), CHANNEL_BITS - 1e-6))
 
     def half_sum(self, k: int) -> float:
         """Largest sum of half a window."""

@@ -68,10 +68,9 @@ class Fit:
         """
         windows = len(self.scores)
         inverse = np.linalg.pinv(self.information, hermitian=True)
-        own = self.scores.T @ self.scores
-        shared = self.scores[:-1].T @ self.scores[1:]
-        variance = np.diag(inverse @ own @ inverse)
-        with_neighbours = np.diag(inverse @ (own + shared + shared.T) @ inverse)
+        moved = self.scores @ inverse  # by each window; a sum of squares, which rounding cannot make negative
+        variance = np.sum(moved**2, axis=0)
+        with_neighbours = variance + 2 * np.sum(moved[:-1] * moved[1:], axis=0)
         few = windows / max(windows - 2, 1)
         return np.asarray(np.sqrt(np.maximum(variance, with_neighbours) * few))
 

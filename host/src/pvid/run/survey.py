@@ -98,24 +98,43 @@ def fitted(rig: RigFile, run: Run) -> RigFile:
     return sized_for(replace(rig, identifier=replace(rig.identifier, survey=False)), run)
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
 def survey(rig: RigFile, run: Run) -> Survey | None:
-    """Searches a run for p; None where no start leads to plausible parameters.
-
-    What was found is kept as long as the run is: advice identifies a run again with some of the settings changed.
-    """
-    kept = _FOUND.setdefault(run, {})
+    """Searches a run for p; None where no start leads to plausible parameters."""
+    found = _searched(rig, run)
+    if found is None:
+        return None
+    at, fit, agreeing, tried = found
+    rows = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).thinned(_WINDOWS)
     asked = rig.identifier
-    key = replace(rig, identifier=replace(asked, core="f32", law="stationary")), asked.core_traits.corrects_angles
+    if (asked.full_angle or asked.damping) and asked.core_traits.corrects_angles:
+        rows, fit = _corrected(rig, rows, fit)
+    ratio = _disturbance(rows, fit)
+    if ratio > 0:
+        fit = rows.fitted(fit.p, ratio)
+    density = ratio * rows.row_sd * math.sqrt(rows.design.dt)
+    if not (rig.mechanism.model.is_plausible(fit.p[:4]) and math.isfinite(fit.chi2) and math.isfinite(density)):
+        return None
+    return Survey(fit.p[:4], fit.chi2, density, agreeing, tried)
+
+
+# The rig file of the best start's design, its fit, how many starts agree with it, and how many were tried.
+_Outcome = tuple[RigFile, Fit, int, int]
+_SEARCHED: WeakKeyDictionary[Run, dict[RigFile, _Outcome | None]] = WeakKeyDictionary()
+
+
+def _searched(rig: RigFile, run: Run) -> _Outcome | None:
+    """The minimum of the linear rows; kept as long as the run is, because advice identifies a run again with settings
+    changed that these rows do not depend on."""
+    linear = replace(rig.identifier, core="f32", law="stationary", full_angle=False, damping=False)
+    key = replace(rig, identifier=linear)
+    kept = _SEARCHED.setdefault(run, {})
     if key not in kept:
-        kept[key] = _found(rig, run)
+        kept[key] = _search_all(key, run)
     return kept[key]
 
 
-_FOUND: WeakKeyDictionary[Run, dict[tuple[RigFile, bool], Survey | None]] = WeakKeyDictionary()
-
-
-@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what diverges from a start is judged and left out
-def _found(rig: RigFile, run: Run) -> Survey | None:
+def _search_all(rig: RigFile, run: Run) -> _Outcome | None:
     if not np.isfinite(run.phi).any():
         return None
     outcomes: list[tuple[RigFile, Fit]] = []
@@ -133,18 +152,7 @@ def _found(rig: RigFile, run: Run) -> Survey | None:
     if not outcomes:
         return None
     at, fit = _best(outcomes)
-    agreeing = _agreeing(outcomes, fit)
-    rows = RunRows.of(at, run, weak_design_of(at, run.sample_rate)).thinned(_WINDOWS)
-    asked = rig.identifier
-    if (asked.full_angle or asked.damping) and asked.core_traits.corrects_angles:
-        rows, fit = _corrected(rig, rows, fit)
-    ratio = _disturbance(rows, fit)
-    if ratio > 0:
-        fit = rows.fitted(fit.p, ratio)
-    density = ratio * rows.row_sd * math.sqrt(rows.design.dt)
-    if not (rig.mechanism.model.is_plausible(fit.p[:4]) and math.isfinite(fit.chi2) and math.isfinite(density)):
-        return None
-    return Survey(fit.p[:4], fit.chi2, density, agreeing, tried)
+    return at, fit, _agreeing(outcomes, fit), tried
 
 
 def with_nominal(rig: RigFile, p: Float) -> RigFile:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.fourier import FourierChannel, FourierJet, FourierKind, FourierSignal
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 
 Int16 = npt.NDArray[np.int16]
 Int32 = npt.NDArray[np.int32]
@@ -89,6 +90,20 @@ class FourierFormatQ31:
     ramp: int = 0
 
 
+@dataclass(frozen=True)
+class FourierNoiseQ31:
+    """pvid_fourier_noise_q31: D_h of a kind += W_h factor theta_a theta_b h^(2 power), theta of Y is -1.
+
+    factor : (m, e)
+    """
+
+    kind: int
+    power: int
+    a: int
+    b: int
+    factor: tuple[int, int]
+
+
 @dataclass(frozen=True, eq=False)
 class FourierDesignQ31:
     """pvid_fourier_design_q31: tables and formats for a rig.
@@ -108,6 +123,10 @@ class FourierDesignQ31:
     integral : shifts (once, twice) of each integrand
     format : of each channel
     circle : int16 32767 cos(pi j / hop) [2 hop]
+    factor : of each term (m, e), of h^order times a unit of S_h
+    noise : sorted by kind, then power
+    error_order : of each kind: its own error is that derivative of white noise
+    error_variance : of that noise at a step, of h^(2 order) (m, e) [kinds]; (0, 0): the sensors explain the rows
     units : value of one unit of S_h of each channel [channels]
     margins : for each quantity the bits that its largest value leaves free
     """
@@ -125,6 +144,10 @@ class FourierDesignQ31:
     integral: tuple[tuple[int, int], ...]
     format: tuple[FourierFormatQ31, ...]
     circle: Int16
+    factor: tuple[tuple[int, int], ...]
+    noise: tuple[FourierNoiseQ31, ...]
+    error_order: tuple[int, ...]
+    error_variance: tuple[tuple[int, int], ...]
     units: tuple[float, ...]
     margins: Mapping[str, float]
 
@@ -137,3 +160,35 @@ class FourierDesignQ31:
     def half(self) -> int:
         """The largest half of a filter [ticks]."""
         return max(one.half for one in self.filter)
+
+    @property
+    def rows(self) -> int:
+        """Parts of the sums of a window, K + n."""
+        return self.functions + self.power
+
+    @property
+    def powers(self) -> int:
+        """Of h^2 in the noise."""
+        return 1 + max((*(one.power for one in self.noise), *self.error_order), default=0)
+
+
+@dataclass(frozen=True, eq=False)
+class FourierConfigQ31:
+    """pvid_fourier_config_q31: settings of the identifier.
+
+    Attributes
+    ----------
+    design : tables
+    estimator : rows are in standard deviations, row_sd 2^(8 + y_bits)
+    offset : reading of each sensor at 0 [counts]
+    drive_min : window dropped if the standard deviation of a sample is below [counts]; None: no check
+    iterations : Gauss-Newton steps a window
+    """
+
+    design: FourierDesignQ31
+    estimator: EstimatorConfigQ31
+    offset: tuple[int, ...]
+    drive_min: tuple[int, ...] | None = None
+    iterations: int = 3
+    trust: TrustConfigQ31 = TrustConfigQ31()
+    gate: GateConfigQ31 = GateConfigQ31()

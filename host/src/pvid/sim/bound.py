@@ -15,7 +15,7 @@ _NUDGE = 1e-4  # of a value or of a state's span: sensitivities are right to its
 _DEPENDENT = 1e-13  # of the largest: a combination of starts that the sensors do not show
 
 
-def bound(simulation: RigSimulation, window_s: float | None = None) -> Float:
+def bound(simulation: RigSimulation, window_s: float | None = None, windows: int | None = None) -> Float:
     """Least standard errors of the unknowns [n_p] from the rig's run, inf where it does not show one.
 
     Frictions are soft, of the rig's width; the sensors' noise is that of `Signal.sd`; what a drive sets is known
@@ -25,8 +25,10 @@ def bound(simulation: RigSimulation, window_s: float | None = None) -> Float:
     ----------
     window_s
         Length of the windows [s]; the rig's own by default.
+    windows
+        How many of the run's first ones; all by default.
     """
-    information = information_of(simulation, window_s)
+    information = information_of(simulation, window_s, windows)
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     shown = size > 0
     scaled = information[np.ix_(shown, shown)] / np.outer(size[shown], size[shown])
@@ -35,7 +37,7 @@ def bound(simulation: RigSimulation, window_s: float | None = None) -> Float:
     return out
 
 
-def information_of(simulation: RigSimulation, window_s: float | None = None) -> Float:
+def information_of(simulation: RigSimulation, window_s: float | None = None, windows: int | None = None) -> Float:
     """Fisher's information on the unknowns [n_p, n_p], summed over the windows."""
     rig, plant = simulation.rig, simulation.plant
     truth = simulation.truth
@@ -46,7 +48,7 @@ def information_of(simulation: RigSimulation, window_s: float | None = None) -> 
     span = np.ptp(trajectory.states, axis=0) + 1e-9
     steps = _NUDGE * np.where(truth != 0.0, np.abs(truth), 1.0)
     total = np.zeros((len(truth), len(truth)))
-    for first in range(0, simulation.samples - n + 1, n):
+    for first in range(0, simulation.samples - n + 1, n)[:windows]:
         window = _Window(simulation, first, n)
         start = trajectory.states[first]
         slopes = [_slope(window, truth, start, p=place, step=step) for place, step in enumerate(steps)]

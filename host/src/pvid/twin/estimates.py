@@ -20,3 +20,8 @@ Q31 = _layout(np.int32, "correlation", np.uint32)
 def f32_of(n_p: int) -> np.dtype[np.void]:
     """F32, with more places where there are more parameters."""
     return F32 if n_p <= MAX_P else _layout(np.float32, "covariance", np.float32, n_p)
+
+
+def q31_of(n_p: int) -> np.dtype[np.void]:
+    """Q31, with more places where there are more parameters."""
+    return Q31 if n_p <= MAX_P else _layout(np.int32, "correlation", np.uint32, n_p)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import EstimatorConfig
-from pvid.settings.fourier import FourierConfig, FourierDesign32
+from pvid.settings.fourier import FourierConfig
 from pvid.twin.f32 import fourier_front, fourier_step, fourier_sums, fourier_watch
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.f32.estimator import RelativeEstimator
@@ -28,21 +28,14 @@ _BLOCK = 4
 
 @dataclass(frozen=True)
 class FourierSchedule:
-    """Twin of fourier/schedule.h."""
+    """Twin of fourier/schedule.h: harmonics and stages of a free tick.
 
-    decimation: int
+    free_ticks: those of a block of four steps
+    """
+
+    free_ticks: int
     hop: int
     harmonics: int
-
-    @classmethod
-    def of(cls, design: FourierDesign32) -> FourierSchedule:
-        """That of a design."""
-        return cls(design.decimation, design.hop, design.highest + 1)
-
-    @property
-    def free_ticks(self) -> int:
-        """Ticks of a block of steps that add harmonics or run stages."""
-        return _BLOCK * (self.decimation - 1) if self.decimation > 1 else _BLOCK
 
     @property
     def items_per_tick(self) -> int:
@@ -62,12 +55,14 @@ class Stretch:
 
     Attributes
     ----------
-    steps : step of each tick, counted from the stretch's start; -1: none [ticks]
+    steps : step that each tick takes, counted from the stretch's start; -1: none [ticks]
+    free : ticks that add harmonics or run stages [ticks]
     windows : sums of every window [windows, channels, 2, harmonics]
     drop_reason : why a window is dropped; ACCUMULATED: it is used [windows]
     """
 
     steps: npt.NDArray[np.int64]
+    free: npt.NDArray[np.bool_]
     windows: Float32
     drop_reason: Sequence[Reason]
 
@@ -106,10 +101,10 @@ class FourierTwin:
         self.trust = Trust(config.trust, self.estimator)
         self.dt = _F(design.decimation) / _F(config.sample_rate)
         self.finish = Finish(config, self.dt, self.estimator, self.trust)
-        self.schedule = FourierSchedule.of(design)
-        self.stages_per_tick = self.schedule.stages_per_tick(self.finish.stages)
         self.ticks = FrontTicks.of(design)
-        self.runs = fourier_step.Runs.of(design)
+        self.schedule = FourierSchedule(self.ticks.free_ticks, design.hop, design.highest + 1)
+        self.stages_per_tick = self.schedule.stages_per_tick(self.finish.stages)
+        self.runs = fourier_step.Runs.of(design, _F(self.ticks.first) / _F(config.sample_rate))
 
     @property
     def _delay(self) -> int:
@@ -123,9 +118,10 @@ class FourierTwin:
         steps = np.full(len(samples), -1)
         ticks = np.array([self.ticks.tick_of(step) for step in range(jets.shape[1])], np.int64)
         steps[ticks] = np.arange(len(ticks))
+        free = self.ticks.free(len(samples))
         windows = fourier_sums.windows(values, design, self.dt) if len(values.channels) >= 2 * hop else None
         if windows is None:
-            return Stretch(steps, np.zeros((0, 0, 2, 0), np.float32), [])
+            return Stretch(steps, free, np.zeros((0, 0, 2, 0), np.float32), [])
         count = len(windows)
         drop = np.full(count, Reason.ACCUMULATED)
         later = ticks[2:]  # of the channels
@@ -136,7 +132,7 @@ class FourierTwin:
             limit = np.asarray(self.config.range, np.float32)
             beyond = fourier_watch.halves_beyond(samples, limit, later, self._delay, hop)
             drop[beyond[:-1] | beyond[1:]] = Reason.HELD_OUT_OF_RANGE
-        return Stretch(steps, windows, [Reason(one) for one in drop])
+        return Stretch(steps, free, windows, [Reason(one) for one in drop])
 
     def _drop(self, reason: Reason) -> None:
         counter = {Reason.HELD_NOT_EXCITED: "held_not_excited", Reason.HELD_OUT_OF_RANGE: "held_out_of_range"}
@@ -166,7 +162,7 @@ class FourierTwin:
                         self._drop(verdict)
                         dropped = verdict
             reason[tick] = Reason.ACCUMULATED if warm else Reason.WARMING_UP
-            if step < 0 or self.design.decimation == 1:
+            if stretch.free[tick - first]:
                 if pending > 0:
                     pending -= schedule.items_per_tick
                     if pending <= 0 and joining >= 0:

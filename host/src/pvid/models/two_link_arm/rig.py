@@ -13,5 +13,5 @@ RIG = SimulatedRig(
     start={"q1": -0.9475587, "q2": 1.0365082},
     friction_width=0.1,
     window_s=1.0,
-    design=dict(functions=12, decimation=8, taps=61, rate_taps=61, rate_degree=6),
+    design=dict(functions=20, decimation=2, taps=15, degree=4, rate_taps=35, rate_degree=4),
 )

@@ -24,6 +24,9 @@ from pvid.oracle.fourier.functions import Float, TestFunctions
 
 _ONE = sp.Integer(1)
 
+# A stretch in which a sign is in doubt is one direction in the rows while the fastest test function turns by less [rad].
+_PIECE = 0.5
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -226,8 +229,7 @@ class Channels:
         straight = all(one.is_number for one in weights.values()) and all(jet.order == 1 for jet in weights)
         gain = weights_of(design, 1)
         per_sensor = float(np.sum(gain**2)) ** 0.5
-        # A sign in doubt is one direction in the rows only where no test function changes much.
-        piece = max(2, round(2 * design.hop / (2 * np.pi * design.highest)))
+        piece = max(2, round(_PIECE * 2 * design.hop / (2 * np.pi * design.highest)))
         if straight:
             position = sum((float(one) * grid.raw[jet.of] for jet, one in weights.items()), np.zeros(1))
             sd = sum(float(one) ** 2 * self.model.signal(jet.of).sd ** 2 for jet, one in weights.items()) ** 0.5

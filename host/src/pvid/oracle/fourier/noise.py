@@ -29,11 +29,15 @@ class NoiseFilters:
     """How the noise of each sensor enters the columns of each row kind, to first order, from the symbolic derivatives.
 
     D^m[psi(z, z')] with noise n in z: sum over d of (-1)^m (-D)^d [chi^(m) dpsi/dz^(d)] n. Running integrals smooth
-    their noise away and are left out; so is what noise in a velocity does inside sgn but for the times of reversals.
+    their noise away and are left out. Noise of a velocity enters through a soft sign by its slope; where reversals are
+    located it is in their times (`ReversalNoise`).
     """
 
     def __init__(self, channels: Channels) -> None:
         self.channels = channels
+        marks = channels.sign_marks.values()
+        self._arguments = dict(zip(marks, channels.signs, strict=True))
+        self._sign_slopes = {mark: sp.Symbol(f"slope_of_{mark}", real=True) for mark in marks}
         self.entries: list[tuple[int, str, int]] = []  # channel, sensor, order of the jet
         expressions: list[sp.Expr] = []
         auxiliary = {jet: expression for jet, expression in channels.opaque.items() if not expression.has(Integral)}
@@ -41,18 +45,24 @@ class NoiseFilters:
             if one.fold:
                 continue
             full = one.gain.xreplace(auxiliary).xreplace(channels.sign_marks)
-            for jet in sorted(jets(full), key=str):
+            inside = {mark: sp.diff(full, mark) * slope for mark, slope in self._sign_slopes.items() if full.has(mark)}
+            arguments = {mark: argument for mark, argument in self._arguments.items() if mark in inside}
+            for jet in sorted(jets(full).union(*(jets(one) for one in arguments.values())), key=str):
                 slope = sp.diff(full, jet)
+                slope += sum(inside[mark] * sp.diff(argument, jet) for mark, argument in arguments.items())
                 if slope != 0 and jet.of not in {a.of for a in channels.model.opaque}:
                     if channels.model.signal(jet.of).sd > 0:
                         self.entries.append((place, jet.of, jet.order))
                         expressions.append(slope)
-        self._function = sp.lambdify(channels.plain, expressions, "numpy", cse=True)
+        given = (*channels.plain, *self._sign_slopes.values())
+        self._function = sp.lambdify(given, expressions, "numpy", cse=True)
 
     def gains(self, record: Record) -> list[dict[str, list[Gain]]]:
         """Of each row kind: sensor -> gains. (Nuisances are left out: their noise is second order.)"""
         size, design = record.grid.size, record.grid.design
-        slopes = [broadcast(one, size) for one in self._function(*record.arguments)]
+        slopes = [
+            broadcast(one, size) for one in self._function(*record.arguments, *(one.slopes for one in record.signs))
+        ]
         smooth = max(design.rate_taps // (2 * design.decimation), 1)
         out = []
         for row in self.channels.rows:

@@ -29,11 +29,12 @@ class Signs:
 
     Attributes
     ----------
-    values : with the corrected steps around each reversal; 0 where the mechanism sticks [n]
+    values : with the corrected steps around each reversal; from one sign to the other where it is in doubt for long [n]
     times : places at which the integral of the sign is in doubt: reversals, near misses, pieces of sticking [steps]
     variances : of the times of reversals, or what has the same effect [steps^2]
     reversals : how many of the times are such
     stuck : steps at which the sign stays in doubt for longer than a piece [n]
+    slopes : d values / d v of a soft sign, for the noise of v [n]
     """
 
     values: Float
@@ -41,18 +42,20 @@ class Signs:
     variances: Float
     reversals: int
     stuck: npt.NDArray[np.bool_]
+    slopes: Float
 
 
 def soft(v: Float, width: float) -> Signs:
     """tanh(v / width)."""
-    none = np.zeros(0)
-    return Signs(np.tanh(v / width), none, none, 0, np.zeros(v.shape, bool))
+    none, values = np.zeros(0), np.tanh(v / width)
+    return Signs(values, none, none, 0, np.zeros(v.shape, bool), (1 - values**2) / width)
 
 
 def averaged(v: Float) -> Signs:
     """Mean of sgn over each step, v linear there."""
     none = np.zeros(0)
-    return Signs(np.clip(2 * v / (np.abs(np.gradient(v)) + 1e-300), -1, 1), none, none, 0, np.zeros(v.shape, bool))
+    values = np.clip(2 * v / (np.abs(np.gradient(v)) + 1e-300), -1, 1)
+    return Signs(values, none, none, 0, np.zeros(v.shape, bool), np.zeros(v.shape))
 
 
 def correction(f: Float) -> Float:
@@ -150,6 +153,9 @@ class Position:
 def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position | None = None) -> Signs:
     """Signs with every reversal located, and what stays in doubt.
 
+    In a long stretch in doubt the sign goes straight from that before to that after: its mean where it may switch at
+    any time.
+
     Parameters
     ----------
     v : velocity at the steps [n]
@@ -168,10 +174,11 @@ def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position |
         after = np.sign(v[j]) if j < n else 0.0
         if j - i > piece or before * after == 0:
             stuck[i:j] = True
-            values[i:j] = 0.0
+            values[i:j] = before + (after - before) * (np.arange(j - i) + 0.5) / (j - i)
             count = -(-(j - i) // piece)
             times += list(i + (np.arange(count) + 0.5) * (j - i) / count - 0.5)
-            spans += [(j - i) / count] * count
+            # The pieces err together: their variances sum up to that of the whole stretch.
+            spans += [(j - i) / count**0.5] * count
             turning += [0.0] * count
         elif before == after:
             values[i:j] = before
@@ -210,4 +217,4 @@ def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position |
         values[own] = np.where(own <= t[k], -up[k], up[k])
         if 1 <= at < n - 2:
             values[at - 1 : at + 3] += up[k] * correction(np.array(t[k] - at))
-    return Signs(values, t, variances, len(turns), stuck)
+    return Signs(values, t, variances, len(turns), stuck, np.zeros(n))

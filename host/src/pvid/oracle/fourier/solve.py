@@ -23,6 +23,9 @@ _HINT = 2.0  # with the mean of the windows' weights, below which the exact like
 _SEARCHES = (2, 6)  # passes that look for an error of the equation; the others improve its variance
 _SHARPENING = 3  # steps of a variance at a time
 
+_PASSES_ANEW = 12  # of whitening at most, window by window
+_STAYS = 1e-3  # a step below this ends them
+
 
 @dataclass(frozen=True)
 class Moments:
@@ -318,7 +321,8 @@ def online(rows: WeakRows, start: Float | None = None, equation_error: bool = Tr
     """p after each window [windows, n_p]: every window whitened at the p of its moment, three steps each.
 
     The sums of rows that were whitened at a poor p weigh wrongly. Here all rows are whitened anew when their number is
-    a power of two; an engine that keeps no rows lets its first sums fade instead.
+    a power of two, and again until p stays: three steps from a start that is 50 % off are too few. An engine that keeps
+    no rows lets its first sums fade instead.
     """
     parameters = rows.compiled.parameters
     p = parameters.checked(start)
@@ -327,14 +331,19 @@ def online(rows: WeakRows, start: Float | None = None, equation_error: bool = Tr
     moments = Moments([], [], [])
     history = np.empty((rows.windows, len(p)))
     for w in range(rows.windows):
-        theta = parameters.theta(p)
         anew = w & (w + 1) == 0
         if anew and equation_error and w >= 3:
             past = rows.only(slice(0, w))
+            theta = parameters.theta(p)
             errors = [error_of(past, kind, theta) for kind in range(rows.kinds)]
         own = rows.only(slice(0 if anew else w, w + 1))
-        new = compensated(own, [own.white(group, theta, errors) for group in rows.groups], theta)
-        moments = new if anew else moments.plus(new)
-        p, _ = gauss_newton(parameters, moments, p, prior, 3)
+        for _ in range(_PASSES_ANEW if anew else 1):
+            theta = parameters.theta(p)
+            new = compensated(own, [own.white(group, theta, errors) for group in rows.groups], theta)
+            whole = new if anew else moments.plus(new)
+            p, size = gauss_newton(parameters, whole, p, prior, 3)
+            if size < _STAYS:
+                break
+        moments = whole
         history[w] = p
     return history

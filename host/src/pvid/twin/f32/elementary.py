@@ -74,8 +74,25 @@ def magnitude(x: npt.ArrayLike) -> Float32:
     return np.where(given < 0, -given, given)
 
 
-def soft_sign(v: npt.ArrayLike, width: np.float32 | Float32) -> Float32:
+def soft_sign(v: npt.ArrayLike, width: np.float32) -> Float32:
     """pvid_soft_sign_f32 of v, 1/2 at v = width."""
     given = np.asarray(v, np.float32)
     found: Float32 = given / (magnitude(given) + width)
     return found
+
+
+_TANH_END = F(7)
+
+
+def tanh(x: npt.ArrayLike) -> Float32:
+    """pvid_tanh_f32."""
+    given = np.asarray(x, np.float32)
+    z = given * given
+    above = F(3.99569171e-06) * z + F(2.29304517e-03)
+    above = above * z + F(1.23220012e-01)
+    above = above * z + F(9.99998987e-01)
+    below = F(1.43980025e-04) * z + F(2.11513992e-02)
+    below = below * z + F(4.56545591e-01)
+    below = below * z + F(1)
+    inside = (given * above) / below
+    return np.where(given > _TANH_END, F(1), np.where(given < -_TANH_END, F(-1), inside)).astype(np.float32, copy=False)

@@ -305,7 +305,7 @@ class RelativeEstimator(Estimator):
 
     def add(self, n: Float32, y: Float32, kind: int = 0) -> npt.NDArray[np.uint8]:
         """One row of a group: N [theta of this kind, lanes], Y [lanes]."""
-        block = self.model.blocks[kind]
+        block = self.model.blocks.of_kind[kind]
         with np.errstate(all="ignore"):
             fits = _squares(n, y) <= ROW_LIMIT * ROW_LIMIT
             not_finite = ~fits & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))

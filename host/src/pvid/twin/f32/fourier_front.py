@@ -1,4 +1,4 @@
-"""Twin of fourier/front_f32.c. It feeds forward: a whole stretch of finite samples is computed at once."""
+"""Twin of fourier/fourier_front_f32.c. It feeds forward: a whole stretch of finite samples is computed at once."""
 
 from __future__ import annotations
 
@@ -15,20 +15,25 @@ Places = npt.NDArray[np.int64]
 _F = np.float32
 _HELD_SCALE = _F(1) / _F(24)
 _LEAST_BEFORE = 2  # ticks before the first step
+_LONG_STEP, _PAIRS = 8, 16
 
 
 @dataclass(frozen=True)
 class FrontTicks:
-    """When the steps of a stretch come out; ticks count from the stretch's first sample.
+    """Twin of fourier/schedule.h, as far as it depends on the front end: the work of the ticks of a stretch.
+
+    Ticks count from its first sample.
 
     Attributes
     ----------
     half : of the longest filter
+    pairs : of all filters
     decimation : D
     held : a signal needs the next sample
     """
 
     half: int
+    pairs: int
     decimation: int
     held: bool
 
@@ -36,20 +41,52 @@ class FrontTicks:
     def of(cls, design: FourierDesign32) -> FrontTicks:
         """Those of a design."""
         held = any(one.source == Source.HELD for one in design.model.signal)
-        return cls(design.half, design.decimation, held)
+        return cls(design.half, sum(one.half for one in design.filter), design.decimation, held)
 
     @property
     def first(self) -> int:
         """Sample to whose instant the first step refers."""
         return max(self.half, _LEAST_BEFORE)
 
+    @property
+    def _job_ticks(self) -> int:
+        few = min(-(-self.pairs // _PAIRS), self.decimation // 2)
+        return 1 if self.decimation < _LONG_STEP else max(few, 1)
+
+    @property
+    def _step_place(self) -> int:
+        """Place in a step of the tick that forms the channels."""
+        return self.decimation - 1 if self.decimation < _LONG_STEP else self._job_ticks
+
+    @property
+    def _work_place(self) -> int:
+        """Place of the first tick that adds to the sums or runs stages."""
+        return 0 if self.decimation < _LONG_STEP else self._job_ticks + 1
+
+    @property
+    def free_ticks(self) -> int:
+        """Ticks of a block of four steps that add harmonics or run stages."""
+        return 4 * (self.decimation - self._work_place - (1 < self.decimation < _LONG_STEP))
+
+    @property
+    def _begin(self) -> int:
+        """Tick at which the first job begins."""
+        return self.first + self.half + self.held
+
     def tick_of(self, step: int) -> int:
-        """Tick at whose end the jets of a step are known."""
-        return self.first + self.half + self.held + self.decimation * (step + 1) - 1
+        """Tick that takes the jets of a step."""
+        return self._begin + self.decimation * step + self._step_place
 
     def steps(self, ticks: int) -> int:
-        """Steps whose jets are known after a stretch of so many ticks."""
+        """Steps whose jets have been taken after a stretch of so many ticks."""
         return max(0, (ticks - 1 - self.tick_of(0)) // self.decimation + 1)
+
+    def free(self, ticks: int) -> npt.NDArray[np.bool_]:
+        """Which ticks add harmonics or run stages [ticks]."""
+        since = np.arange(ticks) - self._begin
+        place = since % self.decimation
+        works = (place >= self._work_place) & (place != self._step_place)
+        return np.asarray((since < 0) | works | (self.decimation == 1))
 
 
 def signals(samples: Float32, model: FourierModel, sample_rate: float) -> Float32:

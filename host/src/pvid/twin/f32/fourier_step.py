@@ -19,16 +19,21 @@ _LATER = 2  # steps from a step's jets to its channels
 
 @dataclass
 class Runs:
-    """Integrals since the start of the run, kept over gaps, and what rounding took off [runs]."""
+    """Integrals since the start of the run, kept over gaps, and what rounding took off [runs].
+
+    lead: from the run's first sample to its first step [s]
+    """
 
     value: npt.NDArray[Any]
     low: npt.NDArray[Any]
+    lead: np.float32
+    ran: bool = False
 
     @classmethod
-    def of(cls, design: FourierDesign32) -> Runs:
+    def of(cls, design: FourierDesign32, lead: np.float32) -> Runs:
         """At the start of a run."""
         nothing = np.zeros(design.model.runs, np.float32)
-        return cls(nothing, nothing)
+        return cls(nothing, nothing, lead)
 
     def at_steps(self, rates: Float32, dt: np.float32) -> Float32:
         """Their values at the steps of a stretch [runs, steps] from their derivatives [runs, steps]."""
@@ -40,6 +45,8 @@ class Runs:
                 moved = self.value + rise
                 self.low = rise - (moved - self.value)
                 self.value = moved
+            elif not self.ran:
+                self.value, self.ran = self.lead * rates[:, step], True
             out[:, step] = self.value
         return out
 
@@ -106,7 +113,7 @@ def values(jets: Float32, design: FourierDesign32, runs: Runs, dt: np.float32) -
             return nothing
         v = arguments[model.runs :]
         width = np.asarray(design.sign_width, np.float32)[:, None]
-        signs = np.where(width > 0, elementary.soft_sign(v[:, :-1], width), mean_signs(v))
+        signs = np.where(width > 0, elementary.tanh(v[:, :-1] / width), mean_signs(v))
         found = model.values(np.concatenate([jets[:, :-1], of_runs[:, :-1], signs.astype(np.float32, copy=False)]))
         gains, integrands = found[: model.gains], found[model.gains :].T
         once, twice = _integrals(integrands, hop, dt)

@@ -1,4 +1,4 @@
-"""Twin of pattern_f32.c and kinds.h: a model known by theta(p), C(p) and the pattern of C, M by blocks.
+"""Twin of pattern_f32.c: a model known by theta(p), C(p) and the pattern of C, M by blocks.
 
 Everything has a trailing lane axis; p is float32 [n_p, lanes].
 """
@@ -12,8 +12,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pvid.twin.blocks import Blocks
+
 Float32 = npt.NDArray[np.float32]
-Places = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -40,42 +41,27 @@ class PatternModel:
         return self.n_gated or self.n_p
 
     @cached_property
-    def blocks(self) -> tuple[slice, ...]:
-        """The theta of each kind."""
-        ends = self.kind_end or (self.n_theta,)
-        return tuple(slice(first, end) for first, end in zip((0, *ends), ends, strict=False))
+    def blocks(self) -> Blocks:
+        """The kinds in theta and among the moments."""
+        return Blocks(self.kind_end or (self.n_theta,))
 
-    def _block_of(self, i: int) -> slice:
-        """The theta of the kind that has entry i."""
-        return next(block for block in self.blocks if i < block.stop)
-
-    @cached_property
-    def _places(self) -> tuple[Places, Places]:
-        """Row and column of each moment."""
-        row, column = np.triu_indices(self.n_theta)
-        kind = np.repeat(np.arange(len(self.blocks)), [block.stop - block.start for block in self.blocks])
-        same = kind[row] == kind[column]
-        return row[same], column[same]
-
-    @cached_property
+    @property
     def moments(self) -> int:
         """Distinct entries of M."""
-        return sum(n * (n + 1) // 2 for n in (block.stop - block.start for block in self.blocks))
+        return self.blocks.moments
 
     @property
     def n_sums(self) -> int:
         """M, B, yy, weight."""
-        return self.moments + self.n_theta + 2
+        return self.blocks.n_sums
 
     def terms(self, kind: int, n: Float32, e: Float32, row_weight: Float32) -> Float32:
         """Terms that a row of a kind, N [its theta, lanes], e [lanes], adds to the sums [n_sums, lanes]; -0 changes no
         sum."""
-        block = self.blocks[kind]
+        places, row, column = self.blocks.places_of_kind(kind)
         terms = np.full((self.n_sums, n.shape[1]), -0.0, np.float32)
-        row, column = self._places
-        own = (row >= block.start) & (row < block.stop)
-        terms[: self.moments][own] = n[row[own] - block.start] * n[column[own] - block.start]
-        terms[self.moments : -2][block] = e * n
+        terms[places] = n[row] * n[column]
+        terms[self.moments : -2][self.blocks.of_kind[kind]] = e * n
         terms[-2] = e * e
         terms[-1] = row_weight
         return terms
@@ -83,14 +69,14 @@ class PatternModel:
     def matrix(self, sums: Float32) -> Float32:
         """M [n_theta, n_theta, lanes]; 0 outside of its blocks."""
         m = np.zeros((self.n_theta, self.n_theta, sums.shape[1]), np.float32)
-        row, column = self._places
+        row, column = self.blocks.places
         m[row, column] = sums[: self.moments]
         m[column, row] = sums[: self.moments]
         return m
 
     def transpose_times(self, c: Float32, x: Float32, kind: int | None = None) -> Float32:
         """C^T x [n_p, lanes]; x [n_theta, lanes], or the theta of a kind [its theta, lanes], 0 for the others."""
-        block = slice(0, self.n_theta) if kind is None else self.blocks[kind]
+        block = slice(0, self.n_theta) if kind is None else self.blocks.of_kind[kind]
         out = np.zeros((self.n_p, x.shape[1]), np.float32)
         for k, (row, column) in enumerate(zip(self.c_row, self.c_column, strict=True)):
             if block.start <= row < block.stop:
@@ -105,7 +91,7 @@ class PatternModel:
             own = [k for k, column in enumerate(self.c_column) if column == a]
             t = np.zeros((self.n_theta, lanes), np.float32)
             for k in own:
-                block = self._block_of(self.c_row[k])
+                block = self.blocks.of_entry(self.c_row[k])
                 t[block] = t[block] + m[self.c_row[k], block] * c[k]
             for k in range(own[0], len(self.c_row)):
                 b = self.c_column[k]
@@ -115,7 +101,7 @@ class PatternModel:
     def times(self, m: Float32, x: Float32) -> Float32:
         """M x [n_theta, lanes]."""
         out = np.zeros_like(x)
-        for block in self.blocks:
+        for block in self.blocks.of_kind:
             for j in range(block.start, block.stop):
                 out[block] = out[block] + m[j, block] * x[j]
         return out

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from pvid.twin.blocks import Blocks
 from pvid.twin.q31.integer import Int, round_shift, times_q31
 
 W, D1, D2, C = range(4)
@@ -27,16 +29,22 @@ class ModelQ31:
     jacobian: Callable[[Int], Int]
     formats: Callable[[Sequence[int]], tuple[list[int], list[int]]]
     noisy: tuple[int, int] | None = None  # entries of N that hold the sensor's noise
+    kind_end: tuple[int, ...] = ()  # one past the last theta of each kind of rows; empty: one kind
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The kinds in theta and among the moments."""
+        return Blocks(self.kind_end or (self.n_theta,))
 
     @property
     def moments(self) -> int:
-        """Entries of M on and above the diagonal."""
-        return self.n_theta * (self.n_theta + 1) // 2
+        """Entries of M on and above the diagonals of its blocks."""
+        return self.blocks.moments
 
     @property
     def n_sums(self) -> int:
         """M, B, yy, weight."""
-        return self.moments + self.n_theta + 2
+        return self.blocks.n_sums
 
 
 def _product(a: Int, b: Int) -> Int:

@@ -80,7 +80,8 @@ class EstimatorQ31:
             ):
                 raise PvidError("lanes of one twin must share formats, divider and whether the law is a rate")
         self.model = model
-        self._upper = np.triu_indices(model.n_theta)
+        self._upper = model.blocks.places
+        self._bits = 29 - (0 if model.n_theta <= 11 else 1 if model.n_theta <= 22 else 2)  # of C and steps of theta
         self._diagonal = np.flatnonzero(self._upper[0] == self._upper[1])
         self._c_row, self._c_column = np.array(model.c_row), np.array(model.c_column)
         self._columns = [np.flatnonzero(self._c_column == a) for a in range(model.n_p)]
@@ -166,14 +167,15 @@ class EstimatorQ31:
         self.p[index] = np.clip(value, self.lower[index], self.upper[index])
         self.theta = self.model.theta(self.p)
 
-    def innovation(self, n: Int, y: Int) -> tuple[Int, Mask]:
+    def innovation(self, n: Int, y: Int, kind: int = 0) -> tuple[Int, Mask]:
         """e = Y - N^T theta of a row [lanes], and whether the row fits; shapes as in `add`."""
-        return self.terms(n, y)[1:]
+        return self.terms(n, y, kind)[1:]
 
-    def terms(self, n: Int, y: Int) -> tuple[Int, Int, Mask]:
-        """N_i theta_i of a row [n_theta, lanes], and its innovation."""
-        m, h = self.mantissas(self.theta)
-        terms = clamp(scale(clamp(n, ROW_LIMIT) * m, integers(self.align)[:, None] - h), TERM_MAX)
+    def terms(self, n: Int, y: Int, kind: int = 0) -> tuple[Int, Int, Mask]:
+        """N_i theta_i of a row [theta of its kind, lanes], and its innovation."""
+        block = self.model.blocks.of_kind[kind]
+        m, h = self.mantissas(self.theta[block])
+        terms = clamp(scale(clamp(n, ROW_LIMIT) * m, integers(self.align)[block, None] - h), TERM_MAX)
         e = y - terms.sum(axis=0)
         return terms, e, (np.abs(y) <= ROW_LIMIT) & (np.abs(n) <= ROW_LIMIT).all(axis=0) & (np.abs(e) <= ROW_LIMIT)
 
@@ -182,25 +184,47 @@ class EstimatorQ31:
         """row_sd^2 [lanes], in units of the sums."""
         return scaled(self.row_sd * self.row_sd, -2 * (8 + self.exponent))
 
-    def add(self, n: Int, y: Int) -> Reasons:
-        """One row of a group: N [n_theta, lanes], Y [lanes]."""
-        return self.take_row(n, *self.innovation(n, y))
+    def add(self, n: Int, y: Int, kind: int = 0) -> Reasons:
+        """One row of a group: N [theta of this kind, lanes], Y [lanes]."""
+        return self.take_row(n, *self.innovation(n, y, kind), kind)
 
-    def take_row(self, n: Int, innovation: Int, fits: Mask) -> Reasons:
+    def take_row(self, n: Int, innovation: Int, fits: Mask, kind: int = 0) -> Reasons:
         """As `add`, given the results of `innovation`."""
         e = np.where(fits, innovation, 0)
         self.rss = clamp(self.rss + e * e, WIDE)
         e = round_shift(e, self.exponent)
         row = round_shift(np.where(fits, n, 0), self.exponent)
-        upper, column = self._upper
+        block = self.model.blocks.of_kind[kind]
+        places, upper, column = self.model.blocks.places_of_kind(kind)
         weight = np.where(fits, self.row_weight, 0)
         self.group_weight = self.group_weight + weight
-        self.sums = self.sums + np.concatenate([row[upper] * row[column], row * e, (e * e)[None], weight[None]])
+        sums = self.sums.copy()
+        sums[places] += row[upper] * row[column]
+        sums[self.model.moments : -2][block] += row * e
+        sums[-2] = np.minimum(sums[-2] + e * e, 3 * SUM_LIMIT)
+        sums[-1] += weight
+        self.sums = sums
         if self.is_rate:
-            self.fresh = self.fresh + row * e
+            fresh = self.fresh.copy()
+            fresh[block] += row * e
+            self.fresh = fresh
         reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
         self.counters["rows"] += fits
+        self.counters["rejected_saturated"] += ~fits
+        return reason
+
+    def add_to_b(self, g: Scaled) -> Reasons:
+        """pvid_estimator_add_to_b_q31: g [n_theta, lanes] in units of N's integer times Y's."""
+        added = clamp(g.shifted(-2 * self.exponent).fixed(0), HELD_LIMIT)
+        places = slice(self.model.moments, -2)
+        fits = (np.abs(self.sums[places] + added) <= HELD_LIMIT).all(axis=0)
+        if self.is_rate:
+            fits = fits & (np.abs(self.fresh + added) <= HELD_LIMIT).all(axis=0)
+            self.fresh = np.where(fits, self.fresh + added, self.fresh)
+        self.sums[places] = np.where(fits, self.sums[places] + added, self.sums[places])
+        reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
         self.counters["rejected_saturated"] += ~fits
         return reason
 
@@ -258,13 +282,15 @@ class EstimatorQ31:
 
     def _matrix_stages(self) -> int:
         """Stages that scale M, a few rows each."""
-        stages = row = 0
-        while row < self.model.n_theta:
-            entries = 0
-            while row < self.model.n_theta and entries < self._ENTRIES_PER_STAGE:
-                entries += self.model.n_theta - row
-                row += 1
-            stages += 1
+        stages = 0
+        for block in self.model.blocks.of_kind:
+            row = block.start
+            while row < block.stop:
+                entries = 0
+                while row < block.stop and entries < self._ENTRIES_PER_STAGE:
+                    entries += block.stop - row
+                    row += 1
+                stages += 1
         return stages
 
     # ---- information ----
@@ -297,7 +323,7 @@ class EstimatorQ31:
 
     def _matrix(self, sums: Int) -> Int:
         n = self.model.n_theta
-        m = np.empty((n, n, sums.shape[1]), np.int64)
+        m = np.zeros((n, n, sums.shape[1]), np.int64)
         upper, column = self._upper
         m[upper, column] = sums[: self.model.moments]
         m[column, upper] = sums[: self.model.moments]
@@ -313,12 +339,12 @@ class EstimatorQ31:
         return self._matrix(m), h
 
     def _jacobian(self, h: Int) -> tuple[Int, Int]:
-        """(c, f): C_ka = c_k 2^(f_a - h_row), c within 29 bits."""
+        """(c, f): C_ka = c_k 2^(f_a - h_row), c within 29 bits less the guard bits."""
         model = self.model
         c = model.jacobian(self.p)
         exponent = integers(self.c_exponent)[:, None] + h[self._c_row]
         lengths = length(c) + exponent
-        f = np.stack([np.maximum(lengths[own].max(axis=0), _NOTHING) for own in self._columns]) - 29
+        f = np.stack([np.maximum(lengths[own].max(axis=0), _NOTHING) for own in self._columns]) - self._bits
         return clamp(scale(c, f[self._c_column] - exponent), ONE // 2), f
 
     def _project(self, c: Int, m: Int) -> Int:
@@ -442,7 +468,7 @@ class EstimatorQ31:
         theta = model.theta(p)
         step = theta - self.theta
         align = integers(self.align)[:, None]
-        v_h = np.max(length(step) - align + h, axis=0) - 29
+        v_h = np.max(length(step) - align + h, axis=0) - self._bits
         v = clamp(scale(step, v_h + align - h), ONE // 2)
         b = clamp(b, HELD_LIMIT)
         moved = clamp(scale((m * v[:, None]).sum(axis=0), -(h + v_h)), HELD_LIMIT)
@@ -505,7 +531,7 @@ class EstimatorQ31:
     def judged(self) -> tuple[npt.NDArray[np.void], Mask]:
         """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
         n_p = self.model.n_p
-        out = np.zeros(self.lanes, estimates.Q31)
+        out = np.zeros(self.lanes, estimates.q31_of(n_p))
         out["p"][:, :n_p] = self.p.T
         out["weight"] = np.minimum(self.sums[-1] >> 16, 2**32 - 1)
         out["misfit"] = self._misfit()

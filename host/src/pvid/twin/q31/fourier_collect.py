@@ -14,6 +14,7 @@ from pvid.twin.q31.fourier_values import LATER, steps
 from pvid.twin.q31.integer import Int
 
 _BLOCK = 4
+_LEAST_PAIRS = 16  # of a filter, a tick
 _SHARING = 4  # the least D whose ticks share the work
 
 
@@ -54,9 +55,10 @@ class Schedule:
         ticks = design.decimation
         share = ticks // 2 if ticks > 1 else 1
         pairs = sum(one.half for one in design.filter)
-        each = -(-pairs // share)
+        each = max(-(-pairs // share), _LEAST_PAIRS)
         at_once = ticks < _SHARING
-        others = ticks if at_once else ticks - ticks // 2 - 1
+        job = max(-(-pairs // each), 1)
+        others = ticks if at_once else ticks - job - 1
         slots = max(_BLOCK * others // 2, 1)
         harmonics = design.highest + 1
         slices = -(-harmonics // slots)
@@ -64,7 +66,7 @@ class Schedule:
             decimation=ticks,
             hop=design.hop,
             first=first_step(design) + design.half + int(is_held(design)),
-            job=max(-(-pairs // each), 1) if pairs else 1,
+            job=job,
             at_once=at_once,
             slices=slices,
             adding=-(-harmonics // slices),
@@ -72,11 +74,11 @@ class Schedule:
 
     @property
     def free_ticks(self) -> int:
-        """In a half window, at least."""
+        """Before the next window is joined, at least."""
         ticks = self.decimation
         if self.at_once:
-            return self.hop * ticks
-        return self.hop // _BLOCK * (_BLOCK * (ticks - ticks // 2 - 1) - self.adding)
+            return (self.hop - _BLOCK) * ticks
+        return (self.hop // _BLOCK - 1) * (_BLOCK * (ticks - self.job - 1) - self.adding)
 
     def tick_of_jets(self, step: int) -> int:
         """In which the channels are made from the jets of a step."""
@@ -105,10 +107,14 @@ class Schedule:
 
 @dataclass(frozen=True)
 class Collected:
-    """Of a run: S_h [windows, channels, H + 1, 2], and what each tick did [ticks]."""
+    """Of a run: S_h [windows, channels, H + 1, 2], and what each tick did [ticks].
+
+    spreads : n times the variance of each sample over the n steps of a window [windows, samples]
+    """
 
     windows: Int
     ticks: Int
+    spreads: Int
 
 
 def collect(counts: Int, design: FourierDesignQ31) -> Collected:
@@ -118,6 +124,7 @@ def collect(counts: Int, design: FourierDesignQ31) -> Collected:
     within = np.all(np.abs(counts) <= np.array(design.full_scale)[:, np.newaxis], axis=0)
     runs = np.zeros(design.model.runs, np.int64)
     found, played = [np.zeros((0, len(design.model.channel), design.highest + 1, 2), np.int64)], []
+    spreads = [np.zeros((0, len(counts)), np.int64)]
     first = 0
     while first < total:
         beyond = np.flatnonzero(~within[first:])
@@ -129,9 +136,22 @@ def collect(counts: Int, design: FourierDesignQ31) -> Collected:
             last = first + plan.tick_of_jets(made.beyond)
         ticks = plan.play(last - first, made.channels.shape[1])
         played.append(ticks)
-        found.append(windows(made, design)[: int(np.sum(ticks == Tick.WINDOW))])
+        count = int(np.sum(ticks == Tick.WINDOW))
+        found.append(windows(made, design)[:count])
+        when = first + plan.tick_of_jets(0) + (LATER + np.arange(made.channels.shape[1])) * design.decimation
+        spreads.append(_spreads(counts[:, when], design.hop)[:count])
         runs = made.runs
         if last < total:
             played.append(np.array([Tick.REJECTED]))
         first = last + 1
-    return Collected(np.concatenate(found), np.concatenate(played))
+    return Collected(np.concatenate(found), np.concatenate(played), np.concatenate(spreads))
+
+
+def _spreads(x: Int, hop: int) -> Int:
+    """Of samples at steps [samples, n]: [windows, samples]."""
+    halves = x[:, : x.shape[1] // hop * hop].reshape(len(x), -1, hop)
+    total, square = np.add.reduce(halves, axis=-1), np.add.reduce(halves * halves, axis=-1)
+    n = 2 * hop
+    of_windows, squares = total[:, :-1] + total[:, 1:], square[:, :-1] + square[:, 1:]
+    mean = np.sign(of_windows) * (np.abs(of_windows) // n)
+    return np.asarray(squares - mean * (2 * of_windows - n * mean)).T

@@ -10,7 +10,7 @@ from pvid.settings.fourier import NONE, FourierChannel
 from pvid.settings.fourier_q31 import FourierDesignQ31
 from pvid.twin.q31.elementary import sign, soft_sign
 from pvid.twin.q31.fourier_front import rescaled
-from pvid.twin.q31.integer import WIDE, Int, clamp, round_shift
+from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
 
 LATER = 2  # steps from a step's jets to its channels
 
@@ -94,17 +94,17 @@ def _integrals(f: Int, design: FourierDesignQ31) -> tuple[Int, Int, Int]:
     hop, count = design.hop, f.shape[1] - 1
     last, now, behind = f[:, :-2], f[:, 1:-1], f[:, 2:]
     before = np.concatenate([2 * last[:, :1] - now[:, :1], last[:, :-1]], axis=1)
-    rise = 13 * (last + now) - (before + behind)
-    bend = now - last
+    rise = integers(13 * (last + now) - (before + behind))
+    bend = integers(4 * (now - last))
     once: Int = np.zeros((len(f), count), np.int64)
     twice: Int = np.zeros((len(f), count), np.int64)
     edges = np.zeros((2, len(f), max((count - 1) // hop, 0)), np.int64)
     shifts = np.array(design.integral, np.int64).reshape(-1, 2)
-    first: Int = np.zeros(len(f), np.int64)
-    second: Int = np.zeros(len(f), np.int64)
+    first: Int = once[:, 0]
+    second: Int = twice[:, 0]
     for k in range(1, count):
         next_first = first + rise[:, k - 1]
-        second = second + (first + next_first - 4 * bend[:, k - 1])
+        second = integers(second + (first + next_first - bend[:, k - 1]))
         first = next_first
         if k % hop == 0:
             edges[0, :, k // hop - 1] = round_shift(first, shifts[:, 0])

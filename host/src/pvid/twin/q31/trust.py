@@ -27,7 +27,7 @@ class TrustQ31(TrustTwin):
 
     def __init__(self, config: TrustConfigQ31, estimator: EstimatorQ31) -> None:
         long_memory = np.clip((estimator.block << 31) // (2**31 - estimator.retention), LONG, LONG_MEMORY)
-        super().__init__(config, estimator, long_memory, estimates.Q31)
+        super().__init__(config, estimator, long_memory, estimates.q31_of(len(estimator.p)))
         for a in range(len(estimator.p)):
             self.estimate["correlation"][:, a, a] = ONE
 

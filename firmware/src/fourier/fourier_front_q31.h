@@ -9,6 +9,9 @@
 /* Half of the longest filter of the jets. */
 uint16_t pvid_fourier_front_half_q31(const pvid_fourier_design_q31 *design);
 
+/* Ticks that a job takes: half of a block at most, but one at least. */
+uint32_t pvid_fourier_front_job_q31(const pvid_fourier_design_q31 *design);
+
 /* Requires a valid design. */
 void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design);
 

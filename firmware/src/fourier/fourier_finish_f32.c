@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-#include "fourier/finish_f32.h"
+#include "fourier/fourier_finish_f32.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -30,7 +30,7 @@ enum {
     STAGE_MEAN,    /* the scores to their means */
     STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
     STAGE_JUDGE,   /* trust.h publishes the estimate or holds it */
-    STAGE_IDLE
+    STAGE_IDLE = PVID_FOURIER_IDLE
 };
 
 /* Entries of the noise table, and products of the residuals, in a stage. */
@@ -75,11 +75,6 @@ pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pv
     pvid_fourier_scores_init_f32(&self->scores, config->estimator.forgetting_s * windows_hz);
     self->stage = STAGE_IDLE;
     return PVID_OK;
-}
-
-bool pvid_fourier_finish_is_busy_f32(const pvid_fourier_finish_f32 *self)
-{
-    return self->stage != (uint8_t)STAGE_IDLE;
 }
 
 static void begin_kind(pvid_fourier_finish_f32 *self)
@@ -210,6 +205,17 @@ static bool project_stage(pvid_fourier_f32 *self)
     return finish->index < kind->nuisances;
 }
 
+/* x -= a y */
+static inline void subtract(float a, const float *restrict y, size_t n, float *restrict x)
+{
+    const float *end = &x[n];
+    while (x < end) {
+        *x -= a * *y;
+        x++;
+        y++;
+    }
+}
+
 /* Rows whose residuals a stage forms. */
 static size_t rows_per_stage(const pvid_fourier_kind *kind)
 {
@@ -225,14 +231,16 @@ static bool residual_stage(pvid_fourier_f32 *self)
     const size_t rows = pvid_fourier_rows(self->design);
     const size_t end = (size_t)finish->index + rows_per_stage(kind);
     const size_t last = (end < rows) ? end : rows;
-    for (size_t k = finish->index; k < last; k++) {
-        float e = finish->column[kind->thetas][k];
-        for (size_t j = 0; j < kind->thetas; j++) {
-            e -= theta[j] * finish->column[j][k];
-        }
-        finish->row[k] = e;
-        finish->rss += e * e;
+    const size_t first = finish->index;
+    memcpy(&finish->row[first], &finish->column[kind->thetas][first], (last - first) * sizeof(float));
+    for (size_t j = 0; j < kind->thetas; j++) {
+        subtract(theta[j], &finish->column[j][first], last - first, &finish->row[first]);
     }
+    float rss = finish->rss;
+    for (size_t k = first; k < last; k++) {
+        rss += finish->row[k] * finish->row[k];
+    }
+    finish->rss = rss;
     finish->index = (uint16_t)last;
     return last < rows;
 }
@@ -285,10 +293,12 @@ static bool add_stage(pvid_fourier_f32 *self, pvid_reason *reason)
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
     const size_t k = finish->index;
-    float n[PVID_MAX_THETA] = {0};
+    const float e = finish->row[k];
+    float *score = &finish->score[finish->theta];
+    float n[PVID_MAX_THETA];
     for (size_t j = 0; j < kind->thetas; j++) {
         n[j] = finish->column[j][k];
-        finish->score[finish->theta + j] += n[j] * finish->row[k];
+        score[j] += n[j] * e;
     }
     const pvid_reason added =
         pvid_estimator_add_kind_f32(&self->estimator, finish->kind, n, finish->column[kind->thetas][k]);
@@ -380,7 +390,10 @@ static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
         return STAGE_SCORE; /* that is, the next kind */
     }
     if (finish->used == 0u) {
-        pvid_information_fade_f32(&self->estimator.information, pvid_trust_fade_factor_f32(&self->trust));
+        const float factor = pvid_trust_fade_factor_f32(&self->trust);
+        if (factor < 1.0f) {
+            pvid_information_fade_f32(&self->estimator.information, factor);
+        }
     }
     finish->used++;
     finish->free += freedom;
@@ -410,12 +423,24 @@ static void end_kind(pvid_fourier_f32 *self)
 }
 
 /* The stage after one that is complete. */
+static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    switch (self->finish.stage) {
+    case STAGE_RESIDUAL:
+        return gated(self, reason);
+    case STAGE_JUDGE:
+        return STAGE_IDLE;
+    default:
+        return (uint8_t)(self->finish.stage + 1u);
+    }
+}
+
 static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
+    finish->stage = stage_after(self, reason);
     finish->index = 0;
     finish->part = 0;
-    finish->stage = (finish->stage == (uint8_t)STAGE_RESIDUAL) ? gated(self, reason) : (uint8_t)(finish->stage + 1u);
     if (finish->stage == (uint8_t)STAGE_SCORE) {
         end_kind(self);
     } else if (finish->stage == (uint8_t)STAGE_SOLVE) {

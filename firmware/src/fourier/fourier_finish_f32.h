@@ -1,5 +1,5 @@
-/* A whole window: from its sums to rows, to steps of p, to the published estimate. One stage per call; finish_f32.c lists
- * the stages. Private to the core. */
+/* A whole window: from its sums to rows, to steps of p, to the published estimate. One stage per call; finish_f32.c
+ * lists the stages. Private to the core. */
 #ifndef PVID_FOURIER_FINISH_F32_H
 #define PVID_FOURIER_FINISH_F32_H
 
@@ -8,9 +8,13 @@
 
 #include "pvid/fourier.h"
 
-/* No work; `self` is all zeros. Requires a valid design; dt: between steps [s]. Fails iff the gate's configuration is out
- * of its range. */
-pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pvid_fourier_config_f32 *config, float dt);
+/* Stage without work. */
+#define PVID_FOURIER_IDLE 255u
+
+/* No work; `self` is all zeros. Requires a valid design; dt: between steps [s]. Fails iff the gate's configuration is
+ * out of its range. */
+pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pvid_fourier_config_f32 *config,
+                                         float dt);
 
 /* Begins a window at the estimator's present p. */
 void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self);
@@ -19,7 +23,10 @@ void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self);
 void pvid_fourier_finish_skip_f32(pvid_fourier_finish_f32 *self);
 
 /* Returns whether a window is being processed. */
-bool pvid_fourier_finish_is_busy_f32(const pvid_fourier_finish_f32 *self);
+static inline bool pvid_fourier_finish_is_busy_f32(const pvid_fourier_finish_f32 *self)
+{
+    return self->stage != (uint8_t)PVID_FOURIER_IDLE;
+}
 
 /* Runs one stage. Sets *reason if a row is rejected, if the gate rejects the rows of a kind, or at the last stage. */
 void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason);

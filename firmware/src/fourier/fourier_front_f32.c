@@ -6,11 +6,12 @@
  *
  * A jet is x + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x above 0) or sum_i w_i
  * (x_(+i) - x_(-i)) of odd order, i = 1..half, added outwards from the instant of the step. */
-#include "fourier/front_f32.h"
+#include "fourier/fourier_front_f32.h"
 
 #include <stddef.h>
 
 #include "fourier/schedule.h"
+#include "number/unroll.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
 
@@ -79,6 +80,7 @@ void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self, const pvid_fouri
     self->head = 0;
     self->seen = 0;
     self->begun = false;
+    self->busy = false;
     self->jet = design->model->jets;
     self->wait = (uint16_t)(self->half + pvid_fourier_front_lead_f32(self) + 1u);
 }
@@ -114,8 +116,8 @@ static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier
 }
 
 /* Signals that need samples of other ticks. Returns false if there are none: the next sample is missing. */
-static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model, const float sample[],
-                          float place[])
+PVID_SELDOM static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
+                                      const float sample[], float place[])
 {
     const bool first = self->seen == 0u;
     if (first) {
@@ -135,18 +137,21 @@ static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model
 static inline bool store(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model, const float sample[])
 {
     float *place = &self->ring[(size_t)self->head * model->signals];
-    bool any = true;
-    if (self->needs == NOTHING) {
-        for (size_t i = 0; i < model->signals; i++) {
-            place[i] = sample[model->signal[i].sample];
+    if (self->needs != NOTHING) {
+        if (!place_derived(self, model, sample, place)) {
+            return false;
         }
     } else {
-        any = place_derived(self, model, sample, place);
+        const pvid_fourier_signal *signal = model->signal;
+        const float *end = &place[model->signals];
+        while (place < end) {
+            *place = sample[signal->sample];
+            place++;
+            signal++;
+        }
     }
-    if (any) {
-        self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
-    }
-    return any;
+    self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
+    return true;
 }
 
 /* Begins the next jet of the job: those with half 0 are complete at once. */
@@ -164,13 +169,14 @@ static void begin_jet(pvid_fourier_front_f32 *self, const pvid_fourier_design_f3
     self->sum = 0.0f;
 }
 
-static void begin_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
+PVID_SELDOM static void begin_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
 {
     /* the newest signals are before head, the instant `half` before those */
     const uint16_t back = (uint16_t)(self->half + 1u);
     self->centre = (uint16_t)((self->head >= back) ? (self->head - back) : ((self->head + self->length) - back));
     self->wait = design->decimation;
     self->begun = true;
+    self->busy = true;
     self->jet = 0;
     begin_jet(self, design);
 }
@@ -228,18 +234,28 @@ static size_t add_pairs(pvid_fourier_front_f32 *self, const pvid_fourier_design_
     return pairs;
 }
 
+/* A part of the job. */
+PVID_SELDOM static void advance_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
+{
+    for (size_t left = self->pairs_per_tick; (left > 0u) && (self->jet < design->model->jets);) {
+        left -= add_pairs(self, design, left);
+    }
+    self->busy = self->jet < design->model->jets;
+}
+
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,
                                  const float sample[])
 {
     if (!store(self, design->model, sample)) {
         return false;
     }
-    self->wait--;
-    if (self->wait == 0u) {
+    const uint16_t wait = (uint16_t)(self->wait - 1u);
+    self->wait = wait;
+    if (wait == 0u) {
         begin_job(self, design);
     }
-    for (size_t left = self->pairs_per_tick; (left > 0u) && (self->jet < design->model->jets);) {
-        left -= add_pairs(self, design, left);
+    if (self->busy) {
+        advance_job(self, design);
     }
-    return self->begun && (self->wait == self->step_wait);
+    return (self->wait == self->step_wait) && self->begun;
 }

@@ -4,11 +4,14 @@
  *
  * A jet is the rescaled sum  x 2^bits + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x
  * above order 0) or  sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half. */
-#include "fourier/front_q31.h"
+#include "fourier/fourier_front_q31.h"
 
 #include <stddef.h>
 
 #include "fourier/rescale_q31.h"
+
+/* Pairs a tick, at least: fewer cost less than what a tick does for them beside. */
+#define LEAST_PAIRS 16u
 
 static size_t lesser(size_t a, size_t b)
 {
@@ -24,21 +27,41 @@ uint16_t pvid_fourier_front_half_q31(const pvid_fourier_design_q31 *design)
     return half;
 }
 
+static size_t pairs_of(const pvid_fourier_design_q31 *design)
+{
+    size_t pairs = 0;
+    for (size_t i = 0; i < design->model->jets; i++) {
+        pairs += design->filter[i].half;
+    }
+    return pairs;
+}
+
+static size_t pairs_per_tick(const pvid_fourier_design_q31 *design)
+{
+    const size_t ticks = (design->decimation > 1u) ? ((size_t)design->decimation / 2u) : 1u;
+    const size_t each = (pairs_of(design) + (ticks - 1u)) / ticks;
+    return (each > LEAST_PAIRS) ? each : LEAST_PAIRS;
+}
+
+uint32_t pvid_fourier_front_job_q31(const pvid_fourier_design_q31 *design)
+{
+    const size_t each = pairs_per_tick(design);
+    const size_t ticks = (pairs_of(design) + (each - 1u)) / each;
+    return (uint32_t)((ticks > 0u) ? ticks : 1u);
+}
+
 void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design)
 {
     const pvid_fourier_model_q31 *model = design->model;
-    size_t pairs = 0;
-    for (size_t i = 0; i < model->jets; i++) {
-        pairs += design->filter[i].half;
-    }
+    self->plain = true;
     self->held = false;
     for (size_t i = 0; i < model->signals; i++) {
+        self->plain = self->plain && (model->signal[i].source == (uint8_t)PVID_SIGNAL_SAMPLED);
         self->held = self->held || (model->signal[i].source == (uint8_t)PVID_SIGNAL_HELD);
     }
-    const size_t ticks = (design->decimation > 1u) ? ((size_t)design->decimation / 2u) : 1u;
     self->half = pvid_fourier_front_half_q31(design);
     self->length = (uint16_t)((2u * self->half) + design->decimation);
-    self->pairs_per_tick = (uint16_t)((pairs + (ticks - 1u)) / ticks);
+    self->pairs_per_tick = (uint16_t)pairs_per_tick(design);
     pvid_fourier_front_reset_q31(self, design);
 }
 
@@ -78,19 +101,28 @@ static int32_t signal_of(const pvid_fourier_front_q31 *self, pvid_fourier_signal
 /* Writes the signals of a tick to the ring. Returns false if there are none: the next sample is missing. */
 static bool store(pvid_fourier_front_q31 *self, const pvid_fourier_model_q31 *model, const int32_t counts[])
 {
-    const bool any = self->seen || !self->held;
-    if (!self->seen) {
-        remember(self, model->samples, counts);
-    }
-    if (any) {
-        int32_t *place = &self->ring[(size_t)self->head * model->signals];
-        for (size_t i = 0; i < model->signals; i++) {
-            place[i] = signal_of(self, model->signal[i], counts);
+    const pvid_fourier_signal *signal = model->signal;
+    const size_t signals = model->signals;
+    int32_t *place = &self->ring[self->head * signals];
+    if (self->plain) {
+        for (size_t i = 0; i < signals; i++) {
+            place[i] = counts[signal[i].sample];
         }
-        self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
+    } else {
+        const bool any = self->seen || !self->held;
+        if (!self->seen) {
+            remember(self, model->samples, counts);
+        }
+        if (!any) {
+            return false;
+        }
+        for (size_t i = 0; i < signals; i++) {
+            place[i] = signal_of(self, signal[i], counts);
+        }
         remember(self, model->samples, counts);
     }
-    return any;
+    self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
+    return true;
 }
 
 /* Completes the present jet and every one behind it that needs no pairs. */
@@ -171,18 +203,21 @@ static size_t add_pairs(pvid_fourier_front_q31 *self, const pvid_fourier_design_
 bool pvid_fourier_front_step_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
                                  const int32_t counts[])
 {
+    const size_t jets = design->model->jets;
     if (!store(self, design->model, counts)) {
         return false;
     }
     self->wait--;
-    bool busy = self->jet < design->model->jets;
     if (self->wait == 0u) {
         begin(self, design);
-        busy = true;
+    } else if (self->jet == jets) {
+        return false;
+    } else {
+        /* the job goes on */
     }
     size_t left = self->pairs_per_tick;
-    while ((left > 0u) && (self->jet < design->model->jets)) {
+    while ((left > 0u) && (self->jet < jets)) {
         left -= add_pairs(self, design, left);
     }
-    return busy && (self->jet == design->model->jets);
+    return self->jet == jets;
 }

@@ -1,0 +1,476 @@
+#include "fourier/fourier_finish_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "fourier/columns_q31.h"
+#include "fourier/direction_q31.h"
+#include "fourier/sums_q31.h"
+#include "fourier/white_q31.h"
+#include "number/count.h"
+#include "number/integer_q31.h"
+#include "number/scaled_q31.h"
+#include "solve/row_q31.h"
+#include "solve/state_q31.h"
+
+enum {
+    /* for each kind of rows */
+    STAGE_WEIGH,    /* c_j from a few entries of the noise table */
+    STAGE_SPECTRUM, /* D_h, a few harmonics at a time */
+    STAGE_INVERT,   /* 1 / sqrt(D_h), a harmonic at a time */
+    STAGE_BASIS,    /* directions that the test functions leave out */
+    STAGE_COLUMN,   /* for each column: its parts, then n/2 times one direction of each family off it */
+    STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
+    STAGE_RESIDUAL, /* a few rows of e; at the end the gate accepts or rejects the kind */
+    STAGE_FADE,     /* before the first rows of the window: the factor of a renewal on the sums, in parts */
+    STAGE_ADD,      /* K + n times: a row to the estimator */
+    /* for the window */
+    STAGE_SOLVE,  /* `iterations` solves, several stages each */
+    STAGE_ASSESS, /* several stages */
+    STAGE_JUDGE,  /* trust_q31.h publishes the estimate or holds it */
+    STAGE_IDLE
+};
+
+#define ENTRIES_PER_STAGE 4u
+#define HARMONICS_PER_STAGE 2u
+#define RESIDUALS_PER_STAGE 2u
+
+/* Windows in the average of the gate's scale, which is relative to the sensors' noise and at least 1. */
+#define GATE_MEMORY 4u
+
+static const pvid_fourier_kind *kind_of(const pvid_fourier_q31 *self)
+{
+    return &self->design->model->kind[self->finish.kind];
+}
+
+static size_t columns_of(const pvid_fourier_kind *kind)
+{
+    return (size_t)kind->thetas + 1u + kind->nuisances;
+}
+
+static size_t lesser(size_t a, size_t b)
+{
+    return (a < b) ? a : b;
+}
+
+pvid_status pvid_fourier_finish_init_q31(pvid_fourier_finish_q31 *self, const pvid_fourier_config_q31 *config)
+{
+    const pvid_fourier_design_q31 *design = config->design;
+    const int64_t sd = config->estimator.row_sd;
+    for (size_t i = 0; i < design->model->kinds; i++) {
+        const pvid_status status =
+            pvid_gate_init_q31(&self->gate[i], &config->gate, GATE_MEMORY, pvid_scaled_of_q31(1, 0));
+        if (status != PVID_OK) {
+            return status;
+        }
+    }
+    memcpy(self->n_bits, config->estimator.n_bits, sizeof self->n_bits);
+    self->y_bits = config->estimator.y_bits;
+    self->expected = pvid_scaled_of_q31(sd * sd, -2 * PVID_ROW_SD_BITS);
+    pvid_fourier_white_init_q31(&self->white, design);
+    self->stage = STAGE_IDLE;
+    return PVID_OK;
+}
+
+bool pvid_fourier_finish_is_busy_q31(const pvid_fourier_finish_q31 *self)
+{
+    return self->stage != (uint8_t)STAGE_IDLE;
+}
+
+static void begin_kind(pvid_fourier_finish_q31 *self)
+{
+    self->index = 0;
+    self->part = 0;
+    self->live = 0;
+    self->rss = 0;
+    self->saturated = false;
+    self->stage = STAGE_WEIGH;
+}
+
+void pvid_fourier_finish_begin_q31(pvid_fourier_finish_q31 *self)
+{
+    self->kind = 0;
+    self->theta = 0;
+    self->used = 0;
+    self->iteration = 0;
+    self->free = 0;
+    begin_kind(self);
+}
+
+/* ---- rows of a kind; each returns whether there is more of the stage ---- */
+
+static bool weigh_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const pvid_estimator_q31 *estimator = &self->estimator;
+    const size_t end = lesser((size_t)finish->index + ENTRIES_PER_STAGE, self->design->n_noise);
+    if (finish->index == 0u) {
+        for (size_t j = 0; j < kind_of(self)->thetas; j++) {
+            const size_t i = finish->theta + j;
+            finish->of_theta[j] = pvid_scaled_of_q31(estimator->theta[i], -(int32_t)estimator->theta_bits[i]);
+        }
+    }
+    pvid_fourier_white_weigh_q31(&finish->white, self->design, finish->kind, finish->of_theta, finish->index, end);
+    finish->index = (uint16_t)end;
+    return end < self->design->n_noise;
+}
+
+static bool spectrum_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const size_t harmonics = finish->white.cosines;
+    const size_t end = lesser((size_t)finish->index + HARMONICS_PER_STAGE, harmonics);
+    pvid_fourier_white_spectrum_q31(&finish->white, self->design, finish->kind, finish->index, end);
+    finish->index = (uint16_t)end;
+    if (end == harmonics) {
+        finish->least = pvid_fourier_white_floor_q31(&finish->white, self->design);
+    }
+    return end < harmonics;
+}
+
+static bool invert_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_fourier_white_invert_q31(&finish->white, finish->least, finish->index, (size_t)finish->index + 1u);
+    finish->index++;
+    return finish->index < finish->white.cosines;
+}
+
+static bool basis_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_fourier_white_basis_q31(&finish->white, self->design, finish->index);
+    finish->index++;
+    return finish->index < pvid_fourier_basis_stages_q31(self->design);
+}
+
+static bool column_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const pvid_fourier_design_q31 *design = self->design;
+    const pvid_fourier_kind *kind = kind_of(self);
+    const pvid_fourier_term_q31 *term = design->model->term;
+    const size_t parts = pvid_fourier_column_parts_q31(&finish->white);
+    const size_t place = finish->index;
+    if ((place == 0u) && (finish->part == 0u)) {
+        finish->term = kind->first;
+    }
+    if (finish->part < parts) {
+        size_t end = finish->term;
+        while ((end < kind->end) && (term[end].column == place)) {
+            end++;
+        }
+        pvid_fourier_columns_make_q31(&finish->columns, design, &finish->white, &self->collect.window, place,
+                                      finish->term, end, finish->part);
+        finish->part++;
+        if (finish->part == parts) {
+            finish->term = (uint16_t)end;
+        }
+        return true;
+    }
+    pvid_fourier_white_remove_q31(&finish->white, design, finish->part - parts, finish->columns.x[place]);
+    finish->part++;
+    if (finish->part < (parts + (design->power / 2u))) {
+        return true;
+    }
+    finish->whole[place] = pvid_fourier_columns_square_q31(design, finish->columns.x[place]);
+    finish->part = 0;
+    finish->index++;
+    return finish->index < columns_of(kind);
+}
+
+/* Of each nuisance in order: part 0 its direction, then the columns without it, those of theta, Y and the nuisances
+ * behind it. */
+static bool project_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const pvid_fourier_kind *kind = kind_of(self);
+    const size_t first = (size_t)kind->thetas + 1u;
+    const size_t nuisance = first + finish->index;
+    if (finish->index >= kind->nuisances) {
+        return false;
+    }
+    int32_t *direction = finish->columns.x[nuisance];
+    if (finish->part == 0u) {
+        const bool kept = pvid_fourier_columns_keep_q31(self->design, finish->whole[nuisance], direction);
+        finish->live = (uint8_t)(finish->live + (kept ? 1u : 0u));
+        finish->part = 1;
+        return true;
+    }
+    const size_t place = finish->part - 1u;
+    const size_t column = (place < first) ? place : (place + finish->index + 1u);
+    pvid_fourier_take_off_q31(direction, 0, pvid_fourier_rows_q31(self->design), finish->columns.x[column]);
+    finish->part++;
+    if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
+        finish->part = 0;
+        finish->index++;
+    }
+    return finish->index < kind->nuisances;
+}
+
+/* An entry of a white column in a format of the rows. */
+static int32_t entry_of(const pvid_fourier_columns_q31 *columns, size_t place, size_t row, int32_t bits)
+{
+    const int32_t shift = -((int32_t)columns->exponent[place] + bits);
+    return (int32_t)pvid_clamp_q31(pvid_scale_q31(columns->x[place][row], shift), INT32_MAX);
+}
+
+/* Row k of the kind; returns Y. */
+static int32_t row_of(const pvid_fourier_q31 *self, size_t k, int32_t n[PVID_MAX_THETA_Q31])
+{
+    const pvid_fourier_finish_q31 *finish = &self->finish;
+    const size_t thetas = kind_of(self)->thetas;
+    for (size_t j = 0; j < thetas; j++) {
+        n[j] = entry_of(&finish->columns, j, k, finish->n_bits[finish->theta + j]);
+    }
+    return entry_of(&finish->columns, thetas, k, finish->y_bits);
+}
+
+static bool residual_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const size_t rows = pvid_fourier_rows_q31(self->design);
+    const size_t last = lesser((size_t)finish->index + RESIDUALS_PER_STAGE, rows);
+    pvid_block block;
+    pvid_information_block_q31(self->estimator.model, finish->theta, &block);
+    for (size_t k = finish->index; k < last; k++) {
+        int32_t n[PVID_MAX_THETA_Q31];
+        int64_t e;
+        const int32_t y = row_of(self, k, n);
+        const bool fits = pvid_estimator_innovation_q31(&self->estimator, &block, n, y, &e);
+        const int64_t within = pvid_clamp_q31(e, PVID_ROW_LIMIT_Q31);
+        finish->saturated = finish->saturated || !fits;
+        finish->rss = pvid_clamp_q31(finish->rss + (within * within), PVID_WIDE);
+    }
+    finish->index = (uint16_t)last;
+    return last < rows;
+}
+
+/* rss over its expectation. */
+static pvid_scaled_q31 variance_ratio_of(const pvid_fourier_finish_q31 *self, int64_t rss, int64_t freedom)
+{
+    const pvid_scaled_q31 expected = pvid_scaled_times_q31(pvid_scaled_of_q31(freedom, 0), self->expected);
+    return pvid_scaled_over_q31(pvid_scaled_of_q31(rss, 0), expected);
+}
+
+/* Test functions less nuisances: the dimensions that the rows of the kind span; at least 1. */
+static int64_t freedom_of(const pvid_fourier_q31 *self)
+{
+    const int64_t freedom = (int64_t)self->design->functions - self->finish.live;
+    return (freedom > 0) ? freedom : 1;
+}
+
+/* Whether the gate accepts the kind. Saturated rows pass; the estimator rejects them. */
+static bool passes(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_gate_q31 *gate = &finish->gate[finish->kind];
+    return (gate->limit.m == 0) || finish->saturated ||
+           pvid_gate_passes_q31(gate, variance_ratio_of(finish, finish->rss, freedom_of(self)));
+}
+
+static bool fade_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    if (finish->used > 0u) {
+        return false;
+    }
+    if (finish->index == 0u) {
+        finish->fade_factor = pvid_trust_fade_factor_q31(&self->trust);
+    }
+    if (finish->fade_factor > 0) {
+        pvid_information_fade_q31(&self->estimator.information, finish->index, finish->fade_factor);
+    }
+    finish->index++;
+    return finish->index < PVID_INFORMATION_END_PARTS;
+}
+
+static bool add_stage(pvid_fourier_q31 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    int32_t n[PVID_MAX_THETA_Q31];
+    const int32_t y = row_of(self, finish->index, n);
+    /* INT32_MAX: beyond the limit of a row */
+    const pvid_reason added =
+        pvid_estimator_add_kind_q31(&self->estimator, finish->kind, n, finish->saturated ? INT32_MAX : y);
+    if (added != PVID_ACCUMULATED) {
+        *reason = added;
+    }
+    finish->index++;
+    return finish->index < pvid_fourier_rows_q31(self->design);
+}
+
+/* ---- steps of p and verdict ---- */
+
+static void begin_solves(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const int32_t *fallback = pvid_trust_fallback_q31(&self->trust);
+    pvid_estimator_set_expected_q31(&self->estimator, finish->expected);
+    pvid_estimator_begin_q31(&self->estimator, &finish->solve, true);
+    finish->rss = finish->solve.group_rss;
+    if (fallback != NULL) {
+        finish->solve.has_fallback = true;
+        memcpy(finish->solve.fallback, fallback, sizeof finish->solve.fallback);
+    }
+}
+
+static bool solve_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    if (!pvid_estimator_advance_q31(&self->estimator, &finish->solve)) {
+        return true;
+    }
+    finish->iteration++;
+    finish->reason = finish->solve.reason;
+    finish->size = finish->solve.size;
+    /* ACCUMULATED: the divider allows no solve after this window */
+    if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED)) {
+        return false;
+    }
+    pvid_estimator_begin_q31(&self->estimator, &finish->solve, false);
+    return true;
+}
+
+static void judge_stage(pvid_fourier_q31 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const pvid_scaled_q31 ratio = variance_ratio_of(finish, finish->rss, finish->free);
+    *reason =
+        pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size, finish->solve.above_noise,
+                             pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
+}
+
+/* ---- the order of the stages ---- */
+
+/* Behind a kind: the next kind, or the solves; nothing if no kind has been added. */
+static void end_kind(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    finish->theta = (uint8_t)(finish->theta + kind_of(self)->thetas);
+    finish->kind++;
+    if (finish->kind < self->design->model->kinds) {
+        begin_kind(finish);
+    } else if (finish->used > 0u) {
+        finish->stage = STAGE_SOLVE;
+        begin_solves(self);
+    } else {
+        finish->stage = STAGE_IDLE;
+    }
+}
+
+/* Whether there is more of the present stage, of those of a kind. */
+static bool advance_kind(pvid_fourier_q31 *self, pvid_reason *reason)
+{
+    bool more;
+    switch (self->finish.stage) {
+    case STAGE_WEIGH:
+        more = weigh_stage(self);
+        break;
+    case STAGE_SPECTRUM:
+        more = spectrum_stage(self);
+        break;
+    case STAGE_INVERT:
+        more = invert_stage(self);
+        break;
+    case STAGE_BASIS:
+        more = basis_stage(self);
+        break;
+    case STAGE_COLUMN:
+        more = column_stage(self);
+        break;
+    case STAGE_PROJECT:
+        more = project_stage(self);
+        break;
+    case STAGE_RESIDUAL:
+        more = residual_stage(self);
+        break;
+    case STAGE_FADE:
+        more = fade_stage(self);
+        break;
+    default: /* STAGE_ADD */
+        more = add_stage(self, reason);
+        break;
+    }
+    return more;
+}
+
+static void step_kind(pvid_fourier_q31 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    if (advance_kind(self, reason)) {
+        return;
+    }
+    if ((finish->stage == (uint8_t)STAGE_RESIDUAL) && !passes(self)) {
+        pvid_count_up(&self->estimator.counters.rejected_outlier);
+        *reason = PVID_REJECTED_OUTLIER;
+        end_kind(self);
+    } else if (finish->stage == (uint8_t)STAGE_ADD) {
+        finish->used++;
+        finish->free = (uint16_t)(finish->free + freedom_of(self));
+        end_kind(self);
+    } else {
+        finish->stage++;
+        finish->index = 0;
+        finish->part = 0;
+    }
+}
+
+void pvid_fourier_finish_step_q31(pvid_fourier_q31 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    switch (finish->stage) {
+    case STAGE_SOLVE:
+        if (!solve_stage(self)) {
+            finish->stage = STAGE_ASSESS;
+            pvid_estimator_begin_assessment_q31(&self->estimator, &finish->solve, &finish->candidate);
+        }
+        break;
+    case STAGE_ASSESS:
+        if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->solve, &finish->candidate)) {
+            finish->stage = STAGE_JUDGE;
+        }
+        break;
+    case STAGE_JUDGE:
+        judge_stage(self, reason);
+        finish->stage = STAGE_IDLE;
+        break;
+    case STAGE_IDLE:
+        break;
+    default:
+        step_kind(self, reason);
+        break;
+    }
+}
+
+static uint32_t parts(size_t all, size_t few)
+{
+    return (uint32_t)((all > 0u) ? ((all + (few - 1u)) / few) : 1u);
+}
+
+static uint32_t stages_of_kind(const pvid_fourier_q31 *self, const pvid_fourier_kind *kind)
+{
+    const pvid_fourier_design_q31 *design = self->design;
+    const size_t harmonics = pvid_fourier_harmonics_q31(design);
+    const size_t rows = pvid_fourier_rows_q31(design);
+    const size_t column = pvid_fourier_column_parts_q31(&self->finish.white) + (design->power / 2u);
+    size_t project = (kind->nuisances == 0u) ? 1u : 0u;
+    for (size_t i = 0; i < kind->nuisances; i++) {
+        project += ((size_t)kind->thetas + 1u + kind->nuisances) - i;
+    }
+    return parts(design->n_noise, ENTRIES_PER_STAGE) + parts(harmonics, HARMONICS_PER_STAGE) + (uint32_t)harmonics +
+           (uint32_t)pvid_fourier_basis_stages_q31(design) + (uint32_t)(columns_of(kind) * column) + (uint32_t)project +
+           parts(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows;
+}
+
+uint32_t pvid_fourier_finish_stages_q31(const pvid_fourier_q31 *self)
+{
+    const pvid_fourier_model_q31 *model = self->design->model;
+    uint32_t stages = 1;
+    for (size_t i = 0; i < model->kinds; i++) {
+        stages += stages_of_kind(self, &model->kind[i]);
+    }
+    const uint32_t first = pvid_estimator_stages_q31(&self->estimator, true);
+    const uint32_t more = pvid_estimator_stages_q31(&self->estimator, false);
+    return stages + first + ((self->iterations - 1u) * more) + pvid_estimator_assessment_stages_q31(&self->estimator);
+}

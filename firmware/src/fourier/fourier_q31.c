@@ -1,0 +1,272 @@
+#include "pvid/fourier_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "fourier/collect_q31.h"
+#include "fourier/fourier_finish_q31.h"
+#include "fourier/fourier_front_q31.h"
+#include "fourier/sums_q31.h"
+#include "judge/publication.h"
+#include "number/count.h"
+#include "number/init.h"
+#include "number/integer_q31.h"
+
+#define COUNTS_LIMIT ((int32_t)1 << 24)
+#define STAGES_MAX 64u
+#define POWER_OF_ROW_WEIGHT 65536u /* 1 in Q16 */
+
+static bool is_ready(const pvid_fourier_q31 *self)
+{
+    const bool ready = (self != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
+{
+    if ((model == NULL) || (model->signal == NULL) || (model->jet == NULL) || (model->channel == NULL) ||
+        (model->term == NULL) || (model->kind == NULL) || (model->values == NULL) || (model->model == NULL)) {
+        return PVID_BAD_MODEL;
+    }
+    const size_t inputs = (size_t)model->jets + model->runs + model->signs;
+    const bool fits = (model->samples >= 1u) && (model->samples <= PVID_MAX_SAMPLES) && (model->signals >= 1u) &&
+                      (model->jets >= 1u) && (inputs <= PVID_MAX_INPUTS) && (model->runs <= PVID_MAX_INTEGRANDS) &&
+                      (model->signs <= PVID_MAX_INTEGRANDS) && (model->integrands <= PVID_MAX_INTEGRANDS) &&
+                      (model->gains <= PVID_MAX_CHANNELS) && (model->channels >= 1u) &&
+                      (model->channels <= PVID_MAX_CHANNELS) && (model->kinds >= 1u) &&
+                      (model->kinds <= PVID_MAX_KINDS) &&
+                      ((model->prepare != NULL) || ((model->runs + model->signs) == 0));
+    size_t thetas = 0;
+    bool columns = true;
+    for (size_t i = 0; fits && (i < model->kinds); i++) {
+        const pvid_fourier_kind *kind = &model->kind[i];
+        thetas += kind->thetas;
+        columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS);
+    }
+    return (fits && columns && (thetas == model->model->n_theta)) ? PVID_OK : PVID_BAD_MODEL;
+}
+
+static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
+{
+    if ((design == NULL) || (design->full_scale == NULL) || (design->filter == NULL) || (design->format == NULL) ||
+        (design->factor == NULL) || (design->error_order == NULL) || (design->error_variance == NULL) ||
+        (design->circle == NULL) || ((design->noise == NULL) && (design->n_noise > 0u))) {
+        return PVID_BAD_DESIGN;
+    }
+    const pvid_status status = model_is_valid(design->model);
+    if (status != PVID_OK) {
+        return status;
+    }
+    const pvid_fourier_model_q31 *model = design->model;
+    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
+        return PVID_BAD_FUNCTIONS;
+    }
+    if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
+        return PVID_BAD_DECIMATION;
+    }
+    const size_t harmonics = pvid_fourier_harmonics_q31(design);
+    if ((design->power < 2u) || ((design->power % 2u) != 0u) || (design->power > PVID_MAX_POWER) ||
+        (harmonics > PVID_MAX_HARMONICS)) {
+        return PVID_BAD_FUNCTIONS;
+    }
+    if ((design->hop < harmonics) || ((design->hop % 4u) != 0u) || (design->hop < 8u) || (design->hop > 4096u)) {
+        return PVID_BAD_WINDOW;
+    }
+    const size_t length = (2u * (size_t)pvid_fourier_front_half_q31(design)) + design->decimation;
+    if ((length * model->signals) > PVID_MAX_RING) {
+        return PVID_BAD_TAPS;
+    }
+    bool shifts = (design->sum_shift >= 1u) && (design->sum_shift <= 30u);
+    bool scales = true;
+    for (size_t i = 0; i < model->samples; i++) {
+        scales = scales && (design->full_scale[i] > 0) && (design->full_scale[i] <= COUNTS_LIMIT);
+    }
+    for (size_t i = 0; i < model->channels; i++) {
+        shifts = shifts && (design->format[i].value >= 1u);
+    }
+    if (!scales) {
+        return PVID_BAD_FULL_SCALE;
+    }
+    return shifts ? PVID_OK : PVID_BAD_SHIFT;
+}
+
+static void restart(pvid_fourier_q31 *self)
+{
+    pvid_fourier_collect_reset_q31(&self->collect);
+    self->warm = false;
+}
+
+static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config)
+{
+    const pvid_fourier_design_q31 *design = config->design;
+    pvid_status status = design_is_valid(design);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if (config->offset == NULL) {
+        return PVID_BAD_DESIGN;
+    }
+    for (size_t i = 0; (config->drive_min != NULL) && (i < design->model->samples); i++) {
+        if ((config->drive_min[i] < 0) || (config->drive_min[i] > COUNTS_LIMIT)) {
+            return PVID_BAD_DRIVE_MIN;
+        }
+    }
+    memset(self, 0, sizeof *self);
+    pvid_estimator_config_q31 estimator = config->estimator;
+    estimator.model = design->model->model;
+    /* K + n rows span K dimensions */
+    estimator.row_weight =
+        (POWER_OF_ROW_WEIGHT * (uint32_t)design->functions) / ((uint32_t)design->functions + design->power);
+    status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_trust_init_q31(&self->trust, &config->trust, &self->estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_fourier_finish_init_q31(&self->finish, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if ((config->iterations < 1u) || (config->iterations > PVID_MAX_ITERATIONS)) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->design = design;
+    self->offset = config->offset;
+    self->drive_min = config->drive_min;
+    self->iterations = (uint8_t)((self->estimator.settings.gain < PVID_ONE_Q30) ? 1u : config->iterations);
+    pvid_fourier_collect_init_q31(&self->collect, design);
+    const uint32_t ticks = pvid_fourier_free_ticks_q31(design);
+    const uint32_t stages = pvid_fourier_finish_stages_q31(self);
+    const uint32_t each = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
+    self->stages_per_tick = (uint8_t)((each <= STAGES_MAX) ? each : 0u);
+    return (self->stages_per_tick > 0u) ? PVID_OK : PVID_BAD_ITERATIONS;
+}
+
+pvid_status pvid_fourier_init_q31(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config)
+{
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
+}
+
+/* The counts of the tick in which the channels of step `index` of a half were made. */
+static void watch_drive(pvid_fourier_drive_q31 *self, size_t samples, size_t half, bool begins, const int32_t counts[])
+{
+    for (size_t i = 0; i < samples; i++) {
+        const int64_t x = counts[i];
+        self->sum[half][i] = (begins ? 0 : self->sum[half][i]) + x;
+        self->square[half][i] = (begins ? 0 : self->square[half][i]) + (x * x);
+    }
+}
+
+/* Whether every sample of the last two halves moved as much as it must. |counts| <= 2^24 and 2 hop <= 2^13: nothing
+ * overflows.
+ */
+static bool is_driven(const pvid_fourier_q31 *self)
+{
+    const int64_t n = 2 * (int64_t)self->design->hop;
+    bool driven = true;
+    for (size_t i = 0; (self->drive_min != NULL) && (i < self->design->model->samples); i++) {
+        const int64_t sum = self->drive.sum[0][i] + self->drive.sum[1][i];
+        const int64_t square = self->drive.square[0][i] + self->drive.square[1][i];
+        const int64_t mean = sum / n;
+        const int64_t spread = square - (mean * ((2 * sum) - (n * mean)));
+        const int64_t least = self->drive_min[i];
+        driven = driven && (spread >= (n * (least * least)));
+    }
+    return driven;
+}
+
+/* A whole window. Returns PVID_ACCUMULATED, or the reason why it is dropped. */
+static pvid_reason hand_over(pvid_fourier_q31 *self)
+{
+    self->warm = true;
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    if (!self->driven) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    pvid_fourier_finish_begin_q31(&self->finish);
+    return PVID_ACCUMULATED;
+}
+
+static void advance_finish(pvid_fourier_q31 *self, pvid_reason *reason)
+{
+    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_fourier_finish_is_busy_q31(&self->finish); i++) {
+        pvid_fourier_finish_step_q31(self, reason);
+    }
+}
+
+static pvid_reason reject(pvid_fourier_q31 *self)
+{
+    restart(self);
+    pvid_count_up(&self->estimator.counters.rejected_saturated);
+    return PVID_REJECTED_SATURATED;
+}
+
+pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[])
+{
+    if (!is_ready(self) || (reading == NULL)) {
+        return PVID_NOT_READY;
+    }
+    const size_t samples = self->design->model->samples;
+    const uint16_t index = self->collect.values.index;
+    const uint8_t half = self->collect.values.half;
+    int32_t counts[PVID_MAX_SAMPLES];
+    for (size_t i = 0; i < samples; i++) {
+        /* beyond full scale it stays beyond it */
+        counts[i] = (int32_t)pvid_clamp_q31((int64_t)reading[i] - self->offset[i], 2 * (int64_t)COUNTS_LIMIT);
+    }
+    const pvid_fourier_tick tick = pvid_fourier_collect_step_q31(&self->collect, counts);
+    if (tick == PVID_FOURIER_REJECTED) {
+        return reject(self);
+    }
+    if ((self->collect.values.index != index) || (self->collect.values.half != half)) {
+        watch_drive(&self->drive, samples, half, index == 0u, counts);
+        if (self->collect.values.index == 0u) { /* the half is complete */
+            self->driven = is_driven(self);
+        }
+    }
+    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+    if (tick == PVID_FOURIER_WINDOW) {
+        const pvid_reason dropped = hand_over(self);
+        reason = dropped;
+    } else if (tick == PVID_FOURIER_FREE) {
+        advance_finish(self, &reason);
+    } else {
+        /* the tick is full */
+    }
+    return reason;
+}
+
+const pvid_estimate_q31 *pvid_fourier_estimate_q31(const pvid_fourier_q31 *self)
+{
+    return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_fourier_read_q31(const pvid_fourier_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_q31 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
+}
+
+void pvid_fourier_gap_q31(pvid_fourier_q31 *self)
+{
+    if (is_ready(self)) {
+        restart(self);
+    }
+}
+
+void pvid_fourier_freeze_q31(pvid_fourier_q31 *self, bool frozen)
+{
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
+}

@@ -1,0 +1,142 @@
+"""Twin of fourier/fourier_finish_q31.c: a window's sums to rows, to steps of p, to the published estimate, stage by stage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pvid.settings.enums import Reason
+from pvid.settings.fourier import FourierKind
+from pvid.settings.fourier_q31 import FourierDesignQ31
+from pvid.twin.q31 import fourier_white
+from pvid.twin.q31.estimator import ROW_LIMIT, EstimatorQ31
+from pvid.twin.q31.gate import GateQ31
+from pvid.twin.q31.integer import WIDE, Int, clamp, integers, scale
+from pvid.twin.q31.scaled import Scaled, scaled
+from pvid.twin.q31.trust import TrustQ31
+from pvid.twin.record import of_all_lanes
+from pvid.twin.weak_schedule import Work
+
+_ENTRIES_PER_STAGE = 4
+_HARMONICS_PER_STAGE = 2
+_RESIDUALS_PER_STAGE = 2
+_END_PARTS = 2
+_VARIANCE_RATIO_BITS = 24
+_MOST = 2**31 - 1
+
+
+def _parts(count: int, few: int) -> int:
+    return max(-(-count // few), 1)
+
+
+def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind) -> int:
+    """Up to the residuals, these included."""
+    harmonics = design.highest + 1
+    column = 2 * harmonics + 1 + design.power // 2
+    project = sum(kind.columns - i for i in range(kind.nuisances)) or 1
+    return (
+        _parts(len(design.noise), _ENTRIES_PER_STAGE)
+        + _parts(harmonics, _HARMONICS_PER_STAGE)
+        + harmonics
+        + (design.power // 2) ** 2
+        + kind.columns * column
+        + project
+        + _parts(design.rows, _RESIDUALS_PER_STAGE)
+    )
+
+
+def number_of_stages(design: FourierDesignQ31, iterations: int, estimator: EstimatorQ31) -> int:
+    """Of a window."""
+    rows = sum(_stages_before_gate(design, kind) + _END_PARTS + design.rows for kind in design.model.kind)
+    solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
+    return rows + solves + estimator.assessment_stages + 1
+
+
+def _rows(
+    made: fourier_white.Columns, first: int, estimator: EstimatorQ31, n_bits: Sequence[int], y_bits: int
+) -> tuple[Int, Int]:
+    """N among the thetas of all kinds [rows, n_theta, lanes], and Y [rows, lanes]."""
+    thetas = len(made.x) - 1
+    n = np.zeros((made.x.shape[1], estimator.model.n_theta, estimator.lanes), np.int64)
+
+    def entries(place: int, bits: int) -> Int:
+        shift = np.broadcast_to(-(made.exponent[place] + bits), made.x[place].shape)
+        return clamp(scale(made.x[place], shift), _MOST)
+
+    for j in range(thetas):
+        n[:, first + j] = entries(j, n_bits[first + j])
+    return n, entries(thetas, y_bits)
+
+
+def _ratio(rss: Int, freedom: Int, expected: Scaled) -> Scaled:
+    return scaled(rss, 0).over(scaled(freedom, 0).times(expected))
+
+
+def stages(
+    window: Int,
+    design: FourierDesignQ31,
+    iterations: int,
+    estimator: EstimatorQ31,
+    trust: TrustQ31,
+    gates: Sequence[GateQ31],
+    formats: tuple[Sequence[int], int],
+) -> Work:
+    """Processes a window, S_h [channels, H + 1, 2]; yields the reason to report [lanes], or None, after each stage.
+
+    formats : n_bits, y_bits
+    """
+    lanes = estimator.lanes
+    expected = scaled(estimator.row_sd * estimator.row_sd, -16)
+    sums = np.broadcast_to(window, (lanes, *window.shape))
+    used, first = 0, 0
+    free = np.zeros(lanes, np.int64)
+    for place, kind in enumerate(design.model.kind):
+        own = slice(first, first + kind.thetas)
+        theta = scaled(estimator.theta[own], -integers(estimator.theta_bits[own])[:, np.newaxis])
+        made = fourier_white.columns(fourier_white.white(design, place, theta), place, sums)
+        n, y = _rows(made, first, estimator, *formats)
+        first += kind.thetas
+        freedom = np.maximum(design.functions - made.live, 1)
+        saturated = np.zeros(lanes, np.bool_)
+        rss = np.zeros(lanes, np.int64)
+        for k in range(design.rows):
+            e, fits = estimator.innovation(n[k], y[k])
+            within = clamp(e, ROW_LIMIT)
+            saturated = saturated | ~fits
+            rss = clamp(rss + within * within, WIDE)
+        for _ in range(_stages_before_gate(design, kind) - 1):
+            yield None
+        gate = gates[place]
+        if gate.is_on and not of_all_lanes(gate.passes(_ratio(rss, freedom, expected), ~saturated)):
+            estimator.counters["rejected_outlier"] += 1
+            yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
+            continue
+        yield None
+        if used:
+            yield None
+        else:
+            yield from estimator.fade(trust.next_fade_factor())
+        for k in range(design.rows):
+            added = estimator.add(n[k], np.where(saturated, _MOST, y[k]))
+            yield None if (added == Reason.ACCUMULATED).all() else added
+        used += 1
+        free = free + freedom
+    if not used:
+        return
+    estimator.set_expected(expected)
+    reason = np.full(lanes, Reason.ACCUMULATED, np.uint8)
+    for iteration in range(iterations):
+        fallback = trust.fallback if iteration == 0 else None
+        for solved in estimator.solve(ends_group=iteration == 0, fallback=fallback):
+            yield None
+            if solved is not None:
+                reason = solved
+        if not estimator.was_due:
+            break
+    size = estimator.size
+    for _ in range(estimator.assessment_stages):
+        yield None
+    candidate, above_noise = estimator.judged()
+    ratio = _ratio(estimator.group_rss, free, expected).fixed(_VARIANCE_RATIO_BITS)
+    yield trust.judge(reason, size, above_noise, ratio, candidate)

@@ -1,0 +1,116 @@
+"""`identify --core f32` and `compare` of described mechanisms, from the recording to the printed answer."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.models.simulated_rig import simulated_rig
+from pvid.run.engine_design import config_for_recording
+from pvid.settings.fourier import FourierConfig
+from pvid.twin.fourier import FourierTwin
+
+
+def pvid(*arguments: str | Path) -> Result:
+    """A command in this process; a refusal raises."""
+    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Simulated runs by mechanism, each with its rig file beside it."""
+    folder = tmp_path_factory.mktemp("recorded")
+    paths = {}
+    for name, duration in (("rigid_body", "8"), ("dc_motor", "6")):
+        paths[name] = folder / f"{name}.csv"
+        done = pvid("model", "simulate", name, paths[name], "--duration", duration, "--seed", "3")
+        assert done.return_value == DONE
+    return paths
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "dc_motor"])
+def test_the_core_identifies_a_recording_as_the_oracle_does(name: str, recorded: dict[str, Path]) -> None:
+    core = json.loads(pvid("identify", recorded[name], "--core", "f32", "--json").stdout)
+    oracle = json.loads(pvid("identify", recorded[name], "--json").stdout)
+    assert set(oracle) < set(core)  # the same keys, and the core's own
+    assert core["core"] == "f32" and oracle["core"] == "f64"
+    assert core["identified"] and core["reason"] == "updated" and 0.5 < core["chi2"] < 2
+    assert core["status"] == oracle["status"] and core["reasons"] == oracle["reasons"]
+    truth = simulated_rig(name).truth
+    assert list(core["parameters"]) == list(oracle["parameters"])
+    for parameter, one in core["parameters"].items():
+        exact = oracle["parameters"][parameter]
+        assert one["unit"] == exact["unit"] and one["se"] >= one["se_noise"] > 0
+        assert abs(one["value"] - truth[parameter]) < 5 * one["se"], parameter
+        # The oracle locates each reversal of friction, and chooses its own window; the engine takes the mean of signs.
+        assert abs(one["value"] - exact["value"]) < 5 * max(one["se"], exact["se"]), parameter
+
+
+def test_the_answer_is_a_table_with_the_reason_of_the_last_window(recorded: dict[str, Path]) -> None:
+    answer = pvid("identify", recorded["rigid_body"], "--core", "f32")
+    assert answer.return_value == DONE
+    assert "weak form, C in float32" in answer.stdout and "Ixx [kg*m^2]" in answer.stdout
+    assert "last window: updated; chi2 " in answer.stdout
+
+
+def test_where_the_core_publishes_nothing_the_values_are_null(
+    recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Standard errors of a millionth are the limit of publication."""
+
+    def strict(*given: Any) -> FourierConfig:
+        config = config_for_recording(*given)
+        return replace(config, trust=replace(config.trust, se_max=1e-6))
+
+    monkeypatch.setattr("pvid.run.mechanism_f32.config_for_recording", strict)
+    answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--json")
+    shown = json.loads(answer.stdout)
+    assert answer.return_value == NOTHING_IDENTIFIED and not shown["identified"]
+    assert shown["reason"] == "held uncertain" and shown["chi2"] is None
+    assert all(one["value"] is None and one["se"] is None for one in shown["parameters"].values())
+    assert "nothing identified: held uncertain" in answer.stderr
+
+
+def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = pvid("compare", recorded["dc_motor"])
+    assert answer.return_value == DONE and "equal" in answer.stdout and "6000" in answer.stdout
+    changed = "pvid.run.mechanism_compare.FourierTwin"
+    monkeypatch.setattr(changed, lambda config: FourierTwin(replace(config, iterations=2)))
+    answer = pvid("compare", recorded["dc_motor"])
+    assert answer.return_value == DIFFERENT
+    assert "DIFFERENT: tick" in " ".join(answer.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "sentence"),
+    [
+        ("identify", ("--core", "q31"), "--core q31: dc_motor is identified in float64, or in float32 by --core f32"),
+        ("identify", ("--core", "f32", "--form", "strong"), "--form strong: dc_motor is identified in float64"),
+        ("compare", ("--core", "q31"), "--core q31: dc_motor is compared in float32 by the weak form"),
+        ("compare", ("--on", "stream-host"), "--on stream-host: dc_motor is compared in float32"),
+        ("compare", ("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is compared in float32"),
+    ],
+)
+def test_wrong_combinations_are_refused(
+    command: str, arguments: tuple[str, ...], sentence: str, recorded: dict[str, Path]
+) -> None:
+    with pytest.raises(PvidError) as caught:
+        pvid(command, recorded["dc_motor"], *arguments)
+    assert sentence in str(caught.value)
+
+
+def test_without_a_compiler_there_is_one_sentence(
+    recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    with pytest.raises(PvidError, match="--core f32: .* needs a C compiler"):
+        pvid("identify", recorded["rigid_body"], "--core", "f32")
