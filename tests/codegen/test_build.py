@@ -154,7 +154,10 @@ def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:
     for name, text in {**files, "motor_f32.c": wrong}.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     generated = [tmp_path / f"motor_{one}.c" for one in ("f32", "q31", "test")]
-    core = [source(f"{one}.c") for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
+    core = [
+        source(f"{one}.c")
+        for one in ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
+    ]
     sources = [*generated, *core]
     includes = [f"-I{ROOT / 'firmware' / one}" for one in ("include", "src")]
     run("gcc", "-std=c99", "-O1", *includes, *sources, "-o", tmp_path / "test")
