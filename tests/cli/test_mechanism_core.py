@@ -14,7 +14,7 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.models.simulated_rig import simulated_rig
-from pvid.run.engine_design import engine_config
+from pvid.run.engine_design import config_for_recording
 from pvid.settings.fourier import FourierConfig
 from pvid.twin.fourier import FourierTwin
 
@@ -67,10 +67,10 @@ def test_where_the_core_publishes_nothing_the_values_are_null(
     """Standard errors of a millionth are the limit of publication."""
 
     def strict(*given: Any) -> FourierConfig:
-        config = engine_config(*given)
+        config = config_for_recording(*given)
         return replace(config, trust=replace(config.trust, se_max=1e-6))
 
-    monkeypatch.setattr("pvid.run.mechanism_f32.engine_config", strict)
+    monkeypatch.setattr("pvid.run.mechanism_f32.config_for_recording", strict)
     answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--json")
     shown = json.loads(answer.stdout)
     assert answer.return_value == NOTHING_IDENTIFIED and not shown["identified"]

@@ -29,6 +29,15 @@ OTHER = {
     "PVID_MAX_THETA_Q31": 12,
     "PVID_MAX_MOMENTS_Q31": 78,
     "PVID_MAX_C_Q31": 24,
+    "PVID_MAX_SAMPLES": 3,
+    "PVID_MAX_RING": 500,
+    "PVID_MAX_INPUTS": 15,
+    "PVID_MAX_CHANNELS": 9,
+    "PVID_MAX_INTEGRANDS": 2,
+    "PVID_MAX_HARMONICS": 17,
+    "PVID_MAX_KINDS": 1,
+    "PVID_MAX_COLUMNS": 14,
+    "PVID_MAX_POWER": 6,
 }
 
 LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
@@ -36,6 +45,7 @@ LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
 # The first call of each kind of application; the last one represents files without an init.
 FUNCTIONS = (
     "pvid_weak_init_f32",
+    "pvid_fourier_init_f32",
     "pvid_strong_init_f32",
     "pvid_weak_init_q31",
     "pvid_strong_init_q31",
@@ -46,6 +56,7 @@ FUNCTIONS = (
 USER = """#include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
 static pvid_weak_f32 weak; static pvid_weak_config_f32 weak_config;
+static pvid_fourier_f32 fourier; static pvid_fourier_config_f32 fourier_config;
 static pvid_strong_f32 strong; static pvid_strong_config_f32 strong_config;
 static pvid_weak_q31 weak_q31; static pvid_weak_config_q31 weak_config_q31;
 static pvid_strong_q31 strong_q31; static pvid_strong_config_q31 strong_config_q31;
@@ -54,6 +65,7 @@ static pvid_estimator_q31 estimator_q31; static pvid_estimator_config_q31 estima
 int main(void)
 {
     (void)pvid_weak_init_f32(&weak, &weak_config);
+    (void)pvid_fourier_init_f32(&fourier, &fourier_config);
     (void)pvid_strong_init_f32(&strong, &strong_config);
     (void)pvid_weak_init_q31(&weak_q31, &weak_config_q31);
     (void)pvid_strong_init_q31(&strong_q31, &strong_config_q31);

@@ -5,8 +5,8 @@
  *   sum_j theta_j(p) N_j = Y,     N_j, Y = sum_m D^m[channel]
  *
  * with channels that are functions of the signals at one instant, or such a function times a running integral. Rows are
- * multiplied by K test functions sin^n(pi t/T) e^(2 pi i f t/T) over windows of T that overlap by half, and D^m moves to
- * the test function. Each test function is a sum of few exponentials, so that a window needs of each channel only
+ * multiplied by K test functions sin^n(pi t/T) e^(2 pi i f t/T) over windows of T that overlap by half, and D^m moves
+ * to the test function. Each test function is a sum of few exponentials, so that a window needs of each channel only
  *
  *   S_h = sum_k channel(t_k) e^(2 pi i h k / (2 hop)),   h = 0 .. H = K/2 + n/2,
  *
@@ -19,8 +19,8 @@
  *   same context:  estimate = pvid_fourier_estimate_f32(&identifier);
  *   other context: if (pvid_fourier_read_f32(&identifier, &copy, &number) && (number > 0)) ...
  *
- * Never allocates. Every input is allowed: a sample that is not finite is rejected and restarts the windows; the sums are
- * kept. Call all functions of an object from one context, except pvid_fourier_read_f32 (publication.h).
+ * Never allocates. Every input is allowed: a sample that is not finite is rejected and restarts the windows; the sums
+ * are kept. Call all functions of an object from one context, except pvid_fourier_read_f32 (publication.h).
  */
 #ifndef PVID_FOURIER_H
 #define PVID_FOURIER_H
@@ -49,12 +49,12 @@ typedef struct {
 } pvid_fourier_term_f32;
 
 typedef struct {
-    uint8_t samples;  /* entries of the argument of step */
-    uint8_t signals;  /* with those that are made of samples */
-    uint8_t jets;     /* inputs of `prepare`, the first inputs of `values` */
-    uint8_t runs;     /* integrals since the start of the run: inputs of `values` behind the jets */
-    uint8_t signs;    /* arguments of sgn: inputs of `values` behind the runs */
-    uint8_t gains;    /* first results of `values` */
+    uint8_t samples;    /* entries of the argument of step */
+    uint8_t signals;    /* with those that are made of samples */
+    uint8_t jets;       /* inputs of `prepare`, the first inputs of `values` */
+    uint8_t runs;       /* integrals since the start of the run: inputs of `values` behind the jets */
+    uint8_t signs;      /* arguments of sgn: inputs of `values` behind the runs */
+    uint8_t gains;      /* first results of `values` */
     uint8_t integrands; /* its further results */
     uint8_t channels;
     uint8_t kinds;
@@ -72,8 +72,8 @@ typedef struct {
 
 /* ---- the design: tables for a rig ---- */
 
-/* Filter that gives a jet at a step: of even order x + sum_i w_i ((x_+i - x) + (x_-i - x)), without the leading x if the
- * order is above 0; of odd order sum_i w_i (x_+i - x_-i), i = 1..half. */
+/* Filter that gives a jet at a step: of even order x + sum_i w_i ((x_+i - x) + (x_-i - x)), without the leading x if
+ * the order is above 0; of odd order sum_i w_i (x_+i - x_-i), i = 1..half. */
 typedef struct {
     uint16_t half;        /* 0: the sample itself */
     const float *weights; /* [half], outwards, per second^order */
@@ -99,20 +99,20 @@ typedef struct {
     const float *circle;                   /* [2 hop] cos(pi j / hop) */
     const pvid_fourier_noise_f32 *noise;   /* [n_noise] */
     uint16_t n_noise;
-    const uint8_t *error_order;    /* [kinds] order of the derivative of white noise that the equation's own error is */
-    const float *error_variance;   /* [kinds] variance of that noise at a step, >= 0; 0: the sensors explain the rows */
-    const float *sign_width;    /* [signs] of the soft sign tanh(v / width); 0: the mean of sgn over a step */
-    float overlap;              /* variance inflation by the noise that overlapping windows share, >= 1 */
+    const uint8_t *error_order;  /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const float *error_variance; /* [kinds] variance of that noise at a step, >= 0; 0: the sensors explain the rows */
+    const float *sign_width;     /* [signs] of the soft sign tanh(v / width); 0: the mean of sgn over a step */
+    float overlap;               /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_fourier_design_f32;
 
 /* ---- the configuration ---- */
 
 typedef struct {
-    float sample_rate_hz; /* ticks per second [Hz], 1e-3..1e6 */
+    float sample_rate_hz;                  /* ticks per second [Hz], 1e-3..1e6 */
     const pvid_fourier_design_f32 *design; /* must outlive the identifier, with its tables */
     const float *range;     /* [samples] window dropped if a sample's absolute value is beyond, > 0; NULL: no check */
-    const float *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, >= 0; NULL:
-                               no check */
+    const float *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, >= 0;
+                               NULL: no check */
     bool compensation;      /* B gets what the sensors' noise takes from it (errors in variables) */
     uint8_t iterations;     /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3 */
     pvid_estimator_config_f32 estimator; /* row_sd 1: rows are in standard deviations. init sets model, update_rate_hz,

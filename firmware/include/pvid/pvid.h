@@ -11,6 +11,7 @@
 #include "pvid/differentiator.h"
 #include "pvid/estimator.h"
 #include "pvid/fnv.h"
+#include "pvid/fourier.h"
 #include "pvid/gate.h"
 #include "pvid/information.h"
 #include "pvid/little_endian.h"

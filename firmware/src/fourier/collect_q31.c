@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-#include "fourier/front_q31.h"
+#include "fourier/fourier_front_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/values_q31.h"
 

@@ -5,8 +5,8 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "fourier/finish_f32.h"
-#include "fourier/front_f32.h"
+#include "fourier/fourier_finish_f32.h"
+#include "fourier/fourier_front_f32.h"
 #include "fourier/schedule.h"
 #include "fourier/step_f32.h"
 #include "fourier/sums_f32.h"
@@ -132,7 +132,8 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->channels = summed_channels(design->model);
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_fourier_front_init_f32(&self->front, design, config->sample_rate_hz);
-    pvid_fourier_step_init_f32(&self->history, (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
+    pvid_fourier_step_init_f32(&self->history,
+                               (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
     const uint32_t free_ticks = pvid_fourier_free_ticks(
         design->decimation, pvid_fourier_job_ticks(design->decimation, pvid_fourier_front_pairs_f32(design)));

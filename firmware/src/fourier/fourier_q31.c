@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "fourier/collect_q31.h"
-#include "fourier/finish_q31.h"
-#include "fourier/front_q31.h"
+#include "fourier/fourier_finish_q31.h"
+#include "fourier/fourier_front_q31.h"
 #include "fourier/sums_q31.h"
 #include "judge/publication.h"
 #include "number/count.h"

@@ -1,11 +1,11 @@
 /* The schedule of the weak form of any mechanism: the work of a tick by its place in a step, for both cores. Private to
  * the core.
  *
- * A step has D ticks. The first ones run the front end's FIR job, about 16 pairs each but in at most half of the step; the
- * next one forms the step's channels; in those behind it a block of four steps is added to the sums, some harmonics a
- * tick, and at the end of a window these are joined. In what is left of them stages of the last whole window run. Below
- * 8 ticks the job takes one tick and the channels the last one; all but that add and run stages. With D = 1 every tick
- * does all of it.
+ * A step has D ticks. The first ones run the front end's FIR job, about 16 pairs each but in at most half of the step;
+ * the next one forms the step's channels; in those behind it a block of four steps is added to the sums, some harmonics
+ * a tick, and at the end of a window these are joined. In what is left of them stages of the last whole window run.
+ * Below 8 ticks the job takes one tick and the channels the last one; all but that add and run stages. With D = 1 every
+ * tick does all of it.
  */
 #ifndef PVID_FOURIER_SCHEDULE_H
 #define PVID_FOURIER_SCHEDULE_H

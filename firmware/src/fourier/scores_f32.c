@@ -6,8 +6,8 @@
  *   windows V G V,   G the mean of s s^T, or of that and s s_before^T + s_before s^T, whichever gives more:
  *
  * neighbours share half of their samples. A mean gives the newest window the weight 2/(k + 2), k windows before it, but
- * not less than forgetting does. The first windows, at a poor p, say nothing of the scatter at a good one: the means begin
- * anew with a window whose residuals are far below their mean. */
+ * not less than forgetting does. The first windows, at a poor p, say nothing of the scatter at a good one: the means
+ * begin anew with a window whose residuals are far below their mean. */
 #include "fourier/scores_f32.h"
 
 #include <string.h>

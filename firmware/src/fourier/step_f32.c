@@ -48,8 +48,8 @@ static float mean_sign(float v, float slope)
 }
 
 /* Signs of the step whose arguments are v[0]; `next`: those of the step behind it. */
-static void find_signs(const pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design,
-                       const float next[], float sign[])
+static void find_signs(const pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, const float next[],
+                       float sign[])
 {
     for (size_t i = 0; i < design->model->signs; i++) {
         const float v = self->v[0][i];

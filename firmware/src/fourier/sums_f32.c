@@ -2,10 +2,10 @@
 
 /* A_h and B_h = sum_k channel(t_k) (cos + i sin)(2 pi h k / (2 hop)), k = 0..hop - 1, of the two halves of a window.
  *
- * A block of four steps is complete every four steps; while the next one fills it is added, one harmonic after the other.
- * The circle has all the factors: cos(pi j / hop) at j = h k mod 2 hop, the sine a quarter turn before. Behind the last
- * block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral I = E_1 + I' (E_1 + E_2 of
- * the first half at its end) gets what I' from the second half's own start lacks:
+ * A block of four steps is complete every four steps; while the next one fills it is added, one harmonic after the
+ * other. The circle has all the factors: cos(pi j / hop) at j = h k mod 2 hop, the sine a quarter turn before. Behind
+ * the last block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral I = E_1 + I'
+ * (E_1 + E_2 of the first half at its end) gets what I' from the second half's own start lacks:
  *
  *   fold 1:  B + E_1 B[plain]        fold 2:  (B + E_2 B[plain]) + E_1 B[ramp]
  *
@@ -134,8 +134,7 @@ static void join(const pvid_fourier_sums_f32 *self, const pvid_fourier_design_f3
 }
 
 bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
-                                   uint8_t harmonics, uint8_t channels, float dt,
-                                   float window[][2][PVID_MAX_HARMONICS])
+                                   uint8_t harmonics, uint8_t channels, float dt, float window[][2][PVID_MAX_HARMONICS])
 {
     /* a window's harmonic is joined right behind the addition to it */
     if (self->joined < self->harmonic) {

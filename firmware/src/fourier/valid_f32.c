@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "fourier/front_f32.h"
+#include "fourier/fourier_front_f32.h"
 #include "number/finite_f32.h"
 
 static bool all_within(const float values[], size_t n, float low)
@@ -63,9 +63,9 @@ static bool channel_is_valid(const pvid_fourier_model_f32 *model, size_t place)
     if (one->gain == PVID_FOURIER_NONE) {
         return one->fold == 0u;
     }
-    const bool shifts = (one->fold == 0u) ||
-                        (is_channel(model, one->plain, one->gain, 0) &&
-                         ((one->integrand == PVID_FOURIER_NONE) || (one->integrand < model->integrands)));
+    const bool shifts =
+        (one->fold == 0u) || (is_channel(model, one->plain, one->gain, 0) &&
+                              ((one->integrand == PVID_FOURIER_NONE) || (one->integrand < model->integrands)));
     return (place < PVID_MAX_CHANNELS) && (one->gain < model->gains) && (one->fold <= 2u) && shifts &&
            ((one->fold < 2u) || is_channel(model, one->ramp, one->gain, 1));
 }

@@ -4,8 +4,8 @@
  * that contain it.
  *
  * At every step each sample x adds x - r and (x - r)^2 to its half, r the half's first sample. With d = r_B - r_A the
- * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps is
- * (q - s^2/N) / N of both halves together. */
+ * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps
+ * is (q - s^2/N) / N of both halves together. */
 #include "fourier/watch_f32.h"
 
 void pvid_fourier_watch_init_f32(pvid_fourier_watch_f32 *self, const pvid_fourier_config_f32 *config, uint16_t delay)

@@ -20,7 +20,8 @@ void pvid_fourier_watch_sample_f32(pvid_fourier_watch_f32 *self, size_t samples,
 void pvid_fourier_watch_step_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[], size_t half,
                                  bool first);
 
-/* Whether a sample of the window of two halves of so many steps each was beyond its range; whether one moved too little.
+/* Whether a sample of the window of two halves of so many steps each was beyond its range; whether one moved too
+ * little.
  */
 bool pvid_fourier_watch_beyond_f32(const pvid_fourier_watch_f32 *self);
 bool pvid_fourier_watch_still_f32(const pvid_fourier_watch_f32 *self, size_t samples, size_t later, uint16_t hop);

@@ -35,21 +35,21 @@ typedef struct {
 
 /* From the jets of a step to the values of its channels, two steps later. */
 typedef struct {
-    uint8_t known;                                /* steps since the restart, 0..4 */
-    uint8_t latest;                               /* place in `out` of the step before the last one */
-    bool ran;                                     /* the runs have begun */
-    float lead;                                   /* from a run's first sample to its first step [s] */
-    float now[PVID_MAX_INPUTS];                   /* inputs of `values` at the last step but the newest */
-    float rate[PVID_MAX_INTEGRANDS];              /* derivatives of the runs there */
-    float v[2][PVID_MAX_INTEGRANDS];              /* arguments of sgn at that step and the one before it */
-    float run[PVID_MAX_INTEGRANDS];               /* integrals since the start of the run, and what rounding took off */
+    uint8_t known;                   /* steps since the restart, 0..4 */
+    uint8_t latest;                  /* place in `out` of the step before the last one */
+    bool ran;                        /* the runs have begun */
+    float lead;                      /* from a run's first sample to its first step [s] */
+    float now[PVID_MAX_INPUTS];      /* inputs of `values` at the last step but the newest */
+    float rate[PVID_MAX_INTEGRANDS]; /* derivatives of the runs there */
+    float v[2][PVID_MAX_INTEGRANDS]; /* arguments of sgn at that step and the one before it */
+    float run[PVID_MAX_INTEGRANDS];  /* integrals since the start of the run, and what rounding took off */
     float run_low[PVID_MAX_INTEGRANDS];
     float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
                                                               the next ones */
-    float f[2][PVID_MAX_INTEGRANDS];              /* integrands at the two steps before that one, latest first */
-    float once[PVID_MAX_INTEGRANDS];              /* I^1 and I^2 since the start of the half */
+    float f[2][PVID_MAX_INTEGRANDS]; /* integrands at the two steps before that one, latest first */
+    float once[PVID_MAX_INTEGRANDS]; /* I^1 and I^2 since the start of the half */
     float twice[PVID_MAX_INTEGRANDS];
-    float edge[2][PVID_MAX_INTEGRANDS];           /* I^1 and I^2 of the half before, at its end */
+    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the half before, at its end */
 } pvid_fourier_history_f32;
 
 /* What a half window has seen of a sample. */
@@ -132,7 +132,7 @@ typedef struct {
     float rss;                        /* of the kind's rows before the steps */
     float expected;                   /* sum over the kinds of the rows' variance by the sensors alone */
     float free;                       /* rows less nuisances of the kinds that were added */
-    float square;       /* sum of squares of their residuals before the steps */
+    float square;                     /* sum of squares of their residuals before the steps */
     float own[PVID_MAX_COLUMNS];      /* square of each nuisance before projection, then inverse of what remains */
     float pull[PVID_MAX_THETA];       /* g: what the sensors' noise takes from B */
     float score[PVID_MAX_THETA];      /* sum N e + g of the window */

@@ -1,7 +1,7 @@
 """Identification of a described mechanism by the C core in float32, compiled for this computer.
 
-The float64 oracle analyses the recording first: it chooses the design, finds the equations' own errors and gives the
-verdict. The engine then starts at the guesses and runs over the samples as on a board.
+The float64 oracle analyses the recording first, for the verdict; then it chooses the engine's design and finds the
+equations' own errors. The engine starts at the guesses and runs over the samples as on a board.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from pvid.base.errors import PvidError
 from pvid.codegen.fourier_library import fourier_native
 from pvid.core.fourier_native import FourierIdentifier
-from pvid.run.engine_design import engine_config, samples_of
+from pvid.run.engine_design import config_for_recording, samples_of
 from pvid.run.mechanism import MechanismAnswer, Value, gains_of, values_of
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig
@@ -80,9 +80,9 @@ def identify_in_c(answer: MechanismAnswer) -> CoreAnswer:
     PvidError
         When there is no C compiler, or the engine does not have what the model needs.
     """
-    recording, compiled, found = answer.recording, answer.model, answer.found
+    recording, compiled = answer.recording, answer.model
     try:
-        config = engine_config(compiled, recording.signals, found.design, found.p)
+        config = config_for_recording(compiled, recording)
         native = fourier_native(compiled, config.design)
         identifier = native.identifier_of(config)
     except PvidError as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -34,7 +35,7 @@ _RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
 _PASSES = 10
 
 # Above this the equations' own errors are estimated when designs are compared.
-_MODEL_ERROR = 5.0
+MODEL_ERROR = 5.0
 
 
 @dataclass(frozen=True)
@@ -96,13 +97,24 @@ def chosen(
 
 
 def ranked(
-    model: Compiled, run: Mapping[str, npt.ArrayLike], sample_rate: float, start: Float | None = None
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    sample_rate: float,
+    start: Float | None = None,
+    reversals: Literal["located", "averaged"] = "located",
 ) -> list[Scored]:
-    """All designs tried, the best first."""
+    """All designs tried, the best first.
+
+    Parameters
+    ----------
+    reversals : how signs are summed; "averaged": of the weak engine in C, which whitens the kinds of rows one by one
+    """
     plain = {name: x for name, x in run.items()}
     samples = next(iter(samples_of(model.bare, plain).values())).size
     rates = any(jet.order for jet in model.channels.needed)
-    basis = FourierDesign(sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
+    basis = FourierDesign(
+        sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3, reversals=reversals
+    )
     tried: list[Scored] = []
     errors = False
     fewest = _FEWEST_WINDOWS
@@ -122,7 +134,7 @@ def ranked(
     if not tried:
         raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
     best = min(tried, key=lambda one: one.score)
-    if best.chi2 > _MODEL_ERROR:
+    if best.chi2 > MODEL_ERROR:
         errors = True
         tried.clear()
         attempt([best.design])
@@ -139,7 +151,7 @@ def ranked(
         for count in ((*_FEW_FUNCTIONS, *_FUNCTIONS) if errors else _FUNCTIONS)
         if (length, count) != (best.design.window_s, best.design.functions)
     )
-    if len(model.model.rows) > 1:
+    if len(model.model.rows) > 1 and reversals == "located":
         best = min(tried, key=lambda one: one.score)
         attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
     return sorted(tried, key=lambda one: one.score)

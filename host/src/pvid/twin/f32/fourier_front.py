@@ -1,4 +1,4 @@
-"""Twin of fourier/front_f32.c. It feeds forward: a whole stretch of finite samples is computed at once."""
+"""Twin of fourier/fourier_front_f32.c. It feeds forward: a whole stretch of finite samples is computed at once."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ _LONG_STEP, _PAIRS = 8, 16
 
 @dataclass(frozen=True)
 class FrontTicks:
-    """Twin of fourier/schedule.h, as far as it depends on the front end: the work of the ticks of a stretch, which count
-    from its first sample.
+    """Twin of fourier/schedule.h, as far as it depends on the front end: the work of the ticks of a stretch.
+
+    Ticks count from its first sample.
 
     Attributes
     ----------

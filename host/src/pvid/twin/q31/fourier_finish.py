@@ -1,4 +1,4 @@
-"""Twin of fourier/finish_q31.c: a window's sums to rows, to steps of p, to the published estimate, stage by stage."""
+"""Twin of fourier/fourier_finish_q31.c: a window's sums to rows, to steps of p, to the published estimate, stage by stage."""
 
 from __future__ import annotations
 

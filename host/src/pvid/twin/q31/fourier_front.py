@@ -1,4 +1,4 @@
-"""Twin of fourier/front_q31.c: from counts to the jets of the steps of one stretch without missing samples."""
+"""Twin of fourier/fourier_front_q31.c: from counts to the jets of the steps of one stretch without missing samples."""
 
 from __future__ import annotations
 

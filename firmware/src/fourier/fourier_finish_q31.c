@@ -1,4 +1,4 @@
-#include "fourier/finish_q31.h"
+#include "fourier/fourier_finish_q31.h"
 
 #include <stddef.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-#include "fourier/finish_f32.h"
+#include "fourier/fourier_finish_f32.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -423,12 +423,24 @@ static void end_kind(pvid_fourier_f32 *self)
 }
 
 /* The stage after one that is complete. */
+static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    switch (self->finish.stage) {
+    case STAGE_RESIDUAL:
+        return gated(self, reason);
+    case STAGE_JUDGE:
+        return STAGE_IDLE;
+    default:
+        return (uint8_t)(self->finish.stage + 1u);
+    }
+}
+
 static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
+    finish->stage = stage_after(self, reason);
     finish->index = 0;
     finish->part = 0;
-    finish->stage = (finish->stage == (uint8_t)STAGE_RESIDUAL) ? gated(self, reason) : (uint8_t)(finish->stage + 1u);
     if (finish->stage == (uint8_t)STAGE_SCORE) {
         end_kind(self);
     } else if (finish->stage == (uint8_t)STAGE_SOLVE) {

@@ -1,5 +1,5 @@
-/* A whole window: from its sums to rows, to steps of p, to the published estimate. One stage per call; finish_f32.c lists
- * the stages. Private to the core. */
+/* A whole window: from its sums to rows, to steps of p, to the published estimate. One stage per call; finish_f32.c
+ * lists the stages. Private to the core. */
 #ifndef PVID_FOURIER_FINISH_F32_H
 #define PVID_FOURIER_FINISH_F32_H
 
@@ -11,9 +11,10 @@
 /* Stage without work. */
 #define PVID_FOURIER_IDLE 255u
 
-/* No work; `self` is all zeros. Requires a valid design; dt: between steps [s]. Fails iff the gate's configuration is out
- * of its range. */
-pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pvid_fourier_config_f32 *config, float dt);
+/* No work; `self` is all zeros. Requires a valid design; dt: between steps [s]. Fails iff the gate's configuration is
+ * out of its range. */
+pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pvid_fourier_config_f32 *config,
+                                         float dt);
 
 /* Begins a window at the estimator's present p. */
 void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self);

@@ -6,7 +6,7 @@
  *
  * A jet is x + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x above 0) or sum_i w_i
  * (x_(+i) - x_(-i)) of odd order, i = 1..half, added outwards from the instant of the step. */
-#include "fourier/front_f32.h"
+#include "fourier/fourier_front_f32.h"
 
 #include <stddef.h>
 
@@ -116,8 +116,8 @@ static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier
 }
 
 /* Signals that need samples of other ticks. Returns false if there are none: the next sample is missing. */
-PVID_SELDOM static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model, const float sample[],
-                          float place[])
+PVID_SELDOM static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
+                                      const float sample[], float place[])
 {
     const bool first = self->seen == 0u;
     if (first) {

@@ -4,7 +4,7 @@
  *
  * A jet is the rescaled sum  x 2^bits + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x
  * above order 0) or  sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half. */
-#include "fourier/front_q31.h"
+#include "fourier/fourier_front_q31.h"
 
 #include <stddef.h>
 

@@ -1,0 +1,836 @@
+/* The weak form of a small mechanism: jets, sums, rows and estimates against double arithmetic from the definitions;
+ * what init refuses; gaps, freezing, samples beyond their range. */
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "fourier/columns_f32.h"
+#include "fourier/fourier_finish_f32.h"
+#include "fourier/fourier_front_f32.h"
+#include "fourier/schedule.h"
+#include "fourier/white_f32.h"
+#include "pvid/pvid.h"
+
+#define PI 3.14159265358979323846
+
+/* ---- a mechanism: x' = a u - b x + c + d sgn(u), its sums of all kinds ---- */
+
+/* Channels: u, u I[x], u t, u I^2[x], x, sgn(u), 1. Only u, x, sgn(u) and 1 are in rows; the others are summed. */
+enum { U, U_I1, U_T, U_I2, X, SIGN, ONE, CHANNELS };
+
+static void prepare_of(const float jet[], float out[])
+{
+    out[0] = jet[0]; /* derivative of a run: u */
+    out[1] = jet[0]; /* argument of sgn */
+}
+
+static void values_of(const float in[], float out[])
+{
+    /* u, x, the run of u (no gain), sgn(u) */
+    out[0] = in[0];
+    out[1] = in[1];
+    out[2] = in[3];
+    out[3] = in[1]; /* the integrand */
+}
+
+static void theta_of(const float p[], float theta[])
+{
+    memcpy(theta, p, 4u * sizeof theta[0]);
+}
+
+static void jacobian_of(const float p[], float c[])
+{
+    (void)p;
+    for (int i = 0; i < 4; i++) {
+        c[i] = 1.0f;
+    }
+}
+
+static const uint8_t diagonal[4] = {0, 1, 2, 3};
+static const pvid_model_f32 parameters = {
+    .n_theta = 4,
+    .n_p = 4,
+    .n_moments = 10,
+    .n_c = 4,
+    .positive = 3u,
+    .c_row = diagonal,
+    .c_column = diagonal,
+    .theta = theta_of,
+    .jacobian = jacobian_of,
+};
+
+static const pvid_fourier_signal signals[2] = {{0, PVID_SIGNAL_SAMPLED}, {1, PVID_SIGNAL_SAMPLED}};
+static const pvid_fourier_jet jets[2] = {{0, 0}, {1, 0}};
+static const pvid_fourier_channel channels[CHANNELS] = {
+    [U] = {0, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    [U_I1] = {0, 0, 1, U, PVID_FOURIER_NONE},
+    [U_T] = {0, PVID_FOURIER_NONE, 1, U, PVID_FOURIER_NONE},
+    [U_I2] = {0, 0, 2, U, U_T},
+    [X] = {1, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    [SIGN] = {2, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    [ONE] = {PVID_FOURIER_NONE, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+};
+static const pvid_fourier_term_f32 terms[5] = {
+    {U, 0, 0, 1.0f}, {X, 0, 1, -1.0f}, {ONE, 0, 2, 1.0f}, {SIGN, 0, 3, 1.0f}, {X, 1, 4, 1.0f}};
+static const pvid_fourier_kind kinds[1] = {{4, 0, 0, 5}};
+
+static const pvid_fourier_model_f32 mechanism = {
+    .samples = 2,
+    .signals = 2,
+    .jets = 2,
+    .runs = 1,
+    .signs = 1,
+    .gains = 3,
+    .integrands = 1,
+    .channels = CHANNELS,
+    .kinds = 1,
+    .signal = signals,
+    .jet = jets,
+    .channel = channels,
+    .term = terms,
+    .kind = kinds,
+    .prepare = prepare_of,
+    .values = values_of,
+    .model = &parameters,
+};
+
+#define RATE 200.0
+#define HOP 48
+#define FUNCTIONS 9
+#define POWER 4
+#define HIGHEST ((FUNCTIONS / 2) + (POWER / 2))
+#define SD 1.0e-4
+
+static float circle[2 * HOP];
+static const pvid_fourier_filter_f32 filters[2] = {{0, NULL}, {0, NULL}};
+static const pvid_fourier_noise_f32 noise[2] = {{0, 0, 1, 1, (float)(SD * SD)}, {0, 1, 4, 4, (float)(SD * SD)}};
+static const uint8_t error_order[1] = {0};
+static const float error_variance[1] = {0.0f};
+static const float sign_width[1] = {0.0f};
+static const double truth[4] = {3.0, 2.0, 0.5, 0.2};
+
+static pvid_fourier_design_f32 design_of(const pvid_fourier_model_f32 *model)
+{
+    for (int j = 0; j < 2 * HOP; j++) {
+        const double turn = PI * (double)j / (double)HOP;
+        circle[j] = ((j == HOP / 2) || (j == (3 * HOP) / 2)) ? 0.0f : (float)cos(turn);
+    }
+    const pvid_fourier_design_f32 design = {
+        .model = model,
+        .functions = FUNCTIONS,
+        .power = POWER,
+        .decimation = 1,
+        .hop = HOP,
+        .filter = filters,
+        .circle = circle,
+        .noise = noise,
+        .n_noise = 2,
+        .error_order = error_order,
+        .error_variance = error_variance,
+        .sign_width = sign_width,
+        .overlap = 1.4f,
+    };
+    return design;
+}
+
+static pvid_fourier_config_f32 config_of(const pvid_fourier_design_f32 *design)
+{
+    pvid_fourier_config_f32 config = {
+        .sample_rate_hz = (float)RATE,
+        .design = design,
+        .compensation = true,
+        .iterations = 3,
+        .estimator = pvid_estimator_defaults_f32,
+        .trust = pvid_trust_defaults_f32,
+    };
+    const float start[4] = {2.0f, 3.0f, 0.0f, 0.0f};
+    for (int i = 0; i < 4; i++) {
+        config.estimator.start[i] = start[i];
+        config.estimator.start_sd[i] = 2.0f;
+        config.estimator.lower[i] = (i < 2) ? 0.1f : -10.0f;
+        config.estimator.upper[i] = 20.0f;
+    }
+    config.estimator.row_sd = 1.0f;
+    return config;
+}
+
+/* u, and x by steps of a hundredth of a tick with the exact solution for a constant input. */
+static double drive(double t)
+{
+    return sin(7.0 * t) + (0.7 * sin((19.0 * t) + 1.0)) + (0.5 * cos(31.0 * t));
+}
+
+typedef struct {
+    double t;
+    double x;
+    uint32_t generator;
+} plant;
+
+static float noise_of(plant *self)
+{
+    double sum = 0.0; /* of 12 uniform numbers: variance 1 */
+    for (int i = 0; i < 12; i++) {
+        self->generator = (self->generator * 1664525u) + 1013904223u;
+        sum += ((double)(self->generator >> 8) / 16777216.0) - 0.5;
+    }
+    return (float)(SD * sum);
+}
+
+static void next_sample(plant *self, float sample[2])
+{
+    sample[0] = (float)drive(self->t);
+    sample[1] = (float)self->x + noise_of(self);
+    const int parts = 100;
+    const double h = 1.0 / (RATE * (double)parts);
+    for (int i = 0; i < parts; i++) {
+        const double u = drive(self->t + (0.5 * h));
+        const double input = (truth[0] * u) + truth[2] + (truth[3] * ((u > 0.0) ? 1.0 : -1.0));
+        const double settled = input / truth[1];
+        self->x = settled + ((self->x - settled) * exp(-truth[1] * h));
+        self->t += h;
+    }
+}
+
+static pvid_fourier_f32 self;
+
+static void start(pvid_fourier_design_f32 *design, pvid_fourier_config_f32 *config)
+{
+    *design = design_of(&mechanism);
+    *config = config_of(design);
+    assert_int_equal(pvid_fourier_init_f32(&self, config), PVID_OK);
+}
+
+/* ---- estimates ---- */
+
+static void parameters_are_found_within_their_errors(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    start(&design, &config);
+    plant rig = {.generator = 1u};
+    uint32_t updates = 0;
+    for (int tick = 0; tick < 12000; tick++) {
+        float sample[2];
+        next_sample(&rig, sample);
+        const pvid_reason reason = pvid_fourier_step_f32(&self, sample);
+        if ((reason == PVID_UPDATED) || (reason == PVID_MISFIT)) {
+            updates++;
+        }
+    }
+    pvid_estimate_f32 read;
+    uint32_t number = 0;
+    assert_true(pvid_fourier_read_f32(&self, &read, &number));
+    assert_int_equal(number, updates);
+    assert_true(updates > 200u);
+    const pvid_estimate_f32 *estimate = pvid_fourier_estimate_f32(&self);
+    assert_memory_equal(estimate, &read, sizeof read);
+    for (int i = 0; i < 4; i++) {
+        assert_true(estimate->se[i] < 0.01f);
+        assert_true(fabs((double)estimate->p[i] - truth[i]) < 5.0 * (double)estimate->se[i]);
+        /* the standard error squared is the covariance's diagonal */
+        assert_float_equal(estimate->covariance[i][i] / (estimate->se[i] * estimate->se[i]), 1.0f, 1e-5);
+    }
+}
+
+/* A larger standard error than that of the assessment: an unknown input that is no noise of the sensors. */
+static void scatter_of_the_windows_widens_the_standard_errors(void **state)
+{
+    (void)state;
+    float se[2][4];
+    for (int disturbed = 0; disturbed < 2; disturbed++) {
+        pvid_fourier_design_f32 design;
+        pvid_fourier_config_f32 config;
+        start(&design, &config);
+        plant rig = {.generator = 5u};
+        for (int tick = 0; tick < 6000; tick++) {
+            float sample[2];
+            next_sample(&rig, sample);
+            rig.x += (disturbed != 0) ? (3.0 * (double)noise_of(&rig)) : 0.0;
+            (void)pvid_fourier_step_f32(&self, sample);
+        }
+        memcpy(se[disturbed], pvid_fourier_estimate_f32(&self)->se, sizeof se[disturbed]);
+    }
+    for (int i = 0; i < 4; i++) {
+        assert_true(se[1][i] > 10.0f * se[0][i]);
+    }
+}
+
+/* ---- sums ---- */
+
+/* S_h of the last whole window from its definition: `x` are the values of the channels' gains at its 2 HOP steps. */
+static void sum_of(const double channel[2 * HOP], int h, double out[2])
+{
+    out[0] = 0.0;
+    out[1] = 0.0;
+    for (int k = 0; k < 2 * HOP; k++) {
+        const double turn = PI * (double)h * (double)k / (double)HOP;
+        out[0] += channel[k] * cos(turn);
+        out[1] += channel[k] * sin(turn);
+    }
+}
+
+/* Integrals of x from the window's start by a rule of its own: fine trapezoids of the cubic through the steps. */
+static void sums_are_those_of_the_definition(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    start(&design, &config);
+    /* the integrand is the second sample: here a sine, whose integrals are known */
+    const double w = 11.0;
+    int tick = 0;
+    while (self.finish.stage == PVID_FOURIER_IDLE) {
+        const double t = (double)tick / RATE;
+        const float sample[2] = {(float)(1.5 + cos(5.0 * t)), (float)sin(w * t)};
+        (void)pvid_fourier_step_f32(&self, sample);
+        tick++;
+        assert_true(tick < 4 * HOP);
+    }
+    const double first = 2.0 / RATE; /* the first step has two samples before it */
+    double channel[CHANNELS][2 * HOP];
+    for (int k = 0; k < 2 * HOP; k++) {
+        const double t = first + ((double)k / RATE);
+        const double u = 1.5 + cos(5.0 * t);
+        const double since = (double)k / RATE;
+        const double once = (cos(w * first) - cos(w * t)) / w;
+        const double twice = ((since * cos(w * first)) / w) - ((sin(w * t) - sin(w * first)) / (w * w));
+        channel[U][k] = u;
+        channel[U_I1][k] = u * once;
+        channel[U_T][k] = u * since;
+        channel[U_I2][k] = u * twice;
+        channel[X][k] = sin(w * t);
+        channel[SIGN][k] = 1.0;
+    }
+    for (int c = 0; c < ONE; c++) {
+        double size = 0.0;
+        for (int k = 0; k < 2 * HOP; k++) {
+            size += fabs(channel[c][k]);
+        }
+        for (int h = 0; h <= HIGHEST; h++) {
+            double sum[2];
+            sum_of(channel[c], h, sum);
+            assert_true(fabs((double)self.window[c][0][h] - sum[0]) < 3e-6 * size);
+            assert_true(fabs((double)self.window[c][1][h] - sum[1]) < 3e-6 * size);
+        }
+    }
+}
+
+/* ---- rows ---- */
+
+/* sin^n(pi t/T) {1, cos, sin}(2 pi f (t/T - 1/2)) and its derivative at step k. */
+static void function_of(int place, int k, double out[2])
+{
+    const double length = 2.0 * (double)HOP / RATE;
+    const double s = (double)k / (2.0 * (double)HOP);
+    const double f = (double)((place + 1) / 2);
+    const double bell = pow(sin(PI * s), (double)POWER);
+    const double slope = (double)POWER * pow(sin(PI * s), (double)POWER - 1.0) * cos(PI * s) * PI / length;
+    const double turn = 2.0 * PI * f * (s - 0.5);
+    const double rate = 2.0 * PI * f / length;
+    if ((place == 0) || ((place % 2) != 0)) {
+        out[0] = bell * cos(turn);
+        out[1] = (slope * cos(turn)) - (bell * rate * sin(turn));
+    } else {
+        out[0] = bell * sin(turn);
+        out[1] = (slope * sin(turn)) + (bell * rate * cos(turn));
+    }
+}
+
+/* x <- R^-1 x by Gauss-Jordan, for some columns. */
+static void solve(double r[FUNCTIONS][FUNCTIONS], double x[5][FUNCTIONS])
+{
+    for (int i = 0; i < FUNCTIONS; i++) {
+        const double pivot = r[i][i];
+        for (int j = 0; j < FUNCTIONS; j++) {
+            r[i][j] /= pivot;
+        }
+        for (int c = 0; c < 5; c++) {
+            x[c][i] /= pivot;
+        }
+        for (int k = 0; k < FUNCTIONS; k++) {
+            const double factor = (k == i) ? 0.0 : r[k][i];
+            for (int j = 0; j < FUNCTIONS; j++) {
+                r[k][j] -= factor * r[i][j];
+            }
+            for (int c = 0; c < 5; c++) {
+                x[c][k] -= factor * x[c][i];
+            }
+        }
+    }
+}
+
+/* The moments of the white rows are N^T R^-1 N of the test functions, R = T D T^T the covariance of sensor noise. */
+static void rows_have_the_moments_of_generalised_least_squares(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    start(&design, &config);
+    config.gate.sigmas = 0.0f;
+    plant rig = {.generator = 9u};
+    static float given[4 * HOP][2];
+    int ticks = 0;
+    while (self.estimator.counters.rows < FUNCTIONS + POWER) { /* all rows of the first window */
+        assert_true(ticks < 4 * HOP);
+        next_sample(&rig, given[ticks]);
+        (void)pvid_fourier_step_f32(&self, given[ticks]);
+        ticks++;
+    }
+    double psi[5][2 * HOP]; /* what the functions, or for the last column their derivatives, multiply */
+    for (int k = 0; k < 2 * HOP; k++) {
+        const double u = (double)given[k + 2][0];
+        const double g =
+            0.5 * ((double)given[k + 3][0] - (double)given[(k > 0) ? (k + 1) : 2][0]) * ((k > 0) ? 1.0 : 2.0);
+        const double sign = 2.0 * u / fabs(g);
+        psi[0][k] = u;
+        psi[1][k] = -(double)given[k + 2][1];
+        psi[2][k] = 1.0;
+        psi[3][k] = (sign > 1.0) ? 1.0 : ((sign < -1.0) ? -1.0 : sign);
+        psi[4][k] = (double)given[k + 2][1];
+    }
+    double n[5][FUNCTIONS] = {{0.0}};
+    double r[FUNCTIONS][FUNCTIONS] = {{0.0}};
+    const double b = 3.0; /* of the start, at which the first window is made white */
+    for (int k = 0; k < 2 * HOP; k++) {
+        double chi[FUNCTIONS][2];
+        for (int i = 0; i < FUNCTIONS; i++) {
+            function_of(i, k, chi[i]);
+            for (int c = 0; c < 4; c++) {
+                n[c][i] += chi[i][0] * psi[c][k];
+            }
+            n[4][i] -= chi[i][1] * psi[4][k];
+        }
+        for (int i = 0; i < FUNCTIONS; i++) {
+            for (int j = 0; j < FUNCTIONS; j++) {
+                r[i][j] += SD * SD * ((chi[i][1] * chi[j][1]) + (b * b * chi[i][0] * chi[j][0]));
+            }
+        }
+    }
+    double x[5][FUNCTIONS];
+    memcpy(x, n, sizeof x);
+    solve(r, x);
+    const size_t rows = pvid_fourier_rows(&design);
+    for (int a = 0; a < 5; a++) {
+        for (int c = 0; c < 5; c++) {
+            double expected = 0.0;
+            double found = 0.0;
+            double sizes[2] = {0.0, 0.0};
+            for (int i = 0; i < FUNCTIONS; i++) {
+                expected += n[a][i] * x[c][i];
+                sizes[0] += n[a][i] * x[a][i];
+                sizes[1] += n[c][i] * x[c][i];
+            }
+            for (size_t i = 0; i < rows; i++) {
+                found += (double)self.finish.column[a][i] * (double)self.finish.column[c][i];
+            }
+            assert_true(fabs(found - expected) < 2e-4 * sqrt(sizes[0] * sizes[1]));
+        }
+    }
+}
+
+/* ---- front end ---- */
+
+static const pvid_fourier_signal derived[3] = {{0, PVID_SIGNAL_HELD}, {0, PVID_SIGNAL_JUMP}, {1, PVID_SIGNAL_SAMPLED}};
+static const pvid_fourier_jet derived_jets[4] = {{0, 0}, {1, 0}, {2, 0}, {2, 1}};
+static const float smooth[3] = {0.3f, 0.2f, -0.1f};
+static const float slope[5] = {10.0f, 8.0f, 5.0f, -3.0f, 1.0f};
+static const pvid_fourier_filter_f32 derived_filters[4] = {{0, NULL}, {0, NULL}, {3, smooth}, {5, slope}};
+
+/* Samples that have no pattern. */
+static double sample_at(int tick, int place)
+{
+    const uint32_t mixed = ((uint32_t)(tick + 100) * 2654435761u) ^ ((uint32_t)(place + 1) * 40503u);
+    return ((double)((mixed >> 7) % 20011u) / 10000.0) - 1.0;
+}
+
+static void jets_are_those_of_the_filters_for_every_decimation(void **state)
+{
+    (void)state;
+    pvid_fourier_model_f32 model = mechanism;
+    model.signals = 3;
+    model.signal = derived;
+    model.jets = 4;
+    model.jet = derived_jets;
+    pvid_fourier_design_f32 design = design_of(&model);
+    design.filter = derived_filters;
+    static const uint8_t decimations[6] = {1, 2, 3, 7, 8, 20};
+    for (size_t i = 0; i < 6u; i++) {
+        design.decimation = decimations[i];
+        static pvid_fourier_front_f32 front;
+        memset(&front, 0, sizeof front);
+        pvid_fourier_front_init_f32(&front, &design, (float)RATE);
+        int steps = 0;
+        for (int tick = 0; tick < 200; tick++) {
+            const float sample[2] = {(float)sample_at(tick, 0), (float)sample_at(tick, 1)};
+            if (!pvid_fourier_front_step_f32(&front, &design, sample)) {
+                continue;
+            }
+            const int at = 5 + (steps * (int)decimations[i]); /* the longest filter begins at the first sample */
+            const double held = (-sample_at(at - 2, 0) + (13.0 * sample_at(at - 1, 0)) + (13.0 * sample_at(at, 0)) -
+                                 sample_at(at + 1, 0)) /
+                                24.0;
+            double value = sample_at(at, 1);
+            double rate = 0.0;
+            for (int k = 1; k <= 3; k++) {
+                const double around = sample_at(at + k, 1) + sample_at(at - k, 1) - (2.0 * sample_at(at, 1));
+                value += (double)smooth[k - 1] * around;
+            }
+            for (int k = 1; k <= 5; k++) {
+                rate += (double)slope[k - 1] * (sample_at(at + k, 1) - sample_at(at - k, 1));
+            }
+            assert_float_equal(front.jet_value[0], held, 1e-5);
+            assert_float_equal(front.jet_value[1], (sample_at(at, 0) - sample_at(at - 1, 0)) / (12.0 * RATE), 1e-8);
+            assert_float_equal(front.jet_value[2], value, 1e-5);
+            assert_float_equal(front.jet_value[3], rate, 1e-4);
+            steps++;
+        }
+        assert_true(steps >= (180 / (int)decimations[i]));
+    }
+}
+
+/* ---- schedule ---- */
+
+/* A window needs as many stages as init has counted, and ends before the next one begins. */
+static void stages_are_as_many_as_counted(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    for (int compensation = 0; compensation < 2; compensation++) {
+        start(&design, &config);
+        config.compensation = compensation != 0;
+        assert_int_equal(pvid_fourier_init_f32(&self, &config), PVID_OK);
+        plant rig = {.generator = 3u};
+        while (self.finish.stage == PVID_FOURIER_IDLE) {
+            float sample[2];
+            next_sample(&rig, sample);
+            (void)pvid_fourier_step_f32(&self, sample);
+        }
+        uint32_t stages = 0;
+        pvid_reason reason = PVID_ACCUMULATED;
+        pvid_fourier_finish_begin_f32(&self.finish);
+        while (self.finish.stage != PVID_FOURIER_IDLE) {
+            pvid_fourier_finish_step_f32(&self, &reason);
+            stages++;
+        }
+        assert_int_equal(stages, pvid_fourier_finish_stages_f32(&self));
+    }
+}
+
+static void a_window_that_cannot_be_processed_in_time_is_refused(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    start(&design, &config);
+    design.hop = 8; /* one block of four ticks in which the window's work would have to be done */
+    config.iterations = PVID_MAX_ITERATIONS;
+    assert_int_equal(pvid_fourier_init_f32(&self, &config), PVID_BAD_ITERATIONS);
+}
+
+/* Two designs that differ in the decimation alone, of samples that stay for a block: the same steps, the same bits. */
+static void estimates_do_not_depend_on_the_slices_of_the_schedule(void **state)
+{
+    (void)state;
+    float p[2][4];
+    for (int slow = 0; slow < 2; slow++) {
+        pvid_fourier_design_f32 design = design_of(&mechanism);
+        design.decimation = (slow != 0) ? 10u : 1u;
+        pvid_fourier_config_f32 config = config_of(&design);
+        config.sample_rate_hz = (slow != 0) ? (float)(10.0 * RATE) : (float)RATE;
+        assert_int_equal(pvid_fourier_init_f32(&self, &config), PVID_OK);
+        plant rig = {.generator = 7u};
+        for (int step = 0; step < 1500; step++) {
+            float sample[2];
+            next_sample(&rig, sample);
+            /* steps are at ticks 2, 12, 22, ... of the slow one and at ticks 2, 3, 4, ... of the other */
+            for (int tick = 0; tick < ((slow != 0) ? ((step < 2) ? 1 : 10) : 1); tick++) {
+                (void)pvid_fourier_step_f32(&self, sample);
+            }
+        }
+        for (int tick = 0; tick < 2000; tick++) { /* what is in processing ends; no window is complete */
+            if (self.finish.stage != PVID_FOURIER_IDLE) {
+                pvid_reason reason = PVID_ACCUMULATED;
+                pvid_fourier_finish_step_f32(&self, &reason);
+            }
+        }
+        memcpy(p[slow], self.estimator.p, sizeof p[slow]);
+        assert_true(self.estimator.counters.updates > 10u);
+    }
+    assert_memory_equal(p[0], p[1], sizeof p[0]);
+}
+
+/* ---- gaps, freezing, limits ---- */
+
+static uint32_t run(plant *rig, int ticks, uint32_t reasons[16])
+{
+    memset(reasons, 0, 16u * sizeof reasons[0]);
+    for (int tick = 0; tick < ticks; tick++) {
+        float sample[2];
+        next_sample(rig, sample);
+        reasons[pvid_fourier_step_f32(&self, sample)]++;
+    }
+    return reasons[PVID_UPDATED] + reasons[PVID_MISFIT] + reasons[PVID_HELD_UNCERTAIN];
+}
+
+static void a_gap_restarts_the_windows_and_keeps_the_sums(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    uint32_t reasons[16];
+    start(&design, &config);
+    plant rig = {.generator = 2u};
+    assert_true(run(&rig, 30 * HOP, reasons) > 20u);
+    const float run_before = self.history.run[0];
+    const uint32_t rows = self.estimator.counters.rows;
+    pvid_fourier_gap_f32(&self);
+    (void)run(&rig, 2 * HOP, reasons);
+    assert_int_equal(reasons[PVID_WARMING_UP], (2 * HOP) - reasons[PVID_UPDATED] - reasons[PVID_MISFIT]);
+    assert_true(self.estimator.counters.rows - rows <= FUNCTIONS + POWER); /* the window that was in processing */
+    assert_true(fabs((double)(self.history.run[0] - run_before)) < 2.0);
+    assert_true(run(&rig, 10 * HOP, reasons) >= 8u);
+    assert_true(self.trust.published);
+}
+
+static void a_sample_that_is_not_finite_is_rejected_and_restarts(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    uint32_t reasons[16];
+    start(&design, &config);
+    plant rig = {.generator = 4u};
+    (void)run(&rig, 20 * HOP, reasons);
+    const float bad[3] = {NAN, INFINITY, -INFINITY};
+    for (int i = 0; i < 3; i++) {
+        const float sample[2] = {0.0f, bad[i]};
+        assert_int_equal(pvid_fourier_step_f32(&self, sample), PVID_REJECTED_NOT_FINITE);
+        const float other[2] = {bad[i], 0.0f};
+        assert_int_equal(pvid_fourier_step_f32(&self, other), PVID_REJECTED_NOT_FINITE);
+    }
+    assert_int_equal(self.estimator.counters.rejected_not_finite, 6);
+    (void)run(&rig, HOP, reasons);
+    assert_true(reasons[PVID_WARMING_UP] > 0u);
+    assert_true(run(&rig, 10 * HOP, reasons) >= 7u);
+    for (int i = 0; i < 4; i++) {
+        assert_true(isfinite(self.estimator.p[i]));
+    }
+}
+
+static void a_frozen_identifier_drops_windows_and_resumes(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    uint32_t reasons[16];
+    start(&design, &config);
+    plant rig = {.generator = 6u};
+    (void)run(&rig, 20 * HOP, reasons);
+    pvid_fourier_freeze_f32(&self, true);
+    (void)run(&rig, 2 * HOP, reasons);
+    const uint32_t rows = self.estimator.counters.rows;
+    (void)run(&rig, 5 * HOP, reasons);
+    assert_int_equal(reasons[PVID_HELD_FROZEN], 5);
+    assert_int_equal(self.estimator.counters.rows, rows);
+    assert_true(self.finish.alone); /* the next window has no neighbour */
+    pvid_fourier_freeze_f32(&self, false);
+    assert_true(run(&rig, 5 * HOP, reasons) >= 4u);
+}
+
+static void windows_beyond_a_range_or_without_motion_are_dropped(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    uint32_t reasons[16];
+    const float range[2] = {10.0f, 10.0f};
+    const float least[2] = {0.1f, 0.0f};
+    start(&design, &config);
+    config.range = range;
+    config.drive_min = least;
+    assert_int_equal(pvid_fourier_init_f32(&self, &config), PVID_OK);
+    plant rig = {.generator = 8u};
+    (void)run(&rig, 10 * HOP, reasons);
+    assert_int_equal(reasons[PVID_HELD_OUT_OF_RANGE] + reasons[PVID_HELD_NOT_EXCITED], 0);
+    const float beyond[2] = {0.0f, -10.5f};
+    (void)pvid_fourier_step_f32(&self, beyond);
+    (void)run(&rig, 4 * HOP, reasons);
+    assert_in_range(reasons[PVID_HELD_OUT_OF_RANGE], 2, 3); /* those that contain it, and the seam */
+    assert_int_equal(reasons[PVID_HELD_OUT_OF_RANGE], self.estimator.counters.held_out_of_range);
+    memset(reasons, 0, sizeof reasons);
+    for (int tick = 0; tick < 4 * HOP; tick++) {
+        const float still[2] = {(tick % 2 == 0) ? 5.09f : 5.0f, 0.0f};
+        reasons[pvid_fourier_step_f32(&self, still)]++;
+    }
+    assert_in_range(reasons[PVID_HELD_NOT_EXCITED], 2, 3);
+    assert_int_equal(reasons[PVID_HELD_NOT_EXCITED], self.estimator.counters.held_not_excited);
+}
+
+static void outliers_are_rejected_by_the_gate(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    uint32_t reasons[16];
+    start(&design, &config);
+    config.gate.sigmas = 4.0f;
+    assert_int_equal(pvid_fourier_init_f32(&self, &config), PVID_OK);
+    plant rig = {.generator = 10u};
+    (void)run(&rig, 40 * HOP, reasons);
+    float p[4];
+    memcpy(p, self.estimator.p, sizeof p);
+    const float spike[2] = {0.0f, 5.0f};
+    (void)pvid_fourier_step_f32(&self, spike);
+    (void)run(&rig, (3 * HOP) - 20, reasons);
+    assert_true(reasons[PVID_REJECTED_OUTLIER] >= 1u);
+    assert_int_equal(self.estimator.counters.rejected_outlier, reasons[PVID_REJECTED_OUTLIER]);
+    for (int i = 0; i < 4; i++) {
+        assert_float_equal(self.estimator.p[i], p[i], 0.02);
+    }
+}
+
+/* ---- init ---- */
+
+static void init_names_what_is_out_of_range(void **state)
+{
+    (void)state;
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+#define REFUSES(what, status)                                                                                          \
+    do {                                                                                                               \
+        start(&design, &config);                                                                                       \
+        pvid_fourier_model_f32 model = mechanism;                                                                      \
+        design.model = &model;                                                                                         \
+        what;                                                                                                          \
+        assert_int_equal(pvid_fourier_init_f32(&self, &config), status);                                               \
+        assert_null(self.design);                                                                                      \
+    } while (0)
+    static const pvid_fourier_term_f32 of_high_order[5] = {
+        {U, 0, 0, 1.0f}, {X, 0, 1, -1.0f}, {ONE, 0, 2, 1.0f}, {SIGN, 0, 3, 1.0f}, {X, POWER - 1, 4, 1.0f}};
+    static const pvid_fourier_term_f32 unsorted[5] = {
+        {U, 0, 1, 1.0f}, {X, 0, 0, -1.0f}, {ONE, 0, 2, 1.0f}, {SIGN, 0, 3, 1.0f}, {X, 1, 4, 1.0f}};
+    static const pvid_fourier_kind one_theta_less[1] = {{3, 1, 0, 5}};
+    static const pvid_fourier_filter_f32 without_weights[2] = {{0, NULL}, {3, NULL}};
+    static const float negative[1] = {-1.0f};
+    static const float zero_range[2] = {1.0f, 0.0f};
+    static const float not_a_number[2] = {NAN, 0.0f};
+    static const uint8_t high[1] = {POWER};
+    static const pvid_fourier_noise_f32 of_no_column[2] = {{0, 0, 1, 5, 1.0f}, {0, 1, 4, 4, 1.0f}};
+    static pvid_fourier_channel wrong[CHANNELS];
+    REFUSES(config.sample_rate_hz = 0.0f, PVID_BAD_SAMPLE_RATE);
+    REFUSES(config.sample_rate_hz = NAN, PVID_BAD_SAMPLE_RATE);
+    REFUSES(config.design = NULL, PVID_BAD_DESIGN);
+    REFUSES(design.model = NULL, PVID_BAD_MODEL);
+    REFUSES(model.samples = 0, PVID_BAD_MODEL);
+    REFUSES(model.samples = 1, PVID_BAD_MODEL); /* a signal is of the second one */
+    REFUSES(model.jets = PVID_MAX_INPUTS, PVID_BAD_MODEL);
+    REFUSES(model.runs = PVID_MAX_INTEGRANDS + 1, PVID_BAD_MODEL);
+    REFUSES(model.kinds = 0, PVID_BAD_MODEL);
+    REFUSES(model.prepare = NULL, PVID_BAD_MODEL);
+    REFUSES(model.values = NULL, PVID_BAD_MODEL);
+    REFUSES(model.term = of_high_order, PVID_BAD_MODEL);
+    REFUSES(model.term = unsorted, PVID_BAD_MODEL);
+    REFUSES(model.kind = one_theta_less, PVID_BAD_MODEL);
+    for (int i = 0; i < 4; i++) {
+        memcpy(wrong, channels, sizeof wrong);
+        wrong[U_I2].fold = (i == 0) ? 3u : 2u;
+        wrong[U_I2].plain = (i == 1) ? (uint8_t)U_I1 : (uint8_t)U;
+        wrong[U_I2].ramp = (i == 2) ? (uint8_t)U_I1 : (uint8_t)U_T;
+        wrong[U_I2].integrand = (i == 3) ? 1u : 0u;
+        REFUSES(model.channel = wrong, PVID_BAD_MODEL);
+    }
+    REFUSES(design.decimation = 0, PVID_BAD_DECIMATION);
+    REFUSES(design.decimation = PVID_MAX_DECIMATION + 1, PVID_BAD_DECIMATION);
+    REFUSES(design.power = 3, PVID_BAD_DESIGN);
+    REFUSES(design.functions = 3, PVID_BAD_FUNCTIONS);
+    REFUSES(design.functions = PVID_MAX_FUNCTIONS + 1, PVID_BAD_FUNCTIONS);
+    REFUSES(design.hop = 46, PVID_BAD_WINDOW);
+    REFUSES(design.hop = 4, PVID_BAD_WINDOW);
+    REFUSES(design.overlap = 0.5f, PVID_BAD_OVERLAP);
+    REFUSES(design.circle = NULL, PVID_BAD_DESIGN);
+    REFUSES(design.filter = without_weights, PVID_BAD_DESIGN);
+    REFUSES(design.sign_width = negative, PVID_BAD_DESIGN);
+    REFUSES(design.error_variance = negative, PVID_BAD_DESIGN);
+    REFUSES(design.error_order = high, PVID_BAD_DESIGN);
+    REFUSES(design.noise = of_no_column, PVID_BAD_DESIGN);
+    REFUSES(design.n_noise = 0, PVID_BAD_DESIGN); /* nothing that the rows could be weighted with */
+    REFUSES(config.range = zero_range, PVID_BAD_ANGLE_LIMIT);
+    REFUSES(config.drive_min = not_a_number, PVID_BAD_DRIVE_MIN);
+    REFUSES(config.iterations = 0, PVID_BAD_ITERATIONS);
+    REFUSES(config.estimator.start[0] = -1.0f, PVID_BAD_START);
+    REFUSES(config.trust.se_max = 0.0f, PVID_BAD_SE_MAX);
+    REFUSES(config.gate.sigmas = 1.0f, PVID_BAD_GATE_SIGMAS);
+    assert_int_equal(pvid_fourier_init_f32(&self, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_fourier_init_f32(NULL, &config), PVID_BAD_POINTER);
+}
+
+static void an_object_before_its_init_does_nothing(void **state)
+{
+    (void)state;
+    static pvid_fourier_f32 zero;
+    const float sample[2] = {0.0f, 0.0f};
+    pvid_estimate_f32 estimate;
+    assert_int_equal(pvid_fourier_step_f32(&zero, sample), PVID_NOT_READY);
+    assert_int_equal(pvid_fourier_step_f32(NULL, sample), PVID_NOT_READY);
+    assert_false(pvid_fourier_read_f32(&zero, &estimate, NULL));
+    assert_null(pvid_fourier_estimate_f32(NULL));
+    pvid_fourier_gap_f32(&zero);
+    pvid_fourier_freeze_f32(&zero, true);
+    assert_false(zero.frozen);
+    pvid_fourier_design_f32 design;
+    pvid_fourier_config_f32 config;
+    start(&design, &config);
+    assert_int_equal(pvid_fourier_step_f32(&self, NULL), PVID_NOT_READY);
+    assert_false(pvid_fourier_read_f32(&self, NULL, NULL));
+}
+
+/* ---- nuisances ---- */
+
+static void a_nuisance_that_those_before_it_explain_is_skipped(void **state)
+{
+    (void)state;
+    const float first[4] = {1.0f, 2.0f, 2.0f, 0.0f};
+    float second[4] = {2.0f, 4.0f, 4.0001f, 0.0f};
+    const float whole = pvid_fourier_columns_square_f32(4, second);
+    float inverse = 0.0f;
+    assert_true(pvid_fourier_columns_keep_f32(4, first, pvid_fourier_columns_square_f32(4, first), &inverse));
+    assert_float_equal(inverse, 1.0f / 9.0f, 1e-7);
+    pvid_fourier_columns_project_f32(4, first, inverse, second);
+    assert_false(pvid_fourier_columns_keep_f32(4, second, whole, &inverse));
+    assert_float_equal(inverse, 0.0f, 0.0);
+    float column[4] = {3.0f, 1.0f, -1.0f, 2.0f};
+    pvid_fourier_columns_project_f32(4, first, 1.0f / 9.0f, column);
+    assert_float_equal((column[0] + (2.0f * column[1])) + (2.0f * column[2]), 0.0f, 1e-5);
+    const float nothing[4] = {0.0f};
+    assert_false(pvid_fourier_columns_keep_f32(4, nothing, 0.0f, &inverse));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parameters_are_found_within_their_errors),
+        cmocka_unit_test(scatter_of_the_windows_widens_the_standard_errors),
+        cmocka_unit_test(sums_are_those_of_the_definition),
+        cmocka_unit_test(rows_have_the_moments_of_generalised_least_squares),
+        cmocka_unit_test(jets_are_those_of_the_filters_for_every_decimation),
+        cmocka_unit_test(stages_are_as_many_as_counted),
+        cmocka_unit_test(a_window_that_cannot_be_processed_in_time_is_refused),
+        cmocka_unit_test(estimates_do_not_depend_on_the_slices_of_the_schedule),
+        cmocka_unit_test(a_gap_restarts_the_windows_and_keeps_the_sums),
+        cmocka_unit_test(a_sample_that_is_not_finite_is_rejected_and_restarts),
+        cmocka_unit_test(a_frozen_identifier_drops_windows_and_resumes),
+        cmocka_unit_test(windows_beyond_a_range_or_without_motion_are_dropped),
+        cmocka_unit_test(outliers_are_rejected_by_the_gate),
+        cmocka_unit_test(init_names_what_is_out_of_range),
+        cmocka_unit_test(an_object_before_its_init_does_nothing),
+        cmocka_unit_test(a_nuisance_that_those_before_it_explain_is_skipped),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
