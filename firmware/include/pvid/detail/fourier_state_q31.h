@@ -75,7 +75,7 @@ typedef struct {
 /* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
 typedef struct {
     int16_t exponent[PVID_MAX_COLUMNS];
-    int32_t longest;                    /* bits of the largest product of the present column */
+    int32_t top;                        /* greatest exponent of the weights of the present column */
     int64_t sum[PVID_FOURIER_ROWS_Q31]; /* the present column while it is made */
     int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
 } pvid_fourier_columns_q31;
