@@ -40,6 +40,8 @@ typedef struct {
     int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end, rounded */
     uint16_t index;                          /* of the step whose channels come next, in its half */
     uint8_t half;                            /* that fills, 0 or 1 */
+    uint16_t lead;                           /* ticks from the first sample to the first step */
+    bool ran;                                /* there was a step: the runs have begun */
 } pvid_fourier_values_q31;
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
