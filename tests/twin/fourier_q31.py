@@ -192,17 +192,18 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
 }
 
 extern const pvid_fourier_config_q31 rig_config_q31;
-int identify(const int32_t readings[], unsigned ticks, int32_t p[], int32_t published[], int64_t sums[],
-             uint8_t exponent[], uint8_t reason[]);
+int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
+             uint8_t exponent[], uint8_t reason[], unsigned ticks);
 
 /* The state after every tick; returns the status of init. */
-int identify(const int32_t readings[], unsigned ticks, int32_t p[], int32_t published[], int64_t sums[],
-             uint8_t exponent[], uint8_t reason[])
+int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
+             uint8_t exponent[], uint8_t reason[], unsigned ticks)
 {
     static pvid_fourier_q31 self;
     const size_t samples = rig_design_q31.model->samples;
     const pvid_status status = pvid_fourier_init_q31(&self, &rig_config_q31);
     for (unsigned k = 0; (status == PVID_OK) && (k < ticks); k++) {
+        pvid_fourier_freeze_q31(&self, frozen[k] != 0u);
         reason[k] = (uint8_t)pvid_fourier_step_q31(&self, &readings[k * samples]);
         const pvid_information_q31 *information = &self.estimator.information;
         const size_t n_p = self.estimator.model->n_p;
@@ -277,7 +278,9 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
 SIZES = (
     "PVID_MAX_P=8",
     "PVID_MAX_THETA=12",
-    "PVID_MAX_THETA_Q31=12",
+    "PVID_MAX_THETA_Q31=16",
+    "PVID_MAX_MOMENTS_Q31=78",
+    "PVID_MAX_C_Q31=48",
     "PVID_MAX_CHANNELS=24",
     "PVID_MAX_HARMONICS=25",
     "PVID_MAX_RING=1024",
@@ -313,17 +316,19 @@ class Core:
     def _run(self, arguments: list[str]) -> None:
         subprocess.run(["gcc", *arguments], check=True, cwd=self.folder)
 
-    def library(self, one: Rig) -> ctypes.CDLL:
-        """With the tables of a rig."""
-        if one.name not in self.libraries:
-            code = self.folder / f"{one.name}.tables.c"
-            tables = tables_source(one.fixed, one.parameters, one.design, "rig")
-            code.write_text(tables + "\n\n" + configuration(one.config, "rig"), encoding="utf-8")
-            library = self.folder / f"{one.name}.so"
+    def library(self, one: Rig, config: FourierConfigQ31 | None = None) -> ctypes.CDLL:
+        """With the tables of a rig, and this configuration or its own."""
+        tables = tables_source(one.fixed, one.parameters, one.design, "rig")
+        text = tables + "\n\n" + configuration(config or one.config, "rig")
+        if text not in self.libraries:
+            name = f"{one.name}_{len(self.libraries)}"
+            code = self.folder / f"{name}.tables.c"
+            code.write_text(text, encoding="utf-8")
+            library = self.folder / f"{name}.so"
             objects = [str(path) for path in self.folder.glob("*.o")]
             self._run([*_OPTIONS, "-shared", str(code), *objects, "-o", str(library)])
-            self.libraries[one.name] = ctypes.CDLL(str(library))
-        return self.libraries[one.name]
+            self.libraries[text] = ctypes.CDLL(str(library))
+        return self.libraries[text]
 
     def windows(self, one: Rig, counts: Int) -> tuple[Int, Int]:
         """S_h [windows, channels, H + 1, 2] of counts [samples, ticks], and what each tick did."""
@@ -351,10 +356,13 @@ class Core:
         live = self.library(one).columns(kind, *pointers)
         return x.astype(np.int64), exponent.astype(np.int64), int(live)
 
-    def identify(self, one: Rig, readings: Int) -> tuple[int, Record]:
+    def identify(
+        self, one: Rig, config: FourierConfigQ31, readings: Int, frozen: npt.NDArray[np.uint8] | None = None
+    ) -> tuple[int, Record]:
         """The status of init, and the state after every tick of readings [samples, ticks]."""
         given = np.ascontiguousarray(readings.T, np.int32)
         ticks, model = len(given), one.parameters.model
+        still = np.zeros(ticks, np.uint8) if frozen is None else np.ascontiguousarray(frozen, np.uint8)
         record = Record(
             p=np.zeros((ticks, model.n_p), np.int32),
             sums=np.zeros((ticks, model.n_sums), np.int64),
@@ -362,7 +370,14 @@ class Core:
             exponent=np.zeros(ticks, np.uint8),
             published=np.zeros((ticks, model.n_p), np.int32),
         )
-        arrays = (record.p, record.published, record.sums, record.exponent, record.reason)
+        arrays = (given, still, record.p, record.published, record.sums, record.exponent, record.reason)
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
-        status = self.library(one).identify(ctypes.c_void_p(given.ctypes.data), ticks, *pointers)
+        status = self.library(one, config).identify(*pointers, ticks)
         return int(status), record
+
+
+@cache
+def core_in(folder: Path) -> Core:
+    """Compiled once for all tests of a session."""
+    folder.mkdir()
+    return Core(folder)

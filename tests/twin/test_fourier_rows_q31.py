@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fourier_q31 import DESIGNS, Core, Rig, rig
+from fourier_q31 import DESIGNS, Core, Rig, core_in, rig
 
 from pvid.design.fourier_q31 import scaled_number
 from pvid.oracle.fourier.rows import EquationError
@@ -22,7 +22,7 @@ _OF_A_RUN = 0.1  # the battery's charge begins at the first step here and at the
 
 @pytest.fixture(scope="module")
 def core(tmp_path_factory: pytest.TempPathFactory) -> Core:
-    return Core(tmp_path_factory.mktemp("core"))
+    return core_in(tmp_path_factory.getbasetemp() / "fourier_q31")
 
 
 @pytest.fixture(params=DESIGNS)

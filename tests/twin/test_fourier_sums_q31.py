@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fourier_q31 import DESIGNS, Core, Rig, rig
+from fourier_q31 import DESIGNS, Core, Rig, core_in, rig
 
 from pvid.base.errors import PvidError
 from pvid.codegen.fourier_q31 import JetReaches, fixed_fourier
@@ -19,7 +19,7 @@ _TOLERANCE = 2.0**-15  # of the sum of |channel|: the cosine has 16 bits; as muc
 
 @pytest.fixture(scope="module")
 def core(tmp_path_factory: pytest.TempPathFactory) -> Core:
-    return Core(tmp_path_factory.mktemp("core"))
+    return core_in(tmp_path_factory.getbasetemp() / "fourier_q31")
 
 
 @pytest.fixture(params=DESIGNS)

@@ -97,6 +97,14 @@
 #define pvid_fourier_gap_f32 PVID_SIZED(pvid_fourier_gap_f32)
 #define pvid_fourier_freeze_f32 PVID_SIZED(pvid_fourier_freeze_f32)
 
+/* fourier_q31.h */
+#define pvid_fourier_init_q31 PVID_SIZED(pvid_fourier_init_q31)
+#define pvid_fourier_step_q31 PVID_SIZED(pvid_fourier_step_q31)
+#define pvid_fourier_estimate_q31 PVID_SIZED(pvid_fourier_estimate_q31)
+#define pvid_fourier_read_q31 PVID_SIZED(pvid_fourier_read_q31)
+#define pvid_fourier_gap_q31 PVID_SIZED(pvid_fourier_gap_q31)
+#define pvid_fourier_freeze_q31 PVID_SIZED(pvid_fourier_freeze_q31)
+
 /* gate.h */
 #define pvid_gate_init_f32 PVID_SIZED(pvid_gate_init_f32)
 #define pvid_gate_passes_f32 PVID_SIZED(pvid_gate_passes_f32)

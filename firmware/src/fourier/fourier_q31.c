@@ -44,7 +44,8 @@ static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
         thetas += kind->thetas;
         columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS);
     }
-    return (fits && columns && (thetas == model->model->n_theta)) ? PVID_OK : PVID_BAD_MODEL;
+    const bool same_kinds = (model->model->n_kinds == model->kinds) || (model->kinds == 1u);
+    return (fits && columns && same_kinds && (thetas == model->model->n_theta)) ? PVID_OK : PVID_BAD_MODEL;
 }
 
 static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)

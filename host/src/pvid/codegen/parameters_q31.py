@@ -87,6 +87,7 @@ def fixed_parameters(functions: ModelFunctions, bounds: Sequence[Interval]) -> P
         theta=theta,
         jacobian=jacobian,
         formats=lambda _: (list(theta_bits), list(c_bits)),
+        kind_end=tuple(one.theta.stop for one in functions.kinds),
     )
     return ParametersQ31(p_bits, theta_bits, c_bits, model, functions)
 
@@ -107,6 +108,7 @@ _C = """\
 static const int8_t {prefix}_p_bits[{n_p}] = {{{p_bits}}};
 static const int16_t {prefix}_theta_bits[{n_theta}] = {{{theta_bits}}};
 static const int16_t {prefix}_c_bits[{n_c}] = {{{c_bits}}};
+static const uint8_t {prefix}_kind_end[{n_kinds}] = {{{kind_end}}};
 static const uint8_t {prefix}_c_row[{n_c}] = {{{c_row}}};
 static const uint8_t {prefix}_c_column[{n_c}] = {{{c_column}}};
 
@@ -167,8 +169,10 @@ static void {prefix}_formats(const int8_t p_bits[], int16_t theta_bits[], int16_
 static const pvid_model_q31 {prefix}_model_q31 = {{
     .n_theta = {n_theta},
     .n_p = {n_p},
+    .n_kinds = {n_kinds},
     .n_c = {n_c},
     .positive = {positive}u,
+    .kind_end = {prefix}_kind_end,
     .c_row = {prefix}_c_row,
     .c_column = {prefix}_c_column,
     .theta = {prefix}_theta_fixed,
@@ -194,6 +198,8 @@ def c_parameters(made: ParametersQ31, prefix: str) -> str:
         n_p=len(made.p_bits),
         n_theta=len(made.theta_bits),
         n_c=len(made.c_bits),
+        n_kinds=len(functions.kinds),
+        kind_end=listed([one.theta.stop for one in functions.kinds]),
         p_bits=listed(made.p_bits),
         theta_bits=listed(made.theta_bits),
         c_bits=listed(made.c_bits),

@@ -1,4 +1,4 @@
-"""Twin of fourier/fourier_finish_q31.c: a window's sums to rows, to steps of p, to the published estimate, stage by stage."""
+"""Twin of fourier/fourier_finish_q31.c: a window's sums to rows, steps of p, the published estimate, stage by stage."""
 
 from __future__ import annotations
 
@@ -53,19 +53,15 @@ def number_of_stages(design: FourierDesignQ31, iterations: int, estimator: Estim
     return rows + solves + estimator.assessment_stages + 1
 
 
-def _rows(
-    made: fourier_white.Columns, first: int, estimator: EstimatorQ31, n_bits: Sequence[int], y_bits: int
-) -> tuple[Int, Int]:
-    """N among the thetas of all kinds [rows, n_theta, lanes], and Y [rows, lanes]."""
+def _rows(made: fourier_white.Columns, first: int, n_bits: Sequence[int], y_bits: int) -> tuple[Int, Int]:
+    """N of the kind [rows, thetas, lanes], and Y [rows, lanes]."""
     thetas = len(made.x) - 1
-    n = np.zeros((made.x.shape[1], estimator.model.n_theta, estimator.lanes), np.int64)
 
     def entries(place: int, bits: int) -> Int:
         shift = np.broadcast_to(-(made.exponent[place] + bits), made.x[place].shape)
         return clamp(scale(made.x[place], shift), _MOST)
 
-    for j in range(thetas):
-        n[:, first + j] = entries(j, n_bits[first + j])
+    n = np.stack([entries(j, n_bits[first + j]) for j in range(thetas)], axis=1)
     return n, entries(thetas, y_bits)
 
 
@@ -95,13 +91,13 @@ def stages(
         own = slice(first, first + kind.thetas)
         theta = scaled(estimator.theta[own], -integers(estimator.theta_bits[own])[:, np.newaxis])
         made = fourier_white.columns(fourier_white.white(design, place, theta), place, sums)
-        n, y = _rows(made, first, estimator, *formats)
+        n, y = _rows(made, first, *formats)
         first += kind.thetas
         freedom = np.maximum(design.functions - made.live, 1)
         saturated = np.zeros(lanes, np.bool_)
         rss = np.zeros(lanes, np.int64)
         for k in range(design.rows):
-            e, fits = estimator.innovation(n[k], y[k])
+            e, fits = estimator.innovation(n[k], y[k], place)
             within = clamp(e, ROW_LIMIT)
             saturated = saturated | ~fits
             rss = clamp(rss + within * within, WIDE)
@@ -118,7 +114,7 @@ def stages(
         else:
             yield from estimator.fade(trust.next_fade_factor())
         for k in range(design.rows):
-            added = estimator.add(n[k], np.where(saturated, _MOST, y[k]))
+            added = estimator.add(n[k], np.where(saturated, _MOST, y[k]), place)
             yield None if (added == Reason.ACCUMULATED).all() else added
         used += 1
         free = free + freedom

@@ -1,0 +1,87 @@
+"""The fixed-point weak engine of every shipped mechanism: C and twin, integer by integer after every tick."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from fourier_q31 import DESIGNS, Core, Rig, core_in, rig
+
+from pvid.base.errors import PvidError
+from pvid.settings.enums import Reason, Status
+from pvid.settings.fourier_q31 import FourierConfigQ31
+from pvid.settings.q31 import GateConfigQ31
+from pvid.settings.record import Array
+from pvid.setup.fourier_q31 import row_formats
+from pvid.twin.fourier_q31 import FourierTwinQ31
+from pvid.twin.q31.integer import Int
+
+Frozen = npt.NDArray[np.uint8]
+
+TICKS = 3000
+
+# Of a parameter after three windows or more from a start 40 % off; a friction that hardly shows by then: 10 %.
+_CLOSE = 0.04
+_FRICTION = 0.1
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Core:
+    return core_in(tmp_path_factory.getbasetemp() / "fourier_q31")
+
+
+@pytest.fixture(params=DESIGNS)
+def one(request: pytest.FixtureRequest) -> Rig:
+    return rig(request.param, TICKS)
+
+
+def assert_equal(
+    one: Rig, core: Core, config: FourierConfigQ31, readings: Int, frozen: Frozen | None = None
+) -> tuple[Array, Array]:
+    """Reasons and p after the last tick, once C and twin are equal."""
+    status, found = core.identify(one, config, readings, frozen)
+    assert status == Status.OK
+    twin = FourierTwinQ31(config, one.parameters.model)
+    twin.frozen = None if frozen is None else frozen.astype(np.bool_)
+    wanted = twin.run(readings).lane()
+    for name in ("reason", "p", "sums", "exponent", "published"):
+        assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
+    return found.reason, found.p[-1]
+
+
+def test_every_mechanism_is_identified_with_the_bits_of_the_twin(one: Rig, core: Core) -> None:
+    _, last = assert_equal(one, core, one.config, one.counts)
+    p = last * 2.0 ** -np.array(one.parameters.p_bits)
+    known = one.compiled.parameters
+    for name, value, truth, positive in zip(known.names, p, one.truth, known.positive, strict=True):
+        if positive:
+            assert abs(value / truth - 1) < (_FRICTION if name.startswith("b") else _CLOSE), name
+
+
+def test_hostile_readings_have_the_bits_of_the_twin(one: Rig, core: Core) -> None:
+    """Offsets, jumps beyond full scale and the reach of jets, a frozen stretch, too little drive, a gate."""
+    random = np.random.default_rng(5)
+    readings = one.counts.copy()
+    readings[:, random.integers(0, TICKS, 2)] = 2**31 - 1
+    readings[:, 2400] = np.array(one.design.full_scale)
+    offset = tuple(random.integers(-9, 9, len(readings)).tolist())
+    frozen = np.zeros(TICKS, np.uint8)
+    frozen[1700:2100] = 1
+    config = replace(
+        one.config,
+        offset=offset,
+        drive_min=tuple(int(x) for x in np.std(one.counts, axis=1) * 0.7),
+        gate=GateConfigQ31(sigmas=3 << 16, patience_groups=50),
+    )
+    reasons, _ = assert_equal(one, core, config, readings, frozen)
+    assert np.sum(reasons == Reason.REJECTED_SATURATED) >= 2
+
+
+def test_rows_beyond_fixed_point_are_refused_by_name() -> None:
+    one = rig("rigid_body", TICKS)
+    quiet = one.rows.only(slice(0, 2))
+    quiet.columns = [1e6 * column for column in quiet.columns]
+    with pytest.raises(PvidError, match=r"rigid_body: the residual Y - N theta is .* too much for the rows"):
+        row_formats(quiet, one.truth)
