@@ -17,6 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
 from pvid.cli.input import print_notes
+from pvid.oracle.fourier.weights import Weights
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
@@ -48,12 +49,14 @@ def identify_run(
     *,
     as_json: bool,
     figure: Path | None,
+    weights: Weights = "residuals",
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
 
     Parameters
     ----------
+    weights : of the rows, as in pvid.oracle.fourier.identify
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = model_of(rig).name
@@ -63,8 +66,10 @@ def identify_run(
                 f"--{option} {value}: {name} is identified in float64, or in float32 by --core f32, by the weak form; "
                 f"omit --{option}"
             )
+    if weights != "residuals" and only_in_c.get("core") == "f32":
+        raise PvidError(f"--weights {weights} is for float64; omit --core f32")
     recording, model = recording_of(path, rig, columns)
-    answer = identify_mechanism(recording, model)
+    answer = identify_mechanism(recording, model, weights)
     core: CoreAnswer | None = None
     if only_in_c.get("core") == "f32":
         from pvid.run.mechanism_f32 import identify_in_c
@@ -82,7 +87,7 @@ def identify_run(
 
         convergence(answer, figure)
         click.echo(f"figure: {figure}")
-    for one in answer.found.verdict.reasons:
+    for one in (core.verdict if core is not None else answer.found.verdict).reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
     if not shown.identified:
         reason = f": {core.reason.text}" if core is not None and not core.published else ""
@@ -129,7 +134,7 @@ def _print_core(core: CoreAnswer) -> None:
         _table(core.values, f"{core.oracle.model.title}: weak form, C in float32")
     misfit = "not judged" if core.misfit is None else f"{core.misfit:.2g}"
     click.echo(
-        f"status {core.oracle.found.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
+        f"status {core.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
         f"windows of {2 * core.config.hop_s:.3g} s; hash {core.hash:08x}"
     )
 
