@@ -64,6 +64,7 @@ ESTIMATOR = (
         "src/solve/assess_q31.c",
         "src/solve/information_q31.c",
         "src/solve/kinds.c",
+        "src/solve/scaled_model_q31.c",
         "models/kapitza/kapitza_weak_q31.c",
         "models/kapitza/kapitza_strong_q31.c",
     ),
@@ -172,7 +173,7 @@ PROOFS = (
     ),
     Proof(
         "estimator_q31",
-        "start and rows for the three models and one of three kinds: any configuration, any row on top of any state",
+        "start and rows for the three models and two of three kinds: any configuration, any row on top of any state",
         ESTIMATOR,
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
@@ -181,7 +182,10 @@ PROOFS = (
             "prepare:200,pvid_estimator_init_q31:200,pvid_estimator_add_kind_q31:20,pvid_estimator_add_to_b_q31:20,pvid_estimator_innovation_q31:200,"
             "pvid_estimator_terms_q31:200",
         ),
-        taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_information_init_q31"),
+        taken=(
+            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_scaled_times_q31"),
+            "pvid_information_init_q31",
+        ),
     ),
     Proof(
         "estimator_solve_q31",

@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from bench.attack import KINDS, Outcome, attack, call, campaign, complaint
+from bench.attack import HEADER, KINDS, LONGEST_S, Outcome, attack, call, campaign, complaint
 from bench.attack_commands import command_line
 from bench.attack_files import distorted_run, mutated_run, rig_text
 from pvid.base.errors import PvidError
@@ -31,6 +31,17 @@ def test_mutants_get_answers_and_sentences_alone(kind: str, tmp_path: Path) -> N
     assert tally.tried == SHORT[kind] == sum(tally.codes.values())
     assert tally.codes[2] > 0  # some are refused, and
     assert tally.codes[0] > 0  # some are answered
+
+
+def test_page_counts_every_mutant() -> None:
+    text = (Path(__file__).parents[1] / "ATTACK.md").read_text()
+    lines = text.partition("<!-- attack -->")[2].partition("<!-- /attack -->")[0].strip().splitlines()
+    assert tuple(cell.strip() for cell in lines[0].strip("|").split("|")) == HEADER
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+    assert len(rows) == len(KINDS)
+    for _, mutants, _, answered, nothing, refused, defects, longest_s in rows:
+        assert int(answered) + int(nothing) + int(refused) == int(mutants) >= 500
+        assert int(defects) == 0 and float(longest_s) < LONGEST_S
 
 
 def test_mutants_are_drawn_from_their_seed() -> None:

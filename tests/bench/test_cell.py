@@ -7,6 +7,9 @@ import pytest
 from conftest import ROOT
 
 from bench import cell
+from bench.replay import Replay
+from pvid.models.mechanisms import compiled_of
+from pvid.oracle.fourier.identify import identify
 from pvid.rig.columns import Columns
 from pvid.rig.run import read_recording
 
@@ -41,6 +44,17 @@ def test_two_rc_pairs_predict_another_load_at_a_fifth_of_the_capacity_an_hour() 
     found = cell.outcome("2 RC pairs", "battery_2rc", "steps-mild", "drive-mild")
     assert found.other_rms < BAR
     assert found.own_rms < BAR
+
+
+def test_identify_predicts_another_load_with_the_weights_of_the_sensors_and_says_when_they_matter() -> None:
+    """Without a design: the command line has none."""
+    run, other = cell.recorded("steps-mild"), cell.recorded("drive-mild")
+    model = compiled_of("battery_2rc")
+    found = identify(model, run.signals, run.sample_rate, weights="sensors")
+    assert found.verdict.identified
+    assert all(Replay(model, one).matches(found.p)["v"].rms < BAR for one in (run, other))
+    default = identify(model, run.signals, run.sample_rate)
+    assert "weights" in [one.name for one in default.verdict.reasons]
 
 
 def test_stronger_load_needs_a_resistance_that_falls_with_the_current() -> None:

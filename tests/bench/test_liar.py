@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.liar import COMMANDS, perform, rehearse
+from bench.liar import COMMANDS, HEADER, perform, rehearse
 from bench.liar_mutants import mutate
 from bench.lies import BEHAVIOURS
 
@@ -32,6 +32,21 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_number_of_behaviours() -> None:
     assert len(BEHAVIOURS) >= 100
+
+
+def test_page_has_every_behaviour_of_one_run() -> None:
+    """The summary is that of the table: the same number of behaviours, no defect, the largest memory and delay."""
+    text = (Path(__file__).parents[1] / "LIAR.md").read_text()
+    lines = text.partition("<!-- liar -->")[2].partition("<!-- /liar -->")[0].strip().splitlines()
+    assert tuple(cell.strip() for cell in lines[0].strip("|").split("|")) == HEADER
+    rows = [dict(zip(HEADER, (cell.strip() for cell in line.strip("|").split("|")), strict=True)) for line in lines[2:]]
+    assert [row[HEADER[0]] for row in rows] == list(BEHAVIOURS)
+    assert {row["defects"] for row in rows} == {"0"}
+    memory, late = (max(float(row[key]) for row in rows) for key in ("peak memory, MB", "late, s"))
+    summary = text.partition("<!-- liar-summary -->")[2]
+    assert f"{len(BEHAVIOURS)} behaviours, " in summary and ": 0 defects" in summary
+    assert f"at most {memory:.0f} MB of memory, at most {late:.1f} s late." in summary
+    assert memory < 150 and late < 8
 
 
 @pytest.mark.parametrize("part", range(4))

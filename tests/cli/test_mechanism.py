@@ -96,6 +96,27 @@ def test_what_this_mechanism_cannot_do_is_refused(motor: Path, arguments: tuple[
     assert sentence in str(caught.value)
 
 
+def test_standard_deviation_of_a_constant_is_part_of_the_errors(tmp_path: Path) -> None:
+    """The torque constant scales every other torque of the drive."""
+    path = tmp_path / "drive.csv"
+    pvid("model", "simulate", "two_mass_drive", path, "--duration", "6")
+    exact, known = (
+        json.loads(pvid("identify", path, "--json", *more).stdout)["parameters"]["J1"]
+        for more in ((), ("--set", "known_sd.kt=0.002"))
+    )
+    assert known["value"] == exact["value"]
+    assert known["se"] == pytest.approx(0.02 * known["value"], rel=0.05)  # 0.002 of 0.1 N*m/A
+    assert known["se_noise"] == pytest.approx(exact["se"], rel=1e-6)
+    with pytest.raises(PvidError, match="known_sd.kt must not be negative"):
+        pvid("identify", path, "--set", "known_sd.kt=-1")
+
+
+def test_weights_are_chosen_and_reported(motor: Path) -> None:
+    shown = [json.loads(pvid("identify", motor, "--json", *more).stdout) for more in ((), ("--weights", "sensors"))]
+    assert [one["weights"] for one in shown] == ["residuals", "sensors"]
+    assert shown[1]["identified"]
+
+
 def test_a_dead_sensor_is_named(motor: Path, tmp_path: Path) -> None:
     lines = motor.read_text().splitlines()
     dead = [lines[0], *(line.rsplit(",", 1)[0] + ",0.5" for line in lines[1:])]

@@ -74,7 +74,10 @@ class Generated:
             for name in self.files
             if name.endswith(".c") and not name.endswith(("_test.c", "_weak_f32.c"))
         ]
-        core = [source(f"{one}.c") for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
+        core = [
+            source(f"{one}.c")
+            for one in ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
+        ]
         library = folder / "generated.so"
         options = ["-std=c99", "-O2", "-shared", "-fPIC", "-DPVID_PLAIN_NAMES", *WARNINGS, *INCLUDES, f"-I{folder}"]
         sources = map(str, [*code, folder / "loop.c", *core])

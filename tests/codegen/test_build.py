@@ -140,13 +140,24 @@ def test_the_weak_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
     assert np.allclose(p[:3], truth[:3], rtol=1e-3) and np.allclose(p, truth, atol=2e-5)
 
 
+def test_a_soft_sign_is_one_of_the_design_too() -> None:
+    compiled = compiled_of("two_link_arm")
+    options = Options(design=config_for_simulated_rig(compiled), soft_signs={"q2_1": 0.25})
+    text = files_of(compiled, "test", options)["two_link_arm_design_f32.h"]
+    widths = text.split("two_link_arm_sign_width[2] = {")[1].split("};")[0]
+    assert widths.split() == ["0.0f,", "0.25f,"]
+
+
 def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:
     files = files_of(MOTOR, "test")
     wrong = files["motor_f32.c"].replace("pvid_sign_f32", "pvid_magnitude_f32")
     for name, text in {**files, "motor_f32.c": wrong}.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     generated = [tmp_path / f"motor_{one}.c" for one in ("f32", "q31", "test")]
-    core = [source(f"{one}.c") for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
+    core = [
+        source(f"{one}.c")
+        for one in ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
+    ]
     sources = [*generated, *core]
     includes = [f"-I{ROOT / 'firmware' / one}" for one in ("include", "src")]
     run("gcc", "-std=c99", "-O1", *includes, *sources, "-o", tmp_path / "test")

@@ -112,7 +112,10 @@ def test_random_expressions(tmp_path: Path) -> None:
     cases = [Case(k, expression(chance, 4)) for k in range(COUNT)]
     assert {kind for one in cases for kind in one.program.kinds} >= {"+", "-", "*", "/", "sin", "cos", "sign", "abs"}
     (tmp_path / "random.c").write_text("\n".join([HEAD_C, *(one.code for one in cases)]), encoding="utf-8")
-    core = [source(f"{one}.c") for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
+    core = [
+        source(f"{one}.c")
+        for one in ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
+    ]
     options = ["-std=c99", "-O2", "-shared", "-fPIC", "-ffp-contract=off", "-DPVID_PLAIN_NAMES", *WARNINGS, *INCLUDES]
     sources = [str(tmp_path / "random.c"), *map(str, core)]
     subprocess.run(["gcc", *options, *sources, "-o", str(tmp_path / "random.so"), "-lm"], check=True)

@@ -61,6 +61,39 @@ static const pvid_model_q31 blocks = {
     .formats = blocks_formats,
 };
 
+static void numbers_theta(const pvid_scaled_q31 p[], pvid_scaled_q31 theta[])
+{
+    (void)p;
+    for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
+        theta[i].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
+        theta[i].e = any_i32(-EXPONENT_BOUND, EXPONENT_BOUND);
+    }
+}
+
+static void numbers_jacobian(const pvid_scaled_q31 p[], pvid_scaled_q31 c[])
+{
+    (void)p;
+    for (size_t k = 0; k < PVID_MAX_C_Q31; k++) {
+        c[k].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
+        c[k].e = any_i32(-EXPONENT_BOUND, EXPONENT_BOUND);
+    }
+}
+
+static const pvid_scaled_model_q31 numbers_of_any_size = {numbers_theta, numbers_jacobian, &pvid_read_scaled_q31};
+
+/* The same with numbers of any size. */
+static const pvid_model_q31 numbers = {
+    .n_theta = PVID_MAX_THETA_Q31,
+    .n_p = 4,
+    .n_kinds = 3,
+    .n_c = PVID_MAX_C_Q31,
+    .positive = 5u,
+    .kind_end = blocks_end,
+    .c_row = blocks_row,
+    .c_column = blocks_column,
+    .scaled = &numbers_of_any_size,
+};
+
 static inline void any_sums(const pvid_model_q31 *model, pvid_information_q31 *sums)
 {
     sums->n_theta = model->n_theta;
@@ -88,6 +121,7 @@ static inline void any_parameters(pvid_estimator_q31 *self)
         self->settings.start_sd[a] = any_i32(1, INT32_MAX);
         self->settings.prior[a] = any_i32(0, INT32_MAX);
         self->settings.prior_exponent[a] = (int16_t)any_i32(-200, 200);
+        self->settings.p_bits[a] = (int8_t)any_i32(-64, 64);
     }
 }
 

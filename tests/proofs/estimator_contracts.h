@@ -7,8 +7,7 @@
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
 
-/*@ requires \valid(e) && \valid_read(block) && block->first + block->n <= self->model->n_theta;
-    requires \valid_read(n + (0 .. block->n - 1));
+/*@ requires \valid(e) && \valid_read(block) && \valid_read(n + (0 .. block->n - 1));
     assigns *e, \result \from \nothing;
     ensures \result == 0 || \result == 1;
     ensures \initialized(e) && -0x200000000000 <= *e <= 0x200000000000; */

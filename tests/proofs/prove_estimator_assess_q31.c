@@ -43,4 +43,5 @@ void main(void)
     any_assessment(&pvid_kapitza_weak_q31);
     any_assessment(&pvid_kapitza_weak_zeroed_q31);
     any_assessment(&blocks);
+    any_assessment(&numbers);
 }

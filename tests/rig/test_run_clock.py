@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -176,6 +177,19 @@ def test_a_gap_is_not_interpolated_where_the_motion_is_too_fast_for_it() -> None
     phi[1000:1020] = np.nan
     bridge([phi, y], RATE)
     assert np.isnan(phi[1000:1020]).all() and np.isnan(y[1000:1020]).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_gap_is_interpolated_in_any_unit() -> None:
+    t = uniform(2.0)
+    phi, y = measured(t)
+    phi[1000:1005] = np.nan
+    large = [math.ldexp(1.0, 600) * phi, math.ldexp(1.0, -600) * y]  # their squares are beyond float64
+    bridge([phi, y], RATE)
+    bridge(large, RATE)
+    assert np.isfinite(phi).all()
+    assert large[0].tobytes() == (math.ldexp(1.0, 600) * phi).tobytes()
+    assert large[1].tobytes() == (math.ldexp(1.0, -600) * y).tobytes()
 
 
 def test_a_row_that_was_written_twice_is_left_out(tmp_path: Path) -> None:

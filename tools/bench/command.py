@@ -40,6 +40,16 @@ def bench_demo(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="answer")
+@UPDATE
+def bench_answer(update: Path | None) -> int:
+    """What `model simulate` and `identify` print, as the page on mechanisms shows it."""
+    from bench.mechanism_pages import printed_answer
+
+    put_table(update, "answer", f"```text\n{printed_answer()}\n```")
+    return DONE
+
+
 @bench.command(name="pages")
 @click.argument("names", nargs=-1)
 @click.option("--docs", type=click.Path(path_type=Path, exists=True), default="host/docs", show_default=True)
@@ -101,6 +111,23 @@ def bench_mechanisms(chosen: tuple[str, ...], seeds: int, imperfect: int, update
     for marker, header, rows in tables:
         if rows:
             put_table(update, marker, markdown(header, rows))
+    return DONE
+
+
+@bench.command(name="engine")
+@click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@UPDATE
+def bench_engine(chosen: tuple[str, ...], seeds: int, update: Path | None) -> int:
+    """Errors of the weak engine in C beside those of the float64 oracle on the shipped mechanisms."""
+    from bench import engine
+    from pvid.models.mechanisms import names
+
+    some = chosen or names()
+    with progress_bar("engine", seeds * len(engine.cases(some))) as advance:
+        done = iter(range(1, seeds * len(engine.cases(some)) + 1))
+        rows = list(engine.table(some, seeds, lambda: advance(next(done))))
+    put_table(update, "engine", markdown(engine.HEADER, rows))
     return DONE
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import matplotlib
 
@@ -138,6 +139,22 @@ def page(name: str, example: Example, errors: Mapping[str, str]) -> str:
             "",
         ]
     )
+
+
+def printed_answer() -> str:
+    """What the first two commands of models.md print, standard output before standard error."""
+    from click.testing import CliRunner
+
+    from pvid.cli.main import commands
+
+    with TemporaryDirectory() as folder:
+        path = str(Path(folder) / "motor.csv")
+        done = [
+            CliRunner().invoke(commands, list(arguments), catch_exceptions=False, standalone_mode=False)
+            for arguments in (("model", "simulate", "dc_motor", path), ("identify", path))
+        ]
+    lines = "".join(one.stdout + one.stderr for one in done).replace(f"{folder}/", "").splitlines()
+    return "\n".join(line.rstrip() for line in lines).strip()
 
 
 def write_page(docs: Path, name: str) -> None:

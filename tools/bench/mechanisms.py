@@ -348,7 +348,10 @@ def tables(names: tuple[str, ...], seeds: int, imperfect: int, progress: Progres
         chosen = identified(name, seeds, PERFECT, progress=progress)
         rubs = bool(soft.simulation.rig.friction_width)
         sharp += list(accuracy_rows(name, chosen))
-        own, free = "soft, of known width" if rubs else "none", "sharp; design chosen" if rubs else "none; design chosen"
+        own, free = (
+            "soft, of known width" if rubs else "none",
+            "sharp; design chosen" if rubs else "none; design chosen",
+        )
         summary += [summary_row(name, own, soft), summary_row(name, free, chosen)]
         early += [*two_window_rows(name, own, soft), *two_window_rows(name, free, chosen)]
         if imperfect:

@@ -1,4 +1,5 @@
-/* What the board samples in field mode. sensor.c simulates a rig; a board with an encoder has its own in its place. */
+/* What the board samples in field mode. sensor.c simulates a rig, sensor_recording.c reads a recording; a board with
+ * sensors has its own in their place. */
 #ifndef SENSOR_H
 #define SENSOR_H
 

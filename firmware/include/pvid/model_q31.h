@@ -17,6 +17,18 @@ typedef struct {
     int32_t e;
 } pvid_scaled_q31;
 
+/* theta and C as numbers of any size (scaled_q31.h), for models that need no formats, as the model compiler writes
+ * them. Set `adapter` to &pvid_read_scaled_q31: then the code that reads such numbers is part of the image, otherwise
+ * not. theta is stored with 40 bits at the start and saturates at 2^20 times its size there. */
+typedef struct pvid_scaled_adapter_q31 pvid_scaled_adapter_q31;
+extern const pvid_scaled_adapter_q31 pvid_read_scaled_q31;
+
+typedef struct {
+    void (*theta)(const pvid_scaled_q31 p[], pvid_scaled_q31 theta[]); /* as in the model, p in its unit */
+    void (*jacobian)(const pvid_scaled_q31 p[], pvid_scaled_q31 c[]);
+    const pvid_scaled_adapter_q31 *adapter;
+} pvid_scaled_model_q31;
+
 typedef struct {
     uint8_t n_theta;   /* entries of theta and N, 1..PVID_MAX_THETA_Q31 */
     uint8_t n_p;       /* free parameters, 1..PVID_MAX_P; kappa refers to p[0] */
@@ -28,9 +40,8 @@ typedef struct {
      * Y adds noise[0], noise[1], noise[2] to their products 00, 01, 11 (see estimator_q31.h). */
     uint8_t noisy[2];
 
-    const uint8_t
-        *kind_end;        /* [n_kinds] one past the last theta of each kind, ascending, at last n_theta; NULL for one */
-    const uint8_t *c_row; /* [n_c] row in theta of each non-zero of C, ascending in a column */
+    const uint8_t *kind_end; /* [n_kinds] one past the last theta of each kind, see model.h; NULL for one kind */
+    const uint8_t *c_row;    /* [n_c] row in theta of each non-zero of C, ascending in a column */
     const uint8_t *c_column; /* [n_c] its column (index in p), ascending */
 
     /* theta[n_theta] = f(p) */
@@ -39,6 +50,8 @@ typedef struct {
     void (*jacobian)(const int32_t p[], int64_t c[]);
     /* formats of theta [n_theta] and C [n_c] for those of p [n_p] */
     void (*formats)(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[]);
+    /* In place of these three; NULL: they are set. */
+    const pvid_scaled_model_q31 *scaled;
 } pvid_model_q31;
 
 #endif

@@ -8,6 +8,7 @@
 #include "number/init.h"
 #include "number/count.h"
 #include "solve/information_q31.h"
+#include "solve/scaled_model_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 
@@ -27,12 +28,19 @@ static bool moments_are_valid(size_t n_moments)
     return (n_moments >= 1u) && (n_moments <= PVID_MAX_MOMENTS_Q31);
 }
 
+static bool functions_are_valid(const pvid_model_q31 *model)
+{
+    const pvid_scaled_model_q31 *scaled = model->scaled;
+    return (scaled != NULL) ? ((scaled->theta != NULL) && (scaled->jacobian != NULL) && (scaled->adapter != NULL))
+                            : ((model->theta != NULL) && (model->jacobian != NULL) && (model->formats != NULL));
+}
+
 static bool model_is_valid(const pvid_model_q31 *model)
 {
-    return !((model == NULL) || (model->theta == NULL) || (model->jacobian == NULL) || (model->formats == NULL) ||
-             (model->c_row == NULL) || (model->c_column == NULL) || (model->n_theta < 1u) ||
-             (model->n_theta > PVID_MAX_THETA_Q31) || (model->n_p < 1u) || (model->n_p > PVID_MAX_P) ||
-             (model->n_p > model->n_theta) || (model->n_c < 1u) || (model->n_c > PVID_MAX_C_Q31)) &&
+    return !((model == NULL) || !functions_are_valid(model) || (model->c_row == NULL) || (model->c_column == NULL) ||
+             (model->n_theta < 1u) || (model->n_theta > PVID_MAX_THETA_Q31) || (model->n_p < 1u) ||
+             (model->n_p > PVID_MAX_P) || (model->n_p > model->n_theta) || (model->n_c < 1u) ||
+             (model->n_c > PVID_MAX_C_Q31)) &&
            moments_are_valid(pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end));
 }
 
@@ -112,8 +120,12 @@ static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
 static void init_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
 {
     const pvid_model_q31 *model = config->model;
-    int16_t c_bits[PVID_MAX_C_Q31];
-    model->formats(config->p_bits, self->theta_bits, c_bits);
+    int16_t c_bits[PVID_MAX_C_Q31] = {0};
+    if (model->scaled != NULL) {
+        model->scaled->adapter->formats(self, config);
+    } else {
+        model->formats(config->p_bits, self->theta_bits, c_bits);
+    }
     for (size_t i = 0; i < model->n_theta; i++) {
         self->align[i] = (int16_t)((self->theta_bits[i] + config->n_bits[i]) - config->y_bits);
     }
@@ -133,6 +145,7 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
     memset(self, 0, sizeof *self);
     self->model = config->model;
     pvid_information_init_q31(&self->information, config->model, config->forgetting_groups, config->row_weight);
+    memcpy(self->settings.p_bits, config->p_bits, sizeof self->settings.p_bits);
     init_formats(self, config);
     for (size_t i = 0; i < config->model->n_p; i++) {
         self->p[i] = config->start[i];
@@ -143,7 +156,7 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
             config->row_sd, -PVID_ROW_SD_BITS, config->start_sd[i], &self->settings.prior[i]);
     }
     int64_t theta[PVID_MAX_THETA_Q31];
-    config->model->theta(self->p, theta);
+    pvid_estimator_theta_q31(self, self->p, theta);
     pvid_estimator_set_theta_q31(self, theta);
     self->settings.row_sd = config->row_sd;
     self->settings.gain = config->gain;
@@ -172,7 +185,7 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
     int64_t theta[PVID_MAX_THETA_Q31];
     const int64_t above = (value < self->settings.lower[index]) ? self->settings.lower[index] : value;
     self->p[index] = (int32_t)((above > self->settings.upper[index]) ? self->settings.upper[index] : above);
-    self->model->theta(self->p, theta);
+    pvid_estimator_theta_q31(self, self->p, theta);
     pvid_estimator_set_theta_q31(self, theta);
 }
 

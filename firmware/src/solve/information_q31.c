@@ -9,8 +9,9 @@
 #define BLOCK_MAX 64u
 #define SUM_LOW ((int64_t)1 << 54)
 #define KEEP INT32_MAX
-#define RESIDUAL_MAX (3 * PVID_SUM_LIMIT) /* of rr, which the rows of all kinds add to: 16 rows of one stay below it   \
-                                           */
+#define RESIDUAL_MAX                                                                                                   \
+    (3 * PVID_SUM_LIMIT) /* of rr, which the rows of all kinds add to: 16 rows of one stay below it                    \
+                          */
 
 /* exp(-block / groups) in Q31 for block <= groups / 4, by the series of exp. */
 static int32_t decay(uint32_t block, uint32_t groups)

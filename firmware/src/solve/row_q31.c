@@ -6,9 +6,20 @@
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 #include "solve/information_q31.h"
+#include "solve/scaled_model_q31.h"
 
 #define TERM_MAX ((int64_t)1 << 40) /* of N_i theta_i, far beyond the limit of a row */
 #define TERM_DOWN 18                /* a shift that brings a row's limit times 30 bits there */
+
+void pvid_estimator_theta_q31(const pvid_estimator_q31 *self, const int32_t p[], int64_t theta[])
+{
+    const pvid_model_q31 *model = self->model;
+    if (model->scaled != NULL) {
+        model->scaled->adapter->theta(self, p, theta);
+    } else {
+        model->theta(p, theta);
+    }
+}
 
 void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[])
 {

@@ -21,6 +21,9 @@ void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const pvid_block *bloc
  * the group is complete, before its solve begins. */
 void pvid_estimator_set_expected_q31(pvid_estimator_q31 *self, pvid_scaled_q31 variance);
 
+/* theta[n_theta] = f(p) in the formats of the estimator. */
+void pvid_estimator_theta_q31(const pvid_estimator_q31 *self, const int32_t p[], int64_t theta[]);
+
 /* Sets theta = f(p) and its mantissas and shifts for the innovation of rows. */
 void pvid_estimator_set_theta_q31(pvid_estimator_q31 *self, const int64_t theta[]);
 

@@ -229,7 +229,7 @@ static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve
     } else if (solve->has_fallback) {
         memcpy(solve->p, solve->fallback, sizeof solve->p);
     }
-    self->model->theta(solve->p, solve->theta);
+    pvid_estimator_theta_q31(self, solve->p, solve->theta);
     scale_theta_step(self, solve);
 }
 

@@ -1,6 +1,7 @@
 /* The system S dp = F in integers: M, C and S scaled by powers of two such that 30 bits hold all that matters. */
 #include "solve/system_q31.h"
 #include "number/scaled_q31.h"
+#include "solve/scaled_model_q31.h"
 
 /* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
 #define ENTRIES_PER_STAGE 18u
@@ -76,12 +77,18 @@ void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[],
     int64_t value[PVID_MAX_C_Q31];
     int32_t exponent[PVID_MAX_C_Q31];
     int32_t largest[PVID_MAX_P];
-    model->jacobian(self->p, value);
+    for (size_t k = 0; k < model->n_c; k++) {
+        exponent[k] = (int32_t)self->c_exponent[k] + h[model->c_row[k]];
+    }
+    if (model->scaled != NULL) {
+        model->scaled->adapter->jacobian(self, value, exponent);
+    } else {
+        model->jacobian(self->p, value);
+    }
     for (size_t a = 0; a < model->n_p; a++) {
         largest[a] = PVID_ZERO_EXPONENT_Q31;
     }
     for (size_t k = 0; k < model->n_c; k++) {
-        exponent[k] = (int32_t)self->c_exponent[k] + h[model->c_row[k]];
         const int32_t length = pvid_length_q31(value[k]) + exponent[k];
         const size_t a = model->c_column[k];
         largest[a] = (length > largest[a]) ? length : largest[a];

@@ -43,6 +43,7 @@ typedef struct {
     int32_t kappa_min;
     uint32_t noise_margin;
     uint32_t dead_zone;
+    int8_t p_bits[PVID_MAX_P];
     uint8_t n_p;      /* parameters */
     uint8_t positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a] */
 } pvid_solve_settings_q31;

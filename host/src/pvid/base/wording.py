@@ -25,3 +25,8 @@ def reason(error: BaseException) -> str:
 def printable(text: str) -> str:
     """``text`` on one line of a terminal: what would move the cursor, colour it or turn the text around is escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def with_unit(value: float, unit: str, digits: int) -> str:
+    """``0.0046 rad``: a number of so many digits, with its unit where it has one."""
+    return f"{value:.{digits}g} {unit}".rstrip()

@@ -17,7 +17,7 @@ import numpy as np
 import serial
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import settings_number
+from pvid.board.stream_image import Streamed, settings_number
 from pvid.board.stream_rig import StreamRig
 from pvid.board.target import Target, refusal
 from pvid.cases import Samples
@@ -121,7 +121,7 @@ def collect(
     target: Target,
     ticks: int,
     *,
-    begin: StreamRig | None = None,
+    begin: StreamRig | Streamed | None = None,
     source: Source = Source.SENSOR_PACED,
     hash_every: int = 500,
     estimate_every: int = 500,

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
+from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
 from pvid.board.replay_image import build_image, parse_report, standard_run
 from pvid.core.sources import ROOT
 
@@ -87,20 +88,29 @@ def profile(board: Board, form: str, core: str = "f32", ticks: int = TICKS) -> P
     PvidError
         When the board's emulator is not QEMU or takes no plugins, something does not build, or the image fails.
     """
+    run = standard_run(form, ticks, core)
+    return _counted(board, build_image(board, run)[0], f"pvid_{form}_step_{core}", run.measure_from)
+
+
+def profile_mechanism(board: Board, name: str) -> Profile:
+    """The same of the weak engine with a shipped mechanism."""
+    run = mechanism_run(name)
+    return _counted(board, build_mechanism_image(board, run)[0], "pvid_fourier_step_f32", run.measure_from)
+
+
+def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profile:
     if board.toolchain == "avr":
         raise PvidError(f"{board.name}: only QEMU counts by function")
     prepare_emulator(board)
     _build_plugin()
-    run = standard_run(form, ticks, core)
-    image, _ = build_image(board, run)
     symbols = _symbols(board, image)
     main = _named(symbols, "main")
     base = symbols[0].start
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "counts"
         settings = {
-            "entry": _named(symbols, f"pvid_{form}_step_{core}").start,
-            "skip": run.measure_from,
+            "entry": _named(symbols, entry).start,
+            "skip": measure_from,
             "caller": main.start,
             "caller_end": main.start + main.size,
             "base": base,

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import StreamRig
 from pvid.core.sources import FIRMWARE, FOLDERS, sources_of
 from pvid.design.c_tables import float_literal
+from pvid.link.frames import Configuration, Source
 from pvid.link.names import names_of
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.settings.enums import Core
@@ -52,16 +55,75 @@ def _described() -> list[str]:
     model = MODELS[DEFAULT]
     return [
         f"#define STREAM_SAMPLES {len(model.channels)}u",
-        f"#define STREAM_NAMES {_c_string(names_of(model).text)}",
+        f"#define STREAM_NAMES {c_string(names_of(model).text)}",
     ]
 
 
-def _c_string(text: str) -> str:
+def c_string(text: str) -> str:
+    """A literal of C."""
     return '"' + text.replace("\n", "\\n") + '"'
 
 
-def settings_number(rig: StreamRig) -> int:
+@dataclass(frozen=True)
+class StreamImage:
+    """What an image is compiled from, beside the core.
+
+    Attributes
+    ----------
+    number : CRC-32 of all that the bits depend on
+    macros : lines of stream_rig.h
+    files : generated headers and sources by name
+    core : arithmetic
+    identifier : firmware/apps/stream/identifier_<identifier>.c
+    sensor : a file of firmware/apps/stream
+    sizes : PVID_MAX_ macro -> value
+    """
+
+    number: int
+    macros: list[str]
+    files: dict[str, str]
+    core: Core
+    identifier: str
+    sensor: str
+    sizes: dict[str, str]
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """All files, stream_rig.h among them."""
+        told = f"#define STREAM_SETTINGS 0x{self.number:08X}u /* CRC-32 of what the bits depend on */"
+        return {"stream_rig.h": _guarded("STREAM_RIG_H", [told, *self.macros]), **self.files}
+
+
+class Streamed(Protocol):
+    """What else than a StreamRig an image can be made for."""
+
+    @property
+    def stream_image(self) -> StreamImage: ...
+
+    def configure(
+        self, settings: int, hash_every: int, estimate_every: int, source: Source = ..., first_tick: int = ...
+    ) -> Configuration: ...
+
+
+def image_of(rig: StreamRig | Streamed) -> StreamImage:
+    """What its image is compiled from."""
+    if not isinstance(rig, StreamRig):
+        return rig.stream_image
+    return StreamImage(
+        number=settings_number(rig),
+        macros=[*_macros(rig), *_described()],
+        files={"stream_tables.h": _tables(rig)},
+        core=rig.case.core,
+        identifier=rig.case.core,
+        sensor="sensor.c",
+        sizes=rig.case.sizes(rig.config),
+    )
+
+
+def settings_number(rig: StreamRig | Streamed) -> int:
     """CRC-32 of the settings and tables an image must hold to be configured for `rig`."""
+    if not isinstance(rig, StreamRig):
+        return rig.stream_image.number
     return zlib.crc32("\n".join([*_macros(rig), _tables(rig)]).encode())
 
 
@@ -70,18 +132,7 @@ def _guarded(guard: str, lines: list[str]) -> str:
     return "\n".join([banner, f"#ifndef {guard}", f"#define {guard}", "", *lines, "", "#endif", ""])
 
 
-def headers(rig: StreamRig) -> dict[str, str]:
-    """The headers of an image by file name."""
-    number = (
-        f"#define STREAM_SETTINGS 0x{settings_number(rig):08X}u /* CRC-32 of the following lines and of the tables */"
-    )
-    return {
-        "stream_rig.h": _guarded("STREAM_RIG_H", [number, *_macros(rig), *_described()]),
-        "stream_tables.h": _tables(rig),
-    }
-
-
-def build_image(rig: StreamRig, board: Board | None) -> Path:
+def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
     """Builds the stream image for a board, or for this machine (None), under build/targets; returns it.
 
     Raises
@@ -89,29 +140,31 @@ def build_image(rig: StreamRig, board: Board | None) -> Path:
     PvidError
         When a compiler is missing or something does not build.
     """
-    name = f"stream-{settings_number(rig):08x}"
+    image = image_of(rig)
+    files = image.headers
+    name = f"stream-{zlib.crc32(repr(sorted(files.items())).encode()):08x}"
     folder = BUILD / "runs" / name
-    for file, text in headers(rig).items():
+    for file, text in files.items():
         keep_header(folder, file, text)
-    sizes = rig.case.sizes(rig.config)
     if board is None:
         tree = BUILD / f"{HOST}-{name}"
         with one_at_a_time(tree):
-            return _build_for_host(folder, tree, rig.case.core, sizes)
-    options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": rig.case.core, **sizes}
+            return _build_for_host(image, folder, tree)
+    options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": image.identifier, **image.sizes}
     tree = build(board, BUILD / f"{board.name}-{name}", options)
     return tree / "apps" / "stream" / "stream.elf"
 
 
-def _build_for_host(folder: Path, tree: Path, core: Core, sizes: dict[str, str]) -> Path:
+def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
     """With the options of the core (firmware/cmake/PvidCompile.cmake); what the other core alone needs is left out."""
     application = FIRMWARE / "apps" / "stream"
     sources = [
-        *sources_of(core),
+        *sources_of(made.core),
         FIRMWARE / "link" / "link.c",
         FIRMWARE / "ports" / "host" / "port.c",
         FIRMWARE / "ports" / "host" / "receiver.c",
-        *(application / file for file in ("main.c", "answers.c", "sensor.c", f"identifier_{core}.c")),
+        *(application / file for file in ("main.c", "answers.c", made.sensor, f"identifier_{made.identifier}.c")),
+        *(folder / name for name in sorted(made.files) if name.endswith(".c")),
     ]
     image = tree / "stream"
     inputs = [*sources, *folder.glob("*.h"), *FIRMWARE.glob("**/*.h")]
@@ -121,7 +174,7 @@ def _build_for_host(folder: Path, tree: Path, core: Core, sizes: dict[str, str])
     fresh = tree / "stream.new"
     includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports", folder]
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
-    command += [f"-D{name}={value}" for name, value in sizes.items()]
+    command += [f"-D{name}={value}" for name, value in made.sizes.items()]
     command += [f"-I{one}" for one in includes] + [str(one) for one in sources] + ["-lm", "-o", str(fresh)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:

@@ -17,7 +17,7 @@ from pvid.rig.run import Run
 from pvid.settings.kinds import Settings
 from pvid.sim.pendulum import standard_sensors
 
-_SLOWEST = 1.0  # ticks a second: the image counts the time between two samples in 32 bits of nanoseconds
+SLOWEST = 1.0  # ticks a second: the image counts the time between two samples in 32 bits of nanoseconds
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class StreamRig:
     y_lsb: float
 
     def __post_init__(self) -> None:
-        if not self.sample_rate >= _SLOWEST:
+        if not self.sample_rate >= SLOWEST:
             raise PvidError(f"sample_rate is {self.sample_rate:g} Hz, and a board streams at 1 Hz and more")
 
     @property

@@ -22,7 +22,7 @@ import serial
 from pvid.base import subprocesses as child
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
-from pvid.board.stream_image import build_image, settings_number
+from pvid.board.stream_image import Streamed, build_image, settings_number
 from pvid.board.stream_rig import StreamRig
 from pvid.core.native import Native
 from pvid.link.frames import (
@@ -73,7 +73,7 @@ class Target:
             self.process.wait()
 
 
-def open_target(name: str, rig: StreamRig, wrap: Callable[[Port], Port] = lambda port: port) -> Target:
+def open_target(name: str, rig: StreamRig | Streamed, wrap: Callable[[Port], Port] = lambda port: port) -> Target:
     """Starts the emulator of that name with the image for `rig`, or opens a port.
 
     Parameters

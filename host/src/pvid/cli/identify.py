@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import click
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.base.errors import PvidError
 from pvid.cli.input import FigurePath, form_options, print_notes, read_input, with_overrides
 from pvid.cli.result import identified, print_result, print_warning, write_figure
 from pvid.core.native import Native
@@ -25,6 +27,12 @@ from pvid.run.survey import fitted
 @form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
 @click.option(
+    "--weights",
+    type=click.Choice(["residuals", "sensors"]),
+    help="Of the rows of a described mechanism: an error of the equations, estimated from the residuals, beside the "
+    "noise of the sensors; or that noise alone.  [default: residuals]",
+)
+@click.option(
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -38,6 +46,7 @@ def command(
     law: str | None,
     form: str | None,
     core: str | None,
+    weights: Literal["residuals", "sensors"] | None,
     target: str | None,
     as_json: bool,
     figure: Path | None,
@@ -58,7 +67,11 @@ def command(
         from pvid.cli.mechanism import identify_run  # loads SymPy
 
         options = {"core": core, "form": form, "law": law, "on": target}
-        return identify_run(run_path, described, columns, as_json=as_json, figure=figure, **options)
+        return identify_run(
+            run_path, described, columns, as_json=as_json, figure=figure, weights=weights or "residuals", **options
+        )
+    if weights is not None:
+        raise PvidError(f"--weights {weights} is for a described mechanism, --model; the pendulum has its own weights")
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
     run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)
     given, rig = rig, resolved(rig, run)

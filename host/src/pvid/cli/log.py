@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from rich.console import Console
@@ -18,22 +19,39 @@ from pvid.board.target import EMULATORS, HOST_TARGET, open_target
 from pvid.link.frames import Configuration, Source
 from pvid.link.port import BAUD
 from pvid.log.live_stream import LiveStream
+from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.reader import Account, Observer
 from pvid.log.recorder import EmulatorSource, Logger, PortSource
 from pvid.log.rig import refuse_to_append
 from pvid.log.status import StatusLine
 from pvid.log.values import UNKNOWN_RIG
 from pvid.models.model import Mechanism
+from pvid.rig.columns import parsed
 from pvid.rig.file import RigFile, load
+from pvid.rig.mechanism_file import channels_of
+from pvid.rig.run import read_recording
 from pvid.show.page import DEFAULT as LIVE_PAGE
 from pvid.show.page import is_local, page
 from pvid.show.view import LiveView
+
+if TYPE_CHECKING:
+    from pvid.board.mechanism_board import MechanismBoard
 
 
 @click.command(name="log")
 @click.argument("port")
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file; copied into the log, for verify.")
+@click.option(
+    "--model",
+    help="A mechanism of `pvid models`; its shipped rig without --run.  [default: that of the rig file, kapitza]",
+)
+@click.option(
+    "--run",
+    "run_path",
+    type=click.Path(path_type=Path),
+    help="Recording of the mechanism: the board's design is made from it, and an emulated board's sensors read it.",
+)
 @click.option("--append", is_flag=True, help="Append to an existing log.")
 @click.option("--restart", is_flag=True, help="Restart the board on every (re)connection (needs --rig).")
 @click.option("--paced", is_flag=True, help="Sample as fast as the line allows instead of in real time.")
@@ -65,6 +83,8 @@ def command(
     port: str,
     out: Path,
     rig_path: Path | None,
+    model: str | None,
+    run_path: Path | None,
     append: bool,
     restart: bool,
     paced: bool,
@@ -81,17 +101,24 @@ def command(
     the board is back, in a new segment of the same log. The file contains every received byte and can be read even if
     this program is killed. With a rig file, a board that waits for its settings is started.
 
+    A mechanism other than kapitza is named by --model or in the rig file, with a recording of it: --run RUN.csv, and
+    RUN.toml beside it by default. With --model alone it is a shipped one, whose simulated rig the board reads.
+
     On a terminal the estimates are shown as they arrive; otherwise a status line is printed every 10 s.
     """
     emulated = port in (HOST_TARGET, *EMULATORS)
-    rig = None if rig_path is None else load(rig_path)
-    if emulated and rig is None:
+    described = _described(rig_path, model, run_path)
+    rig = None if rig_path is None or described is not None else load(rig_path)
+    if emulated and rig is None and described is None:
         rig = RigFile.standard()
-    if restart and rig is None:
+    if restart and rig is None and described is None:
         raise PvidError("--restart needs --rig: the board is restarted with its settings")
+    text = described.text() if described is not None else rig.text() if rig is not None else None
     if append:
-        refuse_to_append(out, rig)
-    board = None if rig is None else _board(rig)
+        refuse_to_append(out, rig if described is None else text)
+    board = described or (None if rig is None else _board(rig))
+    if described is not None and emulated and samples is None:
+        samples = len(described.recording)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)
     mechanism = UNKNOWN_RIG if rig is None else rig.mechanism
@@ -104,7 +131,7 @@ def command(
             source=EmulatorSource(port, lambda: open_target(port, board)) if emulated and board else PortSource(port),
             out=out,
             observers=observers,
-            rig=None if rig is None else rig.text(),
+            rig=text,
             append=append,
             duration_s=duration,
             samples=samples,
@@ -133,13 +160,31 @@ def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     return StatusLine(sys.stderr, mechanism.model)
 
 
+def _described(rig_path: Path | None, model: str | None, run_path: Path | None) -> MechanismBoard | None:
+    """The board of a described mechanism; None: it is one of the library's."""
+    described = mechanism_rig(run_path, rig_path, (), model)
+    if described is None:
+        if run_path is not None:
+            raise PvidError("--run is for a described mechanism: name it with --model, or in the rig file")
+        return None
+    from pvid.board.mechanism_board import MechanismBoard  # loads SymPy
+    from pvid.run.mechanism import model_of
+
+    if run_path is None and rig_path is None:
+        return MechanismBoard.of_shipped_rig(described.model)
+    if run_path is None:
+        raise PvidError(f"{described.model}: name a recording of it with --run, from which the board's design is made")
+    columns = parsed(None, channels_of(model_of(described)))
+    return MechanismBoard.of_recording(described, read_recording(run_path, described.sample_rate, columns))
+
+
 def _board(rig: RigFile) -> StreamRig:
     if rig.sample_rate is None:
         raise PvidError("sample_rate is required in the rig file: the board samples on its own clock")
     return stream_rig(rig, rig.sample_rate)
 
 
-def _configurations(board: StreamRig, source: Source) -> Callable[[], Configuration]:
+def _configurations(board: StreamRig | MechanismBoard, source: Source) -> Callable[[], Configuration]:
     """Makes configurations with an estimate and a hash ten times a second."""
     settings = settings_number(board)
     every = max(1, min(65535, round(board.sample_rate / 10)))

@@ -17,6 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
 from pvid.cli.input import print_notes
+from pvid.oracle.fourier.weights import Weights
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
@@ -48,12 +49,14 @@ def identify_run(
     *,
     as_json: bool,
     figure: Path | None,
+    weights: Weights = "residuals",
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
 
     Parameters
     ----------
+    weights : of the rows, as in pvid.oracle.fourier.identify
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = model_of(rig).name
@@ -63,8 +66,10 @@ def identify_run(
                 f"--{option} {value}: {name} is identified in float64, or in float32 by --core f32, by the weak form; "
                 f"omit --{option}"
             )
+    if weights != "residuals" and only_in_c.get("core") == "f32":
+        raise PvidError(f"--weights {weights} is for float64; omit --core f32")
     recording, model = recording_of(path, rig, columns)
-    answer = identify_mechanism(recording, model)
+    answer = identify_mechanism(recording, model, weights)
     core: CoreAnswer | None = None
     if only_in_c.get("core") == "f32":
         from pvid.run.mechanism_f32 import identify_in_c

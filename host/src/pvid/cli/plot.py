@@ -8,8 +8,11 @@ import click
 
 from pvid.base.console import DONE
 from pvid.cli.input import FigurePath, columns_option, print_notes, rig_options
+from pvid.log.rig import LOG_SUFFIX, mechanism_of_log
 from pvid.log.rig_settings import rig_for
+from pvid.models.registry import MODELS
 from pvid.rig.columns import parsed
+from pvid.rig.run import is_run
 
 
 @click.command(name="plot")
@@ -20,8 +23,18 @@ from pvid.rig.columns import parsed
 def command(log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: str | None, out: Path | None) -> int:
     """Draws a report of a LOG: convergence, residuals and their autocorrelation, spectra, phase plot.
 
-    A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first.
+    A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first. Of a log of
+    another mechanism than kapitza the estimates are drawn under the names that the board gave.
     """
+    if rig_path is None and not is_run(log) and log.suffix == LOG_SUFFIX:
+        mechanism = mechanism_of_log(log)
+        if mechanism.model.name not in MODELS:
+            from pvid.show.log_figure import write_log_figure
+
+            out = out or log.with_suffix(".png")
+            write_log_figure(log, mechanism, out)
+            click.echo(out)
+            return DONE
     from pvid.show.report import recording_of, write_report  # matplotlib and scipy, which other commands do not need
 
     recording = recording_of(log, rig_for(log, rig_path, settings), parsed(columns))

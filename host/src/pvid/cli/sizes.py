@@ -44,7 +44,10 @@ def command(
             raise PvidError("--profile has no budget: omit --budget and --check")
         from pvid.board import profile
 
-        profiles = {form: profile.profile(boards.board(profiled), form) for form in ("strong", "weak")}
+        on = boards.board(profiled)
+        profiles = {name: profile.profile_mechanism(on, name) for name in models} or {
+            form: profile.profile(on, form) for form in ("strong", "weak")
+        }
         put_table(update, "profile", markdown(profile.HEADER, profile.table_rows(profiles)))
         return DONE
     if (targets or models) and (update is not None or budget is not None or check is not None):

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar
 from pvid.cli.input import log_argument, log_rig
 from pvid.log.reader import LogReader
-from pvid.log.rig import rig_of_log
-from pvid.rig.file import load
+from pvid.log.rig import engine_text_of_log, rig_of_log
+from pvid.rig.file import RigFile, load
+
+if TYPE_CHECKING:
+    from pvid.log.verify import EngineBoard
 
 _MOST_STRETCHES = 100  # that are printed
+
+
+def _rig_of(log: Path) -> RigFile | EngineBoard | None:
+    text = engine_text_of_log(log)
+    if text is None:
+        return rig_of_log(log)
+    from pvid.board.mechanism_board import MechanismBoard  # loads SymPy
+
+    return MechanismBoard.parse(text)
 
 
 @click.command(name="verify")
@@ -30,7 +43,7 @@ def command(log: Path, rig_path: Path | None, partial: bool) -> int:
     """
     from pvid.log.verify import Verdict, Verifier  # the twins, which other commands do not need
 
-    rig = load(rig_path) if rig_path is not None else rig_of_log(log)
+    rig = load(rig_path) if rig_path is not None else _rig_of(log)
     reader = LogReader(log)
     verdict = Verdict()
     with progress_bar("verifying", None) as advance:

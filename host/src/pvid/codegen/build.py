@@ -21,6 +21,7 @@ from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
 from pvid.settings.fourier import FourierConfig
+from pvid.setup.fourier import with_soft_signs
 from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
 
 _CMAKE = """\
@@ -111,7 +112,7 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         files[f"{name}_q31.c"] = files_q31.source(fixed, command)
     apart = [f"{name}_test.c", f"{name}_weak_f32.c"]
     if weak_refusal(compiled) is None:
-        files |= _weak_files(compiled, command, chosen.design)
+        files |= _weak_files(compiled, command, chosen)
     if chosen.strong:
         named = renamed(strong_functions_of(strong_form(compiled)))
         files[f"{name}_strong.h"] = files_strong.header(named, command)
@@ -126,13 +127,14 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
     return files
 
 
-def _weak_files(compiled: CompiledModel, command: str, design: FourierConfig | None) -> dict[str, str]:
+def _weak_files(compiled: CompiledModel, command: str, options: Options) -> dict[str, str]:
     made, model = fourier_functions_of(compiled), fourier_model_of(compiled)
     files = {
         f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), command),
         f"{made.name}_weak_f32.c": files_fourier.source(made, model, command),
     }
-    if design is not None:
+    if options.design is not None:
+        design = with_soft_signs(options.design, options.soft_signs)
         names = [f"{one.name} [{one.unit or '1'}]" for one in compiled.unknowns]
         needed = sizes_of_design(design.design)
         files[f"{made.name}_design_f32.h"] = files_design.header(design, needed, command, compiled.title, names)

@@ -52,9 +52,25 @@ def header(fixed: FixedModel, command: str) -> str:
         f"extern const uint8_t {name}_c_row_q31[{upper}_C];",
         f"extern const uint8_t {name}_c_column_q31[{upper}_C];",
         "",
+        "/* theta and C of all rows for the estimator, which is given each row with its kind:",
+        " * pvid_estimator_add_kind_q31. init refuses it unless the library is compiled with",
+        f" * {', '.join(f'{macro} >= {size}' for macro, size in sizes_of(functions).items())}. */",
+        f"extern const pvid_model_q31 {name}_model_q31;",
+        "",
     ]
-    body = [f'#include "{name}_sizes.h"', '#include "pvid/elementary_q31.h"', "", *for_cpp(lines)]
+    includes = [f'#include "{name}_sizes.h"', '#include "pvid/elementary_q31.h"', '#include "pvid/model_q31.h"']
+    body = [*includes, "", *for_cpp(lines)]
     return guarded(f"{name}_q31", about, body)
+
+
+def sizes_of(functions: ModelFunctions) -> dict[str, int]:
+    """What pvid_model_q31 needs of pvid/config.h."""
+    return {
+        "PVID_MAX_P": len(functions.model.unknowns),
+        "PVID_MAX_THETA_Q31": len(functions.theta.labels),
+        "PVID_MAX_MOMENTS_Q31": functions.moments,
+        "PVID_MAX_C_Q31": len(functions.c_row),
+    }
 
 
 def _formats(fixed: FixedModel) -> list[str]:
@@ -99,8 +115,39 @@ def source(fixed: FixedModel, command: str) -> str:
         "\n".join(tables),
         *(c_q31.fixed_function(signature(functions, one.function), one.made, fixed.limits) for one in fixed.of_inputs),
         *(c_q31.scaled_function(signature(functions, one), one.program) for one in fixed.of_parameters),
+        _model(functions),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _model(functions: ModelFunctions) -> str:
+    """NAME_model_q31."""
+    name, upper = functions.name, functions.name.upper()
+    positive = sum(1 << k for k, one in enumerate(functions.model.unknowns) if one.positive)
+    several = len(functions.kinds) > 1
+    ends = ", ".join(map(str, functions.kind_end))
+    return "\n".join(
+        [
+            *([f"static const uint8_t kind_end[{upper}_KINDS] = {{{ends}}};"] if several else []),
+            "static const pvid_scaled_model_q31 scaled = {",
+            f"    .theta = {name}_theta_q31,",
+            f"    .jacobian = {name}_jacobian_q31,",
+            "    .adapter = &pvid_read_scaled_q31,",
+            "};",
+            "",
+            f"const pvid_model_q31 {name}_model_q31 = {{",
+            f"    .n_theta = {upper}_THETA,",
+            f"    .n_p = {upper}_P,",
+            *([f"    .n_kinds = {upper}_KINDS,"] if several else []),
+            f"    .n_c = {upper}_C,",
+            f"    .positive = {positive}u,",
+            *(["    .kind_end = kind_end,"] if several else []),
+            f"    .c_row = {name}_c_row_q31,",
+            f"    .c_column = {name}_c_column_q31,",
+            "    .scaled = &scaled,",
+            "};",
+        ]
+    )
 
 
 def _table(kind: str, name: str, size: str, values: tuple[int, ...]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from pvid.codegen.banner import banner
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import ModelFunctions
 from pvid.twin.f32.pattern import PatternModel
+from pvid.twin.kapitza.weak_q31 import ModelQ31, ScaledModelQ31
 from pvid.twin.q31.integer import Int
 from pvid.twin.q31.scaled import Scaled
 
@@ -126,16 +127,39 @@ class TwinQ31:
     channels: Callable[[Int], tuple[Int, npt.NDArray[np.bool_]]]
     theta: Callable[[Scaled], Scaled]
     jacobian: Callable[[Scaled], Scaled]
+    model: ModelQ31
     integrands: Callable[[Int], tuple[Int, npt.NDArray[np.bool_]]] | None = None
+
+
+def _no_integers(_: Int) -> Int:
+    raise AssertionError("the model has numbers of any size")
+
+
+def _no_formats(_: Sequence[int]) -> tuple[list[int], list[int]]:
+    raise AssertionError("the model has numbers of any size")
 
 
 def loaded_q31(fixed: FixedModel) -> TwinQ31:
     """The fixed-point part of the module, run."""
     space = namespace(text(fixed.functions, "loaded", fixed), fixed.functions.name)
+    functions = fixed.functions
+    model = ModelQ31(
+        n_theta=len(functions.theta.labels),
+        n_p=len(functions.model.unknowns),
+        positive=tuple(one.positive for one in functions.model.unknowns),
+        c_row=functions.c_row,
+        c_column=functions.c_column,
+        theta=_no_integers,
+        jacobian=_no_integers,
+        formats=_no_formats,
+        kind_end=functions.kind_end if len(functions.kinds) > 1 else (),
+        scaled=ScaledModelQ31(space["theta_q31"], space["jacobian_q31"]),
+    )
     return TwinQ31(
         channels=space["channels_q31"],
         theta=space["theta_q31"],
         jacobian=space["jacobian_q31"],
+        model=model,
         integrands=space.get("integrands_q31"),
     )
 

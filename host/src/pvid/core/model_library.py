@@ -23,7 +23,7 @@ from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, core_sources
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
 _ROOMS = ("number", "solve", "judge", "fourier", "keep")
-_NOT = ("_q31", "_strong_f32", "_weak_f32", "fingerprint_f32")  # ends of names that the weak engine does without
+_NOT = ("_q31", "_strong_f32", "_weak_f32")  # ends of names that the weak engine does without
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"
 
@@ -59,14 +59,8 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
 
 
 def _sources() -> list[Path]:
-    found = [
-        path for path in core_sources() if path.parent.parent == SRC and path.parent.name in _ROOMS and _used(path.stem)
-    ]
-    return [*found, NATIVE / "replay_fourier.c"]
-
-
-def _used(stem: str) -> bool:
-    return not stem.endswith(_NOT) or stem.endswith("fourier_f32")
+    rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in _ROOMS]
+    return [*(path for path in rooms if not path.stem.endswith(_NOT)), NATIVE / "replay_fourier.c"]
 
 
 @cache

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.toml_text import toml_document
 from pvid.link.frames import Hello, Names
 from pvid.log.board_model import mechanism_of
 from pvid.log.reader import LogReader, LogStream
@@ -28,15 +29,45 @@ def rig_of_log(path: Path) -> RigFile | None:
     Raises
     ------
     PvidError
-        When the log cannot be read, or the rig file in it is none.
+        When the log cannot be read, is that of a described mechanism, or the rig file in it is none.
     """
     reader = LogReader(path)
     for _ in reader:
         if reader.rig is not None:
+            if is_engine_text(reader.rig):
+                raise PvidError(
+                    f"{path} is the log of a described mechanism: export it, and name its table and --model"
+                )
             return RigFile.parse(reader.rig)
         if reader.account.frames:
             break  # it stands in front of all that the board said
     return None
+
+
+def engine_text_of_log(path: Path) -> str | None:
+    """The rig of a log of a described mechanism with the settings of its engine (board.mechanism_board); None: it is a
+    log of something else.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read.
+    """
+    reader = LogReader(path)
+    for _ in reader:
+        if reader.rig is not None:
+            return reader.rig if is_engine_text(reader.rig) else None
+        if reader.account.frames:
+            break
+    return None
+
+
+def is_engine_text(text: str) -> bool:
+    """Whether the rig of a log is that of a described mechanism."""
+    try:
+        return isinstance(toml_document(text).get("engine"), dict)
+    except PvidError:
+        return False
 
 
 def mechanism_of_log(path: Path) -> Mechanism:
@@ -47,7 +78,7 @@ def mechanism_of_log(path: Path) -> Mechanism:
     PvidError
         When the log cannot be read, or the rig file in it is none.
     """
-    rig = rig_of_log(path)
+    rig = None if engine_text_of_log(path) is not None else rig_of_log(path)
     if rig is not None:
         return rig.mechanism
     for record in LogReader(path):
@@ -57,8 +88,9 @@ def mechanism_of_log(path: Path) -> Mechanism:
     return UNKNOWN_RIG
 
 
-def refuse_to_append(path: Path, rig: RigFile | None) -> None:
-    """A log has one rig file: verify, identify and export take it for all of its segments.
+def refuse_to_append(path: Path, rig: RigFile | str | None) -> None:
+    """A log has one rig file: verify, identify and export take it for all of its segments. `rig` of a described
+    mechanism is the text.
 
     Raises
     ------
@@ -77,7 +109,10 @@ def refuse_to_append(path: Path, rig: RigFile | None) -> None:
         raise PvidError(f"cannot read {path}: {error.strerror}") from error
     if stream.account.bytes and not stream.is_log and not stream.account.frames:
         raise PvidError(f"{path} is not a log of pvid: nothing is appended")
-    if rig is not None and stream.rig is not None and RigFile.parse(stream.rig) != rig:
+    if rig is None or stream.rig is None:
+        return
+    of_engine = isinstance(rig, str) or is_engine_text(stream.rig)
+    if stream.rig != rig if of_engine else RigFile.parse(stream.rig) != rig:
         raise PvidError(f"{path} was recorded with another rig file: record to a new log")
 
 

@@ -16,13 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import settings_number
+from pvid.board.stream_image import StreamImage, settings_number
 from pvid.board.stream_rig import stream_rig
 from pvid.cases import case_of
 from pvid.link.frames import (
@@ -43,11 +43,26 @@ from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
 from pvid.run.compare import P_NAMES, Difference
 from pvid.settings.enums import Reason
+from pvid.settings.fourier import FourierConfig
 from pvid.settings.kinds import Settings
 from pvid.settings.record import HASHED_TYPES
 from pvid.twin import fnv
+from pvid.twin.fourier import FourierTwin
 
 Check = Estimate | EstimateQ31 | Hash | Credit
+
+
+class EngineBoard(Protocol):
+    """A board that identifies a described mechanism; pvid.board.mechanism_board.MechanismBoard is one."""
+
+    @property
+    def stream_image(self) -> StreamImage: ...
+
+    @property
+    def p_names(self) -> tuple[str, ...]: ...
+
+    def configured(self, frame: Configuration) -> FourierConfig: ...
+
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
 _UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
@@ -156,6 +171,7 @@ class _Open:
     stretch: Stretch
     lacks: str
     session: int
+    samples: int  # of a tick
     late: bool = False
     harmed: bool = False
     parts: list[npt.NDArray[Any]] = field(default_factory=list)
@@ -183,14 +199,14 @@ class Verifier:
     Parameters
     ----------
     rig
-        The board's rig; None: nothing can be verified.
+        The board's rig file, or the board of a described mechanism; None: nothing can be verified.
     progress
         Called with the number of ticks computed so far.
 
     Memory: the samples of the longest stretch.
     """
 
-    def __init__(self, rig: RigFile | None, progress: Callable[[int], None] | None = None) -> None:
+    def __init__(self, rig: RigFile | EngineBoard | None, progress: Callable[[int], None] | None = None) -> None:
         self.rig = rig
         self._progress = progress
         self._done = 0
@@ -199,6 +215,7 @@ class Verifier:
         self._open: _Open | None = None
         self._before: tuple[int, int] | None = None  # segment and tick where the last samples ended
         self._settings: dict[float, tuple[Settings, int]] = {}
+        self._number: int | None = None  # of the board's image
 
     def stretches(self, records: Iterable[Record]) -> Iterator[Stretch]:
         """The stretches of all records, in order."""
@@ -231,10 +248,11 @@ class Verifier:
 
     def _take_samples(self, record: Record, raw: Raw | RawCount) -> Iterator[Stretch]:
         opened = self._open
-        if opened is None or record.tick != opened.next or not opened.is_of(raw.session):
+        follows = opened is not None and record.tick == opened.next and raw.samples == opened.samples
+        if opened is None or not follows or not opened.is_of(raw.session):
             yield from self._close()
             opened = self._open = _Open(
-                Stretch(record.segment, record.tick, 0), self._missing_note(record), raw.session
+                Stretch(record.segment, record.tick, 0), self._missing_note(record), raw.session, raw.samples
             )
             if (configuration := self._configurations.get(raw.session)) is not None:
                 opened.begin_with(configuration)
@@ -286,14 +304,16 @@ class Verifier:
             )
         if configuration is None:
             raise PvidError("the board's configuration is missing")
-        config = self._config(configuration)
+        twin, names = self._twin(configuration)
         samples = np.concatenate(opened.parts)
+        if samples.shape[1] != twin.samples:
+            raise PvidError(f"they are {samples.shape[1]} a tick, and the identifier takes {twin.samples}")
         checks: dict[int, list[Check]] = {}
         for tick, check in opened.checks:
             if check.session == stretch.session:
                 checks.setdefault(tick, []).append(check)
         with np.errstate(all="ignore"):  # a board may send any number, in samples and in its configuration
-            recomputation = _Recomputation(config, checks, stretch, self._count)
+            recomputation = _Recomputation(twin, names, checks, stretch, self._count)
             recomputation.run(samples)
         stretch.verified = recomputation.covered
         allowed = _pace(configuration) + recomputation.reach
@@ -306,15 +326,25 @@ class Verifier:
         if self._progress is not None and self._done % 512 == 0:
             self._progress(self._done)
 
-    def _config(self, configuration: Configuration) -> Settings:
-        """The identifier's settings: those of the rig file, with the values of the configuration."""
+    def _twin(self, configuration: Configuration) -> tuple[_Twin, tuple[str, ...]]:
+        """The twin with the values of the configuration, and the names of p."""
         if self.rig is None:
             raise PvidError("the log holds no rig file: name it with --rig")
+        if isinstance(self.rig, RigFile):
+            return _PendulumTwin(self._config(self.rig, configuration)), P_NAMES
+        if self._number is None:
+            self._number = self.rig.stream_image.number
+        if configuration.settings != self._number:
+            raise PvidError("the board's image was made for other settings than the log's, or by another version")
+        return _EngineTwin(self.rig.configured(configuration)), self.rig.p_names
+
+    def _config(self, rig: RigFile, configuration: Configuration) -> Settings:
+        """The identifier's settings: those of the rig file, with the values of the configuration."""
         if self._hello is None:
             raise PvidError("the board has not sent its identity (a Hello frame)")
         rate = float(self._hello.sample_rate)
         if rate not in self._settings:
-            board = stream_rig(self.rig, self.rig.sample_rate or rate)
+            board = stream_rig(rig, rig.sample_rate or rate)
             self._settings[rate] = (board.config, settings_number(board))
         config, number = self._settings[rate]
         if configuration.settings != number:
@@ -327,6 +357,56 @@ def _pace(configuration: Configuration) -> int:
     return min((every for every in (configuration.hash_every, configuration.estimate_every) if every), default=0)
 
 
+class _Twin(Protocol):
+    """An identifier that computes a stretch again."""
+
+    samples: int  # of a tick
+    reach: int
+    matrix: str  # of an estimate
+    estimator: Any
+
+    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
+        """Steps through samples [ticks, samples]; calls `after` after every tick."""
+
+    def estimate(self) -> Any:
+        """What the board says at present."""
+
+
+class _PendulumTwin:
+    """Of the rig file's form and core."""
+
+    samples = 2
+
+    def __init__(self, config: Settings) -> None:
+        case = case_of(config)
+        self._twin = case.twin(config)
+        self.matrix = case.matrix
+        self.reach, self.estimator = self._twin.reach, self._twin.estimator
+
+    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
+        return self._twin.follow(samples[:, 0], samples[:, 1], after)
+
+    def estimate(self) -> Any:
+        return self.estimator.assess()[0]
+
+
+class _EngineTwin:
+    """The engine of any mechanism, which says what it publishes."""
+
+    matrix = "covariance"
+
+    def __init__(self, config: FourierConfig) -> None:
+        self._twin = FourierTwin(config)
+        self.samples = config.design.model.samples
+        self.reach, self.estimator = config.ticks_needed, self._twin.estimator
+
+    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
+        return self._twin.follow(samples, after)
+
+    def estimate(self) -> Any:
+        return self._twin.trust.estimate[0]
+
+
 class _DifferentError(Exception):
     """Ends a recomputation."""
 
@@ -337,14 +417,15 @@ class _Recomputation:
 
     def __init__(
         self,
-        config: Settings,
+        twin: _Twin,
+        p_names: tuple[str, ...],
         checks: dict[int, list[Check]],
         stretch: Stretch,
         count: Callable[[], None],
     ) -> None:
-        self._case = case_of(config)
-        self.twin = self._case.twin(config)
-        self.reach = self.twin.reach
+        self.twin = twin
+        self._p_names = p_names
+        self.reach = twin.reach
         self.covered = 0
         self.hashed = False
         self._checks = checks
@@ -355,10 +436,10 @@ class _Recomputation:
         self._verdict = int(Reason.WARMING_UP)
 
     def run(self, samples: npt.NDArray[Any]) -> None:
-        """Runs over samples [ticks, 2] from the session's first tick; writes the result into the stretch."""
+        """Runs over samples [ticks, samples] from the session's first tick; writes the result into the stretch."""
         self._sample_hashes = fnv.sample_hashes(samples)
         try:
-            self.twin.follow(samples[:, 0], samples[:, 1], self._after)
+            self.twin.follow(samples, self._after)
         except _DifferentError:
             pass
 
@@ -401,19 +482,23 @@ class _Recomputation:
                 yield from self._compared_estimate(check)
 
     def _compared_estimate(self, check: Estimate | EstimateQ31) -> Iterator[tuple[str, int, int]]:
-        matrix = self._case.matrix
+        matrix = self.twin.matrix
         if not hasattr(check, matrix):
             raise PvidError("the estimates are of another core than the rig file sets")
-        own = self.twin.estimator.assess()[0]
+        own = self.twin.estimate()
         n_p = len(self.twin.estimator.p)
         upper = tuple((a, b) for a, b in _UPPER if b < n_p)
         for i in range(n_p):
-            yield P_NAMES[i], _word(check.p[i]), _word(own["p"][i])
+            yield self._p_names[i], _word(check.p[i]), _word(own["p"][i])
         logged = dict(zip(_UPPER, getattr(check, matrix), strict=True))
         for i, se in enumerate(getattr(check, "se", ())[:n_p]):  # where the matrix does not hold them
-            yield f"standard error of {P_NAMES[i]}", _word(se), _word(own["se"][i])
+            yield f"standard error of {self._p_names[i]}", _word(se), _word(own["se"][i])
         for a, b in upper:
-            yield f"{matrix} of {P_NAMES[a]} and {P_NAMES[b]}", _word(logged[a, b]), _word(own[matrix][a, b])
+            yield (
+                f"{matrix} of {self._p_names[a]} and {self._p_names[b]}",
+                _word(logged[a, b]),
+                _word(own[matrix][a, b]),
+            )
         for name in ("kappa", "residual_sd", "weight"):
             yield name.replace("_", " "), _word(getattr(check, name)), _word(own[name])
         yield "updates", check.updates, int(self.twin.estimator.counters["updates"][0])

@@ -85,11 +85,12 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Known:
-    """A constant with a value that the rig file may set."""
+    """A constant with a value, and the standard deviation of it [unit], that the rig file may set."""
 
     symbol: sp.Symbol
     unit: str
     value: float
+    sd: float = 0.0
 
     @property
     def name(self) -> str:

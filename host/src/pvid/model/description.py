@@ -118,12 +118,14 @@ class Model:
         self._agree(jet - self.defined[jet], f"the definition of {name}")
         return jet
 
-    def known(self, name: str, unit: str, value: float) -> sp.Symbol:
-        """A constant with a value, which a rig file may change."""
+    def known(self, name: str, unit: str, value: float, sd: float = 0.0) -> sp.Symbol:
+        """A constant with a value and the standard deviation of it, which a rig file may change."""
         symbol = self._symbol(name, unit)
         if not math.isfinite(value):
             raise self._refused(f"{name}: its value {value} is no number")
-        self.knowns.append(Known(symbol, unit, float(value)))
+        if not 0 <= sd < math.inf:
+            raise self._refused(f"{name}: its standard deviation must be a number of at least 0, not {sd}")
+        self.knowns.append(Known(symbol, unit, float(value), float(sd)))
         return symbol
 
     def unknown(

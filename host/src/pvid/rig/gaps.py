@@ -45,7 +45,8 @@ def bridge(signals: Sequence[FloatArray], sample_rate: float) -> tuple[IntArray,
     if not firsts.size:
         return firsts, ends
     longest = max(1, int(_BRIDGED_S * sample_rate + 1e-9))
-    noise = [_FITTING * _noise(signal[:_NOISE_SAMPLES]) for signal in signals]
+    units = [_unit(signal) for signal in signals]
+    noise = [_FITTING * _noise(signal[:_NOISE_SAMPLES] / unit) for signal, unit in zip(signals, units, strict=True)]
     for first, end in zip(firsts.tolist(), ends.tolist(), strict=True):
         gap = slice(first, end)
         if end - first > longest:
@@ -61,15 +62,22 @@ def bridge(signals: Sequence[FloatArray], sample_rate: float) -> tuple[IntArray,
         within = np.vander((np.arange(first, end) - middle) / scale, powers.shape[1], increasing=True)
         free = known.size - powers.shape[1]
         found = []
-        for signal, largest in zip(signals, noise, strict=True):
-            coefficients = inverse @ signal[known]
-            residual = signal[known] - powers @ coefficients
+        for signal, unit, largest in zip(signals, units, noise, strict=True):
+            beside_it = signal[known] / unit
+            coefficients = inverse @ beside_it
+            residual = beside_it - powers @ coefficients
             if free > 0 and float(residual @ residual) > free * largest**2:
                 break
-            found.append(within @ coefficients)
+            with np.errstate(over="ignore"):  # next to the largest number of all
+                found.append(within @ coefficients * unit)
         for k, signal in enumerate(signals):
             signal[gap] = found[k] if len(found) == len(signals) else np.nan
     return firsts, ends
+
+
+def _unit(x: FloatArray) -> float:
+    """A power of two above the largest of x [n], in which no square overflows; divided by it x keeps its bits."""
+    return math.ldexp(1.0, min(math.frexp(float(np.nanmax(np.abs(x))))[1], 1023))
 
 
 def _noise(x: FloatArray) -> float:

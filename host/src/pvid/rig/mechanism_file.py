@@ -5,6 +5,8 @@
     name = "dc_motor"         # or the path of a model file
     [known]
     g = 9.81                  # constants of the model
+    [known_sd]
+    g = 0.01                  # standard deviations of constants, in their units; 0 where none is given
     [sensor.phi]
     resolution = 0.0015       # in the unit of the signal; noise in resolutions
     [sensor.V]
@@ -44,7 +46,7 @@ class MechanismRig:
     ----------
     model : name of a shipped mechanism or path of a model file
     sample_rate : [Hz]; None: that of the run
-    known : values of the model's constants
+    known, known_sd : values of the model's constants, and standard deviations of them
     sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative]; of an input gain_sd alone
     nominal : guesses of the unknowns
     """
@@ -54,6 +56,7 @@ class MechanismRig:
     known: Mapping[str, float] = field(default_factory=dict)
     sensor: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     nominal: Mapping[str, float] = field(default_factory=dict)
+    known_sd: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def parse(cls, text: str) -> MechanismRig:
@@ -69,7 +72,7 @@ class MechanismRig:
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> MechanismRig:
         """From the tables of a text; see `parse`."""
-        known_keys = ("sample_rate", "model", "known", "sensor", "nominal")
+        known_keys = ("sample_rate", "model", "known", "known_sd", "sensor", "nominal")
         for key in document:
             if key not in known_keys:
                 raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(known_keys)} are")
@@ -91,13 +94,14 @@ class MechanismRig:
             _numbers(_table(document, "known"), "known"),
             sensors,
             _numbers(_table(document, "nominal"), "nominal"),
+            _numbers(_table(document, "known_sd"), "known_sd"),
         )
 
     def text(self) -> str:
         """TOML text; `parse` gives the same rig back."""
         lines = [] if self.sample_rate is None else [f"sample_rate = {self.sample_rate!r}  # Hz"]
         lines += ["", "[model]", f'name = "{self.model}"']
-        tables: dict[str, Mapping[str, float]] = {"known": self.known}
+        tables: dict[str, Mapping[str, float]] = {"known": self.known, "known_sd": self.known_sd}
         tables |= {f"sensor.{name}": keys for name, keys in self.sensor.items()}
         tables["nominal"] = self.nominal
         for name, keys in tables.items():
@@ -126,7 +130,11 @@ class MechanismRig:
             if signal.kind == "input" and set(self.sensor.get(signal.name, {})) - {"gain_sd"}:
                 raise PvidError(f"sensor.{signal.name}: an input of the model has a gain_sd alone")
         _refuse_unknown("nominal", self.nominal, list(model.p_names))
-        knowns = tuple(replace(one, value=self.known.get(one.name, one.value)) for one in model.knowns)
+        _refuse_unknown("known_sd", self.known_sd, [one.name for one in model.knowns])
+        knowns = tuple(
+            replace(one, value=self.known.get(one.name, one.value), sd=self.known_sd.get(one.name, one.sd))
+            for one in model.knowns
+        )
         signals = []
         for signal in model.signals:
             given = self.sensor.get(signal.name, {})
@@ -187,7 +195,7 @@ def _numbers(table: Mapping[str, Any], place: str) -> dict[str, float]:
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             name = f"{place}.{key}" if place else key
             raise PvidError(f"{name} must be a number, not {shown(str(value))}")
-        if key in (*_OF_A_SENSOR, "sample_rate") and not value >= 0:
+        if (key in (*_OF_A_SENSOR, "sample_rate") or place == "known_sd") and not value >= 0:
             raise PvidError(f"{place}.{key} must not be negative".removeprefix("."))
     return {key: float(value) for key, value in table.items()}
 

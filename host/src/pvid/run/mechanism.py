@@ -13,8 +13,9 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
 from pvid.models.mechanisms import compiled_of
-from pvid.oracle.fourier.identify import Identified
+from pvid.oracle.fourier.identify import Identified, given
 from pvid.oracle.fourier.identify import identify as identified_by
+from pvid.oracle.fourier.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 
@@ -42,12 +43,14 @@ class MechanismAnswer:
     found : estimate and verdict
     values : by name: outputs of the model, then p
     recording : the samples
+    weights : of the rows
     """
 
     model: CompiledModel
     found: Identified
     values: Mapping[str, Value]
     recording: Recording
+    weights: Weights = "residuals"
 
     @property
     def identified(self) -> bool:
@@ -71,6 +74,7 @@ class MechanismAnswer:
             "r2": found.r2,
             "window_s": found.design.window_s,
             "windows": len(found.times),
+            "weights": self.weights,
             "input": list(self.recording.notes),
             "samples": len(self.recording),
             "model": self.model.name,
@@ -84,8 +88,12 @@ def model_of(rig: MechanismRig) -> CompiledModel:
     return rig.applied(compiled_of(rig.model))
 
 
-def identify_mechanism(recording: Recording, model: CompiledModel) -> MechanismAnswer:
+def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weights = "residuals") -> MechanismAnswer:
     """Parameters of a mechanism from a recording without missing samples.
+
+    Parameters
+    ----------
+    weights : of the rows, as in pvid.oracle.fourier.identify
 
     Raises
     ------
@@ -93,8 +101,8 @@ def identify_mechanism(recording: Recording, model: CompiledModel) -> MechanismA
         When the recording is too short, or holds a signal beyond all reason.
     """
     _refuse_constant(recording, model)
-    found = identified_by(model, recording.signals, recording.sample_rate)
-    return MechanismAnswer(model, found, _values(model, found), recording)
+    found = identified_by(model, recording.signals, recording.sample_rate, weights=weights)
+    return MechanismAnswer(model, found, _values(model, found), recording, weights)
 
 
 def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
@@ -106,7 +114,7 @@ def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
 
 def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
     gains = gains_of(model, found)
-    # Of noise: the correlations of the rows, with the published standard errors but for those of the gains.
+    # Of noise: the correlations of the rows, with the published standard errors but for gains and constants.
     noise = np.sqrt(np.maximum(found.se**2 - np.sum(gains**2, axis=0), 0.0))
     widened = noise / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
@@ -114,9 +122,8 @@ def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
 
 
 def gains_of(model: CompiledModel, found: Identified) -> Float:
-    """What p is off by for an error of each gain of one standard deviation [gains, n_p]."""
-    gains = np.array([one.gain_sd * found.by_gain[one.name] for one in model.signals if one.gain_sd > 0])
-    return gains.reshape(-1, len(found.p))
+    """What p is off by for one standard deviation of each gain and of each constant that has any [gains, n_p]."""
+    return np.array(given(model, found.by_gain, found.by_known)).reshape(-1, len(found.p))
 
 
 def values_of(model: CompiledModel, p: Float, covariance: Float, gains: Float, *, identified: bool) -> dict[str, Value]:

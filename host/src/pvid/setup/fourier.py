@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +68,13 @@ def design_tables(
         sign_width=np.full(model.signs, design.soft if design.reversals == "soft" else 0.0, np.float32),
         overlap=float(np.float32(overlap_of(rows, p, found))),
     )
+
+
+def with_soft_signs(config: FourierConfig, widths: Mapping[str, float]) -> FourierConfig:
+    """The settings with soft signs v / (|v| + width) of some arguments, as in phi_1; the others keep theirs."""
+    design = config.design
+    width = [widths.get(name, float(own)) for name, own in zip(design.model.sign_names, design.sign_width, strict=True)]
+    return replace(config, design=replace(design, sign_width=_as_float32(width)))
 
 
 def _check(design: FourierDesign, rows: WeakRows) -> None:

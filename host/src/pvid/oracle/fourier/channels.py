@@ -24,7 +24,7 @@ from pvid.oracle.fourier.functions import Float, TestFunctions
 
 _ONE = sp.Integer(1)
 
-# A stretch in which a sign is in doubt is one direction in the rows while the fastest test function turns by less [rad].
+# A sign in doubt is one direction in the rows while the fastest test function turns by less than this [rad].
 _PIECE = 0.5
 
 

@@ -90,10 +90,19 @@ def lengths(samples: int, sample_rate: float, fewest: int = _FEWEST_WINDOWS) -> 
 
 
 def chosen(
-    model: Compiled, run: Mapping[str, npt.ArrayLike], sample_rate: float, start: Float | None = None
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    sample_rate: float,
+    start: Float | None = None,
+    equation_error: bool = True,
 ) -> FourierDesign:
-    """The design of least score, one choice after the other: length, smoothing of rates, number of functions."""
-    return ranked(model, run, sample_rate, start)[0].design
+    """The design of least score, one choice after the other: length, smoothing of rates, number of functions.
+
+    Parameters
+    ----------
+    equation_error : estimate the error of each equation where the sensors do not explain the residuals
+    """
+    return ranked(model, run, sample_rate, start, equation_error)[0].design
 
 
 def ranked(
@@ -101,12 +110,14 @@ def ranked(
     run: Mapping[str, npt.ArrayLike],
     sample_rate: float,
     start: Float | None = None,
+    equation_error: bool = True,
     reversals: Literal["located", "averaged"] = "located",
 ) -> list[Scored]:
     """All designs tried, the best first.
 
     Parameters
     ----------
+    equation_error : as in `chosen`
     reversals : how signs are summed; "averaged": of the weak engine in C, which whitens the kinds of rows one by one
     """
     plain = {name: x for name, x in run.items()}
@@ -134,7 +145,7 @@ def ranked(
     if not tried:
         raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
     best = min(tried, key=lambda one: one.score)
-    if best.chi2 > MODEL_ERROR:
+    if best.chi2 > MODEL_ERROR and equation_error:
         errors = True
         tried.clear()
         attempt([best.design])

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.model.compiled import CompiledModel
+from pvid.model.compiled import CompiledModel, Known
 from pvid.oracle.fourier import verdict
 from pvid.oracle.fourier.attenuation import other_line
 from pvid.oracle.fourier.choice import chosen
@@ -19,9 +19,9 @@ from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.gate import gated
 from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.fourier.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
-from pvid.oracle.fourier.solve import Fit, online
+from pvid.oracle.fourier.solve import Fit, batch, compensated, gauss_newton, online
 from pvid.oracle.fourier.verdict import Halves, Verdict
-from pvid.oracle.fourier.weights import as_white_force
+from pvid.oracle.fourier.weights import Weights, as_white_force
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Identified:
     p : [n_p]
     se : published standard errors, those of gains included [n_p]
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
+    by_known : of each constant with a standard deviation, what p is off by over the constant's error [n_p]
     sensor_error : the systematic error of a sensor that explains residuals; None: there is none
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     covariance : of p, that of `predicted` [n_p, n_p]
@@ -64,6 +65,7 @@ class Identified:
     halves: Halves | None
     fit: Fit
     by_gain: dict[str, Float]
+    by_known: dict[str, Float]
     sensor_error: SensorError | None
 
     @property
@@ -74,6 +76,7 @@ class Identified:
 
 _SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
 _KEPT = 16
+_STEPS_OF_KNOWN = 10
 _ready: dict[int, Compiled] = {}
 
 
@@ -106,6 +109,7 @@ def identify(
     start: Mapping[str, float] | npt.ArrayLike | None = None,
     design: FourierDesign | None = None,
     compensate: bool = True,
+    weights: Weights = "residuals",
 ) -> Identified:
     """Parameters of a mechanism from a run.
 
@@ -116,12 +120,16 @@ def identify(
     start : of p, by name or in order; the guesses of the model where none is given
     design : None: chosen by predicted errors and chi^2 on this run
     compensate : take the bias of noisy regressors off
+    weights
+        "residuals": of the sensors and an error of the equations, estimated from the residuals; "sensors": of the
+        sensors alone
     """
     model = ready(compiled)
     begun = start_of(compiled, start)
-    used = design or chosen(model, run, sample_rate, begun)
+    with_error = weights == "residuals"
+    used = design or chosen(model, run, sample_rate, begun, with_error)
     rows = WeakRows.of(model, run, used)
-    fit = gated(rows, begun, compensate=compensate)
+    fit = gated(rows, begun, with_error, compensate)
     found = uncertainty(fit)
     halves = verdict.halves_of(fit)
     reasons = {
@@ -130,14 +138,17 @@ def identify(
         "halves": verdict.of_halves(compiled, fit, halves),
         "attenuation": verdict.of_attenuation(compiled, fit, found, other_line(fit)),
         "feedback": verdict.of_feedback(compiled, fit),
-        "residuals": verdict.of_residuals(found),
+        "residuals": verdict.of_residuals(found, with_error),
         "range": verdict.of_range(compiled, fit.p),
         "left_out": verdict.of_spoiled(rows, fit),
     }
-    other = other_length(model, run, used, fit.p)
+    sensors_only = by_sensors(fit)
+    if sensors_only is not None:
+        reasons["weights"] = verdict.of_weights(compiled, fit, found, sensors_only, uncertainty(sensors_only))
+    other = other_length(model, run, used, fit.p, with_error)
     if other is not None:
         reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
-    shorter = shorter_rates(model, run, used, fit.p)
+    shorter = shorter_rates(model, run, used, fit.p, with_error)
     if shorter is not None:
         reasons["smoothing"] = verdict.of_smoothing(compiled, fit, found, shorter, uncertainty(shorter))
     sensors = SensorErrors(run, used, fit)
@@ -145,15 +156,19 @@ def identify(
     error = sensors.found(found.se)
     reasons["sensors"] = of_sensors(compiled, error, found.se)
     reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
-    gains = [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
+    by_known = {one.name: of_known(compiled, run, fit, one) for one in compiled.knowns if one.sd > 0}
     white = as_white_force(fit)
     by_weights = [] if white is None else [white - fit.p]
-    history = online(fit.rows, begun)
+    history = online(fit.rows, begun, with_error)
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
         p=fit.p,
-        se=np.sqrt(np.sum(np.square([verdict.widened(found.se, halves), *gains, *by_weights]), axis=0)),
+        se=np.sqrt(
+            np.sum(
+                np.square([verdict.widened(found.se, halves), *given(compiled, by_gain, by_known), *by_weights]), axis=0
+            )
+        ),
         predicted=found.predicted,
         clustered=found.clustered,
         covariance=found.covariance,
@@ -167,19 +182,55 @@ def identify(
         halves=halves,
         fit=fit,
         by_gain=by_gain,
+        by_known=by_known,
         sensor_error=error,
     )
 
 
-def shorter_rates(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:
+def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float]) -> list[Float]:
+    """Errors of p [n_p] for one standard deviation of each gain and constant that has any."""
+    gains = [one.gain_sd * by_gain[one.name] for one in model.signals if one.gain_sd > 0]
+    return gains + [one.sd * by_known[one.name] for one in model.knowns if one.sd > 0]
+
+
+def of_known(compiled: CompiledModel, run: Mapping[str, npt.ArrayLike], fit: Fit, known: Known) -> Float:
+    """d p / d constant [n_p], with the weights of the fit: one standard deviation more, and p again."""
+    moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in compiled.knowns)
+    rows = WeakRows.of(Compiled(replace(compiled, knowns=moved)), run, fit.rows.record.grid.design)
+    rows = rows.only(np.isin(rows.numbers, fit.rows.numbers))
+    p, prior = fit.p, fit.parameters.prior(fit.start)
+    theta = rows.compiled.parameters.theta(p)
+    moments = compensated(rows, [rows.white(group, theta, fit.errors) for group in rows.groups], theta)
+    p, _ = gauss_newton(rows.compiled.parameters, moments, p, prior, _STEPS_OF_KNOWN)
+    return np.asarray((p - fit.p) / known.sd)
+
+
+def by_sensors(fit: Fit) -> Fit | None:
+    """The same with the weights of the sensors alone, of a model with unmeasured coordinates.
+
+    The error of an equation that is left when these are eliminated is no force: its cause may be an error of a signal.
+    None: nothing was eliminated, or the weights are those of the sensors.
+    """
+    model = fit.rows.compiled.bare
+    hidden = {jet.of for jet in model.hidden} - {jet.of for jet in model.opaque}
+    if not hidden or not any(one.variance for one in fit.errors):
+        return None
+    return batch(fit.rows, fit.p, equation_error=False)
+
+
+def shorter_rates(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float, equation_error: bool = True
+) -> Fit | None:
     """The same with derivatives over fewer samples; None where there are none, or too few samples for the degree."""
     taps = 2 * round(_SHORTER * design.rate_taps / 2) + 1
     if not any(jet.order for jet in model.channels.needed) or taps <= design.rate_degree + 2:
         return None
-    return gated(WeakRows.of(model, run, replace(design, rate_taps=taps)), p)
+    return gated(WeakRows.of(model, run, replace(design, rate_taps=taps)), p, equation_error)
 
 
-def other_length(model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float) -> Fit | None:
+def other_length(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], design: FourierDesign, p: Float, equation_error: bool = True
+) -> Fit | None:
     """The same with windows of another length, twice if the run has enough of them, else half; None: neither fits."""
     for factor in (2.0, 0.5):
         try:
@@ -188,5 +239,5 @@ def other_length(model: Compiled, run: Mapping[str, npt.ArrayLike], design: Four
         except PvidError:
             continue
         if rows.windows >= 8:
-            return gated(rows, p)
+            return gated(rows, p, equation_error)
     return None

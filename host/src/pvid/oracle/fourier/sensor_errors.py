@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
-from pvid.base.wording import listed
+from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.signals import Jet
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import clustered_variance
 from pvid.oracle.fourier.front import filtered, polynomial_weights
@@ -65,6 +66,7 @@ class SensorError:
     size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal], gain less 1; width over
         which a friction changes its sign [unit of the argument]
     certainty : size over its standard error
+    unit : of the signal; of a friction that of the argument, "" where it is not one signal's rate
     shift : by how much p moves when the error is taken off [n_p]
     """
 
@@ -73,6 +75,7 @@ class SensorError:
     size: float
     certainty: float
     shift: Float
+    unit: str = ""
 
     @property
     def text(self) -> str:
@@ -81,12 +84,16 @@ class SensorError:
             shifted = "delayed" if self.size > 0 else "advanced"
             return f"{self.signal} seems to be {shifted} by {abs(self.size):.2g} s"
         if self.kind == "friction":
-            return f"the friction seems to be soft: sgn({self.signal}) changes over a width of about {self.size:.2g}"
+            return f"the friction seems to be soft: sgn({self.signal}) changes over a width of about {self._size}"
         if self.kind == "gain":
             than = "larger" if self.size < 0 else "smaller"
             return f"{self.signal} seems to be {100 * abs(self.size):.2g} % {than} than recorded"
         what = "a backlash of" if self.kind == "play" else "an eccentric encoder of amplitude"
-        return f"{self.signal} seems to have {what} {abs(self.size):.2g}"
+        return f"{self.signal} seems to have {what} {self._size}"
+
+    @property
+    def _size(self) -> str:
+        return with_unit(abs(self.size), self.unit, 2)
 
 
 class SensorErrors:
@@ -172,7 +179,13 @@ class SensorErrors:
         shift = -self.unit * (self.inverse @ (mixed @ size))
         amount = float(size[0]) if len(size) == 1 else float(np.hypot(*size))
         certainty = float(np.max(np.abs(size) / np.sqrt(variance))) if abs(amount) < largest else 0.0
-        return SensorError(signal, kind, amount, certainty, shift)
+        return SensorError(signal, kind, amount, certainty, shift, self._unit(signal))
+
+    def _unit(self, name: str) -> str:
+        """Of a signal or of a signal's rate, as in q1_1."""
+        units = {one.name: one.unit for one in self.model.signals}
+        units |= {str(Jet(one.name, 1)): f"{one.unit or '1'}/s" for one in self.model.signals}
+        return units.get(name, "")
 
     def _delay(self, signal: Signal) -> Float:
         """Column of a delay [s]."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import sympy as sp
 
-from pvid.base.wording import listed
+from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Jet
 from pvid.oracle.fourier.errors import Uncertainty, uncertainty
@@ -36,6 +36,7 @@ Name = Literal[
     "sensor",
     "friction",
     "scale",
+    "weights",
 ]
 Status = Literal["good", "warning", "not_identified"]
 
@@ -128,7 +129,8 @@ def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[R
     partner = partner_of(fit, int(bad[0]))
     together = f"{names[0]} and {model.p_names[partner]}" if partner is not None else ""
     mixed = f"; {together} are not identifiable together" if together else ""
-    error = f"the standard error of {names[0]} is {found.se[bad[0]]:.2g}"
+    worst = with_unit(found.se[bad[0]], model.unknowns[bad[0]].unit, 2)
+    error = f"the standard error of {names[0]} is {worst}"
     return [Reason("not_identified", f"The run does not determine {listed(names)}: {error}{mixed}.")]
 
 
@@ -174,7 +176,8 @@ def disagreement(
         return []
     k = int(apart[0])
     names = listed(model.p_names[bad] for bad in apart)
-    shown = text.format(names=names, name=model.p_names[k], one=f"{one[k]:.4g}", other=f"{other[k]:.4g}")
+    values = [with_unit(value, model.unknowns[k].unit, 4) for value in (one[k], other[k])]
+    shown = text.format(names=names, name=model.p_names[k], one=values[0], other=values[1])
     return [Reason(name, shown)]
 
 
@@ -228,10 +231,20 @@ def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fl
     return disagreement("attenuation", model, fit.parameters, fit.p, other, np.abs(fit.p - other) / found.se, text)
 
 
-def of_residuals(found: Uncertainty) -> list[Reason]:
-    """Residuals beyond what the sensors explain."""
+def of_weights(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+    """The same rows, weighted by the sensors' noise alone, disagree: a note, as no residual tells which is right."""
+    text = (
+        "With the weights of the sensors alone (--weights sensors) {names} would differ ({name}: {other} in place of "
+        "{one}): use the values that predict another run of this mechanism better."
+    )
+    reasons = _of_same_samples("weights", model, fit, found, other, of_other, text)
+    return [replace(one, alarm=False) for one in reasons]
+
+
+def of_residuals(found: Uncertainty, equation_error: bool = True) -> list[Reason]:
+    """Residuals beyond what the sensors explain, and beyond what they and an error of the equations explain."""
     out = []
-    if found.weighted_chi2 > _CHI2_WEIGHTED:
+    if equation_error and found.weighted_chi2 > _CHI2_WEIGHTED:
         out.append(
             Reason(
                 "shape",

@@ -6,11 +6,17 @@ and fast motion differently. Recorded runs of real rigs moved by up to 4 standar
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.rows import EquationError
 from pvid.oracle.fourier.solve import Fit, compensated, gauss_newton, sharpened
+
+# Rows are weighted by the sensors' noise and an error of the equations that is estimated from the residuals, or by the
+# sensors' noise alone.
+Weights = Literal["residuals", "sensors"]
 
 _PASSES = 10  # of whitening
 _STEPS = 10  # of Gauss-Newton between two

@@ -1,4 +1,4 @@
-"""Twin of fourier/fourier_finish_f32.c: from the sums of a whole window to rows, to steps of p, to the published estimate."""
+"""Twin of fourier/fourier_finish_f32.c: from the sums of a whole window to rows, steps of p, the published estimate."""
 
 from __future__ import annotations
 

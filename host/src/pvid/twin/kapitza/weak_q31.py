@@ -10,10 +10,19 @@ import numpy as np
 
 from pvid.twin.blocks import Blocks
 from pvid.twin.q31.integer import Int, round_shift, times_q31
+from pvid.twin.q31.scaled import Scaled
 
 W, D1, D2, C = range(4)
 _UP = 15  # p of 31 bits becomes 46, as a product of two of them shifted right by 16
 _DOWN = 16
+
+
+@dataclass(frozen=True)
+class ScaledModelQ31:
+    """pvid_scaled_model_q31: theta [n_theta, ...] and the non-zeros of C [n_c, ...] of p [n_p, ...], of any size."""
+
+    theta: Callable[[Scaled], Scaled]
+    jacobian: Callable[[Scaled], Scaled]
 
 
 @dataclass(frozen=True)
@@ -30,6 +39,7 @@ class ModelQ31:
     formats: Callable[[Sequence[int]], tuple[list[int], list[int]]]
     noisy: tuple[int, int] | None = None  # entries of N that hold the sensor's noise
     kind_end: tuple[int, ...] = ()  # one past the last theta of each kind of rows; empty: one kind
+    scaled: ScaledModelQ31 | None = None  # in place of theta, jacobian and formats
 
     @cached_property
     def blocks(self) -> Blocks:

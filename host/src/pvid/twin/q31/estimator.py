@@ -40,12 +40,18 @@ TERM_MAX = 2**40  # of |N_i theta_i|, far beyond the limit of a row
 HELD_LIMIT = 2 * SUM_LIMIT  # of |b|, rr and what a step may add to them
 UNIT_BITS = cholesky.RHS_BITS - 1
 _REST_BITS = 28  # of F, for a dead zone
+_THETA_BITS = 40  # of theta at the start, of a model with numbers of any size
 _NOTHING = -200  # exponent of a number that is 0
 
 
 def length(x: Int) -> Int:
     """Bits of |x|; very negative for 0, so that it never is the largest."""
     return np.where(x == 0, _NOTHING, bit_length(np.abs(x)))
+
+
+def _length(x: Scaled) -> Int:
+    """Bits of |x| before the point; very negative for 0."""
+    return np.where(x.m == 0, -9000, bit_length(np.abs(x.m)) + x.e)
 
 
 def decay(groups: int, block: int) -> int:
@@ -114,7 +120,8 @@ class EstimatorQ31:
         self.is_rate = first.gain < ONE  # a law that does not iterate
         self.divider = first.divider
         self.block, self.retention = integers([self._forgetting(c.forgetting_groups) for c in configs]).T
-        theta_bits, c_bits = model.formats(first.p_bits)
+        self._p_bits = integers(first.p_bits)[:, None]
+        theta_bits, c_bits = self._formats(first.p_bits)
         # e = Y - sum N_i theta_i 2^-align_i;  C in units of e per N_i per p_a is c_k 2^c_exponent_k
         self.align = [t + n - first.y_bits for t, n in zip(theta_bits, first.n_bits, strict=True)]
         self.c_exponent = [
@@ -122,7 +129,7 @@ class EstimatorQ31:
             for row, column, bits in zip(model.c_row, model.c_column, c_bits, strict=True)
         ]
         self.theta_bits = theta_bits
-        self.theta = model.theta(self.p)
+        self.theta = self._theta_of(self.p)
         self.phase = 0
         self.age = np.zeros(lanes, np.int64)
         self.exponent = np.zeros(lanes, np.int64)
@@ -131,6 +138,32 @@ class EstimatorQ31:
         self.counters = {name: np.zeros(lanes, np.int64) for name in COUNTERS}
         self.was_due = True
         self.prior, self.prior_exponent = self._square_ratio(self.row_sd, integers(-8))
+
+    def _numbers(self, p: Int) -> Scaled:
+        """p in its unit."""
+        return scaled(p, -self._p_bits)
+
+    def _theta_of(self, p: Int) -> Int:
+        """theta in its formats."""
+        if self.model.scaled is None:
+            return self.model.theta(p)
+        return clamp(self.model.scaled.theta(self._numbers(p)).fixed(integers(self.theta_bits)[:, None]), 2**60)
+
+    def _formats(self, p_bits: Sequence[int]) -> tuple[list[int], list[int]]:
+        """Formats of theta and C: those of the model, or from the start, which all lanes then share."""
+        model = self.model
+        if model.scaled is None:
+            return model.formats(p_bits)
+        start, sd = self._numbers(self.p), self._numbers(self.start_sd)
+        c = model.scaled.jacobian(start)
+        lengths = _length(model.scaled.theta(start))
+        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
+            change = Scaled(c.m[k], c.e[k]).times(Scaled(sd.m[column], sd.e[column]))
+            lengths[row] = np.maximum(lengths[row], _length(change))
+        if (lengths != lengths[:, :1]).any():
+            raise PvidError("lanes of one twin must share the formats of theta: their starts differ too much")
+        bits = clamp(_THETA_BITS - lengths[:, 0], 500)
+        return [int(one) for one in bits], [0] * len(model.c_row)
 
     def _square_ratio(self, sd: Int, exponent: Int) -> tuple[Int, Int]:
         """(sd 2^exponent / start_sd)^2 = prior 2^-prior_exponent, prior of 31 bits."""
@@ -165,7 +198,7 @@ class EstimatorQ31:
         """Sets p[index] before the first row, within its bounds."""
         self.p = self.p.copy()
         self.p[index] = np.clip(value, self.lower[index], self.upper[index])
-        self.theta = self.model.theta(self.p)
+        self.theta = self._theta_of(self.p)
 
     def innovation(self, n: Int, y: Int, kind: int = 0) -> tuple[Int, Mask]:
         """e = Y - N^T theta of a row [lanes], and whether the row fits; shapes as in `add`."""
@@ -341,8 +374,12 @@ class EstimatorQ31:
     def _jacobian(self, h: Int) -> tuple[Int, Int]:
         """(c, f): C_ka = c_k 2^(f_a - h_row), c within 29 bits less the guard bits."""
         model = self.model
-        c = model.jacobian(self.p)
         exponent = integers(self.c_exponent)[:, None] + h[self._c_row]
+        if model.scaled is None:
+            c = model.jacobian(self.p)
+        else:
+            c, more = model.scaled.jacobian(self._numbers(self.p))
+            exponent = exponent + more
         lengths = length(c) + exponent
         f = np.stack([np.maximum(lengths[own].max(axis=0), _NOTHING) for own in self._columns]) - self._bits
         return clamp(scale(c, f[self._c_column] - exponent), ONE // 2), f
@@ -465,7 +502,7 @@ class EstimatorQ31:
     def _follow(self, p: Int, m: Int, h: Int, b: Int, reason: Reasons, falls_back: Mask, in_dead_zone: Mask) -> Reasons:
         """Moves p, theta, b and rr together: b -= M dtheta, rr -= dtheta^T (b_old + b_new)."""
         model = self.model
-        theta = model.theta(p)
+        theta = self._theta_of(p)
         step = theta - self.theta
         align = integers(self.align)[:, None]
         v_h = np.max(length(step) - align + h, axis=0) - self._bits

@@ -1,0 +1,310 @@
+"""A board that identifies a described mechanism by the weak engine: settings, generated C, its text in a log."""
+
+from __future__ import annotations
+
+import secrets
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.base.toml_text import toml_document
+from pvid.board.stream_image import StreamImage, c_string
+from pvid.board.stream_rig import SLOWEST
+from pvid.codegen import files_design, files_fourier
+from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.sizes import raised
+from pvid.design.c_tables import float_literal
+from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Source
+from pvid.link.names import BoardNames
+from pvid.model.compiled import CompiledModel
+from pvid.models.mechanisms import names as shipped
+from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording
+from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, samples_of
+from pvid.run.mechanism import model_of
+from pvid.settings.enums import Law
+from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
+from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierNoise
+from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+from pvid.sim.simulated_run import RigSimulation
+
+_COMMAND = "pvid log"
+_PER_PARAMETER = ("start", "start_sd", "lower", "upper")
+_SINGLE = ("row_sd", "forgetting_s", "feedback_hz", "divider")
+_ARRAYS: dict[str, type[np.generic]] = {"error_order": np.uint8}  # the others are float32
+_TABLE = "engine"
+_SHORT, _WORDS = 16, 12  # numbers that are written as such; words in a line
+
+
+@dataclass(frozen=True, eq=False)
+class MechanismBoard:
+    """What a stream image is made for.
+
+    Attributes
+    ----------
+    rig : of the mechanism
+    compiled : the model with the values of the rig
+    config : settings and tables of the engine
+    recording : what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
+    """
+
+    rig: MechanismRig
+    compiled: CompiledModel
+    config: FourierConfig
+    recording: npt.NDArray[np.float32]
+
+    @classmethod
+    def of_recording(cls, rig: MechanismRig, recording: Recording) -> MechanismBoard:
+        """With the design and the tables that a recording of the rig asks for; the board's sensors read it.
+
+        Raises
+        ------
+        PvidError
+            When the recording is too short, or the engine does not have what the model needs.
+        """
+        compiled = model_of(rig)
+        recording.refuse_damaged()
+        whole = recording.whole()
+        config = config_for_recording(compiled, whole)
+        return cls(rig, compiled, config, samples_of(config, whole.signals))
+
+    @classmethod
+    def of_shipped_rig(cls, name: str) -> MechanismBoard:
+        """That of a shipped mechanism, whose sensors read a simulation.
+
+        Raises
+        ------
+        PvidError
+            Where there is no such mechanism, or the engine does not have what it needs.
+        """
+        simulated = simulated_rig(name)
+        rig = MechanismRig(name, simulated.sample_rate, known=simulated.knowns)
+        compiled = model_of(rig)
+        config = config_for_simulated_rig(compiled)
+        return cls(rig, compiled, config, samples_of(config, RigSimulation.of(compiled, simulated).run()))
+
+    def __post_init__(self) -> None:
+        if not self.config.sample_rate >= SLOWEST:
+            raise PvidError(f"the sample rate is {self.config.sample_rate:g} Hz, and a board streams at 1 Hz and more")
+
+    @property
+    def names(self) -> BoardNames:
+        """What the board says about itself."""
+        units = {one.name: one.unit for one in self.compiled.signals}
+        return BoardNames(
+            self.config.design.model.name,
+            tuple((name, units[name]) for name in self.config.design.model.sample_names),
+            tuple((one.name, one.unit) for one in self.compiled.unknowns),
+        )
+
+    @property
+    def p_names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(name for name, _ in self.names.parameters)
+
+    @property
+    def sample_rate(self) -> float:
+        """Ticks a second."""
+        return self.config.sample_rate
+
+    @property
+    def stream_image(self) -> StreamImage:
+        """Headers, generated C and sizes."""
+        model, design = self.config.design.model, self.config.design
+        made = fourier_functions_of(self.compiled)
+        listed = [f"{one.name} [{one.unit or '1'}]" for one in self.compiled.unknowns]
+        code = {
+            f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), _COMMAND),
+            f"{made.name}_weak_f32.c": files_fourier.source(made, model, _COMMAND),
+            "stream_tables.h": files_design.header(
+                self.config, sizes_of_design(design), _COMMAND, self.compiled.title, listed
+            ),
+        }
+        units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
+        macros = [
+            f"#define STREAM_CORE {int(Core.F32)}",
+            f"#define STREAM_FORM {int(Form.FOURIER)}",
+            f"#define STREAM_CONFIG {made.name}_config_f32",
+            f"#define STREAM_N_P {len(self.compiled.unknowns)}u",
+            f"#define STREAM_SAMPLES {model.samples}u",
+            f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
+            "#define STREAM_PHI_LSB 0.0f",
+            "#define STREAM_Y_LSB 0.0f",
+            f"#define STREAM_P_UNIT {{{units}}}",
+            f"#define STREAM_NAMES {c_string(self.names.text)}",
+        ]
+        return StreamImage(
+            number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
+            macros=macros,
+            files={**code, "stream_recording.h": _recording(self.recording)},
+            core="f32",
+            identifier="fourier_f32",
+            sensor="sensor_recording.c",
+            sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
+        )
+
+    def configure(
+        self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC, first_tick: int = 0
+    ) -> Configuration:
+        """The frame that configures a board whose image has these `settings`, with a new session number."""
+        own = self.config.estimator
+        places: dict[str, Any] = {
+            name: (*getattr(own, name).tolist(), *[0.0] * (MAX_P - len(own.start))) for name in _PER_PARAMETER
+        }
+        return Configure(
+            session=secrets.randbelow(2**32 - 1) + 1,
+            settings=settings,
+            form=int(Form.FOURIER),
+            source=int(source),
+            hash_every=hash_every,
+            estimate_every=estimate_every,
+            law=int(own.law),
+            first_tick=first_tick,
+            **places,
+            **{name: getattr(own, name) for name in _SINGLE},
+        )
+
+    def configured(self, frame: Configuration) -> FourierConfig:
+        """The settings with the values of a Configure frame.
+
+        Raises
+        ------
+        PvidError
+            For one of the other core, or a law that there is not.
+        """
+        if not isinstance(frame, Configure):
+            raise PvidError("the board's image contains another core than the log's settings")
+        if frame.law not in list(Law):
+            raise PvidError(f"the board was configured with law {frame.law}, which does not exist")
+        own = self.config.estimator
+        places: dict[str, Any] = {
+            name: np.array(getattr(frame, name)[: len(own.start)], np.float32) for name in _PER_PARAMETER
+        }
+        single = {name: getattr(frame, name) for name in _SINGLE}
+        return replace(self.config, estimator=replace(own, law=Law(frame.law), **places, **single))
+
+    def text(self) -> str:
+        """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
+        lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config).items()]
+        return "\n".join([self.rig.text(), f"[{_TABLE}]", *lines, ""])
+
+    @classmethod
+    def parse(cls, text: str) -> MechanismBoard | None:
+        """From the text of a log; None: that of another kind of rig.
+
+        Raises
+        ------
+        PvidError
+            Where it breaks off, or its mechanism is none of the shipped ones.
+        """
+        document = toml_document(text)
+        engine = document.pop(_TABLE, None)
+        if not isinstance(engine, dict):
+            return None
+        rig = MechanismRig.of_document(document)
+        if rig.model not in shipped():
+            raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
+        compiled = model_of(rig)
+        try:
+            config = _config(compiled, engine)
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
+        return cls(rig, compiled, config, np.zeros((0, config.design.model.samples), np.float32))
+
+
+def _recording(samples: npt.NDArray[np.float32]) -> str:
+    rows = [f"    {{{', '.join(float_literal(value) for value in row)}}}," for row in samples]
+    return "\n".join(
+        [
+            "/* Generated by pvid.board.mechanism_board: do not edit. */",
+            "#ifndef STREAM_RECORDING_H",
+            "#define STREAM_RECORDING_H",
+            "",
+            f"#define RECORDED_TICKS {len(samples)}u",
+            f"static const float recorded[RECORDED_TICKS][{samples.shape[1]}] = {{",
+            *rows,
+            "};",
+            "",
+            "#endif",
+            "",
+        ]
+    )
+
+
+# ---- the text of the settings: numbers as Python writes them, which read back exactly; long tables as their bits
+
+
+def _flat(config: FourierConfig) -> dict[str, Any]:
+    """Key -> value; keys of the parts have their names in front."""
+    parts: dict[str, Any] = {
+        "estimator": config.estimator,
+        "trust": config.trust,
+        "gate": config.gate,
+        "design": config.design,
+    }
+    found = {one.name: getattr(config, one.name) for one in fields(config) if one.name not in parts}
+    for part, owner in parts.items():
+        found |= {f"{part}_{one.name}": getattr(owner, one.name) for one in fields(owner) if one.name != "model"}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _written(value: Any) -> str:
+    match value:
+        case bool():
+            return str(value).lower()
+        case IntEnum():
+            return str(int(value))
+        case FourierFilter():
+            return _written(value.weights)
+        case np.ndarray() if value.size > _SHORT:  # the bits
+            words = [f"{word:08x}" for word in value.view(np.uint32).tolist()]
+            rows = [" ".join(words[k : k + _WORDS]) for k in range(0, len(words), _WORDS)]
+            return "\n".join(["'''", *rows, "'''"])
+        case FourierNoise():
+            return _written([value.kind, value.power, value.a, value.b, float(value.factor)])
+        case np.ndarray():
+            return _written(value.tolist())
+        case tuple() | list():
+            apart = ",\n" if len(value) > _SHORT else ", "
+            return f"[{apart.join(map(_written, value))}]"
+        case _:
+            return repr(value)
+
+
+def _array(value: Any, kind: type[np.generic] = np.float32) -> npt.NDArray[Any]:
+    if isinstance(value, str):
+        return np.array([int(word, 16) for word in value.split()], np.uint32).view(np.float32)
+    return np.array(value, kind)
+
+
+def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> FourierConfig:
+    def part(name: str) -> dict[str, Any]:
+        return {key.removeprefix(f"{name}_"): value for key, value in engine.items() if key.startswith(f"{name}_")}
+
+    def arrays(values: dict[str, Any]) -> dict[str, Any]:
+        return {
+            key: _array(value, _ARRAYS.get(key, np.float32)) if isinstance(value, list | str) else value
+            for key, value in values.items()
+        }
+
+    design = part("design")
+    filters = tuple(FourierFilter(_array(one)) for one in design.pop("filter"))
+    noise = tuple(FourierNoise(kind, power, a, b, np.float32(x)) for kind, power, a, b, x in design.pop("noise"))
+    made = FourierDesign32(model=fourier_model_of(compiled), filter=filters, noise=noise, **arrays(design))
+    estimator = arrays(part("estimator"))
+    own = {one.name: engine[one.name] for one in fields(FourierConfig) if one.name in engine}
+    return FourierConfig(
+        **arrays(own),
+        design=made,
+        estimator=EstimatorConfig(**{**estimator, "law": Law(estimator["law"])}),
+        trust=TrustConfig(**part("trust")),
+        gate=GateConfig(**part("gate")),
+    )

@@ -1,0 +1,101 @@
+"""A log of a described mechanism as a figure, under the names that the board gave: estimates, what is said of them, and
+the last seconds of the samples."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from pvid.base.errors import PvidError
+from pvid.base.figure_file import drawable, save
+from pvid.base.rounding import with_error
+from pvid.log.history import History
+from pvid.log.reader import LogReader
+from pvid.log.words import board_words, reason_words, residual_words
+from pvid.models.model import Mechanism
+from pvid.show.axis_limits import interesting
+
+_COLUMNS = 2
+_LINE = 130  # characters of the title
+_POINTS = 2000  # half of the most estimates that are drawn
+
+
+def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
+    """Draws it; the format follows the suffix of `path` (png, svg, pdf).
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read or holds no estimate, or the file cannot be written.
+    """
+    history, reader = History(mechanism, points=_POINTS), LogReader(log)
+    history.know(mechanism)  # whatever the board says later
+    for record in reader:
+        history.take(record)
+    t = history.estimates("t")
+    if not len(t):
+        raise PvidError(f"{log} holds no estimate: there is nothing to plot")
+    model = history.model
+    panels = len(model.parameters) + 2 + len(model.channels)
+    rows = -(-panels // _COLUMNS)
+    figure, grid = plt.subplots(rows, _COLUMNS, squeeze=False, figsize=(13, 1.5 + 1.9 * rows), layout="constrained")
+    try:
+        axes = list(grid.T.flat)
+        for one, axis in zip(model.parameters, axes, strict=False):
+            value, band = history.estimates(one.name), 2 * history.estimates(f"{one.name}_se")
+            axis.fill_between(t, value - band, value + band, color="C0", alpha=0.25, label="±2 standard errors")
+            axis.plot(t, value, color="C0", linewidth=1.2, label="estimate")
+            low, high = interesting(value, band)
+            if math.isfinite(low) and low < high:
+                axis.set_ylim(low, high)
+            axis.set_ylabel(one.name_and_unit)
+        rest = axes[len(model.parameters) :]
+        _quality(history, rest[0], rest[1])
+        seconds, *signals = history.samples()
+        for channel, x, axis in zip(model.channels, signals, rest[2:], strict=False):
+            axis.plot(seconds, x, color="C1", linewidth=0.8, label=f"last {history.window_s:g} s at most")
+            axis.set_ylabel(channel.name_and_unit)
+        for axis in axes[:panels]:
+            axis.grid(alpha=0.3)
+            axis.set_xlabel("time of the log [s]")
+        for axis in axes[panels:]:
+            axis.set_axis_off()
+        for axis in (axes[0], *rest[2:3]):
+            axis.legend(loc="upper right", fontsize="small")
+        lines = [f"{log.name}, {board_words(history.hello, reader.account)}", _last(history), reader.account.text]
+        folded = [part for line in lines for part in textwrap.wrap(drawable(line), _LINE) or [""]]
+        figure.suptitle("\n".join(folded), fontsize=11, parse_math=False)
+        save(figure, path, dpi=110)
+    finally:
+        plt.close(figure)
+
+
+def _quality(history: History, residual: Axes, kappa: Axes) -> None:
+    t = history.estimates("t")
+    residual.plot(t, history.estimates("residual"), color="C4")
+    residual.set_ylabel("residual")
+    residual.set_title(residual_words(history.hello), fontsize="small")
+    shown = history.estimates("kappa")
+    kappa.semilogy(t, np.where(shown > 0, shown, np.nan), color="C2")
+    kappa.set_ylabel(f"kappa of {history.model.p_names[0]}")
+
+
+def _last(history: History) -> str:
+    """The last estimate in words."""
+    newest = history.newest
+    parts = []
+    for one in history.model.parameters:
+        if math.isfinite(newest.get(one.name, math.nan)):
+            value, error = with_error(newest[one.name], newest[f"{one.name}_se"])
+            parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())
+    words = reason_words(history.reason)
+    return f"{', '.join(parts)} (± standard error); {history.reason}{': ' if words else ''}{words}"

@@ -1,0 +1,33 @@
+"""The bench of the weak engine against the oracle: its short form, and its table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bench import engine
+from pvid.sim.simulated_run import PERFECT, SOFT
+
+
+def test_the_engine_is_as_accurate_as_the_oracle() -> None:
+    """Ratio of the RMS errors over three runs from starts within +-50 %; 20 runs: `pvid bench engine`."""
+    case = engine.Case("kapitza", SOFT)
+    counted = []
+    found = engine.errors_of(case, 3, lambda: counted.append(1))
+    assert len(counted) == 3 and found.published == 3
+    # Three runs: errors of 0.1 standard error between the two move a ratio by some 0.1 / sqrt(3).
+    assert found.ratios().max() < 1.2
+    assert np.sqrt(np.mean(found.apart**2)) < 0.2
+    row = engine.row_of(case, found)
+    assert len(row) == len(engine.HEADER)
+    assert row[:5] == ("kapitza", "none", "12", "3", "3")
+
+
+def test_mechanisms_with_friction_have_two_cases() -> None:
+    assert [one.friction for one in engine.cases(["kapitza", "dc_motor"])] == ["none", "soft", "sharp"]
+    assert engine.cases(["dc_motor"])[1].law is PERFECT
+
+
+def test_ratios_are_by_parameter() -> None:
+    one = engine.Errors(np.array([[3.0, 0.0], [4.0, 2.0]]), np.array([[1.0, 2.0], [7.0, 2.0]]), np.zeros((2, 2)), 2, 12)
+    assert one.ratios() == pytest.approx([(25 / 50) ** 0.5, (4 / 8) ** 0.5])
