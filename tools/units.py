@@ -104,6 +104,8 @@ def applications(machine: str) -> list[Unit]:
                 found += _units(machine, [stream / "main.c"], *kind)
             if first:
                 found += _units(machine, [stream / "answers.c", stream / "sensor.c"], *kind)
+                engine = (RIG, board, "-DSTREAM_CORE=0", "-DSTREAM_FORM=2")
+                found += _units(machine, [stream / "identifier_fourier_f32.c", stream / "sensor_recording.c"], *engine)
     return found
 
 

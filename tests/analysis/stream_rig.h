@@ -3,7 +3,9 @@
 #ifndef STREAM_RIG_H
 #define STREAM_RIG_H
 
-#if (STREAM_CORE == 1) && (STREAM_FORM == 1)
+#if STREAM_FORM == 2
+#define STREAM_CONFIG motor_config_f32
+#elif (STREAM_CORE == 1) && (STREAM_FORM == 1)
 #define STREAM_TYPE pvid_weak_q31
 #define STREAM_CONFIG pvid_weak_config_q31
 #define STREAM_INIT pvid_weak_init_q31
@@ -32,6 +34,8 @@
 
 #define STREAM_SETTINGS 0x12345678u
 #define STREAM_N_P 4u
+#define STREAM_SAMPLES 2u
+#define STREAM_NAMES "motor\nsample V V\nsample i A\np R ohm"
 #define STREAM_SAMPLE_RATE 1000.0f
 #define STREAM_PHI_LSB 3.8e-4f
 #define STREAM_Y_LSB 5.0e-6f

@@ -95,7 +95,7 @@ static void answer(uint8_t type, const uint8_t payload[], size_t length)
 static void answer_hello(void)
 {
     static const char board[] = PVID_BOARD_NAME;
-    static const float p_unit[LINK_MAX_P] = STREAM_P_UNIT;
+    static const float p_unit[] = STREAM_P_UNIT; /* at most LINK_MAX_P */
     uint8_t payload[PVID_HELLO_BYTES];
     memset(payload, 0, sizeof payload);
     payload[PVID_HELLO_FORM] = STREAM_FORM;
@@ -107,7 +107,7 @@ static void answer_hello(void)
     pvid_put_f32(&payload[PVID_HELLO_SAMPLE_RATE], STREAM_SAMPLE_RATE);
     pvid_put_f32(&payload[PVID_HELLO_PHI_LSB], STREAM_PHI_LSB);
     pvid_put_f32(&payload[PVID_HELLO_Y_LSB], STREAM_Y_LSB);
-    for (size_t i = 0; i < LINK_MAX_P; i++) {
+    for (size_t i = 0; i < (sizeof p_unit / sizeof p_unit[0]); i++) {
         pvid_put_f32(&payload[PVID_HELLO_P_UNIT + (4u * i)], p_unit[i]);
     }
     for (size_t i = 0; (i < (sizeof board - 1u)) && (i < (PVID_HELLO_TICK_HIGH - PVID_HELLO_BOARD)); i++) {
