@@ -67,6 +67,16 @@ def test_the_answer_is_a_table_with_the_reason_of_the_last_window(recorded: dict
     assert "last window: updated; chi2 " in answer.stdout
 
 
+def test_a_simulated_run_of_the_described_pendulum_is_identified_from_its_description(tmp_path: Path) -> None:
+    """Its rig file names the mechanism that the core has a form of its own for."""
+    run = tmp_path / "run.csv"
+    assert pvid("model", "simulate", "kapitza", run, "--duration", "20").return_value == DONE
+    answer = json.loads(pvid("identify", run, "--json").stdout)
+    assert answer["identified"] and answer["core"] == "f64"
+    truth = simulated_rig("kapitza").truth
+    assert all(abs(answer["parameters"][name]["value"] / truth[name] - 1) < 0.01 for name in ("w", "d1", "d2"))
+
+
 def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(recorded: dict[str, Path]) -> None:
     rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
     core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
