@@ -39,3 +39,14 @@ def test_every_imperfection_is_one_that_the_mechanism_can_have() -> None:
     assert [row[1] for row in rows][0] == "none" and all(len(row) == len(mechanisms.IMPERFECT) for row in rows)
     late = next(row for row in rows if row[1] == "one sensor a sample late")
     assert "sensor" in late[6] and late[7] == "0/1"
+
+
+def test_what_two_windows_can_say_is_shown_where_they_do_not_suffice(monkeypatch: pytest.MonkeyPatch) -> None:
+    outcome = mechanisms.smooth("dc_motor", 2)
+    assert not list(mechanisms.two_window_rows("dc_motor", "soft", outcome))
+    monkeypatch.setattr(mechanisms, "CLOSE", 0.0)
+    rows = list(mechanisms.two_window_rows("dc_motor", "soft", outcome))
+    assert [row[2] for row in rows] == list(outcome.simulation.model.p_names)
+    assert all(len(row) == len(mechanisms.TWO_WINDOWS) and row[3] == "2/2" for row in rows)
+    # The rows of two windows that overlap by half do not use all that their samples say.
+    assert all(float(row[5]) > 0.5 * float(row[6]) > 0 for row in rows)

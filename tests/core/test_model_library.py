@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,8 +13,8 @@ import pytest
 from pvid.base.errors import PvidError
 from pvid.core import model_library
 from pvid.core.fourier_native import FourierNative
-from pvid.core.sizes import default_sizes, raised
-from pvid.core.sources import FIRMWARE
+from pvid.core.sizes import default_sizes, least_sizes, raised, smallest
+from pvid.core.sources import FIRMWARE, PUBLIC_INCLUDES
 
 MODEL = """
 #include <stddef.h>
@@ -72,3 +73,15 @@ def test_sizes_that_exceed_the_defaults_are_the_ones_of_config_h() -> None:
     assert set(usual) == set(re.findall(r"#ifndef (PVID_MAX_\w+)", text))
     assert usual["PVID_MAX_P"] == 4
     assert raised({"PVID_MAX_P": 7, "PVID_MAX_THETA": 3}) == {"PVID_MAX_P": 7}
+
+
+def test_the_smallest_sizes_are_within_the_limits_of_config_h(tmp_path: Path) -> None:
+    assert set(least_sizes()) == set(default_sizes())
+    assert all(least_sizes()[name] <= usual for name, usual in default_sizes().items())
+    needed = smallest(dict.fromkeys(default_sizes(), 1))
+    (tmp_path / "x.c").write_text('#include "pvid/config.h"\ntypedef int nothing;\n', encoding="utf-8")
+    sizes = [f"-D{name}={size}" for name, size in needed.items()]
+    command = ["gcc", "-std=c99", *PUBLIC_INCLUDES, "-fsyntax-only", str(tmp_path / "x.c")]
+    assert subprocess.run([*command, *sizes], check=False).returncode == 0
+    less = [f"-D{name}={size - 1}" for name, size in needed.items() if name == "PVID_MAX_THETA"]
+    assert subprocess.run([*command, *less], capture_output=True, check=False).returncode != 0

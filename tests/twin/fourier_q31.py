@@ -39,17 +39,7 @@ Int = npt.NDArray[np.int64]
 
 # Designs that the engine has; those of the rigs but for long windows, which would make the tests slow.
 DESIGNS = {
-    "kapitza": FourierDesign(
-        1000.0,
-        1.28,
-        9,
-        6,
-        decimation=16,
-        taps=41,
-        degree=6,
-        rate_taps=41,
-        rate_degree=6,
-    ),
+    "kapitza": FourierDesign(1000.0, 1.28, 9, 6, decimation=16, taps=61, rate_taps=101, rate_degree=6),
     "dc_motor": FourierDesign(1000.0, 0.4, 16, 6, rate_taps=21, rate_degree=3),
     "cart_pendulum": FourierDesign(1000.0, 0.96, 12, 6, decimation=4, taps=41, rate_taps=41, rate_degree=4),
     "furuta": FourierDesign(1000.0, 0.96, 12, 6, decimation=4, taps=41, rate_taps=41, rate_degree=4),
@@ -136,7 +126,7 @@ class Rig:
     def sizes(self) -> dict[int, float]:
         """Largest sum of |channel| over a window, integrals counted from the start of the window, by place."""
         design = self.design
-        made = steps(jets(self.counts, design), design, np.zeros(design.model.runs, np.int64))
+        made = steps(jets(self.counts, design), design, np.zeros(design.model.runs, np.int64), 2)
         out = {}
         for place, one in enumerate(design.model.channel):
             if one.gain == NONE:

@@ -22,7 +22,7 @@ Frozen = npt.NDArray[np.uint8]
 
 TICKS = 3000
 
-# Of a parameter after three windows or more from a start 40 % off; a friction that hardly shows by then: 10 %.
+# Of a parameter after two windows or more from a start 40 % off; a friction that hardly shows by then: 10 %.
 _CLOSE = 0.04
 _FRICTION = 0.1
 

@@ -11,6 +11,8 @@
 #include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
+#include "pvid/scaled_q31.h"
 
 /* Three kinds with 2, 1 and 3 theta; p[1] occurs in all of them. theta = p0, p1, p1 p2, p1, p2, p0 p1. */
 #define N_THETA 6
@@ -308,6 +310,202 @@ static void several_kinds_find_their_parameters(void **state)
     assert_int_equal(estimator.counters.rows, 600);
 }
 
+/* b, behind the moments in the sums. */
+static float b_of(const pvid_estimator_f32 *estimator, size_t i)
+{
+    return estimator->information.high[MOMENTS + i] + estimator->information.low[MOMENTS + i];
+}
+
+static void a_vector_is_added_to_b_or_refused(void **state)
+{
+    (void)state;
+    const float fits[N_THETA] = {1.0f, -2.0f, 3.0f, -4.0f, 5.0f, -1.0e28f};
+    for (int law = 0; law < 2; law++) {
+        pvid_estimator_config_f32 fresh = config();
+        fresh.feedback_hz = (law == 0) ? 0.0f : 50.0f;
+        pvid_estimator_f32 estimator;
+        assert_int_equal(pvid_estimator_init_f32(&estimator, &fresh), PVID_OK);
+        assert_int_equal(pvid_estimator_add_to_b_f32(&estimator, fits), PVID_ACCUMULATED);
+        for (size_t i = 0; i < N_THETA; i++) {
+            assert_true(b_of(&estimator, i) == fits[i]);
+        }
+        /* C^T g at p = 1.5: the step of a law with g < 1 takes it like N e of a row */
+        assert_true(estimator.innovation[1] ==
+                    ((law == 0) ? 0.0f : ((-2.0f + (1.5f * 3.0f)) - 4.0f) + (1.5f * -1.0e28f)));
+        const pvid_estimator_f32 before = estimator;
+        float large[N_THETA] = {0.0f};
+        large[3] = 1.1e28f;
+        assert_int_equal(pvid_estimator_add_to_b_f32(&estimator, large), PVID_REJECTED_SATURATED);
+        large[5] = large[3] * 1.0e38f;
+        assert_int_equal(pvid_estimator_add_to_b_f32(&estimator, large), PVID_REJECTED_NOT_FINITE);
+        assert_memory_equal(&estimator.information, &before.information, sizeof before.information);
+        assert_memory_equal(estimator.innovation, before.innovation, sizeof before.innovation);
+        assert_int_equal(estimator.counters.rejected_saturated, 1);
+        assert_int_equal(estimator.counters.rejected_not_finite, 1);
+    }
+}
+
+/* ---- fixed point: the same model with numbers of any size ---- */
+
+static const pvid_scaled_q31 one = {1 << 29, -29};
+
+static void numbers_theta(const pvid_scaled_q31 p[], pvid_scaled_q31 theta[])
+{
+    theta[0] = p[0];
+    theta[1] = p[1];
+    theta[2] = pvid_scaled_times_q31(p[1], p[2]);
+    theta[3] = p[1];
+    theta[4] = p[2];
+    theta[5] = pvid_scaled_times_q31(p[0], p[1]);
+}
+
+static void numbers_jacobian(const pvid_scaled_q31 p[], pvid_scaled_q31 c[])
+{
+    const pvid_scaled_q31 values[N_C] = {one, p[1], one, p[2], one, p[0], p[1], one};
+    memcpy(c, values, sizeof values);
+}
+
+static pvid_scaled_model_q31 numbers = {numbers_theta, numbers_jacobian, &pvid_read_scaled_q31};
+static pvid_model_q31 fixed = {
+    .n_theta = N_THETA,
+    .n_p = N_P,
+    .n_kinds = N_KINDS,
+    .n_c = N_C,
+    .positive = 7u,
+    .kind_end = kind_end,
+    .c_row = c_row,
+    .c_column = c_column,
+    .scaled = &numbers,
+};
+
+static pvid_estimator_config_q31 fixed_config(void)
+{
+    pvid_estimator_config_q31 fresh = {
+        .model = &fixed,
+        .y_bits = 10,
+        .row_sd = 256,
+        .gain = 1 << 30,
+        .correlation = 1u << 16,
+        .row_weight = 1u << 16,
+        .step_limit = 19661,
+        .divider = 1,
+    };
+    for (size_t a = 0; a < N_P; a++) {
+        fresh.start[a] = 3 << 23; /* 1.5 */
+        fresh.start_sd[a] = 1 << 24;
+        fresh.lower[a] = 1 << 20;
+        fresh.upper[a] = 10 << 24;
+        fresh.p_bits[a] = 24;
+    }
+    return fresh;
+}
+
+static void fixed_point_finds_the_parameters_of_several_kinds(void **state)
+{
+    (void)state;
+    const float truth[N_P] = {1.25f, 0.75f, 3.0f};
+    const pvid_estimator_config_q31 fresh = fixed_config();
+    pvid_estimator_q31 estimator;
+    float theta[N_THETA];
+    theta_of(truth, theta);
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &fresh), PVID_OK);
+    assert_int_equal(estimator.information.n_sums, MOMENTS + N_THETA + 2);
+    for (int group = 0; group < 200; group++) {
+        for (size_t kind = 0; kind < N_KINDS; kind++) {
+            const pvid_block block = block_of(pvid_kind_first(kind_end, kind));
+            int32_t n[3];
+            float y = 0.0f;
+            for (size_t i = 0; i < block.n; i++) {
+                const float entry = integer();
+                n[i] = (int32_t)entry;
+                y += entry * theta[block.first + i];
+            }
+            assert_int_equal(pvid_estimator_add_kind_q31(&estimator, (uint8_t)kind, n, (int32_t)(y * 1024.0f)),
+                             PVID_ACCUMULATED);
+        }
+        assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
+    }
+    for (size_t a = 0; a < N_P; a++) { /* 2^-10 of Y, and the prior's pull */
+        assert_true(fabsf(((float)estimator.p[a] / 16777216.0f) - truth[a]) < 1.0e-4f);
+    }
+    const int32_t n[3] = {0};
+    assert_int_equal(pvid_estimator_add_kind_q31(&estimator, N_KINDS, n, 0), PVID_NOT_READY);
+}
+
+static void a_fixed_point_vector_is_added_to_b_or_refused(void **state)
+{
+    (void)state;
+    for (int law = 0; law < 2; law++) {
+        pvid_estimator_config_q31 fresh = fixed_config();
+        fresh.gain = (law == 0) ? (1 << 30) : (1 << 28);
+        pvid_estimator_q31 estimator;
+        assert_int_equal(pvid_estimator_init_q31(&estimator, &fresh), PVID_OK);
+        estimator.information.exponent = 1; /* b in units of 4 */
+        pvid_scaled_q31 g[N_THETA] = {{0, 0}, {-(1 << 30), -20}, {1 << 30, 30}};
+        assert_int_equal(pvid_estimator_add_to_b_q31(&estimator, g), PVID_ACCUMULATED);
+        const int64_t *b = &estimator.information.sums[MOMENTS];
+        assert_int_equal(b[0], 0);
+        assert_int_equal(b[1], -256);
+        assert_int_equal(b[2], (int64_t)1 << 58);
+        assert_int_equal(estimator.fresh[1], (law == 0) ? 0 : -256);
+        const pvid_estimator_q31 before = estimator;
+        g[2].e = 34;
+        assert_int_equal(pvid_estimator_add_to_b_q31(&estimator, g), PVID_REJECTED_SATURATED);
+        assert_memory_equal(&estimator.information, &before.information, sizeof before.information);
+        assert_int_equal(estimator.counters.rejected_saturated, 1);
+    }
+}
+
+static pvid_status init_fixed(void)
+{
+    const pvid_estimator_config_q31 fresh = fixed_config();
+    pvid_estimator_q31 estimator;
+    return pvid_estimator_init_q31(&estimator, &fresh);
+}
+
+static void a_fixed_point_model_is_whole_or_refused(void **state)
+{
+    (void)state;
+    static const uint8_t early[3] = {2, 3, 5};
+    const pvid_model_q31 kept = fixed;
+    const pvid_scaled_model_q31 kept_numbers = numbers;
+    assert_int_equal(init_fixed(), PVID_OK);
+    numbers.theta = NULL;
+    assert_int_equal(init_fixed(), PVID_BAD_MODEL);
+    numbers = kept_numbers;
+    numbers.jacobian = NULL;
+    assert_int_equal(init_fixed(), PVID_BAD_MODEL);
+    numbers = kept_numbers;
+    numbers.adapter = NULL;
+    assert_int_equal(init_fixed(), PVID_BAD_MODEL);
+    numbers = kept_numbers;
+    fixed.scaled = NULL; /* and no functions of integers */
+    assert_int_equal(init_fixed(), PVID_BAD_MODEL);
+    fixed = kept;
+    fixed.kind_end = early;
+    assert_int_equal(init_fixed(), PVID_BAD_MODEL);
+    fixed.kind_end = NULL;
+    assert_int_equal(init_fixed(), PVID_BAD_MODEL);
+    fixed = kept;
+}
+
+/* theta_bits: 40 bits of theta at the start, or of what start_sd changes it by. */
+static void formats_of_theta_follow_the_start(void **state)
+{
+    (void)state;
+    pvid_estimator_config_q31 fresh = fixed_config();
+    pvid_estimator_q31 estimator;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &fresh), PVID_OK);
+    assert_int_equal(estimator.theta_bits[0], 39); /* 1.5: one bit before the point */
+    assert_int_equal(estimator.theta_bits[2], 38); /* 2.25 */
+    assert_true(estimator.theta[0] == ((int64_t)3 << 38));
+    fresh.start_sd[0] = 10 << 24;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &fresh), PVID_OK);
+    assert_int_equal(estimator.theta_bits[0], 36);
+    pvid_estimator_place_q31(&estimator, 0, (int64_t)9 << 24);
+    assert_true(estimator.theta[0] == ((int64_t)9 << 36));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -317,6 +515,11 @@ int main(void)
         cmocka_unit_test(kinds_divide_theta_or_are_refused),
         cmocka_unit_test(a_model_with_functions_of_its_own_has_one_kind),
         cmocka_unit_test(several_kinds_find_their_parameters),
+        cmocka_unit_test(a_vector_is_added_to_b_or_refused),
+        cmocka_unit_test(fixed_point_finds_the_parameters_of_several_kinds),
+        cmocka_unit_test(a_fixed_point_vector_is_added_to_b_or_refused),
+        cmocka_unit_test(a_fixed_point_model_is_whole_or_refused),
+        cmocka_unit_test(formats_of_theta_follow_the_start),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -229,6 +229,7 @@ static void estimators_and_differentiators_do_nothing_either(void **state)
     static pvid_differentiator_q31 differentiator_q31;
     const float n[PVID_MAX_THETA] = {0.0f};
     const int32_t n_q31[PVID_MAX_THETA_Q31] = {0};
+    const pvid_scaled_q31 g_q31[PVID_MAX_THETA_Q31] = {{0, 0}};
     float out[PVID_ORDERS];
     int32_t d_phi[PVID_ORDERS];
     int32_t d_y[PVID_Y_ORDERS_Q31];
@@ -243,6 +244,8 @@ static void estimators_and_differentiators_do_nothing_either(void **state)
         assert_int_equal(pvid_estimator_iterate_f32(self), PVID_NOT_READY);
         pvid_estimator_place_f32(self, n);
         assert_int_equal(pvid_estimator_add_q31(self_q31, n_q31, 0), PVID_NOT_READY);
+        assert_int_equal(pvid_estimator_add_kind_q31(self_q31, 0, n_q31, 0), PVID_NOT_READY);
+        assert_int_equal(pvid_estimator_add_to_b_q31(self_q31, g_q31), PVID_NOT_READY);
         assert_int_equal(pvid_estimator_update_q31(self_q31), PVID_NOT_READY);
         assert_int_equal(pvid_estimator_iterate_q31(self_q31), PVID_NOT_READY);
         pvid_estimator_place_q31(self_q31, 0, 1);

@@ -46,7 +46,7 @@ void pvid_fourier_collect_init_q31(pvid_fourier_collect_q31 *self, const pvid_fo
     self->at_once = design->decimation < SHARING;
     self->slices_per_tick = (uint8_t)slices(design);
     pvid_fourier_front_init_q31(&self->front, design);
-    pvid_fourier_values_init_q31(&self->values);
+    pvid_fourier_values_init_q31(&self->values, pvid_fourier_front_lead_q31(design));
     pvid_fourier_collect_reset_q31(self);
 }
 

@@ -4,7 +4,7 @@
  *   sum over terms  factor (-1)^m (i omega_h)^m S_h[channel]
  *
  * over their standard deviations, without what the test functions leave out (white_f32.c). The products of a term have
- * 61 bits and an exponent of their own; they are added with that of the largest, then rounded to a block. */
+ * 61 bits and an exponent of their own; they are added with that of the largest weight, then rounded to a block. */
 #include "fourier/columns_q31.h"
 
 #include <string.h>
@@ -14,7 +14,7 @@
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 
-#define SUM_BITS 45 /* of the largest product; 2^16 of them fit */
+#define GUARD 4 /* bits that the products of 61 bits lose at least: 64 of them fit */
 #define KEPT_BITS 20
 #define SQUARE_DOWN 16u
 
@@ -33,68 +33,72 @@ static turn turn_of(uint8_t order)
     return result;
 }
 
-/* factor h^order / sqrt(D_h) */
+/* factor h^order / sqrt(D_h): m 2^e with |m| <= 2^30. */
 static pvid_scaled_q31 weight_of(pvid_scaled_q31 factor, uint8_t order, size_t h, pvid_scaled_q31 scale)
 {
-    int64_t power = 1;
+    int32_t power = 1;
     for (size_t i = 0; i < order; i++) {
-        power *= (int64_t)h;
+        power *= (int32_t)h;
     }
-    return pvid_scaled_times_q31(pvid_scaled_times_q31(factor, scale), pvid_scaled_of_q31(power, 0));
+    const int32_t bits = (int32_t)pvid_bit_length_q31((uint64_t)power);
+    const int32_t both = (int32_t)pvid_floor_shift_q31(pvid_product_q31(factor.m, scale.m), 30);
+    const pvid_scaled_q31 weight = {(int32_t)pvid_floor_shift_q31(pvid_product_q31(both, power), (uint32_t)bits),
+                                    factor.e + scale.e + 30 + bits};
+    return weight;
 }
 
-/* Bits of the value of a product before its exponent. */
-static int32_t length_of(pvid_scaled_q31 weight, int32_t s)
+/* The greatest exponent of the weights of a column, at least `top`. */
+static int32_t greatest(const pvid_fourier_design_q31 *design, const pvid_fourier_white_q31 *white, size_t t,
+                        int32_t top)
 {
-    return (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(s)) + 30 + weight.e;
+    int32_t found = top;
+    for (size_t h = 0; h < white->cosines; h++) {
+        const pvid_scaled_q31 weight = weight_of(design->factor[t], design->model->term[t].order, h, white->scale[h]);
+        found = ((weight.m != 0) && (weight.e > found)) ? weight.e : found;
+    }
+    return found;
 }
 
-/* A term at harmonic h: `adds` its products to the column, else finds the longest. */
+/* Adds a term at harmonic h. */
 static void take_term(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
-                      const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t t, size_t h,
-                      bool adds)
+                      const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t t, size_t h)
 {
     const pvid_fourier_term_q31 term = design->model->term[t];
-    const size_t rows = pvid_fourier_rows_q31(design);
     const turn turned = turn_of(term.order);
     const pvid_scaled_q31 weight = weight_of(design->factor[t], term.order, h, white->scale[h]);
-    const size_t parts = ((h > 0u) && ((white->cosines + h) <= rows)) ? 2u : 1u;
-    for (size_t part = 0; (part < parts) && (weight.m != 0); part++) {
-        const int32_t s = window->s[term.channel][h][turned.part[part]];
-        if (s == 0) {
-            continue;
-        }
-        if (adds) {
-            const int64_t product = pvid_product_q31(turned.is_negative[part] ? -s : s, weight.m);
-            const size_t row = (part == 0u) ? h : ((white->cosines + h) - 1u);
-            self->sum[row] += pvid_scale_q31(product, (self->longest - SUM_BITS) - weight.e);
-        } else {
-            const int32_t length = length_of(weight, s);
-            self->longest = (length > self->longest) ? length : self->longest;
-        }
+    if (weight.m == 0) {
+        return;
+    }
+    const uint32_t shift = (uint32_t)((self->top - weight.e) + GUARD);
+    const int32_t *s = window->s[term.channel][h];
+    const int32_t re = turned.is_negative[0] ? -s[turned.part[0]] : s[turned.part[0]];
+    self->sum[h] += pvid_round_shift_q31(pvid_product_q31(re, weight.m), shift);
+    if ((h > 0u) && ((white->cosines + h) <= pvid_fourier_rows_q31(design))) {
+        const int32_t im = turned.is_negative[1] ? -s[turned.part[1]] : s[turned.part[1]];
+        self->sum[(white->cosines + h) - 1u] += pvid_round_shift_q31(pvid_product_q31(im, weight.m), shift);
     }
 }
 
-/* For each harmonic: what is longest; then for each: the sums; then the block. */
+/* The greatest exponent; each harmonic; the block. */
 void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
                                    const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
                                    size_t place, size_t first, size_t end, size_t part)
 {
-    const size_t harmonics = white->cosines;
     if (part == 0u) {
         memset(self->sum, 0, sizeof self->sum);
-        self->longest = INT32_MIN;
-    }
-    if (part < (2u * harmonics)) {
-        const bool adds = part >= harmonics;
+        self->top = INT32_MIN;
         for (size_t t = first; t < end; t++) {
-            take_term(self, design, white, window, t, adds ? (part - harmonics) : part, adds);
+            self->top = greatest(design, white, t, self->top);
         }
-        return;
+    } else if (part <= white->cosines) {
+        for (size_t t = first; t < end; t++) {
+            take_term(self, design, white, window, t, part - 1u);
+        }
+    } else {
+        const int32_t exponent = pvid_fourier_block_q31(self->sum, 0, pvid_fourier_rows_q31(design), self->x[place]);
+        const int32_t unit = (self->top == INT32_MIN) ? 0 : (self->top + GUARD);
+        self->exponent[place] = (int16_t)pvid_clamp_q31((int64_t)unit + exponent, INT16_MAX);
     }
-    const int32_t exponent = pvid_fourier_block_q31(self->sum, 0, pvid_fourier_rows_q31(design), self->x[place]);
-    const int32_t unit = (self->longest == INT32_MIN) ? 0 : (self->longest - SUM_BITS);
-    self->exponent[place] = (int16_t)pvid_clamp_q31((int64_t)unit + exponent, INT16_MAX);
 }
 
 uint64_t pvid_fourier_columns_square_q31(const pvid_fourier_design_q31 *design, const int32_t x[])

@@ -10,7 +10,7 @@
 /* Parts of making a column. */
 static inline size_t pvid_fourier_column_parts_q31(const pvid_fourier_white_q31 *white)
 {
-    return (2u * (size_t)white->cosines) + 1u;
+    return (size_t)white->cosines + 2u;
 }
 
 /* The next part of making column `place` of a kind in standard deviations, from its terms first..end-1 and the sums of

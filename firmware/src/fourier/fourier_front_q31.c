@@ -67,12 +67,10 @@ void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourie
 
 void pvid_fourier_front_reset_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design)
 {
-    /* the first step has two ticks before it at least: signals of several samples are right there */
-    const uint16_t before = (self->half > 2u) ? self->half : 2u;
     self->head = 0;
     self->seen = false;
     self->jet = design->model->jets;
-    self->wait = (uint16_t)(self->half + before + 1u);
+    self->wait = (uint16_t)(self->half + pvid_fourier_front_lead_q31(design) + 1u);
 }
 
 /* The samples before: all equal to the first one since a restart. */

@@ -9,6 +9,13 @@
 /* Half of the longest filter of the jets. */
 uint16_t pvid_fourier_front_half_q31(const pvid_fourier_design_q31 *design);
 
+/* Ticks from the first sample to the first step: two at least, so that signals of several samples are right there. */
+static inline uint16_t pvid_fourier_front_lead_q31(const pvid_fourier_design_q31 *design)
+{
+    const uint16_t half = pvid_fourier_front_half_q31(design);
+    return (half > 2u) ? half : 2u;
+}
+
 /* Ticks that a job takes: half of a block at most, but one at least. */
 uint32_t pvid_fourier_front_job_q31(const pvid_fourier_design_q31 *design);
 

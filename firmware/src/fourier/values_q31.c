@@ -14,9 +14,10 @@
 #include "fourier/rescale_q31.h"
 #include "pvid/elementary_q31.h"
 
-void pvid_fourier_values_init_q31(pvid_fourier_values_q31 *self)
+void pvid_fourier_values_init_q31(pvid_fourier_values_q31 *self, uint16_t lead)
 {
     memset(self, 0, sizeof *self);
+    self->lead = lead;
 }
 
 void pvid_fourier_values_reset_q31(pvid_fourier_values_q31 *self)
@@ -57,11 +58,19 @@ static void complete_inputs(pvid_fourier_values_q31 *self, const pvid_fourier_de
     }
 }
 
-static void take_newest(pvid_fourier_values_q31 *self, const pvid_fourier_model_q31 *model, const int32_t jet[],
+static void take_newest(pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design, const int32_t jet[],
                         const int32_t newest[])
 {
+    const pvid_fourier_model_q31 *model = design->model;
     for (size_t i = 0; i < model->runs; i++) {
-        const int64_t rise = (self->known > 0u) ? ((int64_t)self->rate[i] + newest[i]) : 0;
+        int64_t rise = 0; /* over a gap */
+        if (self->known > 0u) {
+            rise = (int64_t)self->rate[i] + newest[i];
+        } else if (!self->ran) { /* from the first sample to the first step */
+            rise = (2 * ((int64_t)newest[i] * self->lead)) / design->decimation;
+        } else {
+            /* the run stays */
+        }
         self->run[i] = pvid_clamp_q31(self->run[i] + rise, PVID_WIDE);
         self->rate[i] = newest[i];
     }
@@ -70,6 +79,7 @@ static void take_newest(pvid_fourier_values_q31 *self, const pvid_fourier_model_
         self->v[0][i] = newest[model->runs + i];
     }
     memcpy(self->now, jet, model->jets * sizeof jet[0]);
+    self->ran = true;
 }
 
 /* Integrals at the step before that of the integrands f; at the first step of a half they begin anew. */
@@ -154,7 +164,7 @@ pvid_fourier_outcome pvid_fourier_values_step_q31(pvid_fourier_values_q31 *self,
         memcpy(self->gain, out, model->gains * sizeof out[0]);
         memcpy(self->f[0], f, model->integrands * sizeof f[0]);
     }
-    take_newest(self, model, jet, newest);
+    take_newest(self, design, jet, newest);
     self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
     return complete ? PVID_FOURIER_CHANNELS : PVID_FOURIER_NO_CHANNELS;
 }

@@ -21,8 +21,8 @@ static inline size_t pvid_fourier_summed_q31(const pvid_fourier_model_q31 *model
     return (model->channel[last].gain == PVID_FOURIER_NONE) ? last : (last + 1u);
 }
 
-/* The runs start at 0. */
-void pvid_fourier_values_init_q31(pvid_fourier_values_q31 *self);
+/* The runs start at the first sample, `lead` ticks before the first step. */
+void pvid_fourier_values_init_q31(pvid_fourier_values_q31 *self, uint16_t lead);
 
 /* After missing samples: the runs are kept. */
 void pvid_fourier_values_reset_q31(pvid_fourier_values_q31 *self);

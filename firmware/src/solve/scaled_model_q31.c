@@ -18,7 +18,7 @@ static void numbers_of(const pvid_estimator_q31 *self, const int32_t p[], pvid_s
     }
 }
 
-static void theta_of(const pvid_estimator_q31 *self, const int32_t p[], int64_t theta[])
+static void scaled_theta(const pvid_estimator_q31 *self, const int32_t p[], int64_t theta[])
 {
     pvid_scaled_q31 numbers[PVID_MAX_P];
     pvid_scaled_q31 found[PVID_MAX_THETA_Q31];
@@ -29,7 +29,7 @@ static void theta_of(const pvid_estimator_q31 *self, const int32_t p[], int64_t 
     }
 }
 
-static void jacobian_of(const pvid_estimator_q31 *self, int64_t value[], int32_t exponent[])
+static void scaled_jacobian(const pvid_estimator_q31 *self, int64_t value[], int32_t exponent[])
 {
     pvid_scaled_q31 numbers[PVID_MAX_P];
     pvid_scaled_q31 c[PVID_MAX_C_Q31];
@@ -47,7 +47,7 @@ static int32_t length_of(pvid_scaled_q31 x)
     return (x.m == 0) ? LENGTH_OF_ZERO : ((int32_t)pvid_bit_length_q31(pvid_magnitude_q31(x.m)) + x.e);
 }
 
-static void formats_of(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+static void scaled_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
 {
     const pvid_model_q31 *model = self->model;
     pvid_scaled_q31 numbers[PVID_MAX_P];
@@ -71,4 +71,4 @@ static void formats_of(pvid_estimator_q31 *self, const pvid_estimator_config_q31
     }
 }
 
-const struct pvid_scaled_adapter_q31 pvid_read_scaled_q31 = {theta_of, jacobian_of, formats_of};
+const struct pvid_scaled_adapter_q31 pvid_read_scaled_q31 = {scaled_theta, scaled_jacobian, scaled_formats};

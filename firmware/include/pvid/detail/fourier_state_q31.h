@@ -40,6 +40,8 @@ typedef struct {
     int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end, rounded */
     uint16_t index;                          /* of the step whose channels come next, in its half */
     uint8_t half;                            /* that fills, 0 or 1 */
+    uint16_t lead;                           /* ticks from the first sample to the first step */
+    bool ran;                                /* there was a step: the runs have begun */
 } pvid_fourier_values_q31;
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
@@ -75,7 +77,7 @@ typedef struct {
 /* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
 typedef struct {
     int16_t exponent[PVID_MAX_COLUMNS];
-    int32_t longest;                    /* bits of the largest product of the present column */
+    int32_t top;                        /* greatest exponent of the weights of the present column */
     int64_t sum[PVID_FOURIER_ROWS_Q31]; /* the present column while it is made */
     int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
 } pvid_fourier_columns_q31;

@@ -93,7 +93,7 @@ def identify_run(
 
         convergence(answer, figure)
         click.echo(f"figure: {figure}")
-    for one in answer.found.verdict.reasons:
+    for one in (core.verdict if core is not None else answer.found.verdict).reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
     if not shown.identified:
         reason = f": {core.reason.text}" if core is not None and not core.published else ""
@@ -140,7 +140,7 @@ def _print_core(core: CoreAnswer) -> None:
         _table(core.values, f"{core.oracle.model.title}: weak form, C in float32")
     misfit = "not judged" if core.misfit is None else f"{core.misfit:.2g}"
     click.echo(
-        f"status {core.oracle.found.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
+        f"status {core.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
         f"windows of {2 * core.config.hop_s:.3g} s; hash {core.hash:08x}"
     )
 

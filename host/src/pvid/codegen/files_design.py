@@ -9,6 +9,7 @@ import numpy as np
 from pvid.codegen import describe
 from pvid.codegen.files_f32 import guarded
 from pvid.codegen.files_fourier import size_check, table
+from pvid.core.sizes import smallest
 from pvid.design.c_tables import float_literal
 from pvid.settings.f32 import EstimatorConfig
 from pvid.settings.fourier import Float32, FourierConfig, FourierDesign32
@@ -41,6 +42,9 @@ def header(
         f"of {step_s:.6g} s.",
         f"The first estimate comes after at most {config.ticks_needed} samples, "
         f"{config.ticks_needed / config.sample_rate:.3g} s.",
+        "",
+        "The smallest sizes of the core that hold it, for little RAM:",
+        f"  {' '.join(f'-D{macro}={size}' for macro, size in smallest(needed).items())}",
         "",
         "Parameters:",
         *describe.table(

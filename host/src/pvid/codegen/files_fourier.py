@@ -11,7 +11,7 @@ from pvid.codegen.files_f32 import UNCONTRACTED, for_cpp, guarded, includes_of, 
 from pvid.codegen.fourier import FourierFunctions
 from pvid.codegen.fourier_twin import functions_in
 from pvid.codegen.functions import Function
-from pvid.core.sizes import raised
+from pvid.core.sizes import raised, smallest
 from pvid.design.c_tables import float_literal
 from pvid.settings.fourier import NONE, FourierModel, Source
 
@@ -76,7 +76,7 @@ def header(made: FourierFunctions, model: FourierModel, needed: Mapping[str, int
 
 def size_check(needed: Mapping[str, int]) -> list[str]:
     """An error for a library of smaller arrays."""
-    options = " ".join(f"-D{macro}={size}" for macro, size in (raised(needed) or needed).items())
+    options = " ".join(f"-D{macro}={size}" for macro, size in smallest(raised(needed) or needed).items())
     checks = " || \\\n    ".join(" || ".join(one) for one in _pairs([f"{k} < {v}" for k, v in needed.items()]))
     return [f"#if {checks}", f'#error "compile pvid and this file with {options}"', "#endif"]
 

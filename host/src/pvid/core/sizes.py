@@ -11,12 +11,26 @@ from pvid.core.sources import FIRMWARE
 _DEFINED = re.compile(r"^#define (PVID_MAX_\w+) (\d+)$", re.MULTILINE)
 _LEAST = re.compile(r"^#if (PVID_MAX_\w+) < (\d+)", re.MULTILINE)
 
+_LEAST = re.compile(r"^#if (PVID_MAX_\w+) < (\d+) ", re.MULTILINE)
+
 
 @cache
 def default_sizes() -> Mapping[str, int]:
     """Macro -> value where nothing else is given."""
     text = (FIRMWARE / "include" / "pvid" / "config.h").read_text(encoding="utf-8")
     return {name: int(value) for name, value in _DEFINED.findall(text)}
+
+
+@cache
+def least_sizes() -> Mapping[str, int]:
+    """Macro -> least value that config.h allows."""
+    text = (FIRMWARE / "include" / "pvid" / "config.h").read_text(encoding="utf-8")
+    return {name: int(value) for name, value in _LEAST.findall(text)}
+
+
+def smallest(needed: Mapping[str, int]) -> dict[str, int]:
+    """The smallest sizes that hold what is needed."""
+    return {name: max(value, least_sizes().get(name, value)) for name, value in needed.items()}
 
 
 def raised(needed: Mapping[str, int]) -> dict[str, int]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from pvid.base.toml_text import toml_document
 from pvid.models.registry import DEFAULT, MODELS
@@ -36,10 +37,17 @@ def mechanism_rig(
     table = document.get("model", {})
     if model is not None:
         document = {**document, "model": {**(table if isinstance(table, dict) else {}), "name": model}}
-    elif not isinstance(table, dict) or table.get("name", DEFAULT) in MODELS:
+    elif not isinstance(table, dict) or (table.get("name", DEFAULT) in MODELS and not _is_described(document)):
         return None
     elif rig_path is not None and str(table["name"]).endswith(".py"):
         document["model"]["name"] = str(rig_path.parent / table["name"])
-    if model in MODELS:
+    if model in MODELS and not _is_described(document):
         return None
     return MechanismRig.of_document(with_settings(document, settings))
+
+
+def _is_described(document: Mapping[str, Any]) -> bool:
+    """Whether the file of a mechanism that the core has a form of its own for is that of its description, as `pvid
+    model simulate` writes it: with a table for each sensor."""
+    sensors = document.get("sensor")
+    return isinstance(sensors, dict) and bool(sensors) and all(isinstance(one, dict) for one in sensors.values())

@@ -6,20 +6,27 @@ equations' own errors. The engine starts at the guesses and runs over the sample
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed, with_unit
 from pvid.codegen.fourier_library import fourier_native
 from pvid.core.fourier_native import FourierIdentifier
+from pvid.oracle.fourier.verdict import Reason, Verdict
 from pvid.run.engine_design import config_for_recording, samples_of
 from pvid.run.mechanism import MechanismAnswer, Value, gains_of, values_of
-from pvid.settings.enums import Reason
+from pvid.settings.enums import Reason as Outcome
 from pvid.settings.fourier import FourierConfig
 from pvid.settings.record import Record
+
+# The core and the analysis disagree if they differ by so many standard errors, and by this part of the value.
+_CLASH = 3.0
+_VISIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +49,7 @@ class CoreAnswer:
     config: FourierConfig
     values: Mapping[str, Value]
     published: bool
-    reason: Reason
+    reason: Outcome
     misfit: float | None
     windows: int
     hash: int
@@ -51,6 +58,38 @@ class CoreAnswer:
     def identified(self) -> bool:
         """Whether the core has published, and the recording shows every parameter."""
         return self.published and self.oracle.identified
+
+    @property
+    def verdict(self) -> Verdict:
+        """The doubts of the core's own answer, then those of the analysis."""
+        return Verdict((*self._doubts(), *self.oracle.found.verdict.reasons))
+
+    def _doubts(self) -> Iterator[Reason]:
+        if not self.identified:
+            return
+        if apart := [name for name in self.oracle.model.p_names if self._clashes(name)]:
+            first = [values[apart[0]] for values in (self.values, self.oracle.values)]
+            one, other = (with_unit(found.value or 0.0, found.unit, 4) for found in first)
+            of_signs = " The core takes the mean of a friction's sign over a step, the analysis locates its reversals."
+            yield Reason(
+                "core",
+                f"The C core and the float64 analysis disagree on {listed(apart)} ({apart[0]}: "
+                f"{one} and {other}); the analysis is nearer." + (of_signs if self.config.design.model.signs else ""),
+            )
+        if self.reason == Outcome.MISFIT and self.misfit is not None:
+            yield Reason(
+                "misfit",
+                f"The residuals in the C core are {self.misfit:.3g} times what the sensors explain; standard errors "
+                "are from their scatter.",
+                alarm=False,
+            )
+
+    def _clashes(self, name: str) -> bool:
+        one, other = self.values[name], self.oracle.values[name]
+        if one.value is None or one.se is None or other.value is None or other.se is None:
+            return False
+        apart = abs(one.value - other.value)
+        return apart > _CLASH * math.hypot(one.se, other.se) and apart > _VISIBLE * abs(other.value)
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
@@ -61,6 +100,9 @@ class CoreAnswer:
                 name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
                 for name, one in self.values.items()
             },
+            "status": self.verdict.status,
+            "warning": self.verdict.warning,
+            "reasons": {one.name: one.text for one in self.verdict.reasons},
             "chi2": self.misfit,
             "reason": self.reason.text,
             "window_s": 2 * self.config.hop_s,
@@ -96,7 +138,7 @@ def _answer(
 ) -> CoreAnswer:
     estimate = identifier.published
     model, found = answer.model, answer.found
-    ends = record.reason[(record.reason != Reason.WARMING_UP) & (record.reason != Reason.ACCUMULATED)]
+    ends = record.reason[(record.reason != Outcome.WARMING_UP) & (record.reason != Outcome.ACCUMULATED)]
     n_p = len(found.p)
     last = identifier.estimate
     covariance = np.asarray(last["covariance"], np.float64)[:n_p, :n_p]
@@ -113,7 +155,7 @@ def _answer(
         config=config,
         values=values,
         published=estimate is not None,
-        reason=Reason(int(ends[-1])) if len(ends) else Reason.WARMING_UP,
+        reason=Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP,
         misfit=None if estimate is None or np.isnan(misfit) else misfit,
         windows=int(len(ends)),
         hash=identifier.running_hash,

@@ -85,19 +85,17 @@ def clustered_variance(scores: Float, s_inverse: Float) -> Float:
     errors that last longer than a window.
     """
     windows = len(scores)
-    local = scores.T @ scores
-    near = local.copy()
-    wide = local.copy()
+    moves = scores @ s_inverse  # of p by each window: sums of their squares are positive whatever the rounding
+    local = np.sum(moves**2, axis=0)
+    near, wide = local, local
     reach = max(1, round(1.3 * windows ** (1 / 3)))
     for lag in range(1, min(reach, windows - 1) + 1):
-        product = scores[:-lag].T @ scores[lag:]
-        both = product + product.T
+        both = 2 * np.sum(moves[:-lag] * moves[lag:], axis=0)
         if lag == 1:
             near = near + both
         wide = wide + (1 - lag / (reach + 1)) * both
     few = windows / max(windows - 1, 1)
-    variances = [few * np.diag(s_inverse @ one @ s_inverse) for one in (local, near, wide)]
-    return np.asarray(np.max(variances, axis=0))
+    return np.asarray(few * np.max([local, near, wide], axis=0))
 
 
 def chi2_of_sensors(fit: Fit) -> float:

@@ -37,6 +37,8 @@ Name = Literal[
     "friction",
     "scale",
     "weights",
+    "misfit",
+    "core",
 ]
 Status = Literal["good", "warning", "not_identified"]
 

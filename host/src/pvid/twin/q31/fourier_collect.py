@@ -125,13 +125,16 @@ def collect(counts: Int, design: FourierDesignQ31) -> Collected:
     runs = np.zeros(design.model.runs, np.int64)
     found, played = [np.zeros((0, len(design.model.channel), design.highest + 1, 2), np.int64)], []
     spreads = [np.zeros((0, len(counts)), np.int64)]
+    lead = first_step(design)
     first = 0
     while first < total:
         beyond = np.flatnonzero(~within[first:])
         last = first + int(beyond[0]) if len(beyond) else total
         of_steps = jets(counts[:, first:last], design)
         whole = sum(1 for step in range(of_steps.shape[1]) if plan.tick_of_jets(step) < last - first)
-        made = steps(of_steps[:, :whole], design, runs)
+        made = steps(of_steps[:, :whole], design, runs, lead)
+        if whole and made.beyond != 0:
+            lead = 0
         if made.beyond is not None:
             last = first + plan.tick_of_jets(made.beyond)
         ticks = plan.play(last - first, made.channels.shape[1])

@@ -1,4 +1,4 @@
-"""Twin of fourier/fourier_finish_q31.c: a window's sums to rows, steps of p, the published estimate, stage by stage."""
+"""Twin of fourier_finish_q31.c: a window of the weak engine to rows, to steps of p, to the published estimate."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _parts(count: int, few: int) -> int:
 def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind) -> int:
     """Up to the residuals, these included."""
     harmonics = design.highest + 1
-    column = 2 * harmonics + 1 + design.power // 2
+    column = harmonics + 2 + design.power // 2
     project = sum(kind.columns - i for i in range(kind.nuisances)) or 1
     return (
         _parts(len(design.noise), _ENTRIES_PER_STAGE)

@@ -40,8 +40,14 @@ class Steps:
     beyond: int | None
 
 
-def steps(jets: Int, design: FourierDesignQ31, runs: Int) -> Steps:
-    """From jets [jets, n] of a stretch; `runs` are the sums before it."""
+def steps(jets: Int, design: FourierDesignQ31, runs: Int, lead: int = 0) -> Steps:
+    """From jets [jets, n] of a stretch.
+
+    Parameters
+    ----------
+    runs : the sums before it
+    lead : ticks from the first sample to the first step, where the runs begin with this stretch
+    """
     model = design.model
     n = jets.shape[1]
     newest = np.zeros((model.runs + model.signs, n), np.int64)
@@ -52,7 +58,8 @@ def steps(jets: Int, design: FourierDesignQ31, runs: Int) -> Steps:
     n = n if beyond is None else beyond
     jets, newest = jets[:, :n], newest[:, :n]
     rates, v = newest[: model.runs], newest[model.runs :]
-    rises = np.concatenate([np.zeros((model.runs, 1), np.int64), rates[:, 1:] + rates[:, :-1]], axis=1)[:, :n]
+    begun = np.sign(rates[:, :1]) * (2 * np.abs(rates[:, :1]) * lead // design.decimation)
+    rises = np.concatenate([begun, rates[:, 1:] + rates[:, :-1]], axis=1)
     sums = clamp(runs[:, np.newaxis] + np.cumsum(rises, axis=1), WIDE)
     nothing = np.zeros((len(model.channel), 0), np.int64)
     if n < LATER:

@@ -15,7 +15,8 @@ from pvid.twin.q31.integer import Int, bit_length, clamp, reciprocal, root_of, r
 from pvid.twin.q31.scaled import Scaled, pick, scaled
 
 _COLUMN_BITS = 27
-_SUM_BITS = 45
+_GUARD = 4  # bits that products lose at least
+_NONE = -(2**31)  # exponent where there is no term
 _FLOOR_BITS = 20
 _LEAST_EXPONENT = -200
 _KEPT_BITS = 20
@@ -151,33 +152,32 @@ def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
     window: S_h [lanes, channels, H + 1, 2].
     """
     design = made.design
-    first, end = design.model.kind[kind].first, design.model.kind[kind].end
-    products: list[tuple[int, Int, Int, Int]] = []  # row, product, exponent, length
+    own = design.model.kind[kind]
+    terms = [t for t in range(own.first, own.end) if design.model.term[t].column == place]
     lanes = window.shape[0]
-    for t in range(first, end):
-        term = design.model.term[t]
-        if term.column != place:
-            continue
-        turned, negative = term.order % 2 == 1, (term.order + 1) % 4 >= 2
-        factor = Scaled(*(np.full(lanes, x, np.int64) for x in design.factor[t]))
-        for h in range(made.cosines):
-            of_h = Scaled(made.scale.m[h], made.scale.e[h])
-            weight = factor.times(of_h).times(_number(h**term.order, factor.m))
-            parts = 2 if h and made.cosines + h <= design.rows else 1
-            for part in range(parts):
-                s = window[:, term.channel, h, (1 - part) if turned else part]
-                minus = (turned != negative) if part == 0 else negative
-                product = (-s if minus else s) * weight.m
-                length = np.where(product != 0, bit_length(np.abs(s)) + 30 + weight.e, np.iinfo(np.int64).min)
-                products.append((h if part == 0 else made.cosines + h - 1, product, weight.e, length))
-    longest = np.max([np.full(lanes, np.iinfo(np.int64).min), *(one[3] for one in products)], axis=0)
-    any_at_all = longest > np.iinfo(np.int64).min
-    unit = np.where(any_at_all, longest - _SUM_BITS, 0)
+    weights = {(t, h): _weight(made, t, h) for t in terms for h in range(made.cosines)}
+    exponents = [np.where(one.m != 0, one.e, _NONE) for one in weights.values()]
+    top = np.max([np.full(lanes, _NONE), *exponents], axis=0)
     total = np.zeros((design.rows, lanes), np.int64)
-    for row, product, e, _ in products:
-        total[row] += np.where(product != 0, scale(product, unit - e), 0)
+    for (t, h), weight in weights.items():
+        term = design.model.term[t]
+        turned, negative = term.order % 2 == 1, (term.order + 1) % 4 >= 2
+        shift = np.where(weight.m != 0, top - weight.e + _GUARD, 0)
+        for part in range(2 if h and made.cosines + h <= design.rows else 1):
+            s = window[:, term.channel, h, (1 - part) if turned else part]
+            minus = (turned != negative) if part == 0 else negative
+            total[h if part == 0 else made.cosines + h - 1] += round_shift((-s if minus else s) * weight.m, shift)
     x, exponent = block(total)
-    return x, unit + exponent
+    return x, np.where(top > _NONE, top + _GUARD, 0) + exponent
+
+
+def _weight(made: White, t: int, h: int) -> Scaled:
+    """Of a term at a harmonic, |m| <= 2^30."""
+    factor, order = made.design.factor[t], made.design.model.term[t].order
+    power = h**order
+    both = (factor[0] * made.scale.m[h]) >> 30
+    bits = power.bit_length()
+    return Scaled((both * power) >> bits, factor[1] + made.scale.e[h] + 30 + bits)
 
 
 def square(x: Int) -> Int:
