@@ -21,7 +21,7 @@ from pvid.link.frames import Code, Estimate, Form, Raw, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader
 from pvid.log.recorder import EmulatorSource, Logger
-from pvid.log.rig import engine_text_of_log, mechanism_of_log, rig_of_log
+from pvid.log.rig import engine_text_of_log, mechanism_of_log, recording_of_log, rig_of_log
 from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.models.mechanisms import names
 from pvid.show.log_figure import write_log_figure
@@ -148,6 +148,11 @@ def test_log_of_a_mechanism_is_exported_under_its_names(log: Path, motor: Mechan
     last = list(csv.DictReader(paths[1].open()))[-1]
     truth = dict(zip(motor.p_names, motor.compiled.p_names, strict=True))
     assert set(truth) <= set(last) and float(last["R"]) == pytest.approx(1.2, rel=0.01) and float(last["R_se"]) > 0
+    recording = recording_of_log(log, ["phi", "V"])
+    assert np.array_equal(np.float32(recording.signals["V"]), motor.recording[:, 0])
+    assert list(recording.signals) == ["phi", "V"] and recording.sample_rate == 1000.0
+    with pytest.raises(PvidError, match="a log of dc_motor: it has V, i and phi, and not x"):
+        recording_of_log(log, ["x"])
     with pytest.raises(PvidError, match="is the log of a described mechanism"):
         rig_of_log(log)
 

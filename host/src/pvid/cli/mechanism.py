@@ -17,6 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
 from pvid.cli.input import print_notes
+from pvid.log.rig import LOG_SUFFIX, recording_of_log
 from pvid.oracle.fourier.weights import Weights
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
@@ -33,9 +34,14 @@ _POSSIBLE = (("core", "f64"), ("core", "f32"), ("form", "weak"))
 def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Recording, CompiledModel]:
     """The longest stretch of a recording without a missing sample, and the model with the values of the rig."""
     model = model_of(rig)
-    if not is_run(path):
-        raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals")
-    recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
+    if path.suffix == LOG_SUFFIX:
+        if columns is not None:
+            raise PvidError(f"{path} is a log with known columns: omit --columns")
+        recording = recording_of_log(path, [one.name for one in model.signals])
+    elif is_run(path):
+        recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
+    else:
+        raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals, or a log")
     recording.refuse_damaged()
     recording = recording.whole()
     print_notes(recording.notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
+from pvid.base.wording import listed
 from pvid.link.frames import Hello, Names
 from pvid.log.board_model import mechanism_of
 from pvid.log.reader import LogReader, LogStream
@@ -17,7 +19,7 @@ from pvid.log.values import UNKNOWN_RIG, Values, is_rate
 from pvid.models.model import Mechanism
 from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile
-from pvid.rig.run import MIN_ROWS, Run
+from pvid.rig.run import MIN_ROWS, Recording, Run
 
 LOG_SUFFIX = ".pvlog"
 _LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
@@ -35,9 +37,7 @@ def rig_of_log(path: Path) -> RigFile | None:
     for _ in reader:
         if reader.rig is not None:
             if is_engine_text(reader.rig):
-                raise PvidError(
-                    f"{path} is the log of a described mechanism: export it, and name its table and --model"
-                )
+                raise PvidError(f"{path} is the log of a described mechanism: name it with --model")
             return RigFile.parse(reader.rig)
         if reader.account.frames:
             break  # it stands in front of all that the board said
@@ -132,12 +132,39 @@ def run_of_log(path: Path) -> Run:
     PvidError
         When the log cannot be read, the board's sample rate is unknown, or there are too few samples.
     """
+    (t, phi, y), rate = _longest(path, UNKNOWN_RIG, tuple(Columns().units)[1:])
+    if (there := int(np.isfinite(phi).sum())) < MIN_ROWS:
+        raise PvidError(f"{path} holds {there} samples in a row; a run needs at least {MIN_ROWS}")
+    return Run(t=t, phi=phi, y=y, sample_rate=rate)
+
+
+def recording_of_log(path: Path, names: Sequence[str]) -> Recording:
+    """The longest stretch of a log of a described mechanism without a gap, of the signals of these names.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, the board's sample rate is unknown, it has other samples or too few.
+    """
+    mechanism = mechanism_of_log(path)
+    named = [one.name for one in mechanism.model.channels]
+    if lacking := [name for name in names if name not in named]:
+        raise PvidError(f"{path} is a log of {mechanism.model.name}: it has {listed(named)}, and not {listed(lacking)}")
+    (t, *signals), rate = _longest(path, mechanism, names)
+    if len(t) < MIN_ROWS:
+        raise PvidError(f"{path} holds {len(t)} samples in a row; a recording needs at least {MIN_ROWS}")
+    return Recording(t, dict(zip(names, signals, strict=True)), rate)
+
+
+def _longest(path: Path, mechanism: Mechanism, names: Sequence[str]) -> tuple[npt.NDArray[np.float64], float]:
+    """t and these samples of the longest stretch without a gap [1 + names, ticks], NaN for what is no number or no
+    rig's; and the sample rate."""
     hello = hello_of_log(path)
     if hello is None:
         raise PvidError(f"{path}: the log contains no description of the board, so its sample rate is unknown")
     if not is_rate(hello.sample_rate):
         raise PvidError(f"{path}: the board reported a sample rate of {hello.sample_rate:g} Hz, which is invalid")
-    values = Values(hello=hello)
+    values = Values(mechanism, hello)
     best: list[npt.NDArray[np.float64]] = []
     parts: list[npt.NDArray[np.float64]] = []
     longest = length = 0
@@ -146,7 +173,7 @@ def run_of_log(path: Path) -> Run:
         for rows in values.rows(record):
             if rows.table != "samples":
                 continue
-            columns = np.stack([rows.columns[name] for name in Columns().units])
+            columns = np.stack([rows.columns[name] for name in ("t", *names)])
             columns[1:, ~(np.abs(columns[1:]) <= _LARGEST).all(axis=0)] = np.nan
             if record.tick != expected:
                 parts, length = [], 0
@@ -155,7 +182,4 @@ def run_of_log(path: Path) -> Run:
             expected = record.tick + columns.shape[1]
             if length > longest:
                 best, longest = parts, length
-    t, phi, y = np.concatenate([np.empty((3, 0)), *best], axis=1)
-    if (there := int(np.isfinite(phi).sum())) < MIN_ROWS:
-        raise PvidError(f"{path} holds {there} samples in a row; a run needs at least {MIN_ROWS}")
-    return Run(t=t, phi=phi, y=y, sample_rate=float(hello.sample_rate))
+    return np.concatenate([np.empty((1 + len(names), 0)), *best], axis=1), float(hello.sample_rate)
