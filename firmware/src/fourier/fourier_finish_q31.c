@@ -256,7 +256,7 @@ static pvid_scaled_q31 variance_ratio_of(const pvid_fourier_finish_q31 *self, in
 /* Test functions less nuisances: the dimensions that the rows of the kind span; at least 1. */
 static int64_t freedom_of(const pvid_fourier_q31 *self)
 {
-    const int64_t freedom = (int64_t)self->design->functions - self->finish.live;
+    const int64_t freedom = (int64_t)self->design->functions - (int64_t)self->finish.live;
     return (freedom > 0) ? freedom : 1;
 }
 
@@ -407,7 +407,7 @@ static void step_kind(pvid_fourier_q31 *self, pvid_reason *reason)
         end_kind(self);
     } else if (finish->stage == (uint8_t)STAGE_ADD) {
         finish->used++;
-        finish->free = (uint16_t)(finish->free + freedom_of(self));
+        finish->free = (uint16_t)(finish->free + (uint16_t)freedom_of(self));
         end_kind(self);
     } else {
         finish->stage++;

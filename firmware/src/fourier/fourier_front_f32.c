@@ -178,8 +178,8 @@ PVID_SELDOM static void begin_job(pvid_fourier_front_f32 *self, const pvid_fouri
 }
 
 /* Pairs of a filter of even order, outwards; x: the signal at the instant. */
-static inline float add_even(const float *restrict weight, const float *after, const float *before, size_t stride,
-                             size_t pairs, float x, float sum)
+static inline float add_even(const float *weight, const float *after, const float *before, size_t stride, size_t pairs,
+                             float x, float sum)
 {
     for (size_t i = 0; i < pairs; i++) {
         sum += weight[i] * ((*after - x) + (*before - x));
@@ -190,8 +190,8 @@ static inline float add_even(const float *restrict weight, const float *after, c
 }
 
 /* Of odd order. */
-static inline float add_odd(const float *restrict weight, const float *after, const float *before, size_t stride,
-                            size_t pairs, float sum)
+static inline float add_odd(const float *weight, const float *after, const float *before, size_t stride, size_t pairs,
+                            float sum)
 {
     for (size_t i = 0; i < pairs; i++) {
         sum += weight[i] * (*after - *before);

@@ -12,7 +12,7 @@
 #include "number/init.h"
 #include "number/integer_q31.h"
 
-#define COUNTS_LIMIT ((int32_t)1 << 24)
+#define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define STAGES_MAX 64u
 #define POWER_OF_ROW_WEIGHT 65536u /* 1 in Q16 */
 
@@ -36,7 +36,7 @@ static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
                       (model->gains <= PVID_MAX_CHANNELS) && (model->channels >= 1u) &&
                       (model->channels <= PVID_MAX_CHANNELS) && (model->kinds >= 1u) &&
                       (model->kinds <= PVID_MAX_KINDS) &&
-                      ((model->prepare != NULL) || ((model->runs + model->signs) == 0));
+                      ((model->prepare != NULL) || ((model->runs + model->signs) == 0u));
     size_t thetas = 0;
     bool columns = true;
     for (size_t i = 0; fits && (i < model->kinds); i++) {

@@ -145,7 +145,8 @@ bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fouri
         model->values(self->now, next);
         if (complete) {
             integrate(self, model->integrands, dt, index == 0u, &now[model->gains], &next[model->gains]);
-            find_channels(self, model, channels, dt * (float)index, now, channel);
+            const float t = dt * (float)index;
+            find_channels(self, model, channels, t, now, channel);
         }
         move_runs(self, model->runs, 0.5f * dt, arguments);
     } else if (!self->ran) {

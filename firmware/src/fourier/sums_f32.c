@@ -138,7 +138,8 @@ bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fouri
 {
     /* a window's harmonic is joined right behind the addition to it */
     if (self->joined < self->harmonic) {
-        join(self, design, channels, dt * (float)design->hop, window);
+        const float half_time = dt * (float)design->hop;
+        join(self, design, channels, half_time, window);
         self->joined++;
         return self->joined == harmonics;
     }

@@ -6,7 +6,7 @@
 #include "number/integer_q31.h"
 #include "number/unroll.h"
 
-#define BLOCK PVID_FOURIER_BLOCK_Q31
+#define BLOCK ((size_t)PVID_FOURIER_BLOCK_Q31)
 #define DOWN 14u
 
 enum { RE = 0, IM = 1 };

@@ -67,7 +67,7 @@ static void take_newest(pvid_fourier_values_q31 *self, const pvid_fourier_design
         if (self->known > 0u) {
             rise = (int64_t)self->rate[i] + newest[i];
         } else if (!self->ran) { /* from the first sample to the first step */
-            rise = (2 * ((int64_t)newest[i] * self->lead)) / design->decimation;
+            rise = (2 * ((int64_t)newest[i] * (int64_t)self->lead)) / (int64_t)design->decimation;
         } else {
             /* the run stays */
         }

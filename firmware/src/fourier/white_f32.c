@@ -101,7 +101,7 @@ static size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t row)
     return (row < self->cosines) ? row : ((row + 1u) - self->cosines);
 }
 
-static inline float product(const float *restrict x, const float *restrict y, size_t first, size_t last)
+static inline float product(const float *x, const float *y, size_t first, size_t last)
 {
     float sum = 0.0f;
     for (size_t i = first; i < last; i++) {

@@ -79,7 +79,7 @@ void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *bloc
         }
     }
     tail[0] = pvid_clamp_q31(tail[0] + pvid_square_q31(error), RESIDUAL_MAX);
-    tail[1] += self->row_weight;
+    tail[1] += (int64_t)self->row_weight;
 }
 
 /* The largest sum of squares: the others cannot be larger. */
