@@ -304,7 +304,8 @@ class Verifier:
             )
         if configuration is None:
             raise PvidError("the board's configuration is missing")
-        twin, names = self._twin(configuration)
+        with np.errstate(all="ignore"):  # a board may send any number, in samples and in its configuration
+            twin, names = self._twin(configuration)
         samples = np.concatenate(opened.parts)
         if samples.shape[1] != twin.samples:
             raise PvidError(f"they are {samples.shape[1]} a tick, and the identifier takes {twin.samples}")
@@ -312,7 +313,7 @@ class Verifier:
         for tick, check in opened.checks:
             if check.session == stretch.session:
                 checks.setdefault(tick, []).append(check)
-        with np.errstate(all="ignore"):  # a board may send any number, in samples and in its configuration
+        with np.errstate(all="ignore"):
             recomputation = _Recomputation(twin, names, checks, stretch, self._count)
             recomputation.run(samples)
         stretch.verified = recomputation.covered
