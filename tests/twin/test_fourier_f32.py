@@ -195,3 +195,38 @@ def test_stages_per_tick_are_those_of_the_core() -> None:
         twin = FourierTwin(rig.config)
         assert core.state.stages_per_tick == twin.stages_per_tick
         assert core.state.items_per_tick == twin.schedule.items_per_tick
+
+
+def random_case(seed: int) -> tuple[EngineRig, FourierConfig, Float32]:
+    """A mechanism with random sizes, settings and limits, and a piece of its run with random faults."""
+    random = np.random.default_rng(seed)
+    rig = engine_rig(str(random.choice(mechanisms.names())))
+    design, kinds = rig.config.design, rig.config.design.model.kinds
+    functions = int(random.integers(4, design.functions + 1))
+    hop = 4 * int(random.integers((functions + design.power) // 8 + 4, 40))
+    config = rig.resized(functions=functions, hop=hop, decimation=int(random.integers(1, design.decimation + 1)))
+    variance = np.where(random.random(kinds) < 0.5, 0.0, 10.0 ** random.uniform(-12, 3, kinds)).astype(np.float32)
+    orders = random.integers(0, 3, kinds).astype(np.uint8)
+    config = replace(
+        config,
+        design=replace(config.design, error_variance=variance, error_order=orders),
+        iterations=int(random.integers(1, 6)),
+        compensation=bool(random.integers(2)),
+        gate=GateConfig(float(random.choice([0.0, 3.0])), float(random.choice([0.0, 1.0]))),
+        trust=TrustConfig(se_max=10.0, groups_min=int(random.integers(3)), renewal=float(random.choice([0.0, 0.2]))),
+        range=(np.abs(rig.samples).max(axis=0) * random.uniform(0.8, 3.0) + 1e-6).astype(np.float32),
+        drive_min=(rig.samples.std(axis=0) * random.uniform(0.0, 0.5)).astype(np.float32),
+    )
+    first = int(random.integers(5000))
+    samples = rig.samples[first : first + 3000].copy()
+    for fault in (np.nan, 1e30, 1e-42, 0.0, 3e38):
+        start = int(random.integers(len(samples)))
+        samples[start : start + int(random.integers(60)), int(random.integers(samples.shape[1]))] = fault
+    return rig, config, samples
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_settings_and_faults_equal_the_twin(seed: int) -> None:
+    rig, config, samples = random_case(seed)
+    record = assert_equals_the_twin(rig.native, config, samples)[0]
+    assert (record.reason == Reason.REJECTED_NOT_FINITE).any() or np.isfinite(samples).all()

@@ -18,18 +18,18 @@
 #define KEPT_BITS 20
 #define SQUARE_DOWN 16u
 
-/* Parts of S_h that a term takes for the real and the imaginary part, and their signs: (-i omega)^m is 1, -i omega,
- * -omega^2, i omega^3, ... */
+/* What a term takes for the real and the imaginary part: (-i omega)^m is 1, -i omega, -omega^2, i omega^3, ... */
 typedef struct {
-    size_t part[2];
-    bool is_negative[2];
+    bool turned; /* the imaginary part of S_h for the real part, and the real one for the imaginary part */
+    bool re_negative;
+    bool im_negative;
 } turn;
 
 static turn turn_of(uint8_t order)
 {
     const bool turned = (order % 2u) != 0u;
     const bool negative = ((order + 1u) % 4u) >= 2u;
-    const turn result = {{turned ? 1u : 0u, turned ? 0u : 1u}, {turned ? !negative : negative, negative}};
+    const turn result = {turned, turned ? !negative : negative, negative};
     return result;
 }
 
@@ -71,11 +71,12 @@ static void take_term(pvid_fourier_columns_q31 *self, const pvid_fourier_design_
     }
     const uint32_t shift = (uint32_t)((self->top - weight.e) + GUARD);
     const int32_t *s = window->s[term.channel][h];
-    const int32_t re = turned.is_negative[0] ? -s[turned.part[0]] : s[turned.part[0]];
-    self->sum[h] += pvid_round_shift_q31(pvid_product_q31(re, weight.m), shift);
+    const int32_t re = turned.turned ? s[1] : s[0];
+    const int32_t im = turned.turned ? s[0] : s[1];
+    self->sum[h] += pvid_round_shift_q31(pvid_product_q31(turned.re_negative ? -re : re, weight.m), shift);
     if ((h > 0u) && ((white->cosines + h) <= pvid_fourier_rows_q31(design))) {
-        const int32_t im = turned.is_negative[1] ? -s[turned.part[1]] : s[turned.part[1]];
-        self->sum[(white->cosines + h) - 1u] += pvid_round_shift_q31(pvid_product_q31(im, weight.m), shift);
+        const int64_t product = pvid_product_q31(turned.im_negative ? -im : im, weight.m);
+        self->sum[(white->cosines + h) - 1u] += pvid_round_shift_q31(product, shift);
     }
 }
 

@@ -22,10 +22,9 @@
 
 static inline bool all_finite(const float values[], size_t n)
 {
-    const float *end = &values[n];
     bool finite = true;
-    for (const float *value = values; value < end; value++) {
-        finite = finite && pvid_finite_f32(*value);
+    for (size_t i = 0; i < n; i++) {
+        finite = finite && pvid_finite_f32(values[i]);
     }
     return finite;
 }

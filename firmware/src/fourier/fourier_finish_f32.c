@@ -208,19 +208,15 @@ static bool project_stage(pvid_fourier_f32 *self)
 /* x -= a y */
 static inline void subtract(float a, const float *restrict y, size_t n, float *restrict x)
 {
-    const float *end = &x[n];
-    while (x < end) {
-        *x -= a * *y;
-        x++;
-        y++;
+    for (size_t i = 0; i < n; i++) {
+        x[i] -= a * y[i];
     }
 }
 
 /* Rows whose residuals a stage forms. */
 static size_t rows_per_stage(const pvid_fourier_kind *kind)
 {
-    const size_t rows = PRODUCTS_PER_STAGE / (kind->thetas + 1u);
-    return (rows > 0u) ? rows : 1u;
+    return PRODUCTS_PER_STAGE / (kind->thetas + 1u); /* at least 1: PVID_MAX_COLUMNS is at most 48 */
 }
 
 static bool residual_stage(pvid_fourier_f32 *self)

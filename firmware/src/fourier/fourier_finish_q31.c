@@ -443,7 +443,7 @@ void pvid_fourier_finish_step_q31(pvid_fourier_q31 *self, pvid_reason *reason)
     }
 }
 
-static uint32_t parts(size_t all, size_t few)
+static uint32_t stages_of(size_t all, size_t few)
 {
     return (uint32_t)((all > 0u) ? ((all + (few - 1u)) / few) : 1u);
 }
@@ -458,9 +458,10 @@ static uint32_t stages_of_kind(const pvid_fourier_q31 *self, const pvid_fourier_
     for (size_t i = 0; i < kind->nuisances; i++) {
         project += ((size_t)kind->thetas + 1u + kind->nuisances) - i;
     }
-    return parts(design->n_noise, ENTRIES_PER_STAGE) + parts(harmonics, HARMONICS_PER_STAGE) + (uint32_t)harmonics +
-           (uint32_t)pvid_fourier_basis_stages_q31(design) + (uint32_t)(columns_of(kind) * column) + (uint32_t)project +
-           parts(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows;
+    return stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
+           (uint32_t)harmonics + (uint32_t)pvid_fourier_basis_stages_q31(design) +
+           (uint32_t)(columns_of(kind) * column) + (uint32_t)project + stages_of(rows, RESIDUALS_PER_STAGE) +
+           PVID_INFORMATION_END_PARTS + (uint32_t)rows;
 }
 
 uint32_t pvid_fourier_finish_stages_q31(const pvid_fourier_q31 *self)

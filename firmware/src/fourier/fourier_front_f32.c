@@ -142,12 +142,8 @@ static inline bool store(pvid_fourier_front_f32 *self, const pvid_fourier_model_
             return false;
         }
     } else {
-        const pvid_fourier_signal *signal = model->signal;
-        const float *end = &place[model->signals];
-        while (place < end) {
-            *place = sample[signal->sample];
-            place++;
-            signal++;
+        for (size_t i = 0; i < model->signals; i++) {
+            place[i] = sample[model->signal[i].sample];
         }
     }
     self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
@@ -237,7 +233,8 @@ static size_t add_pairs(pvid_fourier_front_f32 *self, const pvid_fourier_design_
 /* A part of the job. */
 PVID_SELDOM static void advance_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
 {
-    for (size_t left = self->pairs_per_tick; (left > 0u) && (self->jet < design->model->jets);) {
+    size_t left = self->pairs_per_tick;
+    while ((left > 0u) && (self->jet < design->model->jets)) {
         left -= add_pairs(self, design, left);
     }
     self->busy = self->jet < design->model->jets;

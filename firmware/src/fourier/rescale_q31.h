@@ -11,8 +11,8 @@
 static inline int32_t pvid_fourier_rescaled_q31(int64_t sum, const pvid_fourier_rescale_q31 *rescale)
 {
     const int32_t first = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(sum, rescale->down), INT32_MAX);
-    const int64_t product = pvid_product_q31(first, rescale->multiplier);
-    return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(product, rescale->shift), INT32_MAX);
+    const int64_t second = pvid_round_shift_q31(pvid_product_q31(first, rescale->multiplier), rescale->shift);
+    return (int32_t)pvid_clamp_q31(second, INT32_MAX);
 }
 
 #endif

@@ -131,7 +131,7 @@ bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fouri
                                 float dt, const float jet[], uint16_t index, float channel[])
 {
     const pvid_fourier_model_f32 *model = design->model;
-    float arguments[PVID_MAX_INPUTS]; /* of the newest step: derivatives of the runs, then arguments of sgn */
+    float arguments[PVID_MAX_INPUTS] = {0.0f}; /* of the newest step: derivatives of the runs, then arguments of sgn */
     const float *v = &arguments[model->runs];
     const bool complete = self->known > 1u;
     if (model->prepare != NULL) {

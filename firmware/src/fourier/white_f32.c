@@ -103,14 +103,9 @@ static size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t row)
 
 static inline float product(const float *restrict x, const float *restrict y, size_t first, size_t last)
 {
-    const float *end = &x[last];
     float sum = 0.0f;
-    x += first;
-    y += first;
-    while (x < end) {
-        sum += *x * *y;
-        x++;
-        y++;
+    for (size_t i = first; i < last; i++) {
+        sum += x[i] * y[i];
     }
     return sum;
 }
@@ -118,13 +113,8 @@ static inline float product(const float *restrict x, const float *restrict y, si
 /* x -= a y */
 static inline void subtract(float a, const float *restrict y, size_t first, size_t last, float *restrict x)
 {
-    const float *end = &x[last];
-    x += first;
-    y += first;
-    while (x < end) {
-        *x -= a * *y;
-        x++;
-        y++;
+    for (size_t i = first; i < last; i++) {
+        x[i] -= a * y[i];
     }
 }
 

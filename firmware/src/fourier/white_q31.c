@@ -129,7 +129,7 @@ static void begin_vector(pvid_fourier_white_q31 *self, size_t k, size_t first, s
 }
 
 /* To a block again: what is left may be small. */
-static void raise(int32_t u[], size_t first, size_t last)
+static void fill(int32_t u[], size_t first, size_t last)
 {
     int64_t wide[PVID_FOURIER_ROWS_Q31];
     for (size_t i = first; i < last; i++) {
@@ -153,8 +153,8 @@ void pvid_fourier_white_basis_q31(pvid_fourier_white_q31 *self, const pvid_fouri
         begin_vector(self, k, self->cosines, rows);
     } else {
         pvid_fourier_white_remove_q31(self, design, (part - 1u) % k, u);
-        raise(u, 0, self->cosines);
-        raise(u, self->cosines, rows);
+        fill(u, 0, self->cosines);
+        fill(u, self->cosines, rows);
     }
     if (part == (2u * k)) {
         pvid_fourier_normalise_q31(0, self->cosines, u);

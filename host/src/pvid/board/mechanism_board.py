@@ -56,6 +56,7 @@ class MechanismBoard:
     recording : what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
     """
 
+    configure_frame = Configure
     rig: MechanismRig
     compiled: CompiledModel
     config: FourierConfig
@@ -180,7 +181,7 @@ class MechanismBoard:
         PvidError
             For one of the other core, or a law that there is not.
         """
-        if not isinstance(frame, Configure):
+        if not isinstance(frame, self.configure_frame):
             raise PvidError("the board's image contains another core than the log's settings")
         if frame.law not in list(Law):
             raise PvidError(f"the board was configured with law {frame.law}, which does not exist")

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
     from pvid.run.mechanism_f32 import CoreAnswer
 
-_POSSIBLE = (("core", "f64"), ("core", "f32"), ("form", "weak"))
+_IN_C = ("core", "f32")
+_POSSIBLE = (("core", "f64"), _IN_C, ("form", "weak"))
+_COMPARED = (_IN_C, ("form", "weak"))
 
 
 def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Recording, CompiledModel]:
@@ -72,12 +74,13 @@ def identify_run(
                 f"--{option} {value}: {name} is identified in float64, or in float32 by --core f32, by the weak form; "
                 f"omit --{option}"
             )
-    if weights != "residuals" and only_in_c.get("core") == "f32":
+    in_c = _IN_C in only_in_c.items()
+    if weights != "residuals" and in_c:
         raise PvidError(f"--weights {weights} is for float64; omit --core f32")
     recording, model = recording_of(path, rig, columns)
     answer = identify_mechanism(recording, model, weights)
     core: CoreAnswer | None = None
-    if only_in_c.get("core") == "f32":
+    if in_c:
         from pvid.run.mechanism_f32 import identify_in_c
 
         core = identify_in_c(answer)
@@ -113,7 +116,7 @@ def compare_recording(path: Path, rig: MechanismRig, columns: str | None, **give
 
     name = model_of(rig).name
     for option, value in given.items():
-        if value is not None and (option, value) not in (("core", "f32"), ("form", "weak")):
+        if value is not None and (option, value) not in _COMPARED:
             raise PvidError(
                 f"--{option} {value}: {name} is compared in float32 by the weak form on this computer; omit --{option}"
             )
