@@ -10,8 +10,9 @@
  *
  *   S_h = sum_k channel(t_k) e^(2 pi i h k / (2 hop)),   h = 0 .. H = K/2 + n/2,
  *
- * added once for each half of a window: S_h = A_h + (-1)^h B_h. Derivatives are factors (i omega_h)^m, and the noise of
- * the S_h is independent, so that the rows of a window are made white at the present p by two small Cholesky factors.
+ * added once for each half of a window: S_h = A_h + (-1)^h B_h. Derivatives are factors (i omega_h)^m. The noise of the
+ * S_h is independent, of a variance that follows from p: the white rows of a window are the S_h over their standard
+ * deviations, less what no test function contains (src/fourier/white_f32.c).
  *
  *   static pvid_fourier_f32 identifier;
  *   if (pvid_fourier_init_f32(&identifier, &config) != PVID_OK) ...     config: printed by `pvid model build`
@@ -131,19 +132,33 @@ typedef struct pvid_fourier_f32 pvid_fourier_f32;
  *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS). */
 pvid_status pvid_fourier_init_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config);
 
-/* One tick: the samples [samples], taken at the same time, in the units of the model. Returns as pvid_weak_step_f32. */
+/* One tick: the samples [samples], taken at the same time, in the units of the model. Returns
+ *   - PVID_WARMING_UP until the first window is complete,
+ *   - PVID_REJECTED_NOT_FINITE if a sample is not finite, PVID_REJECTED_SATURATED if a row of the window exceeds
+ *     its limit,
+ *   - PVID_HELD_NOT_EXCITED or PVID_HELD_OUT_OF_RANGE when a window is dropped by drive_min or range,
+ *     PVID_REJECTED_OUTLIER when the gate rejects its rows, PVID_HELD_FROZEN while frozen,
+ *   - the reason of trust.h at the tick that completes a window's processing,
+ *   - PVID_ACCUMULATED at all other ticks.
+ * The work of a window is spread over the ticks of half a window; that of a tick does not depend on the data. */
 pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[]);
 
 /* The published estimate, for the context that calls step; the start before the first one. */
 const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self);
 
-/* Copies the published estimate from any context; as pvid_weak_read_f32. */
+/* Copies the published estimate from any context, also while another one calls step (publication.h). *number:
+ * estimates published so far, 0: *estimate is the start; may be NULL. Fails iff
+ *   - an estimate was published during each of PVID_READ_ATTEMPTS attempts, or
+ *   - `self` is not initialised.
+ * On failure *estimate is undefined. */
 bool pvid_fourier_read_f32(const pvid_fourier_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number);
 
 /* Call this when samples are missing: the windows restart, all other state is kept. */
 void pvid_fourier_gap_f32(pvid_fourier_f32 *self);
 
-/* Freezes the identifier (true) or resumes it (false); as pvid_weak_freeze_f32. */
+/* Freezes the identifier (true) or resumes it (false). While frozen, whole windows are dropped with PVID_HELD_FROZEN; p
+ * and the sums are kept without forgetting. Windows continue to fill, so that resuming is bumpless: the next window may
+ * contain samples from before the resumption. */
 void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen);
 
 #ifdef __cplusplus

@@ -149,11 +149,13 @@ static bool column_stage(pvid_fourier_f32 *self)
         }
         memset(finish->sum, 0, sizeof finish->sum);
         const pvid_fourier_term_f32 *term = design->model->term;
-        while ((finish->term < kind->end) && (term[finish->term].column == finish->index)) {
-            pvid_fourier_columns_add_f32(design, &term[finish->term], self->harmonics, finish->white.omega,
+        const uint16_t end = kind->end;
+        uint16_t place = finish->term;
+        for (; (place < end) && (term[place].column == finish->index); place++) {
+            pvid_fourier_columns_add_f32(design, &term[place], self->harmonics, finish->white.omega,
                                          (const float (*)[2][PVID_MAX_HARMONICS])self->window, finish->sum);
-            finish->term++;
         }
+        finish->term = place;
         finish->part = 1;
         return true;
     }

@@ -233,11 +233,12 @@ static size_t add_pairs(pvid_fourier_front_f32 *self, const pvid_fourier_design_
 /* A part of the job. */
 PVID_SELDOM static void advance_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
 {
+    const size_t jets = design->model->jets;
     size_t left = self->pairs_per_tick;
-    while ((left > 0u) && (self->jet < design->model->jets)) {
+    for (size_t runs = left; (runs > 0u) && (left > 0u) && (self->jet < jets); runs--) { /* each has a pair at least */
         left -= add_pairs(self, design, left);
     }
-    self->busy = self->jet < design->model->jets;
+    self->busy = self->jet < jets;
 }
 
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,

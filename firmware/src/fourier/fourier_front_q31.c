@@ -128,16 +128,18 @@ static void complete(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31
 {
     const pvid_fourier_model_q31 *model = design->model;
     const int32_t *instant = &self->ring[(size_t)self->centre * model->signals];
-    while ((self->jet < model->jets) && (self->pair == design->filter[self->jet].half)) {
-        const pvid_fourier_filter_q31 *filter = &design->filter[self->jet];
-        const pvid_fourier_jet jet = model->jet[self->jet];
+    const uint8_t jets = model->jets;
+    uint8_t place = self->jet;
+    for (; (place < jets) && (self->pair == design->filter[place].half); place++) {
+        const pvid_fourier_filter_q31 *filter = &design->filter[place];
+        const pvid_fourier_jet jet = model->jet[place];
         const int64_t x = (jet.order == 0u) ? instant[jet.signal] : 0;
         const int64_t sum = self->sum + (x * ((int64_t)1 << filter->bits));
-        self->value[self->jet] = pvid_fourier_rescaled_q31(sum, &filter->rescale);
-        self->jet++;
+        self->value[place] = pvid_fourier_rescaled_q31(sum, &filter->rescale);
         self->pair = 0;
         self->sum = 0;
     }
+    self->jet = place;
 }
 
 static void begin(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design)
@@ -214,7 +216,7 @@ bool pvid_fourier_front_step_q31(pvid_fourier_front_q31 *self, const pvid_fourie
         /* the job goes on */
     }
     size_t left = self->pairs_per_tick;
-    while ((left > 0u) && (self->jet < jets)) {
+    for (size_t runs = left; (runs > 0u) && (left > 0u) && (self->jet < jets); runs--) { /* each has a pair at least */
         left -= add_pairs(self, design, left);
     }
     return self->jet == jets;

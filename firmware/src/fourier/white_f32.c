@@ -141,8 +141,8 @@ void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, const pvid_fouri
     const size_t rows = pvid_fourier_rows(design);
     const float highest = (float)(self->cosines - 1u);
     size_t k = 0;
-    while (((k + 1u) * (k + 1u)) <= stage) {
-        k++;
+    for (size_t next = 1; (next < (PVID_MAX_POWER / 2u)) && ((next * next) <= stage); next++) {
+        k = next;
     }
     const size_t part = stage - (k * k);
     float *u = self->basis[k];

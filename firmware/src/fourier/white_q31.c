@@ -143,8 +143,8 @@ void pvid_fourier_white_basis_q31(pvid_fourier_white_q31 *self, const pvid_fouri
 {
     const size_t rows = pvid_fourier_rows_q31(design);
     size_t k = 0;
-    while (((k + 1u) * (k + 1u)) <= stage) {
-        k++;
+    for (size_t next = 1; (next < (PVID_MAX_POWER / 2u)) && ((next * next) <= stage); next++) {
+        k = next;
     }
     const size_t part = stage - (k * k);
     int32_t *u = self->basis[k];

@@ -122,7 +122,7 @@ static void init_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q
     const pvid_model_q31 *model = config->model;
     int16_t c_bits[PVID_MAX_C_Q31] = {0};
     if (model->scaled != NULL) {
-        model->scaled->adapter->formats(self, config);
+        model->scaled->adapter->formats(self, config, self->theta_bits);
     } else {
         model->formats(config->p_bits, self->theta_bits, c_bits);
     }

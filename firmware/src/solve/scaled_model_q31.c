@@ -47,7 +47,7 @@ static int32_t length_of(pvid_scaled_q31 x)
     return (x.m == 0) ? LENGTH_OF_ZERO : ((int32_t)pvid_bit_length_q31(pvid_magnitude_q31(x.m)) + x.e);
 }
 
-static void scaled_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+static void scaled_formats(const pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config, int16_t bits[])
 {
     const pvid_model_q31 *model = self->model;
     pvid_scaled_q31 numbers[PVID_MAX_P];
@@ -67,7 +67,7 @@ static void scaled_formats(pvid_estimator_q31 *self, const pvid_estimator_config
         length[i] = (change > length[i]) ? change : length[i];
     }
     for (size_t i = 0; i < model->n_theta; i++) {
-        self->theta_bits[i] = (int16_t)pvid_clamp_q31(THETA_BITS - (int64_t)length[i], FORMAT_LIMIT);
+        bits[i] = (int16_t)pvid_clamp_q31(THETA_BITS - (int64_t)length[i], FORMAT_LIMIT);
     }
 }
 

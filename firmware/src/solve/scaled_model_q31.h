@@ -10,8 +10,8 @@ struct pvid_scaled_adapter_q31 {
     void (*theta)(const pvid_estimator_q31 *self, const int32_t p[], int64_t theta[]);
     /* C_k at self->p is value[k] 2^e: writes value[n_c] and adds e to exponent[k] */
     void (*jacobian)(const pvid_estimator_q31 *self, int64_t value[], int32_t exponent[]);
-    /* self->theta_bits from the start; needs self->settings.p_bits */
-    void (*formats)(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config);
+    /* bits[n_theta], the formats of theta, from the start; needs self->settings.p_bits */
+    void (*formats)(const pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config, int16_t bits[]);
 };
 
 #endif
