@@ -9,7 +9,7 @@
 #include "replay.h"
 
 static inline void record_tick(const pvid_record_f32 *record, uint32_t tick, const pvid_estimator_f32 *estimator,
-                        pvid_reason reason)
+                               pvid_reason reason)
 {
     const uint32_t n_p = estimator->model->n_p;
     const uint32_t n_sums = estimator->information.n_moments + estimator->information.n_theta + 2u;

@@ -29,8 +29,8 @@ typedef struct {
 
 /* A channel: gain I^fold[integrand], I the integral from the window's start. At least one channel is summed. */
 typedef struct {
-    uint8_t gain;      /* index among the gains; PVID_FOURIER_NONE: 1 with fold 0, whose sums are known: it costs nothing
-                          as the last channel. A gain of 1 with an integral is an ordinary gain */
+    uint8_t gain;      /* index among the gains; PVID_FOURIER_NONE: 1 with fold 0, whose sums are known: it costs
+                          nothing as the last channel. A gain of 1 with an integral is an ordinary gain */
     uint8_t integrand; /* index among the integrands; PVID_FOURIER_NONE: 1, so that I^fold is t^fold / fold! */
     uint8_t fold;      /* 0: no integral; 1, 2 */
     uint8_t plain;     /* of an integral: the channel with the same gain and fold 0 */
