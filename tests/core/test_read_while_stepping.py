@@ -21,7 +21,15 @@ TIMEOUT_S = 40.0
 def play_threads(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     sources = [path for path in core_sources("*_f32.c") if path.parent.name in ROOMS]
     command = ["clang", "-std=c99", "-O1", "-g", "-fsanitize=thread", *options, *INCLUDES, str(PROGRAM)]
-    command += [str(source("publication.c")), *map(str, sources), "-lm", "-lpthread", "-o", str(folder / "read")]
+    command += [
+        str(source("publication.c")),
+        str(source("kinds.c")),
+        *map(str, sources),
+        "-lm",
+        "-lpthread",
+        "-o",
+        str(folder / "read"),
+    ]
     built = subprocess.run(command, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
     return subprocess.run([str(folder / "read")], capture_output=True, text=True, check=False, timeout=TIMEOUT_S)

@@ -141,5 +141,7 @@ def test_sticking_is_cut_into_pieces_of_unknown_sign() -> None:
     v = np.concatenate([np.linspace(1, 0, 50), np.zeros(40), np.linspace(0, 1, 50)])
     signs = reversals.located(v, 1e-3, np.zeros(v.size), 8)
     assert signs.stuck[50:90].all() and not signs.stuck[:45].any()
-    assert np.all(signs.values[signs.stuck] == 0.0)
+    assert np.all(signs.values[signs.stuck] == 1.0)  # from + to +
+    turned = reversals.located(np.sign(np.arange(v.size) - 70) * v, 1e-3, np.zeros(v.size), 8)
+    assert turned.stuck[50:90].all() and np.all(np.diff(turned.values[turned.stuck]) > 0)  # from - to +
     assert len(signs.times) == 6 and np.all(np.diff(signs.times) <= 8)

@@ -12,7 +12,7 @@
 #include "fourier/columns_f32.h"
 #include "fourier/fourier_finish_f32.h"
 #include "fourier/fourier_front_f32.h"
-#include "fourier/schedule.h"
+#include "fourier/fourier_schedule.h"
 #include "fourier/white_f32.h"
 #include "pvid/pvid.h"
 

@@ -7,8 +7,8 @@
 
 #include "fourier/fourier_finish_f32.h"
 #include "fourier/fourier_front_f32.h"
-#include "fourier/schedule.h"
-#include "fourier/step_f32.h"
+#include "fourier/fourier_schedule.h"
+#include "fourier/fourier_step_f32.h"
 #include "fourier/sums_f32.h"
 #include "fourier/valid_f32.h"
 #include "fourier/watch_f32.h"

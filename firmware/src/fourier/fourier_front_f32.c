@@ -10,7 +10,7 @@
 
 #include <stddef.h>
 
-#include "fourier/schedule.h"
+#include "fourier/fourier_schedule.h"
 #include "number/unroll.h"
 
 #define HELD_SCALE (1.0f / 24.0f)

@@ -28,7 +28,7 @@ _BLOCK = 4
 
 @dataclass(frozen=True)
 class FourierSchedule:
-    """Twin of fourier/schedule.h: harmonics and stages of a free tick.
+    """Twin of fourier/fourier_schedule.h: harmonics and stages of a free tick.
 
     free_ticks: those of a block of four steps
     """

@@ -20,7 +20,7 @@ _LONG_STEP, _PAIRS = 8, 16
 
 @dataclass(frozen=True)
 class FrontTicks:
-    """Twin of fourier/schedule.h, as far as it depends on the front end: the work of the ticks of a stretch.
+    """Twin of fourier/fourier_schedule.h, as far as it depends on the front end: the work of the ticks of a stretch.
 
     Ticks count from its first sample.
 

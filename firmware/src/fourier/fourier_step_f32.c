@@ -12,7 +12,7 @@
  *   of 1:       t and t^2/2
  *
  * Both integrals are 0 at the first step of a half window; their values there without that are the `edge`. */
-#include "fourier/step_f32.h"
+#include "fourier/fourier_step_f32.h"
 
 #include <stddef.h>
 
