@@ -1,4 +1,4 @@
-"""Twin of fourier/fourier_step_f32.c: from the jets of a stretch's steps to the values of its channels, all steps at once."""
+"""Twin of fourier/fourier_step_f32.c: from the jets of a stretch's steps to its channels, all steps at once."""
 
 from __future__ import annotations
 
