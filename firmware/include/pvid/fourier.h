@@ -92,7 +92,8 @@ typedef struct {
 
 typedef struct {
     const pvid_fourier_model_f32 *model;
-    uint8_t functions;  /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
+    uint8_t functions;  /* K, 4..PVID_MAX_FUNCTIONS: f = 0, then cosine and sine of f = 1, 2, ...; an even K
+                           ends with a cosine */
     uint8_t power;      /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation; /* D, ticks a step, 1..PVID_MAX_DECIMATION */
     uint16_t hop;       /* steps of half a window, a multiple of 4; H < hop */
@@ -114,7 +115,7 @@ typedef struct {
     const float *range;     /* [samples] window dropped if a sample's absolute value is beyond, > 0; NULL: no check */
     const float *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, >= 0;
                                NULL: no check */
-    bool compensation;      /* B gets what the sensors' noise takes from it (errors in variables) */
+    bool compensation;      /* corrects the bias by the sensors' noise (errors in variables) */
     uint8_t iterations;     /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3 */
     pvid_estimator_config_f32 estimator; /* row_sd 1: rows are in standard deviations. init sets model, update_rate_hz,
                                             row_weight and correlation */

@@ -1,5 +1,5 @@
-/* As in step_f32.c: with the jets of step k the gains and integrands of step k - 1 follow, and with those the channels
- * of step k - 2.
+/* As in fourier_step_f32.c: with the jets of step k the gains and integrands of step k - 1 follow, and with those the
+ * channels of step k - 2.
  *
  *   sgn_(k-1)  from the arguments v at k - 2, k - 1, k: the mean of sgn over the step, v linear there
  *   I^1        I_j = I_(j-1) + (-f_(j-2) + 13 f_(j-1) + 13 f_j - f_(j+1)) dt/24, the integral of a cubic

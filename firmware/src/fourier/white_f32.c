@@ -7,9 +7,9 @@
  *
  * with the equation's own error, white noise of variance v differentiated m times, as a part v of c_m. The K test
  * functions sin^n(pi t/T) cos and sin(2 pi f t/T) are K combinations T of the K + n parts: real ones at h = 0..(K +
- * n)/2, imaginary ones at h = 1..(K - 1)/2 + n/2. Their covariance T diag(D) T^T is no matrix for float32: its
- * condition is (K/pi)^(2 n). But what T leaves out is known: an n-th difference of a polynomial below degree n is 0. So
- * the parts over their standard deviations, without their components along
+ * n)/2, imaginary ones at h = 1..(K - 1)/2 + n/2. Their covariance T diag(D) T^T is too ill-conditioned for float32:
+ * its condition number is (K/pi)^(2 n). But the directions that this matrix T leaves out are known: an n-th difference
+ * of a polynomial below degree n is 0. So the parts over their standard deviations, without their components along
  *
  *   h^(2 k) / sqrt(D_h) of the real parts,   h^(2 k + 1) / sqrt(D_h) of the imaginary parts,   k = 0..n/2 - 1,
  *
