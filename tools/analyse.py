@@ -140,7 +140,9 @@ def cppcheck(alike: list[Unit]) -> set[Finding]:
     number is all there is."""
     first = alike[0]
     options = [option for option in first.common if option.startswith(("-I", "-D"))]
-    folder = BUILD / hashlib.sha256("\n".join([first.machine, *options]).encode()).hexdigest()[:8]
+    # cppcheck keeps a file's findings while its preprocessed text stays; lines of comments in headers are not in it.
+    headers = "\n".join(path.read_text(encoding="utf-8") for path in sorted(FIRMWARE.rglob("*.h")))
+    folder = BUILD / hashlib.sha256("\n".join([first.machine, *options, headers]).encode()).hexdigest()[:8]
     folder.mkdir(parents=True, exist_ok=True)
     checks = [
         "--std=c99",
