@@ -31,7 +31,7 @@ size_t pvid_kinds_moments(size_t n_theta, size_t n_kinds, const uint8_t *kind_en
     bool ascends = kind_end != NULL;
     for (size_t kind = 0; (kind < n_kinds) && ascends; kind++) {
         ascends = kind_end[kind] > first;
-        moments += moments_of(kind_end[kind] - first);
+        moments += ascends ? moments_of(kind_end[kind] - first) : 0u;
         first = kind_end[kind];
     }
     return (ascends && (first == n_theta)) ? moments : 0u;
