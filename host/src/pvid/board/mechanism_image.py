@@ -30,7 +30,7 @@ from pvid.twin.fourier import FourierTwin
 
 Float32 = npt.NDArray[np.float32]
 
-MISSING = int(np.iinfo(np.int32).min)  # a count that stands for no sample
+MISSING = int(np.iinfo(np.int32).min)  # marks a missing sample
 MADE_BY = "pvid.board.mechanism_image"
 _PERIODS = 3  # half windows whose ticks are counted
 _COUNTS = 2**22  # of a signal without a resolution, over its largest value; a float holds such a count exactly

@@ -27,7 +27,7 @@ from pvid.twin import fnv
 
 REPORT_EVERY = 500  # ticks from one line with the running hash to the next
 
-MISSING = int(np.iinfo(np.int16).min)  # a count that stands for no sample; not in fixed point
+MISSING = int(np.iinfo(np.int16).min)  # marks a missing sample; not in fixed point
 
 # From so many ticks on the samples are a file that the assembler takes in: a compiler is slow with so many numbers.
 MANY_TICKS = 100_000
