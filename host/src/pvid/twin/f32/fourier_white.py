@@ -113,7 +113,7 @@ class White:
                 u[family.start + k] = 1
             for place in reversed(range(k + 1)):
                 u = self._reflected(place, u)
-            leverage = leverage + u * u
+            leverage = np.asarray(leverage + u * u)
         return leverage
 
     def _reflected(self, place: int, x: Float32) -> Float32:
@@ -126,7 +126,7 @@ class White:
         return out
 
     def columns(self, parts: Float32) -> Float32:
-        """White columns [columns, rows, lanes] from their parts over the standard deviations [columns, parts, lanes]."""
+        """White columns [columns, rows, lanes] from their parts in standard deviations [columns, parts, lanes]."""
         x = np.moveaxis(parts, 0, 1)
         with np.errstate(all="ignore"):
             for place in range(self.rows.vectors):
@@ -170,6 +170,6 @@ def _reflection(x: Float32) -> Float32:
     size, head = np.sqrt(total(x * x)), x[0]
     negative = head < 0
     scale = _F(1) / np.sqrt(size * (size + np.where(negative, -head, head)))
-    v = x * scale
+    v: Float32 = x * scale
     v[0] = np.where(negative, head - size, head + size) * scale
     return v
