@@ -76,7 +76,7 @@ def test_every_byte_is_saved_and_restored_but_those_of_pointers() -> None:
     rig = engine_rig("kapitza")
     one, other, _ = engines(rig, rig.config)
     ffi, size = one.ffi, one.ffi.sizeof("void *")
-    solve = [ffi.offsetof(one.type, "finish", "solve", name) for name in ("fallback", "estimate")]
+    solve = [ffi.offsetof(one.type, "finish", "solve", name) for name in ("fallback", "noise", "estimate")]
     for place in assert_every_byte_is_kept(one, other):
         assert any(first <= place < first + size for first in solve), place
     assert other.state.finish.solve.fallback == ffi.addressof(other.state.trust.estimate, "p")[0]

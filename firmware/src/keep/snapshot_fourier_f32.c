@@ -60,6 +60,7 @@ static const pvid_snapshot_pointer pointers[] = {
     {PLACE(watch.range), PVID_SNAPSHOT_OF_INIT},
     {PLACE(watch.drive_min), PVID_SNAPSHOT_OF_INIT},
     {PLACE(finish.solve.fallback), PLACE(trust.estimate.p)},
+    {PLACE(finish.solve.noise), PLACE(finish.candidate.covariance)},
     {PLACE(finish.solve.estimate), PLACE(finish.candidate)},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
 };

@@ -60,6 +60,7 @@ static const pvid_snapshot_pointer pointers[] = {
     {PLACE(front.second), PVID_SNAPSHOT_OF_INIT},
     {PLACE(finish.angle), PVID_SNAPSHOT_OF_INIT},
     {PLACE(finish.solve.fallback), PLACE(trust.estimate.p)},
+    {PLACE(finish.solve.noise), PVID_SNAPSHOT_OF_INIT},
     {PLACE(finish.solve.estimate), PLACE(finish.candidate)},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
 };
