@@ -150,7 +150,7 @@ _DRIVER = """
 
 #include "fourier/collect_q31.h"
 #include "fourier/columns_q31.h"
-#include "fourier/direction_q31.h"
+#include "fourier/mirror_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/white_q31.h"
 
@@ -216,11 +216,11 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     const pvid_fourier_design_q31 *design = &rig_design_q31;
     const pvid_fourier_kind *own = &design->model->kind[kind];
     const size_t harmonics = pvid_fourier_harmonics_q31(design);
-    const size_t rows = pvid_fourier_rows_q31(design);
+    const size_t rows = design->functions;
     const size_t used = own->thetas + 1u;
     const size_t count = used + own->nuisances;
     uint64_t whole[PVID_MAX_COLUMNS];
-    unsigned live = 0;
+    size_t live = 0;
     size_t term = own->first;
     for (size_t c = 0; c < design->model->channels; c++) {
         for (size_t h = 0; h < harmonics; h++) {
@@ -233,36 +233,34 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     pvid_fourier_white_spectrum_q31(&white, design, (uint8_t)kind, 0, harmonics);
     const pvid_scaled_q31 least = pvid_fourier_white_floor_q31(&white, design);
     pvid_fourier_white_invert_q31(&white, least, 0, harmonics);
-    for (size_t k = 0; k < pvid_fourier_basis_stages_q31(design); k++) {
-        pvid_fourier_white_basis_q31(&white, design, k);
+    for (size_t k = 0; k < pvid_fourier_mirrors_q31(design); k++) {
+        pvid_fourier_white_mirror_q31(&white, design, k);
     }
     for (size_t j = 0; j < count; j++) {
         size_t end = term;
         while ((end < own->end) && (design->model->term[end].column == j)) {
             end++;
         }
-        for (size_t part = 0; part < pvid_fourier_column_parts_q31(&white); part++) {
-            pvid_fourier_columns_make_q31(&made, design, &white, &sums, j, term, end, part);
-        }
+        pvid_fourier_columns_make_q31(&made, design, &white, &sums, j, term, end);
         term = end;
-        for (size_t k = 0; k < design->power / 2u; k++) {
-            pvid_fourier_white_remove_q31(&white, design, k, made.x[j]);
-        }
-        whole[j] = pvid_fourier_columns_square_q31(design, made.x[j]);
+        pvid_fourier_white_remove_q31(&white, design, made.x[j]);
+        whole[j] = pvid_fourier_columns_square_q31(rows, made.x[j]);
     }
     for (size_t j = used; j < count; j++) {
-        live += pvid_fourier_columns_keep_q31(design, whole[j], made.x[j]) ? 1u : 0u;
+        int32_t *mirror = &made.x[j][live];
+        const bool kept = pvid_fourier_columns_keep_q31(whole[j], rows - live, mirror);
         for (size_t i = 0; i < count; i++) {
-            if ((i < used) || (i > j)) {
-                pvid_fourier_take_off_q31(made.x[j], 0, rows, made.x[i]);
+            if (kept && ((i < used) || (i > j))) {
+                pvid_fourier_mirror_q31(mirror, rows - live, &made.x[i][live]);
             }
         }
+        live += kept ? 1u : 0u;
     }
     for (size_t j = 0; j < used; j++) {
         memcpy(&x[j * rows], made.x[j], rows * sizeof x[0]);
         exponent[j] = made.exponent[j];
     }
-    return live;
+    return (unsigned)live;
 }
 """
 SIZES = (
@@ -341,7 +339,7 @@ class Core:
         count = design.model.kind[kind].thetas + 1
         given = np.ascontiguousarray(np.stack([theta.m, theta.e], axis=-1), np.int32)
         sums = np.ascontiguousarray(window, np.int32)
-        x, exponent = np.zeros((count, design.rows), np.int32), np.zeros(count, np.int32)
+        x, exponent = np.zeros((count, design.functions), np.int32), np.zeros(count, np.int32)
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, sums, x, exponent)]
         live = self.library(one).columns(kind, *pointers)
         return x.astype(np.int64), exponent.astype(np.int64), int(live)

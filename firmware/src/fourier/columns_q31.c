@@ -3,18 +3,18 @@
  *
  *   sum over terms  factor (-1)^m (i omega_h)^m S_h[channel]
  *
- * over their standard deviations, without what the test functions leave out (white_f32.c). The products of a term have
- * 61 bits and an exponent of their own; they are added with that of the largest weight, then rounded to a block. */
+ * over their standard deviations. The sums of a channel are shifted up to 30 bits, the factors of all terms to the
+ * exponent of the largest; products lose 33 of their bits, so that 15 of them fit. */
 #include "fourier/columns_q31.h"
 
 #include <string.h>
 
-#include "fourier/direction_q31.h"
+#include "fourier/mirror_q31.h"
 #include "fourier/white_q31.h"
 #include "number/integer_q31.h"
-#include "number/scaled_q31.h"
 
-#define GUARD 4 /* bits that the products of 61 bits lose at least: 64 of them fit */
+#define SUM_BITS 30
+#define PRODUCT_DOWN 33
 #define KEPT_BITS 20
 #define SQUARE_DOWN 16u
 
@@ -33,97 +33,102 @@ static turn turn_of(uint8_t order)
     return result;
 }
 
-/* factor h^order / sqrt(D_h): m 2^e with |m| <= 2^30. */
-static pvid_scaled_q31 weight_of(pvid_scaled_q31 factor, uint8_t order, size_t h, pvid_scaled_q31 scale)
+/* Bits that the sums of a channel may be shifted up, 0 if there is nothing to shift. */
+static uint32_t lift_of(const pvid_fourier_window_q31 *window, size_t channel, size_t harmonics)
 {
-    int32_t power = 1;
-    for (size_t i = 0; i < order; i++) {
-        power *= (int32_t)h;
+    uint32_t all = 0;
+    for (size_t h = 0; h < harmonics; h++) {
+        const int32_t *s = window->s[channel][h];
+        all |= (uint32_t)((s[0] < 0) ? -s[0] : s[0]);
+        all |= (uint32_t)((s[1] < 0) ? -s[1] : s[1]);
     }
-    const int32_t bits = (int32_t)pvid_bit_length_q31((uint64_t)power);
-    const int32_t both = (int32_t)pvid_floor_shift_q31(pvid_product_q31(factor.m, scale.m), 30);
-    const pvid_scaled_q31 weight = {(int32_t)pvid_floor_shift_q31(pvid_product_q31(both, power), (uint32_t)bits),
-                                    factor.e + scale.e + 30 + bits};
-    return weight;
+    const uint32_t length = pvid_bit_length_q31(all);
+    return ((length == 0u) || (length > (uint32_t)SUM_BITS)) ? 0u : ((uint32_t)SUM_BITS - length);
 }
 
-/* The greatest exponent of the weights of a column, at least `top`. */
-static int32_t greatest(const pvid_fourier_design_q31 *design, const pvid_fourier_white_q31 *white, size_t t,
-                        int32_t top)
+/* x 2^lift weight 2^-33, rounded down. */
+static int32_t part_of(bool negative, int32_t x, uint32_t lift, int32_t weight)
 {
-    int32_t found = top;
-    for (size_t h = 0; h < white->cosines; h++) {
-        const pvid_scaled_q31 weight = weight_of(design->factor[t], design->model->term[t].order, h, white->scale[h]);
-        found = ((weight.m != 0) && (weight.e > found)) ? weight.e : found;
-    }
-    return found;
+    const int32_t lifted = x * (int32_t)((uint32_t)1 << lift);
+    return (int32_t)pvid_floor_shift_q31(pvid_product_q31(negative ? -lifted : lifted, weight), PRODUCT_DOWN);
 }
 
-/* Adds a term at harmonic h. */
-static void take_term(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
-                      const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t t, size_t h)
+/* Adds a term whose unit is 2^below of the column's. */
+static void take_term(const pvid_fourier_design_q31 *design, const pvid_fourier_white_q31 *white,
+                      const pvid_fourier_window_q31 *window, size_t t, uint32_t lift, uint32_t below, int32_t x[])
 {
     const pvid_fourier_term_q31 term = design->model->term[t];
     const turn turned = turn_of(term.order);
-    const pvid_scaled_q31 weight = weight_of(design->factor[t], term.order, h, white->scale[h]);
-    if (weight.m == 0) {
-        return;
-    }
-    const uint32_t shift = (uint32_t)((self->top - weight.e) + GUARD);
-    const int32_t *s = window->s[term.channel][h];
-    const int32_t re = turned.turned ? s[1] : s[0];
-    const int32_t im = turned.turned ? s[0] : s[1];
-    self->sum[h] += pvid_round_shift_q31(pvid_product_q31(turned.re_negative ? -re : re, weight.m), shift);
-    if ((h > 0u) && ((white->cosines + h) <= pvid_fourier_rows_q31(design))) {
-        const int64_t product = pvid_product_q31(turned.im_negative ? -im : im, weight.m);
-        self->sum[(white->cosines + h) - 1u] += pvid_round_shift_q31(product, shift);
+    const size_t harmonics = white->cosines;
+    const size_t sines = pvid_fourier_sums_rows_q31(design) - harmonics;
+    const int32_t factor = design->factor[t].m;
+    for (size_t h = 0; h < harmonics; h++) {
+        const int32_t *s = window->s[term.channel][h];
+        const int32_t weight =
+            pvid_floor_shift_32_q31(pvid_fourier_white_weight_q31(white, term.order, h, factor), below);
+        const int32_t re = turned.turned ? s[1] : s[0];
+        const int32_t im = turned.turned ? s[0] : s[1];
+        x[h] += part_of(turned.re_negative, re, lift, weight);
+        if ((h > 0u) && (h <= sines)) {
+            x[(harmonics + h) - 1u] += part_of(turned.im_negative, im, lift, weight);
+        }
     }
 }
 
-/* The greatest exponent; each harmonic; the block. */
 void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
                                    const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
-                                   size_t place, size_t first, size_t end, size_t part)
+                                   size_t place, size_t first, size_t end)
 {
-    if (part == 0u) {
-        memset(self->sum, 0, sizeof self->sum);
-        self->top = INT32_MIN;
-        for (size_t t = first; t < end; t++) {
-            self->top = greatest(design, white, t, self->top);
-        }
-    } else if (part <= white->cosines) {
-        for (size_t t = first; t < end; t++) {
-            take_term(self, design, white, window, t, part - 1u);
-        }
-    } else {
-        const int32_t exponent = pvid_fourier_block_q31(self->sum, 0, pvid_fourier_rows_q31(design), self->x[place]);
-        const int32_t unit = (self->top == INT32_MIN) ? 0 : (self->top + GUARD);
-        self->exponent[place] = (int16_t)pvid_clamp_q31((int64_t)unit + exponent, INT16_MAX);
+    const size_t parts = pvid_fourier_sums_rows_q31(design);
+    int32_t *x = self->x[place];
+    uint32_t lift[PVID_FOURIER_TERMS_Q31] = {0};
+    int32_t top = INT32_MIN;
+    memset(x, 0, parts * sizeof x[0]);
+    for (size_t t = first; t < end; t++) {
+        lift[t - first] = lift_of(window, design->model->term[t].channel, white->cosines);
+        const int32_t e = design->factor[t].e - (int32_t)lift[t - first];
+        top = ((design->factor[t].m != 0) && (e > top)) ? e : top;
     }
+    for (size_t t = first; t < end; t++) {
+        const int32_t below = top - (design->factor[t].e - (int32_t)lift[t - first]);
+        if ((design->factor[t].m != 0) && (below < SUM_BITS)) {
+            take_term(design, white, window, t, lift[t - first], (uint32_t)below, x);
+        }
+    }
+    const int32_t exponent = pvid_fourier_block_q31(parts, x);
+    const int32_t unit = (top == INT32_MIN) ? 0 : (top + white->exponent + 30 + PRODUCT_DOWN);
+    self->exponent[place] = (int16_t)pvid_clamp_q31((int64_t)unit + exponent, INT16_MAX);
 }
 
-uint64_t pvid_fourier_columns_square_q31(const pvid_fourier_design_q31 *design, const int32_t x[])
+uint64_t pvid_fourier_columns_square_q31(size_t n, const int32_t x[])
 {
     uint64_t square = 0;
-    for (size_t i = 0; i < pvid_fourier_rows_q31(design); i++) {
+    for (size_t i = 0; i < n; i++) {
         square += (uint64_t)pvid_square_q31(x[i]) >> SQUARE_DOWN;
     }
     return square;
 }
 
-bool pvid_fourier_columns_keep_q31(const pvid_fourier_design_q31 *design, uint64_t whole, int32_t x[])
+bool pvid_fourier_columns_keep_q31(uint64_t whole, size_t n, int32_t x[])
 {
-    const size_t rows = pvid_fourier_rows_q31(design);
-    const uint64_t left = pvid_fourier_columns_square_q31(design, x);
-    int64_t wide[PVID_FOURIER_ROWS_Q31];
+    const uint64_t left = pvid_fourier_columns_square_q31(n, x);
     if ((left == 0u) || (left <= (whole >> KEPT_BITS))) {
-        memset(x, 0, rows * sizeof x[0]);
+        memset(x, 0, n * sizeof x[0]);
         return false;
     }
-    for (size_t i = 0; i < rows; i++) {
-        wide[i] = x[i];
-    }
-    (void)pvid_fourier_block_q31(wide, 0, rows, x);
-    pvid_fourier_normalise_q31(0, rows, x);
+    (void)pvid_fourier_block_q31(n, x);
+    pvid_fourier_mirror_of_q31(n, x);
     return true;
+}
+
+void pvid_fourier_columns_format_q31(pvid_fourier_columns_q31 *self, size_t place, size_t first, size_t last,
+                                     int32_t bits)
+{
+    const int32_t shift = -((int32_t)self->exponent[place] + bits);
+    const uint32_t down = (shift <= 0) ? 0u : (uint32_t)((shift < 63) ? shift : 63);
+    const uint32_t up = (shift >= 0) ? 0u : (uint32_t)((shift > -31) ? -shift : 31);
+    for (size_t i = first; i < last; i++) {
+        const int64_t wide = pvid_round_shift_q31(self->x[place][i], down) * ((int64_t)1 << up);
+        self->x[place][i] = (int32_t)pvid_clamp_q31(wide, INT32_MAX);
+    }
 }

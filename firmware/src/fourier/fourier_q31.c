@@ -14,7 +14,8 @@
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define STAGES_MAX 64u
-#define POWER_OF_ROW_WEIGHT 65536u /* 1 in Q16 */
+#define ONE_Q16 65536u
+#define LEAST_FUNCTIONS 4u
 
 static bool is_ready(const pvid_fourier_q31 *self)
 {
@@ -42,7 +43,8 @@ static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
     for (size_t i = 0; fits && (i < model->kinds); i++) {
         const pvid_fourier_kind *kind = &model->kind[i];
         thetas += kind->thetas;
-        columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS);
+        columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS) &&
+                  (kind->nuisances < LEAST_FUNCTIONS);
     }
     const bool same_kinds = (model->model->n_kinds == model->kinds) || (model->kinds == 1u);
     return (fits && columns && same_kinds && (thetas == model->model->n_theta)) ? PVID_OK : PVID_BAD_MODEL;
@@ -60,7 +62,7 @@ static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
         return status;
     }
     const pvid_fourier_model_q31 *model = design->model;
-    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
+    if ((design->functions < LEAST_FUNCTIONS) || (design->functions > PVID_MAX_FUNCTIONS)) {
         return PVID_BAD_FUNCTIONS;
     }
     if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
@@ -116,9 +118,7 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
     memset(self, 0, sizeof *self);
     pvid_estimator_config_q31 estimator = config->estimator;
     estimator.model = design->model->model;
-    /* K + n rows span K dimensions */
-    estimator.row_weight =
-        (POWER_OF_ROW_WEIGHT * (uint32_t)design->functions) / ((uint32_t)design->functions + design->power);
+    estimator.row_weight = ONE_Q16;
     status = pvid_estimator_init_q31(&self->estimator, &estimator);
     if (status != PVID_OK) {
         return status;

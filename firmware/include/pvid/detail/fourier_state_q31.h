@@ -62,23 +62,23 @@ typedef struct {
     int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
 } pvid_fourier_window_q31;
 
-/* Most rows of a window: parts of its sums. */
+/* Most parts of the sums of a window: K + n. */
 #define PVID_FOURIER_ROWS_Q31 (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
 
-/* The noise of a kind's rows, and the directions that the test functions leave out. */
+/* The noise of a kind's sums, and the reflections that leave its white rows. */
 typedef struct {
-    uint8_t cosines;                                          /* real parts; the other rows are imaginary parts */
-    uint8_t powers;                                           /* of h^2 in use */
-    pvid_scaled_q31 weight[PVID_MAX_POWER];                   /* c_j of the sensors, variance at the power j of h^2 */
-    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                /* D_h, then 1 / sqrt(D_h) */
-    int32_t basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* orthonormal, one of each family in a row, Q30 */
+    uint8_t cosines;                                           /* real parts; the others are imaginary parts */
+    uint8_t powers;                                            /* of h^2 in use */
+    int32_t rate;                                              /* 1 / H, Q30 */
+    int32_t exponent;                                          /* of 1 / sqrt(D_h) */
+    pvid_scaled_q31 weight[PVID_MAX_POWER];                    /* c_j, variance at the power j of h^2 */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                 /* D_h, then m 2^exponent = 1 / sqrt(D_h) */
+    int32_t mirror[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
 } pvid_fourier_white_q31;
 
 /* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
 typedef struct {
     int16_t exponent[PVID_MAX_COLUMNS];
-    int32_t top;                        /* greatest exponent of the weights of the present column */
-    int64_t sum[PVID_FOURIER_ROWS_Q31]; /* the present column while it is made */
     int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
 } pvid_fourier_columns_q31;
 
@@ -109,6 +109,7 @@ typedef struct {
     uint8_t live;                                 /* nuisances of the kind that are projected out */
     uint8_t iteration;                            /* solves done for this window */
     uint8_t part;                                 /* of a column's stages */
+    bool kept;                                    /* the present nuisance is */
     bool saturated;                               /* a row of the kind does not fit: none of them is used */
     uint16_t index;                               /* within the stage */
     uint16_t term;                                /* first one of the present column */
@@ -120,7 +121,7 @@ typedef struct {
     pvid_scaled_q31 expected;                     /* variance of a row */
     pvid_scaled_q31 least;                        /* D_h */
     pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
-    uint64_t whole[PVID_MAX_COLUMNS];             /* square of each column before nuisances are projected out */
+    uint64_t whole[PVID_MAX_COLUMNS];             /* square of each nuisance before those before it are off */
     int8_t n_bits[PVID_MAX_THETA_Q31];            /* formats of the rows */
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];

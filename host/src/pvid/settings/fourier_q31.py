@@ -123,7 +123,7 @@ class FourierDesignQ31:
     integral : shifts (once, twice) of each integrand
     format : of each channel
     circle : int16 32767 cos(pi j / hop) [2 hop]
-    factor : of each term (m, e), of h^order times a unit of S_h
+    factor : of each term (m, e), of (h/H)^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
     error_variance : of that noise at a step, of h^(2 order) (m, e) [kinds]; (0, 0): the sensors explain the rows
@@ -162,8 +162,8 @@ class FourierDesignQ31:
         return max(one.half for one in self.filter)
 
     @property
-    def rows(self) -> int:
-        """Parts of the sums of a window, K + n."""
+    def parts(self) -> int:
+        """Of the sums of a window, K + n."""
         return self.functions + self.power
 
     @property
