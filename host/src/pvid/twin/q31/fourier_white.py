@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.settings.fourier_q31 import FourierDesignQ31
 from pvid.twin.q31.integer import Int, bit_length, round_shift
@@ -104,7 +103,7 @@ def _reflected(mirrors: Sequence[Int], x: Int) -> Int:
 
 def _weight(gain: Int, highest: int, order: int, h: int, factor: int) -> Int:
     """(h / H)^order / sqrt(D_h) times factor 2^-30 [lanes]."""
-    weight = (gain[h] * factor) >> 30
+    weight: Int = (gain[h] * factor) >> 30
     for _ in range(order):
         weight = (weight * (h * (_ONE // highest))) >> 30
     return weight
