@@ -59,7 +59,7 @@ class Rig:
         run = simulation.run(seed, Imperfections())
         compiled = compiled_of(name)
         self.name, self.compiled = name, ready(compiled)
-        self.oracle_design = for_engine(DESIGNS[name])
+        self.oracle_design = for_engine(DESIGNS[name], comb=False)
         self.run = {key: np.asarray(x, np.float64)[:samples] for key, x in run.items()}
         self.made = fourier_functions_of(compiled)
         known = {one.name: one for one in compiled.signals}
