@@ -30,7 +30,7 @@ from pvid.setup.fourier import design_tables, for_engine
 from pvid.setup.fourier_q31 import config_of_q31, row_formats
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.q31.fourier_front import jets
+from pvid.twin.q31.fourier_front import FrontTicks, jets
 from pvid.twin.q31.fourier_values import steps
 from pvid.twin.q31.scaled import Scaled
 
@@ -59,7 +59,7 @@ class Rig:
         run = simulation.run(seed, Imperfections())
         compiled = compiled_of(name)
         self.name, self.compiled = name, ready(compiled)
-        self.oracle_design = for_engine(DESIGNS[name], comb=False)
+        self.oracle_design = for_engine(DESIGNS[name])
         self.run = {key: np.asarray(x, np.float64)[:samples] for key, x in run.items()}
         self.made = fourier_functions_of(compiled)
         known = {one.name: one for one in compiled.signals}
@@ -107,7 +107,11 @@ class Rig:
     def oracle_sums(self) -> dict[int, Float]:
         """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
         functions = self.oracle_design.test_functions
-        sums = self.record.sums(functions)
+        # The oracle's first step is at the third sample or later; the engine's may be at the first one.
+        missing = max(2 - FrontTicks.of(self.design).lead, 0)
+        padded = {name: np.concatenate([x[:1]] * missing + [x]) for name, x in self.exact.items()}
+        record = record_of(self.compiled, padded, self.oracle_design) if missing else self.record
+        sums = record.sums(functions)
         out = {}
         first = 0
         for row in self.record.channels.rows:
@@ -164,7 +168,8 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
     const pvid_fourier_model_q31 *model = rig_design_q31.model;
     const unsigned harmonics = (rig_design_q31.functions / 2u) + (rig_design_q31.power / 2u) + 1u;
     unsigned windows = 0;
-    pvid_fourier_collect_init_q31(&self, &rig_design_q31);
+    static const int32_t offset[PVID_MAX_SAMPLES] = {0};
+    pvid_fourier_collect_init_q31(&self, &rig_design_q31, offset);
     for (unsigned k = 0; k < ticks; k++) {
         const pvid_fourier_tick tick = pvid_fourier_collect_step_q31(&self, &counts[k * model->samples]);
         outcome[k] = (uint8_t)tick;
@@ -221,11 +226,13 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     const size_t count = used + own->nuisances;
     uint64_t whole[PVID_MAX_COLUMNS];
     size_t live = 0;
-    size_t term = own->first;
     for (size_t c = 0; c < design->model->channels; c++) {
         for (size_t h = 0; h < harmonics; h++) {
-            sums.s[c][h][0] = *window++;
-            sums.s[c][h][1] = *window++;
+            for (size_t part = 0; part < 2u; part++) {
+                const int32_t one = *window++;
+                sums.s[c][h][part] = one;
+                sums.bits[c] = ((h + part == 0u) ? 0u : sums.bits[c]) | (uint32_t)((one < 0) ? -one : one);
+            }
         }
     }
     pvid_fourier_white_init_q31(&white, design);
@@ -236,14 +243,12 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     for (size_t k = 0; k < pvid_fourier_mirrors_q31(design); k++) {
         pvid_fourier_white_mirror_q31(&white, design, k);
     }
+    pvid_fourier_columns_begin_q31(&made, design, kind, &sums);
+    for (size_t h = 0; h < harmonics; h++) {
+        pvid_fourier_columns_take_q31(&made, design, kind, &white, &sums, h);
+    }
     for (size_t j = 0; j < count; j++) {
-        size_t end = term;
-        while ((end < own->end) && (design->model->term[end].column == j)) {
-            end++;
-        }
-        pvid_fourier_columns_make_q31(&made, design, &white, &sums, j, term, end);
-        term = end;
-        pvid_fourier_white_remove_q31(&white, design, made.x[j]);
+        pvid_fourier_columns_end_q31(&made, design, &white, j);
         whole[j] = pvid_fourier_columns_square_q31(rows, made.x[j]);
     }
     for (size_t j = used; j < count; j++) {

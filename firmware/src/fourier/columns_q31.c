@@ -14,90 +14,84 @@
 #include "number/integer_q31.h"
 
 #define SUM_BITS 30
-#define PRODUCT_DOWN 33
+#define PRODUCT_DOWN 33u
 #define KEPT_BITS 20
 #define SQUARE_DOWN 16u
 
-/* What a term takes for the real and the imaginary part: (-i omega)^m is 1, -i omega, -omega^2, i omega^3, ... */
-typedef struct {
-    bool turned; /* the imaginary part of S_h for the real part, and the real one for the imaginary part */
-    bool re_negative;
-    bool im_negative;
-} turn;
-
-static turn turn_of(uint8_t order)
+static int32_t exponent_of(const pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t t)
 {
-    const bool turned = (order % 2u) != 0u;
-    const bool negative = ((order + 1u) % 4u) >= 2u;
-    const turn result = {turned, turned ? !negative : negative, negative};
-    return result;
+    return design->factor[t].e - (int32_t)self->lift[design->model->term[t].channel];
 }
 
-/* Bits that the sums of a channel may be shifted up, 0 if there is nothing to shift. */
-static uint32_t lift_of(const pvid_fourier_window_q31 *window, size_t channel, size_t harmonics)
+void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
+                                    const pvid_fourier_window_q31 *window)
 {
-    uint32_t all = 0;
-    for (size_t h = 0; h < harmonics; h++) {
-        const int32_t *s = window->s[channel][h];
-        all |= (uint32_t)((s[0] < 0) ? -s[0] : s[0]);
-        all |= (uint32_t)((s[1] < 0) ? -s[1] : s[1]);
-    }
-    const uint32_t length = pvid_bit_length_q31(all);
-    return ((length == 0u) || (length > (uint32_t)SUM_BITS)) ? 0u : ((uint32_t)SUM_BITS - length);
-}
-
-/* x 2^lift weight 2^-33, rounded down. */
-static int32_t part_of(bool negative, int32_t x, uint32_t lift, int32_t weight)
-{
-    const int32_t lifted = x * (int32_t)((uint32_t)1 << lift);
-    return (int32_t)pvid_floor_shift_q31(pvid_product_q31(negative ? -lifted : lifted, weight), PRODUCT_DOWN);
-}
-
-/* Adds a term whose unit is 2^below of the column's. */
-static void take_term(const pvid_fourier_design_q31 *design, const pvid_fourier_white_q31 *white,
-                      const pvid_fourier_window_q31 *window, size_t t, uint32_t lift, uint32_t below, int32_t x[])
-{
-    const pvid_fourier_term_q31 term = design->model->term[t];
-    const turn turned = turn_of(term.order);
-    const size_t harmonics = white->cosines;
-    const size_t sines = pvid_fourier_sums_rows_q31(design) - harmonics;
-    const int32_t factor = design->factor[t].m;
-    for (size_t h = 0; h < harmonics; h++) {
-        const int32_t *s = window->s[term.channel][h];
-        const int32_t weight =
-            pvid_floor_shift_32_q31(pvid_fourier_white_weight_q31(white, term.order, h, factor), below);
-        const int32_t re = turned.turned ? s[1] : s[0];
-        const int32_t im = turned.turned ? s[0] : s[1];
-        x[h] += part_of(turned.re_negative, re, lift, weight);
-        if ((h > 0u) && (h <= sines)) {
-            x[(harmonics + h) - 1u] += part_of(turned.im_negative, im, lift, weight);
-        }
-    }
-}
-
-void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
-                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
-                                   size_t place, size_t first, size_t end)
-{
+    const pvid_fourier_model_q31 *model = design->model;
+    const pvid_fourier_kind *own = &model->kind[kind];
     const size_t parts = pvid_fourier_sums_rows_q31(design);
-    int32_t *x = self->x[place];
-    uint32_t lift[PVID_FOURIER_TERMS_Q31] = {0};
-    int32_t top = INT32_MIN;
-    memset(x, 0, parts * sizeof x[0]);
-    for (size_t t = first; t < end; t++) {
-        lift[t - first] = lift_of(window, design->model->term[t].channel, white->cosines);
-        const int32_t e = design->factor[t].e - (int32_t)lift[t - first];
-        top = ((design->factor[t].m != 0) && (e > top)) ? e : top;
+    const size_t columns = (size_t)own->thetas + 1u + own->nuisances;
+    for (size_t k = 0; k < model->channels; k++) {
+        const uint32_t length = pvid_bit_length_q31(window->bits[k]);
+        const bool full = (length == 0u) || (length > (uint32_t)SUM_BITS);
+        self->lift[k] = (uint8_t)(full ? 0u : ((uint32_t)SUM_BITS - length));
     }
-    for (size_t t = first; t < end; t++) {
-        const int32_t below = top - (design->factor[t].e - (int32_t)lift[t - first]);
-        if ((design->factor[t].m != 0) && (below < SUM_BITS)) {
-            take_term(design, white, window, t, lift[t - first], (uint32_t)below, x);
+    for (size_t j = 0; j < columns; j++) {
+        self->exponent[j] = INT16_MIN;
+        for (size_t i = 0; i < parts; i++) {
+            self->x[j][i] = 0;
         }
     }
-    const int32_t exponent = pvid_fourier_block_q31(parts, x);
-    const int32_t unit = (top == INT32_MIN) ? 0 : (top + white->exponent + 30 + PRODUCT_DOWN);
+    for (size_t t = own->first; t < own->end; t++) {
+        const int32_t e = exponent_of(self, design, t);
+        int16_t *top = &self->exponent[model->term[t].column];
+        *top = ((design->factor[t].m != 0) && (e > *top)) ? (int16_t)e : *top;
+    }
+}
+
+/* (-i omega)^m is 1, -i omega, -omega^2, i omega^3, ...: from the imaginary part of S_h to the real part of a column and
+ * from the real one to the imaginary one if m is odd. */
+void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
+                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t h)
+{
+    const pvid_fourier_kind *own = &design->model->kind[kind];
+    const size_t harmonics = white->cosines;
+    const bool has_sine = (h > 0u) && ((harmonics + h) <= pvid_fourier_sums_rows_q31(design));
+    int32_t weight[PVID_MAX_POWER + 1]; /* of the orders */
+    weight[0] = white->scale[h].m;
+    for (size_t m = 1; m < design->power; m++) {
+        weight[m] = (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[m - 1u], (int32_t)h * white->rate), 30);
+    }
+    for (size_t t = own->first; t < own->end; t++) {
+        const pvid_fourier_term_q31 term = design->model->term[t];
+        const int32_t below = self->exponent[term.column] - exponent_of(self, design, t);
+        const int32_t *s = window->s[term.channel][h];
+        if ((design->factor[t].m != 0) && (below < SUM_BITS)) { /* else nothing is left of it */
+            const int32_t whole =
+                (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[term.order], design->factor[t].m), 30);
+            const int32_t w = pvid_floor_shift_32_q31(whole, (uint32_t)below);
+            const int32_t up = (int32_t)((uint32_t)1 << self->lift[term.channel]);
+            const bool turned = (term.order % 2u) != 0u;
+            const int32_t re = (turned ? s[1] : s[0]) * up;
+            const int32_t im = (turned ? s[0] : s[1]) * up;
+            const int32_t of_re = ((term.order % 4u) >= 2u) ? -w : w;
+            const int32_t of_im = (((term.order + 1u) % 4u) >= 2u) ? -w : w;
+            int32_t *x = &self->x[term.column][h];
+            x[0] += (int32_t)pvid_floor_shift_q31(pvid_product_q31(re, of_re), PRODUCT_DOWN);
+            if (has_sine) {
+                x[harmonics - 1u] += (int32_t)pvid_floor_shift_q31(pvid_product_q31(im, of_im), PRODUCT_DOWN);
+            }
+        }
+    }
+}
+
+void pvid_fourier_columns_end_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
+                                  const pvid_fourier_white_q31 *white, size_t place)
+{
+    const int32_t top = self->exponent[place];
+    const int32_t exponent = pvid_fourier_block_q31(pvid_fourier_sums_rows_q31(design), self->x[place]);
+    const int32_t unit = (top == INT16_MIN) ? 0 : (top + white->exponent + 30 + (int32_t)PRODUCT_DOWN);
     self->exponent[place] = (int16_t)pvid_clamp_q31((int64_t)unit + exponent, INT16_MAX);
+    pvid_fourier_white_remove_q31(white, design, self->x[place]);
 }
 
 uint64_t pvid_fourier_columns_square_q31(size_t n, const int32_t x[])

@@ -7,11 +7,17 @@
 
 #include "pvid/fourier_q31.h"
 
-/* Column `place` of a kind in standard deviations, from its terms first..end-1 and the sums of the window: K + n parts
- * that the reflections of white_q31.h make K rows of. */
-void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
-                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
-                                   size_t place, size_t first, size_t end);
+/* Begins the columns of a kind: all entries 0. */
+void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
+                                    const pvid_fourier_window_q31 *window);
+
+/* Adds harmonic h of the window's sums, over its standard deviation, to the K + n parts of all columns. */
+void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
+                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t h);
+
+/* Behind all harmonics: the K white rows of a column. */
+void pvid_fourier_columns_end_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
+                                  const pvid_fourier_white_q31 *white, size_t place);
 
 /* sum x^2 2^-16, in the column's own unit, |x| < 2^31. */
 uint64_t pvid_fourier_columns_square_q31(size_t n, const int32_t x[]);

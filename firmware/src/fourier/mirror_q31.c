@@ -4,12 +4,6 @@
 
 #define NEWTON_STEPS 4u
 
-/* Bits of x < 2^31, by the count of leading zeros where the processor has it. */
-static uint32_t length_of(uint32_t x)
-{
-    return pvid_bit_length_q31(x);
-}
-
 int32_t pvid_fourier_block_q31(size_t n, int32_t x[])
 {
     uint32_t all = 0;
@@ -19,7 +13,7 @@ int32_t pvid_fourier_block_q31(size_t n, int32_t x[])
     if (all == 0u) {
         return 0;
     }
-    const int32_t exponent = (int32_t)length_of(all) - PVID_FOURIER_COLUMN_BITS_Q31;
+    const int32_t exponent = (int32_t)pvid_bit_length_q31(all) - PVID_FOURIER_COLUMN_BITS_Q31;
     if (exponent > 0) {
         for (size_t i = 0; i < n; i++) {
             x[i] = pvid_floor_shift_32_q31(x[i], (uint32_t)exponent);
@@ -85,6 +79,6 @@ void pvid_fourier_mirror_q31(const int32_t v[], size_t n, int32_t x[])
     }
     const int32_t along = (int32_t)pvid_round_shift_q31(sum, 30);
     for (size_t i = 0; i < n; i++) {
-        x[i] -= (int32_t)pvid_round_shift_q31(pvid_product_q31(v[i], along), 30);
+        x[i] -= (int32_t)pvid_floor_shift_q31(pvid_product_q31(v[i], along), 30);
     }
 }

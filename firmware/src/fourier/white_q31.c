@@ -116,10 +116,14 @@ void pvid_fourier_white_invert_q31(pvid_fourier_white_q31 *self, pvid_scaled_q31
  * the highest harmonic. */
 static void begin_vector(const pvid_fourier_white_q31 *self, size_t k, size_t first, size_t n, int32_t x[])
 {
-    const size_t turns = (2u * k) + ((first > 0u) ? 1u : 0u);
+    const size_t order = (2u * k) + ((first > 0u) ? 1u : 0u);
     for (size_t i = 0; i < n; i++) {
         const size_t h = first + i;
-        x[i] = pvid_fourier_white_weight_q31(self, turns, h, PVID_ONE_Q30);
+        int32_t weight = self->scale[h].m;
+        for (size_t m = 0; m < order; m++) {
+            weight = (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight, (int32_t)h * self->rate), 30);
+        }
+        x[i] = weight;
     }
 }
 

@@ -4,24 +4,12 @@
 
 #include <stddef.h>
 
-#include "number/integer_q31.h"
 #include "pvid/fourier_q31.h"
 
 /* Parts of the sums of a window, K + n: real parts of the harmonics 0.., then imaginary parts of the harmonics 1.. */
 static inline size_t pvid_fourier_sums_rows_q31(const pvid_fourier_design_q31 *design)
 {
     return (size_t)design->functions + design->power;
-}
-
-/* (h / H)^order / sqrt(D_h) times `factor` 2^-30, in units of 2^(exponent of self); |factor| <= 2^30. */
-static inline int32_t pvid_fourier_white_weight_q31(const pvid_fourier_white_q31 *self, size_t order, size_t h,
-                                                    int32_t factor)
-{
-    int32_t weight = (int32_t)pvid_floor_shift_q31(pvid_product_q31(self->scale[h].m, factor), 30);
-    for (size_t i = 0; i < order; i++) {
-        weight = (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight, (int32_t)h * self->rate), 30);
-    }
-    return weight;
 }
 
 /* Requires a valid design. */

@@ -64,14 +64,10 @@ class Rescale:
 
 @dataclass(frozen=True, eq=False)
 class FourierFilterQ31:
-    """pvid_fourier_filter_q31: weights int32 [half], outwards; bits of the leading x of order 0.
-
-    is_wide: a product with a pair of signals needs 64 bits.
-    """
+    """pvid_fourier_filter_q31: weights int32 [half], outwards; bits of the leading x of order 0."""
 
     weights: Int32
     bits: int
-    is_wide: bool
     rescale: Rescale
 
     @property
@@ -117,7 +113,8 @@ class FourierDesignQ31:
     hop : steps of half a window, a multiple of 4
     sum_shift : of four steps' products 2^-14 before they are added
     full_scale : of the counts about their offsets [samples]
-    filter : of each jet
+    down : shift of the block sums of each signal to 28 bits
+    filter : of each jet, at the steps: its compensator
     run : from twice the sum over the steps to the input of `values` [runs]
     sign_width : of the soft sign, in the format of its argument [signs]; 0: the mean of sgn over a step
     integral : shifts (once, twice) of each integrand
@@ -138,6 +135,7 @@ class FourierDesignQ31:
     hop: int
     sum_shift: int
     full_scale: tuple[int, ...]
+    down: tuple[int, ...]
     filter: tuple[FourierFilterQ31, ...]
     run: tuple[Rescale, ...]
     sign_width: tuple[int, ...]
@@ -158,7 +156,7 @@ class FourierDesignQ31:
 
     @property
     def half(self) -> int:
-        """The largest half of a filter [ticks]."""
+        """The largest half of a compensator [steps]."""
         return max(one.half for one in self.filter)
 
     @property

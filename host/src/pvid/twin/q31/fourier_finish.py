@@ -23,9 +23,9 @@ _ENTRIES_PER_STAGE = 4
 _HARMONICS_PER_STAGE = 2
 _ROOTS_PER_STAGE = 4
 _RESIDUALS_PER_STAGE = 2
-_COLUMN_PARTS = 2
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
+_SMALL_STEP = 2**15
 _MOST = 2**31 - 1
 
 
@@ -42,7 +42,9 @@ def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int =
         + _parts(harmonics, _HARMONICS_PER_STAGE)
         + _parts(harmonics, _ROOTS_PER_STAGE)
         + design.power
-        + kind.columns * _COLUMN_PARTS
+        + 1
+        + harmonics
+        + kind.columns
         + project
         + kind.thetas
         + 1
@@ -140,7 +142,7 @@ def stages(
             yield None
             if solved is not None:
                 reason = solved
-        if not estimator.was_due:
+        if not estimator.was_due or of_all_lanes(estimator.size <= _SMALL_STEP):
             break
     size = estimator.size
     for _ in range(estimator.assessment_stages):

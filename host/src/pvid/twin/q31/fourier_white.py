@@ -61,7 +61,7 @@ def mirror_of(x: Int) -> Int:
 def mirrored(v: Int, x: Int) -> Int:
     """x - v (v^T x), [n, lanes] each."""
     along = round_shift(np.add.reduce(v * x, axis=0), 30)
-    return x - round_shift(v * along, 30)
+    return np.asarray(x - ((v * along) >> 30))
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,9 @@ def _reflected(mirrors: Sequence[Int], x: Int) -> Int:
     return found
 
 
-def _weight(gain: Int, highest: int, order: int, h: int, factor: int) -> Int:
-    """(h / H)^order / sqrt(D_h) times factor 2^-30 [lanes]."""
-    weight: Int = (gain[h] * factor) >> 30
+def _weight(gain: Int, highest: int, order: int, h: int) -> Int:
+    """(h / H)^order / sqrt(D_h) [lanes]."""
+    weight: Int = gain[h]
     for _ in range(order):
         weight = (weight * (h * (_ONE // highest))) >> 30
     return weight
@@ -156,7 +156,7 @@ def _mirrors(design: FourierDesignQ31, gain: Int, first: int, count: int) -> lis
     found: list[Int] = []
     for k in range(design.power // 2):
         order = 2 * k + (first > 0)
-        vector = np.stack([_weight(gain, design.highest, order, h, _ONE) for h in range(first, first + count)])
+        vector = np.stack([_weight(gain, design.highest, order, h) for h in range(first, first + count)])
         rest = _reflected(found, block(vector)[0])[k:]
         found.append(mirror_of(block(rest)[0]))
     return found
@@ -189,16 +189,15 @@ def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
     total = np.zeros((design.parts, lanes), np.int64)
     for t in terms:
         term = design.model.term[t]
-        turned, negative = term.order % 2 == 1, (term.order + 1) % 4 >= 2
+        negative = (term.order % 4 >= 2, (term.order + 1) % 4 >= 2)
         below = top - (design.factor[t][1] - lifts[t])
         for h in range(made.cosines):
-            weight = _weight(made.gain, design.highest, term.order, h, design.factor[t][0]) >> np.minimum(below, 63)
-            weight = np.where(below < _SUM_BITS, weight, 0)
+            whole = (_weight(made.gain, design.highest, term.order, h) * design.factor[t][0]) >> 30
+            weight = np.where(below < _SUM_BITS, whole >> np.minimum(below, 63), 0)
             for part in range(2 if h and made.cosines + h <= design.parts else 1):
-                s = window[:, term.channel, h, (1 - part) if turned else part] << lifts[t]
-                minus = (turned != negative) if part == 0 else negative
+                s = window[:, term.channel, h, (part + term.order) % 2] << lifts[t]
                 place_of = h if part == 0 else made.cosines + h - 1
-                total[place_of] += ((-s if minus else s) * weight) >> _PRODUCT_DOWN
+                total[place_of] += (s * (-weight if negative[part] else weight)) >> _PRODUCT_DOWN
     x, exponent = block(total)
     return x, np.where(top > _NONE, top + made.exponent + 30 + _PRODUCT_DOWN, 0) + exponent
 
