@@ -30,6 +30,8 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
     },
     "Boards": {
         "log": "Record a board's samples and estimates.",
+        "ports": "List the serial ports of this machine and the emulated boards.",
+        "view": "Show a log on the live page.",
         "export": "Convert a log to csv, parquet, mcap or npz.",
         "sizes": "Measure flash, RAM, stack and instructions on every emulated board.",
     },
