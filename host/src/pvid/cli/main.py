@@ -57,6 +57,18 @@ _ELSEWHERE = {
     "campaign": ("bench.campaign.command", "campaign"),
 }
 _IN_A_CLONE = ("bench", "campaign")
+# Packages that not every installation has, with the extra of pvid that brings them.
+_EXTRAS = {
+    "dask": "cluster",
+    "distributed": "cluster",
+    "matplotlib": "plot",
+    "mcap": "mcap",
+    "pyarrow": "parquet",
+    "serial": "serial",
+    "starlette": "page",
+    "sympy": "models",
+    "uvicorn": "page",
+}
 
 
 def main() -> None:
@@ -79,6 +91,12 @@ def main() -> None:
         code = BAD_INPUT
     except OSError as error:
         write_stderr(f"pvid: {'' if error.filename is None else f'{error.filename}: '}{reason(error)}")
+        code = BAD_INPUT
+    except ModuleNotFoundError as error:
+        extra = _EXTRAS.get((error.name or "").partition(".")[0])
+        if extra is None:
+            raise
+        write_stderr(f"pvid: this needs the Python package {error.name}: pip install 'pvid[{extra}]'")
         code = BAD_INPUT
     except MemoryError as error:
         detail = f" ({reason(error)})" if str(error) else ""

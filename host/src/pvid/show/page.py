@@ -73,11 +73,11 @@ def page(at: str, log: Path, title: str) -> Iterator[str]:
     Raises
     ------
     PvidError
-        As `listen`, and when the packages of the extra `web` are not installed.
+        As `listen`, and when the packages of the extra `page` are not installed.
     """
     lacking = [name for name in ("starlette", "uvicorn") if importlib.util.find_spec(name) is None]
     if lacking:
-        raise PvidError(f"the live page needs {' and '.join(lacking)}: install pvid[web]")
+        raise PvidError(f"the live page needs {' and '.join(lacking)}: pip install 'pvid[page]'")
     listening, address = listen(at)
     command = [sys.executable, "-P", "-m", "pvid.show.page", str(listening.fileno()), str(log), title]
     with listening, open(os.devnull, "wb") as nowhere:
