@@ -232,11 +232,15 @@ install_requirements() { # install_requirements PROFILE
     logged pip-builders "${pip[@]}" --require-hashes --only-binary :all: --requirement "$venv/builders.txt" ||
         die "$failed"
     logged pip "${pip[@]}" --require-hashes --no-build-isolation --requirement "$lock" || die "$failed"
+    # The tests that numpy, scipy, sympy and matplotlib bring along are 45 MB of nothing that is used here.
+    local packages
+    packages=$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+    find "$packages"/{numpy,scipy,sympy,matplotlib} -type d -name tests -prune -exec rm -rf {} + 2>/dev/null || true
     # From inside host/: a path is read as a URL, which spaces break.
     logged pip-pvid env -C "$root/host" "${pip[@]}" --no-index --no-deps --no-build-isolation --editable . ||
         die "$failed"
     # tools/bench, behind the installed packages, so that no module of tools/ hides one of theirs.
-    printf '%s\n' "$root/tools" >"$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/pvid-tools.pth"
+    printf '%s\n' "$root/tools" >"$packages/pvid-tools.pth"
     write_stamp "$venv/installed-$1" "$(requirements)"
 }
 
