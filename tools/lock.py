@@ -2,8 +2,8 @@
 """Writes tools/requirements.txt anew from host/pyproject.toml: run it after a change there, and for newer versions.
 
 First what the others are built with where there is no wheel, then every package that tools/pvid installs, then what it
-adds for parquet, mcap and campaigns, then what tools/test adds: each with its version and the hashes of its files, for Linux on any processor and Python 3.11 and
-later. Needs uv (`pip install uv`).
+adds for parquet, mcap and campaigns, then what tools/test adds: each with its version and the hashes of its files, for
+Linux on any processor and Python 3.11 and later. Needs uv (`pip install uv`).
 """
 
 from __future__ import annotations
@@ -59,7 +59,9 @@ def main() -> None:
     tests = [block for block in rest if pinned(block) not in second]
     parts = [HEADER, *builders, f"{USE}\n", *used, f"{MORE}\n", *more, f"{TESTS}\n", *tests]
     LOCK.write_text("".join(parts), encoding="utf-8")
-    counts = f"{len(builders)} + {len(used)} packages, {len(more)} for parquet, mcap and campaigns, {len(tests)} for tests"
+    counts = (
+        f"{len(builders)} + {len(used)} packages, {len(more)} for parquet, mcap and campaigns, {len(tests)} for tests"
+    )
     print(f"{LOCK.relative_to(ROOT)}: {counts}")
 
 

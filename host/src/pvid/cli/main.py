@@ -14,10 +14,10 @@ from importlib.util import find_spec
 
 import click
 
-from pvid import __version__
 from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.output import watch
+from pvid.base.version import __version__
 from pvid.base.wording import reason
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
