@@ -18,8 +18,8 @@ from pvid.base.wording import listed, with_unit
 from pvid.codegen.fourier_library import fourier_native
 from pvid.core.fourier_native import FourierIdentifier
 from pvid.oracle.fourier.verdict import Reason, Verdict
-from pvid.run.engine_design import config_for_recording, samples_of
-from pvid.run.mechanism import MechanismAnswer, Value, gains_of, values_of
+from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, values_of
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.fourier import FourierConfig
 from pvid.settings.record import Record
@@ -76,6 +76,10 @@ class CoreAnswer:
                 f"The C core and the float64 analysis disagree on {listed(apart)} ({apart[0]}: "
                 f"{one} and {other}); the analysis is nearer." + (of_signs if self.config.design.model.signs else ""),
             )
+        if self.reason not in (Outcome.UPDATED, Outcome.MISFIT):
+            yield Reason(
+                "held", f"The C core holds an earlier estimate, its last windows published nothing: {self.reason.text}."
+            )
         if self.reason == Outcome.MISFIT and self.misfit is not None:
             yield Reason(
                 "misfit",
@@ -124,7 +128,7 @@ def identify_in_c(answer: MechanismAnswer) -> CoreAnswer:
     """
     recording, compiled = answer.recording, answer.model
     try:
-        config = config_for_recording(compiled, recording)
+        config = config_to_identify(compiled, recording)
         native = fourier_native(compiled, config.design)
         identifier = native.identifier_of(config)
     except PvidError as error:
@@ -142,6 +146,9 @@ def _answer(
     n_p = len(found.p)
     last = identifier.estimate
     covariance = np.asarray(last["covariance"], np.float64)[:n_p, :n_p]
+    # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
+    wider = np.maximum(noise_of(model, found) / np.sqrt(np.diag(covariance)), 1.0)
+    covariance = covariance * np.outer(wider, wider)
     values = values_of(
         model,
         np.asarray(last["p"][:n_p], np.float64),

@@ -17,6 +17,7 @@ from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierModel, FourierNoise
 
 HIGHEST_POWER = 8  # n of sin^n
+LONGEST_HOP = 16384  # steps of half a window
 _STEPS_OF_A_BLOCK = 4  # half a window is a whole number of blocks
 
 # An entry whose share is below this part of the noise at every harmonic is left out.
@@ -27,20 +28,16 @@ _GATE = GateConfig(sigmas=4.0, patience_s=0.0)
 _PATIENCE_WINDOWS = 100
 
 
-def for_engine(design: FourierDesign, comb: bool = True) -> FourierDesign:
+def for_engine(design: FourierDesign) -> FourierDesign:
     """The nearest design that the engine has: half windows of whole blocks, block sums before a decimation, kinds of
     rows one by one, signs averaged.
 
     A soft sign stays one. The engine does not locate reversals.
-
-    Parameters
-    ----------
-    comb : before a decimation; False: polynomials, of a core without block sums
     """
     block = _STEPS_OF_A_BLOCK
     least = -(-(design.highest + 1) // block) * block
     hop = max(round(design.hop / block) * block, least)
-    found = replace(design, window_s=2 * hop * design.dt, joint=False, comb=comb and design.decimation > 1)
+    found = replace(design, window_s=2 * hop * design.dt, joint=False, comb=design.decimation > 1)
     return found if design.reversals == "soft" else replace(found, reversals="averaged")
 
 

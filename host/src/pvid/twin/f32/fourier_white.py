@@ -98,8 +98,8 @@ class White:
         rows = self.rows
         x = (rows.harmonic.astype(np.float32) / _F(rows.cosines - 1))[:, None]
         scale = self.scale[rows.harmonic]
-        u = np.where(np.arange(rows.parts)[:, None] < rows.cosines, scale, x * scale)
-        leverage = np.zeros_like(u)
+        u: Float32 = np.where(np.arange(rows.parts)[:, None] < rows.cosines, scale, x * scale)
+        leverage: Float32 = np.zeros(u.shape, np.float32)
         for k in range(rows.vectors):
             u = (x * x) * u if k else u
             for place in range(k):
@@ -113,7 +113,7 @@ class White:
                 u[family.start + k] = 1
             for place in reversed(range(k + 1)):
                 u = self._reflected(place, u)
-            leverage = np.asarray(leverage + u * u)
+            leverage = leverage + u * u
         return leverage
 
     def _reflected(self, place: int, x: Float32) -> Float32:
