@@ -119,7 +119,7 @@ uint32_t pvid_fingerprint_fourier_design_f32(const pvid_fourier_design_f32 *desi
     const uint8_t sizes[] = {design->functions, design->power, design->decimation};
     uint32_t hash = pvid_fingerprint_bytes(PVID_FNV_START, sizes, sizeof sizes);
     hash = pvid_fnv_word(hash, design->hop);
-    hash = filters_of(hash, design->filter, model->jets);
+    hash = filters_of(hash, design->compensator, model->jets);
     hash = pvid_fingerprint_floats(hash, design->circle, 2u * (size_t)design->hop);
     hash = pvid_fnv_word(hash, design->n_noise);
     hash = noise_of(hash, design->noise, design->n_noise);
