@@ -37,8 +37,6 @@ _BOTH: dict[str, Length] = {
     "drive_min": lambda config, model: model.samples,
     "design": lambda config, model: 1,
     "design.model": lambda design, model: 1,
-    "design.filter": lambda design, model: model.jets,
-    "design.filter.weights": lambda filter_, model: filter_.half,
     "design.circle": lambda design, model: 2 * design.hop,
     "design.noise": lambda design, model: design.n_noise,
     "design.error_order": lambda design, model: model.kinds,
@@ -55,11 +53,19 @@ _BOTH: dict[str, Length] = {
     "design.model.model.c_column": lambda p, _: p.n_c,
 }
 _LENGTHS: dict[str, dict[str, Length]] = {
-    "f32": {**_BOTH, "range": lambda config, model: model.samples},
+    "f32": {
+        **_BOTH,
+        "range": lambda config, model: model.samples,
+        "design.compensator": lambda design, model: model.jets,
+        "design.compensator.weights": lambda filter_, model: filter_.half,
+    },
     "q31": {
         **_BOTH,
         "offset": lambda config, model: model.samples,
         "design.full_scale": lambda design, model: model.samples,
+        "design.down": lambda design, model: model.signals,
+        "design.filter": lambda design, model: model.jets,
+        "design.filter.weights": lambda filter_, model: filter_.half,
         "design.run": lambda design, model: model.runs,
         "design.integral": lambda design, model: model.integrands,
         "design.format": lambda design, model: model.channels,

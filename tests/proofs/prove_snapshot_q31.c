@@ -52,13 +52,13 @@ static void any_engine(void)
     engine_config.design = &engine_design;
     engine.design = &engine_design;
     engine.collect.design = &engine_design;
-    engine.offset = limits;
+    engine.collect.front.offset = limits;
     engine.drive_min = limits;
     engine.estimator.model = &pvid_kapitza_weak_q31;
     any_image();
     (void)pvid_snapshot_restore_fourier_q31(&engine, &engine_config, image, any_u32(0, sizeof image));
     /*@ assert engine.design == &engine_design && engine.collect.design == &engine_design; */
-    /*@ assert engine.offset == &limits[0] && engine.drive_min == &limits[0]; */
+    /*@ assert engine.collect.front.offset == &limits[0] && engine.drive_min == &limits[0]; */
     /*@ assert engine.estimator.model == &pvid_kapitza_weak_q31; */
     (void)pvid_snapshot_save_fourier_q31(&engine, &engine_config, any_u32(0, UINT32_MAX), image,
                                          any_u32(0, sizeof image));

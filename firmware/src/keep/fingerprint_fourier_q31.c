@@ -135,7 +135,6 @@ static uint32_t filters_of(uint32_t hash, const pvid_fourier_filter_q31 filter[]
         const pvid_fourier_filter_q31 *one = &filter[i];
         running = pvid_fnv_word(running, one->half);
         running = pvid_fnv_word(running, one->bits);
-        running = pvid_fnv_word(running, one->is_wide ? 1u : 0u);
         running = rescale_of(running, &one->rescale);
         running = pvid_fingerprint_table(running, one->weights, one->half);
     }
@@ -175,6 +174,7 @@ uint32_t pvid_fingerprint_fourier_design_q31(const pvid_fourier_design_q31 *desi
     uint32_t hash = pvid_fingerprint_bytes(PVID_FNV_START, sizes, sizeof sizes);
     hash = pvid_fnv_word(hash, design->hop);
     hash = pvid_fingerprint_words(hash, design->full_scale, model->samples);
+    hash = pvid_fingerprint_bytes(hash, design->down, model->signals);
     hash = filters_of(hash, design->filter, model->jets);
     for (size_t i = 0; i < model->runs; i++) {
         hash = rescale_of(hash, &design->run[i]);

@@ -29,9 +29,8 @@ static const uint32_t layout[] = {
     PLACE(collect.window),
     PLACE(finish),
     PLACE(finish.gate),
-    PLACE(finish.white),
-    PLACE(finish.columns),
-    PLACE(finish.solve),
+    PLACE(finish.work),
+    PLACE(finish.work.rows.columns),
     PLACE(finish.candidate),
     PLACE(estimator),
     PLACE(estimator.p),
@@ -56,8 +55,8 @@ static const uint32_t layout[] = {
 };
 
 static const pvid_snapshot_pointer pointers[] = {
-    {PLACE(design), PVID_SNAPSHOT_OF_INIT},          {PLACE(offset), PVID_SNAPSHOT_OF_INIT},
-    {PLACE(drive_min), PVID_SNAPSHOT_OF_INIT},       {PLACE(collect.design), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(design), PVID_SNAPSHOT_OF_INIT},          {PLACE(drive_min), PVID_SNAPSHOT_OF_INIT},       {PLACE(collect.design), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(collect.front.offset), PVID_SNAPSHOT_OF_INIT},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
 };
 static const pvid_snapshot_shape shape = {sizeof(pvid_fourier_q31), pointers, sizeof pointers / sizeof pointers[0]};

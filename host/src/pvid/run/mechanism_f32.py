@@ -17,8 +17,10 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
 from pvid.codegen.fourier_library import fourier_native
 from pvid.core.fourier_native import FourierIdentifier
+from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.identify import Publications
 from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, values_of
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.fourier import FourierConfig
@@ -43,6 +45,7 @@ class CoreAnswer:
     misfit : of the published estimate; None: not judged
     windows : how many the engine has judged
     hash : running hash of its state after the last tick
+    publications : every estimate that was published; their standard errors contain what `values` contains
     """
 
     oracle: MechanismAnswer
@@ -53,6 +56,7 @@ class CoreAnswer:
     misfit: float | None
     windows: int
     hash: int
+    publications: Publications
 
     @property
     def identified(self) -> bool:
@@ -166,4 +170,14 @@ def _answer(
         misfit=None if estimate is None or np.isnan(misfit) else misfit,
         windows=int(len(ends)),
         hash=identifier.running_hash,
+        publications=_published(answer, record, gains_of(model, found), wider),
     )
+
+
+def _published(answer: MechanismAnswer, record: Record, gains: Float, wider: Float) -> Publications:
+    """All publications of a run: their own errors, times what the analysis found, and those of gains and constants."""
+    ticks = np.flatnonzero(np.isin(record.reason, (Outcome.UPDATED, Outcome.MISFIT)))
+    n_p = len(wider)
+    se = np.hypot(record.published_se[ticks, :n_p] * wider, np.sqrt(np.sum(gains**2, axis=0)))
+    alarm = np.full(len(ticks), answer.found.verdict.warning is not None)
+    return Publications(answer.recording.t[ticks], record.published[ticks, :n_p].astype(np.float64), se, alarm)
