@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,9 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.gate import gated
 from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import Compiled, WeakRows
+from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
 from pvid.rig.run import Recording
-from pvid.settings.fourier import FourierConfig
+from pvid.settings.fourier import FourierConfig, FourierDesign32
 from pvid.setup.fourier import config_of, design_tables, for_engine
 from pvid.sim.simulated_run import RigSimulation
 
@@ -51,12 +51,34 @@ def engine_config(compiled: CompiledModel, run: Run, design: FourierDesign, p: F
     PvidError
         Where the engine does not have what the model or the design needs.
     """
-    model = ready(compiled)
+    made = engine_tables(compiled, run, design, p)
+    return config_of(made.tables, design.sample_rate, made.rows.compiled.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class EngineTables:
+    """What the settings of both cores follow from.
+
+    Attributes
+    ----------
+    rows : of the run, in float64
+    p : fitted to it [n_p]
+    errors : of the equations themselves, of each kind
+    tables : of the float32 engine
+    """
+
+    rows: WeakRows
+    p: Float
+    errors: list[EquationError]
+    tables: FourierDesign32
+
+
+def engine_tables(compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None) -> EngineTables:
+    """Tables of the engine for a rig, from a run of it; parameters as of engine_config."""
     tables_of = fourier_model_of(compiled)
-    rows = WeakRows.of(model, run, for_engine(design))
+    rows = WeakRows.of(ready(compiled), run, for_engine(design))
     fit = gated(rows, p)
-    tables = design_tables(tables_of, rows, fit.p, fit.errors)
-    return config_of(tables, design.sample_rate, model.parameters)
+    return EngineTables(rows, fit.p, list(fit.errors), design_tables(tables_of, rows, fit.p, fit.errors))
 
 
 def config_for_recording(compiled: CompiledModel, recording: Recording, functions: int | None = None) -> FourierConfig:
@@ -66,8 +88,15 @@ def config_for_recording(compiled: CompiledModel, recording: Recording, function
     ----------
     functions : K; None: chosen
     """
+    return engine_config(compiled, recording.signals, *design_and_p(compiled, recording, functions))
+
+
+def design_and_p(
+    compiled: CompiledModel, recording: Recording, functions: int | None = None
+) -> tuple[FourierDesign, Float]:
+    """The design that is chosen for a recording, and the parameters that it was chosen at [n_p]."""
     best = design_for_recording(ready(compiled), recording.signals, recording.sample_rate)
-    return engine_config(compiled, recording.signals, _with(best.design, functions), best.p)
+    return _with(best.design, functions), best.p
 
 
 def design_for_recording(model: Compiled, run: Run, sample_rate: float) -> Scored:
@@ -116,11 +145,16 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
     PvidError
         Where the mechanism has no shipped rig.
     """
+    run, design, p = simulated_run_of(compiled, functions)
+    return engine_config(compiled, run, design, p)
+
+
+def simulated_run_of(compiled: CompiledModel, functions: int | None = None) -> tuple[Run, FourierDesign, Float]:
+    """A run of the shipped rig of a mechanism, the rig's own design, and its parameters [n_p]."""
     rig = simulated_rig(compiled.name)
     simulation = RigSimulation.of(compiled, rig)
-    run = simulation.run()
     design = FourierDesign(rig.sample_rate, rig.window_s, **rig.design)  # type: ignore[arg-type]
-    return engine_config(compiled, run, _with(design, functions), np.asarray(simulation.truth))
+    return simulation.run(), _with(design, functions), np.asarray(simulation.truth)
 
 
 def samples_of(config: FourierConfig, run: Run) -> npt.NDArray[np.float32]:
