@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from pvid.design.fourier_q31 import Sensing, fixed_design, most_counts
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.run import Recording
 from pvid.run.engine_design import Run, design_and_p, engine_tables, simulated_run_of
 from pvid.settings.fourier_q31 import FourierConfigQ31
@@ -22,6 +23,7 @@ from pvid.setup.fourier_q31 import config_of_q31, row_formats
 _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
 _HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
 _FULL_SCALE = 1.5  # over the reach of a signal
+_SE_BITS = 24  # of se_max
 _LONGEST_RUN_S = 3600.0  # of integrals since the start of the run, at least
 
 
@@ -78,13 +80,16 @@ class FixedEngine:
         return np.asarray(p, np.float64) * 2.0 ** -np.array(self.parameters.p_bits, np.float64)
 
 
-def fixed_engine(compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None) -> FixedEngine:
+def fixed_engine(
+    compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None, *, start_there: bool = False
+) -> FixedEngine:
     """The engine for a rig, from a run of it.
 
     Parameters
     ----------
     design : of the oracle; the engine gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
+    start_there : the engine starts at the parameters of this run; False: at the guesses
 
     Raises
     ------
@@ -114,7 +119,13 @@ def fixed_engine(compiled: CompiledModel, run: Run, design: FourierDesign, p: Fl
     tables = fixed_design(made.model, found.tables, Sensing(lsb, full_scale, design.sample_rate), made.formats)
     formats = row_formats(found.rows, found.p, found.errors)
     config = config_of_q31(
-        tables, parameters_of, formats, parameters.p_bits, (0,) * len(lsb), overlap=found.tables.overlap
+        tables,
+        parameters_of,
+        formats,
+        parameters.p_bits,
+        (0,) * len(lsb),
+        found.p if start_there else None,
+        found.tables.overlap,
     )
     return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
 
@@ -126,7 +137,15 @@ def engine_for_recording(compiled: CompiledModel, recording: Recording, function
     ----------
     functions : K; None: chosen
     """
-    return fixed_engine(compiled, recording.signals, *design_and_p(compiled, recording, functions))
+    design, p, known = design_and_p(compiled, recording, functions)
+    return fixed_engine(compiled, recording.signals, design, p, start_there=known)
+
+
+def engine_to_identify(compiled: CompiledModel, recording: Recording) -> FixedEngine:
+    """The same, to identify the recording itself: as config_to_identify."""
+    engine = engine_for_recording(compiled, recording)
+    trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS))
+    return replace(engine, config=replace(engine.config, trust=trust))
 
 
 def engine_for_simulated_rig(compiled: CompiledModel, functions: int | None = None) -> FixedEngine:

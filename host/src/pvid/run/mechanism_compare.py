@@ -12,8 +12,8 @@ from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, first_difference
-from pvid.run.engine_design import config_for_recording, samples_of
-from pvid.run.engine_design_q31 import FixedEngine, engine_for_recording
+from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.engine_design_q31 import FixedEngine, engine_to_identify
 from pvid.settings.enums import Core
 from pvid.settings.fourier import FourierConfig
 from pvid.setup.fourier_sizes import sizes_of_model
@@ -35,9 +35,9 @@ def compare_recording(
         When there is no C compiler, or the engine does not have what the model needs.
     """
     if core == "q31":
-        engine = engine_for_recording(compiled, recording)
+        engine = engine_to_identify(compiled, recording)
         return compare_counts(engine, engine.counts_of(recording.signals), progress)
-    config = config_for_recording(compiled, recording)
+    config = config_to_identify(compiled, recording)
     return compare_samples(compiled, config, samples_of(config, recording.signals), progress)
 
 

@@ -20,9 +20,10 @@ from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.core.native import Publisher
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import Reason, Verdict
-from pvid.run.engine_design import config_for_recording, samples_of
-from pvid.run.engine_design_q31 import engine_for_recording
-from pvid.run.mechanism import MechanismAnswer, Value, gains_of, values_of
+from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.engine_design_q31 import engine_to_identify
+from pvid.run.identify import Publications
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, values_of
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.record import Record
@@ -48,6 +49,7 @@ class CoreAnswer:
     misfit : of the published estimate; None: not judged
     windows : how many the engine has judged
     hash : running hash of its state after the last tick
+    publications : every estimate that was published; their standard errors contain what `values` contains
     """
 
     oracle: MechanismAnswer
@@ -62,6 +64,7 @@ class CoreAnswer:
     misfit: float | None
     windows: int
     hash: int
+    publications: Publications
 
     @property
     def identified(self) -> bool:
@@ -84,6 +87,10 @@ class CoreAnswer:
                 "core",
                 f"The C core and the float64 analysis disagree on {listed(apart)} ({apart[0]}: "
                 f"{one} and {other}); the analysis is nearer." + (of_signs if self.averages_signs else ""),
+            )
+        if self.reason not in (Outcome.UPDATED, Outcome.MISFIT):
+            yield Reason(
+                "held", f"The C core holds an earlier estimate, its last windows published nothing: {self.reason.text}."
             )
         if self.reason == Outcome.MISFIT and self.misfit is not None:
             yield Reason(
@@ -124,7 +131,11 @@ class CoreAnswer:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """The C core after a recording, and its published estimate in the units of the model."""
+    """The C core after a recording, in the units of the model.
+
+    p, covariance : of the published estimate
+    published : p and standard errors published after every tick [ticks, n_p]
+    """
 
     core: Core
     functions: int
@@ -135,6 +146,7 @@ class _Run:
     record: Record
     p: Float
     covariance: Float
+    published: tuple[Float, Float]
 
 
 def identify_in_c(answer: MechanismAnswer, core: Core = "f32") -> CoreAnswer:
@@ -153,7 +165,7 @@ def identify_in_c(answer: MechanismAnswer, core: Core = "f32") -> CoreAnswer:
 
 
 def _in_float(answer: MechanismAnswer) -> _Run:
-    config = config_for_recording(answer.model, answer.recording)
+    config = config_to_identify(answer.model, answer.recording)
     design = config.design
     identifier = fourier_native(answer.model, design).identifier_of(config)
     record = identifier.run_samples(samples_of(config, answer.recording.signals), sums=False)
@@ -168,11 +180,12 @@ def _in_float(answer: MechanismAnswer) -> _Run:
         record,
         np.asarray(last["p"][:n_p], np.float64),
         np.asarray(last["covariance"], np.float64)[:n_p, :n_p],
+        (record.published.astype(np.float64), record.published_se.astype(np.float64)),
     )
 
 
 def _in_fixed_point(answer: MechanismAnswer) -> _Run:
-    engine = engine_for_recording(answer.model, answer.recording)
+    engine = engine_to_identify(answer.model, answer.recording)
     design = engine.config.design
     identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
     record = identifier.run_samples(engine.counts_of(answer.recording.signals), sums=False)
@@ -189,6 +202,7 @@ def _in_fixed_point(answer: MechanismAnswer) -> _Run:
         record,
         engine.values(last["p"][:n_p]),
         correlation * np.outer(se, se),
+        (engine.values(record.published), engine.values(record.published_se)),
     )
 
 
@@ -196,13 +210,12 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
     identifier, record = run.identifier, run.record
     published = identifier.is_published
     ends = record.reason[(record.reason != Outcome.WARMING_UP) & (record.reason != Outcome.ACCUMULATED)]
-    values = values_of(
-        answer.model,
-        run.p,
-        run.covariance,
-        gains_of(answer.model, answer.found),
-        identified=published and answer.identified,
-    )
+    model, found = answer.model, answer.found
+    gains = gains_of(model, found)
+    # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
+    wider = np.maximum(noise_of(model, found) / np.sqrt(np.diag(run.covariance)), 1.0)
+    covariance = run.covariance * np.outer(wider, wider)
+    values = values_of(model, run.p, covariance, gains, identified=published and answer.identified)
     misfit = identifier.misfit
     return CoreAnswer(
         oracle=answer,
@@ -217,4 +230,15 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
         misfit=None if not published or np.isnan(misfit) else misfit,
         windows=int(len(ends)),
         hash=identifier.running_hash,
+        publications=_published(answer, run, gains, wider),
     )
+
+
+def _published(answer: MechanismAnswer, run: _Run, gains: Float, wider: Float) -> Publications:
+    """All publications of a run: their own errors, times what the analysis found, and those of gains and constants."""
+    ticks = np.flatnonzero(np.isin(run.record.reason, (Outcome.UPDATED, Outcome.MISFIT)))
+    n_p = len(wider)
+    p, own = run.published
+    se = np.hypot(own[ticks, :n_p] * wider, np.sqrt(np.sum(gains**2, axis=0)))
+    alarm = np.full(len(ticks), answer.found.verdict.warning is not None)
+    return Publications(answer.recording.t[ticks], p[ticks, :n_p], se, alarm)
