@@ -8,10 +8,9 @@
  *   counts         x less the offset, |x| <= full_scale <= 2^24
  *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1)
  *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
- *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded twice
- *   integrals      exact int64 in dt/24 (once) and dt^2/48 (twice), that of 1 in dt/2; rounded to int32
- *   channels       int32 within +-2^28
- *   sums           of four steps exact (16-bit cosine times 29 bits), then shifted to int32 and added
+ *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
+ * twice integrals      exact int64 in dt/24 (once) and dt^2/48 (twice), that of 1 in dt/2; rounded to int32 channels
+ * int32 within +-2^28 sums           of four steps exact (16-bit cosine times 29 bits), then shifted to int32 and added
  *   S_h            int32, with the window's own start of every integral
  */
 #ifndef PVID_FOURIER_Q31_H
@@ -29,7 +28,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 
 /* Largest magnitude of a channel. */
 #define PVID_FOURIER_LIMIT_Q31 INT32_C(268435456) /* 2^28 */
@@ -117,7 +115,7 @@ typedef struct {
     uint8_t sum_shift;         /* of four steps' products 2^-14 before they are added, 1..30 */
     uint16_t hop;              /* steps of half a window, a multiple of 4; H < hop */
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
-    const uint8_t *down;                   /* [signals] shift of the block sums to 28 bits */
+    const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
     const pvid_fourier_filter_q31 *filter; /* [jets] */
     const pvid_fourier_rescale_q31 *run;   /* [runs] from twice the sum over the steps to the input of `values` */
     const int32_t *sign_width;             /* [signs] of the soft sign, in the format of its argument; 0: the mean of

@@ -48,8 +48,8 @@ void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_f
     }
 }
 
-/* (-i omega)^m is 1, -i omega, -omega^2, i omega^3, ...: from the imaginary part of S_h to the real part of a column and
- * from the real one to the imaginary one if m is odd. */
+/* (-i omega)^m is 1, -i omega, -omega^2, i omega^3, ...: from the imaginary part of S_h to the real part of a column
+ * and from the real one to the imaginary one if m is odd. */
 void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
                                    const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t h)
 {

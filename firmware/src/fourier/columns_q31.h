@@ -13,7 +13,8 @@ void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_f
 
 /* Adds harmonic h of the window's sums, over its standard deviation, to the K + n parts of all columns. */
 void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
-                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t h);
+                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
+                                   size_t h);
 
 /* Behind all harmonics: the K white rows of a column. */
 void pvid_fourier_columns_end_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,

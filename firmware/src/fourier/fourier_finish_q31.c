@@ -111,7 +111,8 @@ static bool weigh_stage(pvid_fourier_q31 *self)
             finish->work.rows.of_theta[j] = pvid_scaled_of_q31(estimator->theta[i], -(int32_t)estimator->theta_bits[i]);
         }
     }
-    pvid_fourier_white_weigh_q31(&finish->work.rows.white, self->design, finish->kind, finish->work.rows.of_theta, finish->index, end);
+    pvid_fourier_white_weigh_q31(&finish->work.rows.white, self->design, finish->kind, finish->work.rows.of_theta,
+                                 finish->index, end);
     finish->index = (uint16_t)end;
     return end < self->design->n_noise;
 }
@@ -156,8 +157,8 @@ static bool column_stage(pvid_fourier_q31 *self)
     if (finish->index == 0u) {
         pvid_fourier_columns_begin_q31(&finish->work.rows.columns, design, finish->kind, &self->collect.window);
     } else if (finish->index <= harmonics) {
-        pvid_fourier_columns_take_q31(&finish->work.rows.columns, design, finish->kind, &finish->work.rows.white, &self->collect.window,
-                                      (size_t)finish->index - 1u);
+        pvid_fourier_columns_take_q31(&finish->work.rows.columns, design, finish->kind, &finish->work.rows.white,
+                                      &self->collect.window, (size_t)finish->index - 1u);
     } else {
         const size_t place = finish->index - (harmonics + 1u);
         pvid_fourier_columns_end_q31(&finish->work.rows.columns, design, &finish->work.rows.white, place);
@@ -341,9 +342,9 @@ static void judge_stage(pvid_fourier_q31 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     const pvid_scaled_q31 ratio = variance_ratio_of(finish, finish->rss, finish->free);
-    *reason =
-        pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size, finish->work.solve.above_noise,
-                             pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
+    *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
+                                   finish->work.solve.above_noise,
+                                   pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
 }
 
 /* ---- the order of the stages ---- */

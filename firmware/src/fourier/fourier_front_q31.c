@@ -7,8 +7,8 @@
  * exact: D^2 |x| fits an int32. It is then shifted to 28 bits.
  *
  * A jet is the rescaled sum  x 2^bits + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x
- * above order 0) or  sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half; x are outputs. They stand twice in the line,
- * one length apart: so the last ones are always contiguous. */
+ * above order 0) or  sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half; x are outputs. They stand twice in the
+ * line, one length apart: so the last ones are always contiguous. */
 #include "fourier/fourier_front_q31.h"
 
 #include <string.h>

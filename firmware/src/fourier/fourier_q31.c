@@ -54,9 +54,10 @@ static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
 
 static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
 {
-    if ((design == NULL) || (design->full_scale == NULL) || (design->down == NULL) || (design->filter == NULL) || (design->format == NULL) ||
-        (design->factor == NULL) || (design->error_order == NULL) || (design->error_variance == NULL) ||
-        (design->circle == NULL) || ((design->noise == NULL) && (design->n_noise > 0u))) {
+    if ((design == NULL) || (design->full_scale == NULL) || (design->down == NULL) || (design->filter == NULL) ||
+        (design->format == NULL) || (design->factor == NULL) || (design->error_order == NULL) ||
+        (design->error_variance == NULL) || (design->circle == NULL) ||
+        ((design->noise == NULL) && (design->n_noise > 0u))) {
         return PVID_BAD_DESIGN;
     }
     const pvid_status status = model_is_valid(design->model);

@@ -27,8 +27,8 @@ static inline int32_t *pvid_fourier_sums_place_q31(pvid_fourier_sums_q31 *self, 
 void pvid_fourier_sums_next_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design, uint16_t index,
                                 uint8_t half);
 
-/* The next of `left` items: the block is added to the sums of a harmonic, each in turn, then where it completes a window
- * the halves are joined, each harmonic in turn. With the first block of a half its sums begin anew. */
+/* The next of `left` items: the block is added to the sums of a harmonic, each in turn, then where it completes a
+ * window the halves are joined, each harmonic in turn. With the first block of a half its sums begin anew. */
 void pvid_fourier_sums_item_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design,
                                 const pvid_fourier_values_q31 *values, pvid_fourier_window_q31 *window);
 

@@ -90,7 +90,8 @@ uint32_t pvid_square_root_q31(uint64_t x)
     const uint32_t left = half - (quotient * upper);
     const uint64_t square = (uint64_t)quotient * quotient;
     const uint64_t remains = ((uint64_t)left << 17) | (low & 0x1FFFFu);
-    const uint32_t root = (upper << 16) + (quotient - ((square > remains) ? 1u : 0u));
+    const uint32_t lower = ((quotient > 0u) && (square > remains)) ? (quotient - 1u) : quotient;
+    const uint32_t root = (upper << 16) | ((lower < 0xFFFFu) ? lower : 0xFFFFu);
     return root >> up;
 }
 

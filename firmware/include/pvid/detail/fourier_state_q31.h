@@ -9,9 +9,9 @@
 
 /* The front end: the block sums of the signals, and their outputs at the last steps. */
 typedef struct {
-    bool plain;                          /* signal i is sample i */
-    bool seen;                           /* a sample since the restart */
-    uint8_t needs;                       /* samples beside those of a tick */
+    bool plain;    /* signal i is sample i */
+    bool seen;     /* a sample since the restart */
+    uint8_t needs; /* samples beside those of a tick */
     uint8_t signals;
     uint8_t decimation;                  /* D */
     uint16_t wait;                       /* ticks until the block ends */
@@ -118,21 +118,21 @@ typedef union {
 typedef struct {
     uint8_t stage;
     uint8_t kind;
-    uint8_t theta;                                /* first one of the kind */
-    uint8_t used;                                 /* kinds whose rows have been added */
-    uint8_t live;                                 /* nuisances of the kind that are projected out */
-    uint8_t iteration;                            /* solves done for this window */
-    uint8_t part;                                 /* of a column's stages */
-    bool kept;                                    /* the present nuisance is */
-    bool saturated;                               /* a row of the kind does not fit: none of them is used */
-    uint16_t index;                               /* within the stage */
-    uint16_t free;                                /* rows less nuisances of the kinds that were added */
-    pvid_reason reason;                           /* of the last solve, then of the window */
-    int64_t size;                                 /* of the last step, relative, Q22 */
-    int64_t rss;                                  /* of the kind's rows before the steps */
-    int32_t fade_factor;                          /* factor on the sums before this window's rows, Q31; 0: none */
-    pvid_scaled_q31 expected;                     /* variance of a row */
-    int8_t n_bits[PVID_MAX_THETA_Q31];            /* formats of the rows */
+    uint8_t theta;                     /* first one of the kind */
+    uint8_t used;                      /* kinds whose rows have been added */
+    uint8_t live;                      /* nuisances of the kind that are projected out */
+    uint8_t iteration;                 /* solves done for this window */
+    uint8_t part;                      /* of a column's stages */
+    bool kept;                         /* the present nuisance is */
+    bool saturated;                    /* a row of the kind does not fit: none of them is used */
+    uint16_t index;                    /* within the stage */
+    uint16_t free;                     /* rows less nuisances of the kinds that were added */
+    pvid_reason reason;                /* of the last solve, then of the window */
+    int64_t size;                      /* of the last step, relative, Q22 */
+    int64_t rss;                       /* of the kind's rows before the steps */
+    int32_t fade_factor;               /* factor on the sums before this window's rows, Q31; 0: none */
+    pvid_scaled_q31 expected;          /* variance of a row */
+    int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];
     pvid_fourier_work_q31 work;
