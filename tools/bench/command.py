@@ -71,6 +71,7 @@ TABLES = (
     ("laws", "laws", "Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."),
     ("strong", "strong", "Errors of the strong form by encoder resolution and differentiator."),
     ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
+    ("pendulum", "pendulum", "The pendulum through the weak engine, beside its own weak form: errors over 80 seeds."),
     ("tune", "tuning", "Errors against the truth with the default settings and with those that `tune` picks."),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
 )

@@ -17,6 +17,7 @@ from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierModel, FourierNoise
 
 HIGHEST_POWER = 8  # n of sin^n
+LONGEST_HOP = 16384  # steps of half a window
 _STEPS_OF_A_BLOCK = 4  # half a window is a whole number of blocks
 
 # An entry whose share is below this part of the noise at every harmonic is left out.
