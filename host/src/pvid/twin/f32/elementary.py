@@ -96,3 +96,18 @@ def tanh(x: npt.ArrayLike) -> Float32:
     below = below * z + F(1)
     inside = (given * above) / below
     return np.where(given > _TANH_END, F(1), np.where(given < -_TANH_END, F(-1), inside)).astype(np.float32, copy=False)
+
+
+def sincos(x: npt.NDArray[np.float32]) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """pvid_sincos_f32 of every element."""
+    f = np.float32
+    total = x * f(0.636619772) + f(12582912.0)
+    turns = total - f(12582912.0)
+    large = (x > f(0.7854)) | (x < f(-0.7854))
+    r = np.where(large, (x - turns * f(1.5703125)) - turns * f(4.83826797e-4), x)
+    quarter = np.where(large, np.ascontiguousarray(total).view(np.uint32) & 3, 0)
+    z = r * r
+    s = r + (r * z) * (f(-1.66666546e-1) + z * (f(8.33216087e-3) - z * f(1.95152959e-4)))
+    c = f(1) + z * (f(-0.5) + z * (f(4.16666456e-2) + z * (f(-1.38873163e-3) + z * f(2.44331571e-5))))
+    a, b = np.where(quarter & 1, c, s), np.where(quarter & 1, -s, c)
+    return np.where(quarter & 2, -a, a), np.where(quarter & 2, -b, b)
