@@ -17,7 +17,7 @@ from pvid.cli.main import commands
 from pvid.cli.mechanism import recording_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run.engine_design import config_for_recording
+from pvid.run.engine_design import config_to_identify
 from pvid.run.mechanism import identify_mechanism
 from pvid.run.mechanism_f32 import identify_in_c
 from pvid.settings.enums import Reason
@@ -98,10 +98,10 @@ def test_where_the_core_publishes_nothing_the_values_are_null(
     """Standard errors of a millionth are the limit of publication."""
 
     def strict(*given: Any) -> FourierConfig:
-        config = config_for_recording(*given)
+        config = config_to_identify(*given)
         return replace(config, trust=replace(config.trust, se_max=1e-6))
 
-    monkeypatch.setattr("pvid.run.mechanism_f32.config_for_recording", strict)
+    monkeypatch.setattr("pvid.run.mechanism_f32.config_to_identify", strict)
     answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--json")
     shown = json.loads(answer.stdout)
     assert answer.return_value == NOTHING_IDENTIFIED and not shown["identified"]

@@ -22,6 +22,7 @@
 #include "pvid/publication.h"
 #include "pvid/refine.h"
 #include "pvid/snapshot.h"
+#include "pvid/snapshot_fourier.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
 #include "pvid/trust.h"

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.design.second_derivative import second_derivative
+from pvid.design.refine_filter import second_derivative
 from pvid.settings.refine import BIG_STEP, RefineConfig, RefineRig
 
 RING = 512  # PVID_REFINE_RING

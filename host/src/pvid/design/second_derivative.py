@@ -1,44 +1,72 @@
-"""Filter for the second derivative of a signal: exact in a pass band, little noise beyond it."""
+"""Second derivative of a sampled signal in a pass band: a decimated FIR that is exact there and passes little noise."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 Float = npt.NDArray[np.float64]
 
-_GRID = 4001
-_EXACT = 1e6  # weight of the pass band, relative to what is wanted there
-_LEAST_WANTED = 0.02  # of the pass band's edge: below it the weight grows no more
-_NOISE = 1e-6  # weight of white noise
+_A_PERIOD = 16  # decimated samples in a period of the edge of the pass band
+_REACH = 0.8  # periods of the edge on each side
+_SHORTEST, _LONGEST = 6, 80  # decimated samples on each side
+_PASS, _NOISE = 1e6, 1e-4  # weights of the relative error in the pass band and of the noise
 
 
-def second_derivative(half: int, pass_band: float) -> Float:
-    """Symmetric weights [half + 1], centre first, per squared step.
+@dataclass(frozen=True, eq=False)
+class SecondDerivative:
+    """A filter.
 
-    Least squares over all frequencies, exact for polynomials to degree 4.
-
-    Parameters
+    Attributes
     ----------
-    half : steps on each side
-    pass_band : highest frequency that is not to be changed [cycles a step], < 0.5
+    mean : samples in an average, which is the decimated signal
+    taps : of the averages [2 half + 1]; the result has the unit of the signal per decimated sample squared
+    worst : largest error in the pass band, relative to the edge's gain
     """
-    place = np.arange(half + 1)
-    frequency = np.linspace(0.0, 0.5, _GRID)
-    response = 2.0 * np.cos(2.0 * np.pi * np.outer(frequency, place))
-    response[:, 0] = 1.0
-    edge = (2.0 * np.pi * pass_band) ** 2
-    inside = frequency < pass_band
-    wanted = np.where(inside, -((2.0 * np.pi * frequency) ** 2), 0.0)
-    size = np.maximum(np.abs(wanted), _LEAST_WANTED * edge)
-    weight = np.where(inside, _EXACT / size**2, _NOISE / edge**2)
-    degrees = np.array([0, 2, 4])
-    moments = np.where(place == 0, 1.0, 2.0) * (place / half) ** degrees[:, None]
-    target = np.array([0.0, 2.0 / half**2, 0.0])
-    system = np.block(
-        [[(response.T * weight) @ response, moments.T], [moments, np.zeros((degrees.size, degrees.size))]]
-    )
-    right = np.concatenate([response.T @ (weight * wanted), target])
-    scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(system)), 1.0))
-    solution = np.linalg.lstsq(system * np.outer(scale, scale), right * scale, rcond=1e-14)[0] * scale
-    return np.asarray(solution[: half + 1])
+
+    mean: int
+    taps: Float
+    worst: float
+
+    @property
+    def half(self) -> int:
+        """Decimated samples on each side."""
+        return len(self.taps) // 2
+
+    def apply(self, x: Float, rate: float) -> tuple[Float, Float]:
+        """Times [s] since the first sample, and x'' there."""
+        k = self.mean
+        averages = x[: len(x) // k * k].reshape(-1, k).mean(1)
+        found = np.convolve(averages - averages.mean(), self.taps[::-1], "valid") * (rate / k) ** 2
+        times = ((np.arange(len(found)) + self.half) * k + (k - 1) / 2) / rate
+        return np.asarray(times, np.float64), np.asarray(found, np.float64)
+
+
+def second_derivative(rate: float, edge_hz: float) -> SecondDerivative:
+    """A filter for samples at `rate` that is exact up to `edge_hz`."""
+    k = max(1, int(rate / (_A_PERIOD * edge_hz)))
+    edge = min(edge_hz * k / rate, 0.4)  # cycles a decimated sample
+    half = int(np.clip(round(_REACH / edge), _SHORTEST, _LONGEST))
+    f = np.linspace(0.0, edge, 20 * half)
+    droop = np.ones_like(f)
+    if k > 1:
+        droop[1:] = np.sin(np.pi * f[1:]) / (k * np.sin(np.pi * f[1:] / k))
+    want = -((2 * np.pi * f) ** 2) / droop
+    scale = (2 * np.pi * edge) ** 2
+    n = np.arange(half + 1)
+    cosines = 2 * np.cos(2 * np.pi * np.outer(f, n))
+    cosines[:, 0] = 1.0
+    # without a gain at f = 0: the centre is minus the sum of the others
+    moving = cosines[:, 1:] - 2.0
+    relative = np.maximum(np.abs(want), 0.02 * scale)
+    weight = np.sqrt(_PASS / len(f)) / relative
+    spread = np.sqrt(2.0 * _NOISE) / scale * np.eye(half)
+    centre = np.sqrt(_NOISE) / scale * -2.0 * np.ones((1, half))
+    rows = np.concatenate([moving * weight[:, None], spread, centre])
+    right = np.concatenate([want * weight, np.zeros(half + 1)])
+    side = np.linalg.lstsq(rows, right, rcond=1e-13)[0]
+    taps = np.concatenate([side[::-1], [-2 * side.sum()], side])
+    worst = float(np.abs(moving @ side - want).max() / scale)
+    return SecondDerivative(k, taps, worst)

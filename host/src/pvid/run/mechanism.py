@@ -113,17 +113,21 @@ def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
 
 
 def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
-    gains = gains_of(model, found)
-    # Of noise: the correlations of the rows, with the published standard errors but for gains and constants.
-    noise = np.sqrt(np.maximum(found.se**2 - np.sum(gains**2, axis=0), 0.0))
-    widened = noise / np.sqrt(np.diag(found.covariance))
+    # The correlations of the rows, with the published standard errors but for gains and constants.
+    widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
-    return values_of(model, found.p, covariance, gains, identified=found.verdict.identified)
+    return values_of(model, found.p, covariance, gains_of(model, found), identified=found.verdict.identified)
+
+
+def noise_of(model: CompiledModel, found: Identified) -> Float:
+    """The published standard errors but for gains and constants [n_p]."""
+    return np.asarray(np.sqrt(np.maximum(found.se**2 - np.sum(gains_of(model, found) ** 2, axis=0), 0.0)))
 
 
 def gains_of(model: CompiledModel, found: Identified) -> Float:
-    """What p is off by for one standard deviation of each gain and of each constant that has any [gains, n_p]."""
-    return np.array(given(model, found.by_gain, found.by_known)).reshape(-1, len(found.p))
+    """What p is off by for one standard deviation of each gain and constant that has any, and of what linearised
+    equations neglect [gains, n_p]."""
+    return np.array([*given(model, found.by_gain, found.by_known), found.by_neglect])
 
 
 def values_of(model: CompiledModel, p: Float, covariance: Float, gains: Float, *, identified: bool) -> dict[str, Value]:

@@ -10,7 +10,7 @@ from pvid.codegen.fourier_library import fourier_native
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, first_difference
-from pvid.run.engine_design import config_for_recording, samples_of
+from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.settings.fourier import FourierConfig
 from pvid.setup.fourier_sizes import sizes_of_model
 from pvid.twin import fnv
@@ -27,7 +27,7 @@ def compare_recording(compiled: CompiledModel, recording: Recording, progress: P
     PvidError
         When there is no C compiler, or the engine does not have what the model needs.
     """
-    config = config_for_recording(compiled, recording)
+    config = config_to_identify(compiled, recording)
     return compare_samples(compiled, config, samples_of(config, recording.signals), progress)
 
 

@@ -17,9 +17,11 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
 from pvid.codegen.fourier_library import fourier_native
 from pvid.core.fourier_native import FourierIdentifier
+from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import Reason, Verdict
-from pvid.run.engine_design import config_for_recording, samples_of
-from pvid.run.mechanism import MechanismAnswer, Value, gains_of, values_of
+from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.identify import Publications
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, values_of
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.fourier import FourierConfig
 from pvid.settings.record import Record
@@ -43,6 +45,7 @@ class CoreAnswer:
     misfit : of the published estimate; None: not judged
     windows : how many the engine has judged
     hash : running hash of its state after the last tick
+    publications : every estimate that was published; their standard errors contain what `values` contains
     """
 
     oracle: MechanismAnswer
@@ -53,6 +56,7 @@ class CoreAnswer:
     misfit: float | None
     windows: int
     hash: int
+    publications: Publications
 
     @property
     def identified(self) -> bool:
@@ -75,6 +79,10 @@ class CoreAnswer:
                 "core",
                 f"The C core and the float64 analysis disagree on {listed(apart)} ({apart[0]}: "
                 f"{one} and {other}); the analysis is nearer." + (of_signs if self.config.design.model.signs else ""),
+            )
+        if self.reason not in (Outcome.UPDATED, Outcome.MISFIT):
+            yield Reason(
+                "held", f"The C core holds an earlier estimate, its last windows published nothing: {self.reason.text}."
             )
         if self.reason == Outcome.MISFIT and self.misfit is not None:
             yield Reason(
@@ -124,7 +132,7 @@ def identify_in_c(answer: MechanismAnswer) -> CoreAnswer:
     """
     recording, compiled = answer.recording, answer.model
     try:
-        config = config_for_recording(compiled, recording)
+        config = config_to_identify(compiled, recording)
         native = fourier_native(compiled, config.design)
         identifier = native.identifier_of(config)
     except PvidError as error:
@@ -142,6 +150,9 @@ def _answer(
     n_p = len(found.p)
     last = identifier.estimate
     covariance = np.asarray(last["covariance"], np.float64)[:n_p, :n_p]
+    # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
+    wider = np.maximum(noise_of(model, found) / np.sqrt(np.diag(covariance)), 1.0)
+    covariance = covariance * np.outer(wider, wider)
     values = values_of(
         model,
         np.asarray(last["p"][:n_p], np.float64),
@@ -159,4 +170,14 @@ def _answer(
         misfit=None if estimate is None or np.isnan(misfit) else misfit,
         windows=int(len(ends)),
         hash=identifier.running_hash,
+        publications=_published(answer, record, gains_of(model, found), wider),
     )
+
+
+def _published(answer: MechanismAnswer, record: Record, gains: Float, wider: Float) -> Publications:
+    """All publications of a run: their own errors, times what the analysis found, and those of gains and constants."""
+    ticks = np.flatnonzero(np.isin(record.reason, (Outcome.UPDATED, Outcome.MISFIT)))
+    n_p = len(wider)
+    se = np.hypot(record.published_se[ticks, :n_p] * wider, np.sqrt(np.sum(gains**2, axis=0)))
+    alarm = np.full(len(ticks), answer.found.verdict.warning is not None)
+    return Publications(answer.recording.t[ticks], record.published[ticks, :n_p].astype(np.float64), se, alarm)

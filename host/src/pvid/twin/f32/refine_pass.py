@@ -153,7 +153,7 @@ class Pass:
 
     def _residuals(self, r: Float32, state: Float32, measured: Float32) -> None:
         e = measured - self.model.output(self.constants, r, state[: self.q], state[self.q :])
-        self.mean = self.mean + _F(0.5) * (self.last + e)
+        self.mean = np.asarray(self.mean + _F(0.5) * (self.last + e), _F)
         self.last = e
 
     def _derivatives(self, r: Float32, signals: Signals, u: Float32) -> Float32:
