@@ -93,7 +93,7 @@ PVID_ALWAYS_INLINE void pvid_refine_motion(const float m[], const float q[], con
     a[1] = x.a2;
 }
 
-/* a, K = da/dq and D = da/dv, both [row][column], U = da/du, B = da/dr by moving parameter: B[parameter][row]; that of
+/* a, K = da/dq, D = da/dv and U = da/du, all [row][column], B = da/dr by moving parameter: B[parameter][row]; that of
  * the skew is not written. */
 PVID_ALWAYS_INLINE void pvid_refine_jacobian(const float m[], const float q[], const float v[], const float u[],
                                              float a[], float K[], float D[], float U[], float B[])

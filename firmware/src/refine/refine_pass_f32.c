@@ -288,7 +288,7 @@ PVID_ALWAYS_INLINE void derivatives(pvid_refine_pass_f32 *self, const float r[],
         PVID_UNROLL for (size_t j = 0; j < PVID_REFINE_INPUTS; j++)
         {
             const float rate = scale * (((3.0f * signals->u[2][j]) - (4.0f * signals->u[1][j])) + signals->u[0][j]);
-            sum += U[(j * N_Q) + i] * rate;
+            sum += U[(i * PVID_REFINE_INPUTS) + j] * rate;
         }
         B[((PVID_REFINE_MOVING - 1) * N_Q) + i] = sum;
     }

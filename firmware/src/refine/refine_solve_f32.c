@@ -94,11 +94,11 @@ static void copy(pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass, 
     }
 }
 
-/* The sums by the motion's columns to those by the steps of r, T^T S T: those with the start and with what does not move,
- * then those of the moving parameters. */
+/* The sums by the motion's columns to those by the steps of r, T^T S T: those with the start and with what does not
+ * move, then those of the moving parameters. */
 static void chart_sides(float sum[], const float linear[])
 {
-#ifdef PVID_REFINE_HAS_CHART
+#if PVID_REFINE_HAS_CHART
     for (size_t i = 0; i < STATES; i++) {
         pvid_refine_chart(linear, &sum[at(WIDTH, i, STATES)]);
     }
@@ -120,7 +120,7 @@ static void chart_sides(float sum[], const float linear[])
 
 static void chart_corner(float sum[], const float linear[])
 {
-#ifdef PVID_REFINE_HAS_CHART
+#if PVID_REFINE_HAS_CHART
     float corner[PVID_REFINE_MOVING][PVID_REFINE_MOVING];
     for (size_t i = 0; i < PVID_REFINE_MOVING; i++) {
         const float *row = &sum[at(WIDTH, STATES + i, STATES + i)];
@@ -321,7 +321,7 @@ void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_ref
         for (size_t j = 0; j < PVID_REFINE_MOVING; j++) {
             by_r[j] = pass->column[STATES + j][i];
         }
-#ifdef PVID_REFINE_HAS_CHART
+#if PVID_REFINE_HAS_CHART
         pvid_refine_chart(linear, by_r);
 #endif
         for (size_t j = 0; j < PVID_REFINE_MOVING; j++) {
@@ -329,7 +329,7 @@ void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_ref
         }
         state[i] = x;
     }
-#ifndef PVID_REFINE_HAS_CHART
+#if !PVID_REFINE_HAS_CHART
     (void)linear;
 #endif
 }

@@ -53,7 +53,7 @@ class RefineShape:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Accelerations a [q] and their derivatives K, D [q, q], U [inputs, q], B [moving, q] (that of the skew is 0)."""
+    """Accelerations a [q] and their derivatives K, D [q, q], U [q, inputs], B [moving, q] (that of the skew is 0)."""
 
     a: Float32
     K: Float32

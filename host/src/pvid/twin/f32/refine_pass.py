@@ -166,7 +166,7 @@ class Pass:
             total: Float32 = np.zeros(q, _F)
             for j in range(shape.inputs):
                 a, b, d = signals[0][:, j]
-                total = total + found.U[j] * (scale * ((_F(3) * d - _F(4) * b) + a))
+                total = total + found.U[:, j] * (scale * ((_F(3) * d - _F(4) * b) + a))
             B[-1] = total
         big = _F(BIG_STEP) * self.h
         g = (big * big) * (_F(1) / _F(12))

@@ -113,7 +113,7 @@ class KapitzaRefine:
                 ],
                 _F,
             ),
-            U=np.array([[u1, u2]], _F),
+            U=np.array([[u1], [u2]], _F),
             B=np.array(
                 [
                     [w * u1, w * u2],
