@@ -137,20 +137,23 @@ PVID_ALWAYS_INLINE void pvid_refine_jacobian(const float m[], const float q[], c
 }
 
 /* z */
-static inline void pvid_refine_output(const float m[], const float r[], const float q[], const float v[], float z[])
+static inline void pvid_refine_output(const float m[], const float r[], const float q[], const float v[],
+                                      const float u[], float z[])
 {
     (void)m;
+    (void)u;
     (void)v;
     z[0] = (q[1] - q[0]) + r[6];
 }
 
 /* dz/dq, dz/dv (only with PVID_REFINE_OUTPUT_RATES) and dz/dr of the entries behind the moving ones. */
 static inline void pvid_refine_output_jacobian(const float m[], const float r[], const float q[], const float v[],
-                                               float Zq[], float Zv[], float Zr[])
+                                               const float u[], float Zq[], float Zv[], float Zr[])
 {
     (void)m;
     (void)r;
     (void)q;
+    (void)u;
     (void)v;
     (void)Zv;
     Zq[0] = -1.0f;

@@ -14,6 +14,7 @@
 #include "refine_model_f32.h"
 
 #define N_Q PVID_REFINE_COORDINATES
+#define V (PVID_REFINE_STATES - N_Q) /* place of the rates in the state; without rates any place */
 #define AB PVID_REFINE_AB
 
 /* Jobs of a pass, in their order; the first two of a pair are those of Runge-Kutta alone. */
@@ -29,7 +30,9 @@ enum { CLEAR, FIRST_A, FIRST_B, FIRST, SECOND_A, SECOND_B, SECOND, COLUMNS, ROWS
 #define VELOCITY                                                                                                       \
     198721.0f / 60480.0f, -18637.0f / 2520.0f, 235183.0f / 20160.0f, -10754.0f / 945.0f, 135713.0f / 20160.0f,         \
         -5603.0f / 2520.0f, 19087.0f / 60480.0f
+#if PVID_REFINE_ORDER == 2
 static const float position_weights[2 * AB] = {POSITION, POSITION};
+#endif
 static const float velocity_weights[2 * AB] = {VELOCITY, VELOCITY};
 
 void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[], float h, float gate)
@@ -63,23 +66,29 @@ static void clear(pvid_refine_pass_f32 *self)
 
 PVID_ALWAYS_INLINE void adams_bashforth(pvid_refine_pass_f32 *self)
 {
-    const float *of_position = &position_weights[AB - self->head];
     const float *of_velocity = &velocity_weights[AB - self->head];
-    float position[N_Q] = {0.0f};
+    const float h = self->h;
     float velocity[N_Q] = {0.0f};
+#if PVID_REFINE_ORDER == 2
+    const float *of_position = &position_weights[AB - self->head];
+    float position[N_Q] = {0.0f};
+#endif
     PVID_UNROLL for (size_t j = 0; j < AB; j++)
     {
         PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
         {
+#if PVID_REFINE_ORDER == 2
             position[i] += of_position[j] * self->rate[i][j];
+#endif
             velocity[i] += of_velocity[j] * self->rate[i][j];
         }
     }
-    const float h = self->h;
     PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
     {
-        self->state[i] += h * (self->state[N_Q + i] + (h * position[i]));
-        self->state[N_Q + i] += h * velocity[i];
+#if PVID_REFINE_ORDER == 2
+        self->state[i] += h * (self->state[V + i] + (h * position[i]));
+#endif
+        self->state[V + i] += h * velocity[i];
     }
 }
 
@@ -95,7 +104,7 @@ PVID_ALWAYS_INLINE void push(pvid_refine_pass_f32 *self, const float a[])
 /* Accelerations without derivatives, out of line: for the seldom first steps. */
 PVID_SELDOM static void accelerations(const float m[], const float state[], const float u[], float a[])
 {
-    pvid_refine_motion(m, state, &state[N_Q], u, a);
+    pvid_refine_motion(m, state, &state[V], u, a);
 }
 
 /* u at the time of the outputs, by the parabola through three steps: `at` 0, 1, 2. */
@@ -119,89 +128,107 @@ PVID_ALWAYS_INLINE void input(const pvid_refine_pass_f32 *self, const pvid_refin
         }
 #else
         u[i] = (at == 1u) ? b : signals->u[at][i];
+        (void)self;
 #endif
     }
 }
 
-/* Runge-Kutta over 2 h: its first half. scratch: k1, k2, the middle. */
+/* A state with the rate k, h after x. */
+static void advanced(const float x[], const float rates[], const float k[], float h, float out[])
+{
+    for (size_t i = 0; i < N_Q; i++) {
+#if PVID_REFINE_ORDER == 2
+        out[i] = x[i] + (h * rates[i]);
+#else
+        (void)rates;
+#endif
+        out[V + i] = x[V + i] + (h * k[i]);
+    }
+}
+
+/* Runge-Kutta over 2 h: its first half. scratch: k1, k2. */
 static void first_half(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {
     const float h = self->h; /* half of the double step */
     const float *x = self->state;
     float u[PVID_REFINE_INPUTS];
     float at[PVID_REFINE_STATES];
+    float rates[N_Q];
+    float k0[N_Q];
     float *k1 = self->scratch[0];
-    float *k2 = &self->scratch[0][N_Q];
+    float *k2 = self->scratch[1];
     input(self, signals, 0, u);
     if (self->starts == STARTS) {
-        float a[N_Q];
-        accelerations(self->constants, x, u, a);
-        push(self, a);
         float z[PVID_REFINE_OUTPUTS];
-        pvid_refine_output(self->constants, r, x, &x[N_Q], z);
+        accelerations(self->constants, x, u, k0);
+        push(self, k0);
+        pvid_refine_output(self->constants, r, x, &x[V], u, z);
         for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++) {
             self->last[i] = signals->z[0][i] - z[i];
         }
     }
     input(self, signals, 1, u);
     for (size_t i = 0; i < N_Q; i++) {
-        const float k0 = self->rate[i][self->head];
-        at[i] = x[i] + (h * x[N_Q + i]);
-        at[N_Q + i] = x[N_Q + i] + (h * k0);
+        k0[i] = self->rate[i][self->head];
+        rates[i] = x[V + i] + (h * k0[i]);
     }
+    advanced(x, &x[V], k0, h, at);
     accelerations(self->constants, at, u, k1);
-    for (size_t i = 0; i < N_Q; i++) {
-        const float k0 = self->rate[i][self->head];
-        at[i] = x[i] + (h * (x[N_Q + i] + (h * k0)));
-        at[N_Q + i] = x[N_Q + i] + (h * k1[i]);
-    }
+    advanced(x, rates, k1, h, at);
     accelerations(self->constants, at, u, k2);
 }
 
-/* Its second half. scratch: the accelerations at the end, -, the state at the middle. */
+/* Its second half. scratch: the state at the end, the state at the middle. */
 static void second_half(pvid_refine_pass_f32 *self, const pvid_refine_signals_f32 *signals)
 {
     const float h = self->h;
     const float h2 = 2.0f * h;
     const float *x = self->state;
-    const float *k1 = self->scratch[0];
-    const float *k2 = &self->scratch[0][N_Q];
-    float *end = self->scratch[1];
-    float *middle = self->scratch[2];
     float u[PVID_REFINE_INPUTS];
     float at[PVID_REFINE_STATES];
+    float end[PVID_REFINE_STATES];
+    float middle[PVID_REFINE_STATES];
+    float rates[N_Q];
+    float mean[N_Q];
     float k3[N_Q];
     float a[N_Q];
     input(self, signals, 2, u);
     for (size_t i = 0; i < N_Q; i++) {
-        at[i] = x[i] + (h2 * (x[N_Q + i] + (h * k1[i])));
-        at[N_Q + i] = x[N_Q + i] + (h2 * k2[i]);
+        rates[i] = x[V + i] + (h * self->scratch[0][i]);
+        mean[i] = self->scratch[0][i] + self->scratch[1][i];
     }
+    advanced(x, rates, self->scratch[1], h2, at);
     accelerations(self->constants, at, u, k3);
     for (size_t i = 0; i < N_Q; i++) {
         const float k0 = self->rate[i][self->head];
-        const float mean = k1[i] + k2[i];
-        at[i] = h2 * (x[N_Q + i] + ((h2 / 6.0f) * (k0 + mean)));
-        at[N_Q + i] = (h2 / 6.0f) * ((k0 + (2.0f * mean)) + k3[i]);
+#if PVID_REFINE_ORDER == 2
+        at[i] = h2 * (x[V + i] + ((h2 / 6.0f) * (k0 + mean[i])));
         end[i] = x[i] + at[i];
-        end[N_Q + i] = x[N_Q + i] + at[N_Q + i];
+#endif
+        at[V + i] = (h2 / 6.0f) * ((k0 + (2.0f * mean[i])) + k3[i]);
+        end[V + i] = x[V + i] + at[V + i];
     }
     accelerations(self->constants, end, u, a);
     for (size_t i = 0; i < N_Q; i++) {
         const float k0 = self->rate[i][self->head];
-        middle[i] =
-            ((x[i] + (0.5f * at[i])) - ((h2 * 0.15625f) * at[N_Q + i])) + (((h2 * h2) * 0.015625f) * (k0 + a[i]));
-        middle[N_Q + i] =
-            (((1.875f * at[i]) / h2) - (0.4375f * (x[N_Q + i] + end[N_Q + i]))) + ((h2 * 0.03125f) * (a[i] - k0));
+#if PVID_REFINE_ORDER == 2
+        middle[i] = ((x[i] + (0.5f * at[i])) - ((h2 * 0.15625f) * at[V + i])) + (((h2 * h2) * 0.015625f) * (k0 + a[i]));
+        middle[V + i] =
+            (((1.875f * at[i]) / h2) - (0.4375f * (x[V + i] + end[V + i]))) + ((h2 * 0.03125f) * (a[i] - k0));
+#else
+        middle[i] = (x[i] + (0.5f * at[i])) + ((h2 * 0.125f) * (k0 - a[i]));
+#endif
     }
+    memcpy(self->scratch[0], end, sizeof end);
+    memcpy(self->scratch[1], middle, sizeof middle);
 }
 
 /* Residuals at a step, into the mean. */
-PVID_ALWAYS_INLINE void residuals(pvid_refine_pass_f32 *self, const float r[], const float state[],
+PVID_ALWAYS_INLINE void residuals(pvid_refine_pass_f32 *self, const float r[], const float state[], const float u[],
                                   const float measured[])
 {
     float z[PVID_REFINE_OUTPUTS];
-    pvid_refine_output(self->constants, r, state, &state[N_Q], z);
+    pvid_refine_output(self->constants, r, state, &state[V], u, z);
     PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++)
     {
         const float e = measured[i] - z[i];
@@ -209,6 +236,8 @@ PVID_ALWAYS_INLINE void residuals(pvid_refine_pass_f32 *self, const float r[], c
         self->last[i] = e;
     }
 }
+
+#if PVID_REFINE_ORDER == 2
 
 /* An entry of x + H/2 D x. */
 PVID_ALWAYS_INLINE float damped(const float D[], float half, const float x[], size_t row)
@@ -262,11 +291,56 @@ PVID_ALWAYS_INLINE void store_kick(pvid_refine_pass_f32 *self, const float K[], 
     }
 }
 
+#else
+
+/* F = H (1 + HK/2 (1 + HK/3 (1 + HK/4))), then F K and F B: the columns' change over a big step with a constant K. */
+PVID_ALWAYS_INLINE void store_kick(pvid_refine_pass_f32 *self, const float K[], const float D[], const float B[])
+{
+    const float big = (float)PVID_REFINE_SUB * self->h;
+    float factor[N_Q][N_Q] = {{0.0f}};
+    float next[N_Q][N_Q];
+    (void)D;
+    for (size_t i = 0; i < N_Q; i++) {
+        factor[i][i] = 1.0f;
+    }
+    for (size_t n = 4; n > 1u; n--) {
+        const float part = big / (float)n;
+        for (size_t i = 0; i < N_Q; i++) {
+            for (size_t j = 0; j < N_Q; j++) {
+                float sum = K[i * N_Q] * factor[0][j];
+                for (size_t k = 1; k < N_Q; k++) {
+                    sum += K[(i * N_Q) + k] * factor[k][j];
+                }
+                next[i][j] = (part * sum) + ((i == j) ? 1.0f : 0.0f);
+            }
+        }
+        memcpy(factor, next, sizeof factor);
+    }
+    for (size_t i = 0; i < N_Q; i++) {
+        for (size_t j = 0; j < N_Q; j++) {
+            float sum = factor[i][0] * K[j];
+            for (size_t k = 1; k < N_Q; k++) {
+                sum += factor[i][k] * K[(k * N_Q) + j];
+            }
+            self->kick[(i * N_Q) + j] = big * sum;
+        }
+        for (size_t j = 0; j < PVID_REFINE_MOVING; j++) {
+            float sum = factor[i][0] * B[j * N_Q];
+            for (size_t k = 1; k < N_Q; k++) {
+                sum += factor[i][k] * B[(j * N_Q) + k];
+            }
+            self->kick[(N_Q * N_Q) + (j * N_Q) + i] = big * sum;
+        }
+    }
+}
+
+#endif
+
 /* dz/dq, dz/dv, dz/dr of the entries that do not move, each [output][entry]. */
 PVID_ALWAYS_INLINE void output_derivatives(const pvid_refine_pass_f32 *self, const float r[], const float x[],
-                                           float derivatives[])
+                                           const float u[], float derivatives[])
 {
-    pvid_refine_output_jacobian(self->constants, r, x, &x[N_Q], derivatives, &derivatives[PVID_REFINE_OUTPUTS * N_Q],
+    pvid_refine_output_jacobian(self->constants, r, x, &x[V], u, derivatives, &derivatives[PVID_REFINE_OUTPUTS * V],
                                 &derivatives[PVID_REFINE_OUTPUTS * PVID_REFINE_STATES]);
 }
 
@@ -279,7 +353,7 @@ PVID_ALWAYS_INLINE void derivatives(pvid_refine_pass_f32 *self, const float r[],
     float U[N_Q * PVID_REFINE_INPUTS];
     float B[N_Q * PVID_REFINE_MOVING];
     const float *x = self->state;
-    pvid_refine_jacobian(self->constants, x, &x[N_Q], u, a, K, D, U, B);
+    pvid_refine_jacobian(self->constants, x, &x[V], u, a, K, D, U, B);
 #if PVID_REFINE_SKEW
     const float scale = 1.0f / (2.0f * self->h);
     PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
@@ -298,7 +372,7 @@ PVID_ALWAYS_INLINE void derivatives(pvid_refine_pass_f32 *self, const float r[],
 #endif
     store_kick(self, K, D, B);
 #if !PVID_REFINE_OUTPUT_LINEAR
-    output_derivatives(self, r, x, self->output_column);
+    output_derivatives(self, r, x, u, self->output_column);
 #else
     (void)r;
 #endif
@@ -312,18 +386,18 @@ PVID_ALWAYS_INLINE void pair(pvid_refine_pass_f32 *self, const float r[], const 
     float u[PVID_REFINE_INPUTS];
     input(self, signals, 1, u);
     adams_bashforth(self);
-    residuals(self, r, self->state, signals->z[1]);
-    pvid_refine_motion(self->constants, self->state, &self->state[N_Q], u, a);
+    residuals(self, r, self->state, u, signals->z[1]);
+    pvid_refine_motion(self->constants, self->state, &self->state[V], u, a);
     push(self, a);
     input(self, signals, 2, u);
     adams_bashforth(self);
     if (to_middle) {
         derivatives(self, r, signals, u, a);
     } else {
-        pvid_refine_motion(self->constants, self->state, &self->state[N_Q], u, a);
+        pvid_refine_motion(self->constants, self->state, &self->state[V], u, a);
     }
     push(self, a);
-    residuals(self, r, self->state, signals->z[2]);
+    residuals(self, r, self->state, u, signals->z[2]);
 }
 
 /* The same behind Runge-Kutta. */
@@ -333,18 +407,18 @@ PVID_SELDOM static void first_pair(pvid_refine_pass_f32 *self, const float r[], 
     float a[N_Q];
     float u[PVID_REFINE_INPUTS];
     input(self, signals, 1, u);
-    residuals(self, r, self->scratch[2], signals->z[1]);
-    accelerations(self->constants, self->scratch[2], u, a);
+    residuals(self, r, self->scratch[1], u, signals->z[1]);
+    accelerations(self->constants, self->scratch[1], u, a);
     push(self, a);
     input(self, signals, 2, u);
-    memcpy(self->state, self->scratch[1], sizeof self->state);
+    memcpy(self->state, self->scratch[0], sizeof self->state);
     if (to_middle) {
         derivatives(self, r, signals, u, a);
     } else {
         accelerations(self->constants, self->state, u, a);
     }
     push(self, a);
-    residuals(self, r, self->state, signals->z[2]);
+    residuals(self, r, self->state, u, signals->z[2]);
     self->starts--;
 }
 
@@ -374,6 +448,7 @@ PVID_ALWAYS_INLINE void entries(float row[][PVID_REFINE_WIDTH], size_t column, c
 }
 
 /* The columns over a big step, and their entries in the rows. */
+#if PVID_REFINE_ORDER == 2
 PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, const float derivatives[], const float weight[])
 {
     float (*row)[PVID_REFINE_WIDTH] = &self->row[self->rows];
@@ -417,6 +492,30 @@ PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, const float derivati
         entries(row, j, x, derivatives, weight);
     }
 }
+#else
+PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, const float derivatives[], const float weight[])
+{
+    float (*row)[PVID_REFINE_WIDTH] = &self->row[self->rows];
+    for (size_t j = 0; j < PVID_REFINE_COLUMNS; j++) {
+        float *s = self->column[j];
+        float x[PVID_REFINE_STATES];
+        float change[N_Q];
+        for (size_t i = 0; i < N_Q; i++) {
+            float sum =
+                (j >= PVID_REFINE_STATES) ? self->kick[(N_Q * N_Q) + ((j - PVID_REFINE_STATES) * N_Q) + i] : 0.0f;
+            for (size_t k = 0; k < N_Q; k++) {
+                sum += self->kick[(i * N_Q) + k] * s[k];
+            }
+            change[i] = sum;
+        }
+        for (size_t i = 0; i < N_Q; i++) {
+            x[i] = s[i] + (0.5f * change[i]);
+            s[i] += change[i];
+        }
+        entries(row, j, x, derivatives, weight);
+    }
+}
+#endif
 
 /* The other entries of the rows of a big step. A row without residual, or beyond the gate, is 0. */
 PVID_ALWAYS_INLINE void end_rows(pvid_refine_pass_f32 *self, const float derivatives[], const float weight[])
@@ -447,7 +546,7 @@ PVID_SELDOM static void end_big_step(pvid_refine_pass_f32 *self, const float r[]
 {
 #if PVID_REFINE_OUTPUT_LINEAR
     float derivatives[PVID_REFINE_OUTPUTS * PVID_REFINE_UNKNOWNS];
-    output_derivatives(self, r, self->state, derivatives);
+    output_derivatives(self, r, self->state, self->state, derivatives); /* constants */
 #else
     const float *derivatives = self->output_column;
     (void)r;

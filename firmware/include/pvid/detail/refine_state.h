@@ -52,7 +52,7 @@ typedef struct {
     float column[PVID_REFINE_COLUMNS][PVID_REFINE_STATES]; /* d state / d (start, moving parameters) */
     float kick[PVID_REFINE_COORDINATES * (PVID_REFINE_STATES + PVID_REFINE_MOVING)]; /* derivatives at the middle of
                                                                 the big step, times the big step */
-    float scratch[3][PVID_REFINE_STATES]; /* between the jobs of a first step */
+    float scratch[2][PVID_REFINE_STATES]; /* between the jobs of a first step */
 #if !PVID_REFINE_OUTPUT_LINEAR
     float output_column[PVID_REFINE_OUTPUTS * PVID_REFINE_UNKNOWNS]; /* dz/dq, dz/dv, dz/dr at that middle */
 #endif
