@@ -238,24 +238,6 @@ PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[]
     return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
 }
 
-/* Harmonics of the last block; a window that is joined begins. */
-PVID_SELDOM static void advance_sums(pvid_fourier_f32 *self)
-{
-    for (uint8_t i = 0; i < self->items_per_tick; i++) {
-        if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
-                                          self->window)) {
-            pvid_fourier_finish_begin_f32(&self->finish);
-        }
-    }
-}
-
-PVID_SELDOM static void advance_finish(pvid_fourier_f32 *self, pvid_reason *reason)
-{
-    for (uint8_t left = self->stages_per_tick; left > 0u; left--) {
-        pvid_fourier_finish_step_f32(self, reason);
-    }
-}
-
 /* A sample that is not finite. */
 PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
 {
@@ -264,14 +246,21 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
     return PVID_REJECTED_NOT_FINITE;
 }
 
-/* Work on the sums, else on the last whole window. */
+/* Harmonics of the last block are added or joined, else stages of the last whole window run. */
 PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
 {
     pvid_reason reason = idle(self);
     if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
-        advance_sums(self);
+        for (uint32_t left = self->items_per_tick; left > 0u; left--) {
+            if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
+                                              self->finish.work.rows.window)) {
+                pvid_fourier_finish_begin_f32(&self->finish);
+            }
+        }
     } else {
-        advance_finish(self, &reason);
+        for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
+            pvid_fourier_finish_step_f32(self, &reason);
+        }
     }
     rest(self);
     return reason;
