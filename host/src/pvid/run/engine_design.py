@@ -60,7 +60,7 @@ def engine_config(
     rows = WeakRows.of(model, run, for_engine(design))
     fit = gated(rows, p)
     tables = design_tables(tables_of, rows, fit.p, fit.errors)
-    return config_of(tables, design.sample_rate, model.parameters, fit.p if start_there else None)
+    return config_of(tables, design.sample_rate, model.parameters, fit.p if start_there else None, run)
 
 
 def config_for_recording(compiled: CompiledModel, recording: Recording, functions: int | None = None) -> FourierConfig:
