@@ -20,6 +20,7 @@
 #include "pvid/model.h"
 #include "pvid/publication.h"
 #include "pvid/snapshot.h"
+#include "pvid/snapshot_fourier.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
 #include "pvid/trust.h"

@@ -139,6 +139,14 @@
 #define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
 #define pvid_snapshot_restore_weak_q31 PVID_SIZED(pvid_snapshot_restore_weak_q31)
 
+/* snapshot_fourier.h */
+#define pvid_snapshot_save_fourier_f32 PVID_SIZED(pvid_snapshot_save_fourier_f32)
+#define pvid_snapshot_restore_fourier_f32 PVID_SIZED(pvid_snapshot_restore_fourier_f32)
+
+/* snapshot_fourier_q31.h */
+#define pvid_snapshot_save_fourier_q31 PVID_SIZED(pvid_snapshot_save_fourier_q31)
+#define pvid_snapshot_restore_fourier_q31 PVID_SIZED(pvid_snapshot_restore_fourier_q31)
+
 /* strong.h */
 #define pvid_strong_init_f32 PVID_SIZED(pvid_strong_init_f32)
 #define pvid_strong_step_f32 PVID_SIZED(pvid_strong_step_f32)

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "fourier/columns_f32.h"
+#include "fourier/noise_f32.h"
 #include "fourier/scores_f32.h"
 #include "fourier/white_f32.h"
 #include "number/count.h"
@@ -16,8 +17,9 @@ enum {
     /* for each kind of rows */
     STAGE_WEIGH,    /* c_j from a few entries of the noise table */
     STAGE_SPECTRUM, /* D_h */
-    STAGE_BASIS,    /* directions that the test functions leave out: white_f32.c */
-    STAGE_COLUMN,   /* for each column: its terms, then n/2 times one direction of each family off it */
+    STAGE_NOISE,  /* a few entries of the noise table: information of the noise alone; nothing if that is not checked */
+    STAGE_BASIS,  /* directions that the test functions leave out: white_f32.c */
+    STAGE_COLUMN, /* for each column: its terms, then n/2 times one direction of each family off it */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
     STAGE_RESIDUAL, /* a few rows of e; at the end the gate accepts or rejects the kind */
     STAGE_SHARE,    /* a few rows' share of R^-1; only if that is needed */
@@ -126,6 +128,46 @@ static bool weigh_stage(pvid_fourier_f32 *self)
                                  finish->index, end);
     finish->index = (uint16_t)end;
     return end < self->design->n_noise;
+}
+
+/* S is compared with the information of the sensors' noise. */
+static bool checks_noise(const pvid_fourier_f32 *self)
+{
+    return (self->estimator.settings.noise_margin > 0.0f) && (self->design->n_noise > 0u);
+}
+
+/* Weight of a window's rows. */
+static float rows_of(const pvid_fourier_f32 *self)
+{
+    return ((float)pvid_fourier_rows(self->design) * (float)self->design->model->kinds) *
+           self->estimator.information.row_weight;
+}
+
+/* The noise's information is in the place of the covariance of the assessment, which comes later. */
+static bool noise_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_design_f32 *design = self->design;
+    if (!checks_noise(self)) {
+        return false;
+    }
+    if ((finish->index == 0u) && (finish->kind == 0u)) {
+        memset(finish->candidate.covariance, 0, sizeof finish->candidate.covariance);
+    }
+    float share[PVID_MAX_POWER];
+    float c[PVID_MAX_THETA * PVID_MAX_P];
+    pvid_fourier_noise_shares_f32(&finish->white, design, share);
+    design->model->model->jacobian(self->estimator.p, c);
+    const size_t end = (size_t)finish->index + PVID_FOURIER_NOISE_ENTRIES;
+    const size_t last = (end < design->n_noise) ? end : design->n_noise;
+    for (size_t i = finish->index; i < last; i++) {
+        if (design->noise[i].kind == finish->kind) {
+            pvid_fourier_noise_add_f32(design, &design->noise[i], finish->theta, share, rows_of(self), c,
+                                       finish->candidate.covariance);
+        }
+    }
+    finish->index = (uint16_t)last;
+    return last < design->n_noise;
 }
 
 static bool basis_stage(pvid_fourier_f32 *self)
@@ -309,11 +351,20 @@ static bool add_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 
 /* ---- steps of p and verdict ---- */
 
+static void begin_solve(pvid_fourier_f32 *self, bool ends_group)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_estimator_begin_f32(&self->estimator, &finish->solve, ends_group);
+    if (checks_noise(self)) {
+        finish->solve.noise = (const float (*)[PVID_MAX_P])finish->candidate.covariance;
+    }
+}
+
 static void begin_solves(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     pvid_estimator_set_expected_f32(&self->estimator, finish->expected / (float)finish->used);
-    pvid_estimator_begin_f32(&self->estimator, &finish->solve, true);
+    begin_solve(self, true);
     finish->solve.fallback = pvid_trust_fallback_f32(&self->trust);
 }
 
@@ -330,7 +381,7 @@ static bool solve_stage(pvid_fourier_f32 *self)
     if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED)) {
         return false;
     }
-    pvid_estimator_begin_f32(&self->estimator, &finish->solve, false);
+    begin_solve(self, false);
     return true;
 }
 
@@ -342,10 +393,9 @@ static bool cluster_stage(pvid_fourier_f32 *self)
     const size_t n_p = self->estimator.model->n_p;
     const size_t a = finish->index;
     const float wide = finish->solve.variance * self->estimator.settings.correlation;
-    const float rows = ((float)pvid_fourier_rows(self->design) * (float)self->design->model->kinds) *
-                       self->estimator.information.row_weight;
-    const float variance = pvid_fourier_scores_variance_f32(
-        &finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance, wide, estimate->weight / rows);
+    const float variance =
+        pvid_fourier_scores_variance_f32(&finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance,
+                                         wide, estimate->weight / rows_of(self));
     /* NaN fails the comparison */
     if ((variance > (estimate->se[a] * estimate->se[a])) && (variance <= VARIANCE_MAX)) {
         estimate->se[a] = sqrtf(variance);
@@ -461,6 +511,9 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
     case STAGE_SPECTRUM:
         pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind, self->harmonics);
         break;
+    case STAGE_NOISE:
+        repeat = noise_stage(self);
+        break;
     case STAGE_BASIS:
         repeat = basis_stage(self);
         break;
@@ -525,7 +578,8 @@ static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_
     const uint32_t nuisances = kind->nuisances;
     /* nuisance i: its square, then all columns but itself and those before it */
     const uint32_t project = (nuisances > 0u) ? ((nuisances * columns) - ((nuisances * (nuisances - 1u)) / 2u)) : 1u;
-    uint32_t stages = entries + 1u + (uint32_t)pvid_fourier_basis_stages(design) + project;
+    const uint32_t noise = checks_noise(self) ? parts_of(design->n_noise, PVID_FOURIER_NOISE_ENTRIES) : 1u;
+    uint32_t stages = entries + 1u + noise + (uint32_t)pvid_fourier_basis_stages(design) + project;
     stages += (columns * ((design->power / 2u) + 1u)) + parts_of(rows, (uint32_t)rows_per_stage(kind)) + rows;
     if (self->finish.shares) {
         stages += parts_of(rows, SHARES_PER_STAGE) + entries;

@@ -30,7 +30,11 @@ static const uint32_t layout[] = {
     PVID_MAX_MOMENTS,
 };
 
-static const uint32_t pointers[] = {PLACE(phi.bank.weights), PLACE(y.bank.weights), PLACE(estimator.model)};
+static const pvid_snapshot_pointer pointers[] = {
+    {PLACE(phi.bank.weights), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(y.bank.weights), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
+};
 static const pvid_snapshot_shape shape = {sizeof(pvid_strong_f32), pointers, sizeof pointers / sizeof pointers[0]};
 
 static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)

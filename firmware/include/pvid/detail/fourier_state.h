@@ -7,30 +7,24 @@
 /* Steps that are added to the sums together. */
 #define PVID_FOURIER_BLOCK 4
 
-/* The front end: signals of the last samples, and the FIR job of the last complete step in slices. */
+/* The front end: block sums of the signals, and their outputs at the last steps. */
 typedef struct {
-    uint8_t needs;           /* samples of other ticks that the signals need; with the next one all signals are those of
-                                the tick before */
-    bool busy;               /* a job is in progress */
-    bool begun;              /* a job has begun since the restart */
-    uint8_t seen;            /* 1: there is a sample since the restart */
-    uint8_t jet;             /* being formed; jets: none */
-    uint16_t half;           /* of the longest filter */
-    uint16_t length;         /* places of the ring in use, 2 half + decimation: a job may last a whole block */
-    uint16_t pairs_per_tick; /* of the job */
-    uint16_t step_wait;      /* `wait` at the tick that forms the channels, behind the job */
-    uint16_t work_wait;      /* and from the first tick on that adds to the sums or runs stages */
-    uint16_t head;           /* place of the next signals */
-    uint16_t wait;           /* ticks until the next job begins */
-    uint16_t centre;         /* place of the job's instant */
-    uint16_t pair;           /* pairs of the present jet that are done */
-    uint16_t newer;          /* places of the last pair */
-    uint16_t older;
+    uint32_t wait;   /* ticks until the block is complete */
+    uint8_t signals; /* of the model */
+    bool plain;      /* signal i is sample i */
+    uint8_t needs;   /* samples of other ticks that the signals need; with the next one all signals are those of the
+                        tick before */
+    bool seen;       /* there is a sample since the restart, and `before` contains it */
+    uint8_t decimation;
+    uint16_t half;                     /* of the longest compensator [steps] */
+    uint16_t missing;                  /* outputs until the line is full, at least 1 */
+    uint16_t head;                     /* place of the next outputs */
+    float ticks;                       /* D */
+    float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
-    float sum;                         /* of the present jet */
-    float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first */
-    float jet_value[PVID_MAX_INPUTS];  /* of the job's instant */
-    float ring[PVID_MAX_RING];         /* [length][signals] */
+    float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
+    float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
+                                  twice */
 } pvid_fourier_front_f32;
 
 /* From the jets of a step to the values of its channels, two steps later. */
@@ -149,14 +143,17 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    float dt;          /* between steps [s] */
+    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;      /* reason of a tick that only adds its samples; BUSY: harmonics are to be added or joined, or a
+                          window is being processed */
+    bool warm;         /* a window has been complete since the restart */
+    bool frozen;       /* complete windows are dropped */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;
     uint8_t items_per_tick;  /* harmonics that a tick adds or joins */
     uint8_t stages_per_tick; /* stages of a whole window per tick */
-    bool warm;               /* a window has been complete since the restart */
-    bool frozen;             /* complete windows are dropped */
+    float dt;                /* between steps [s] */
     pvid_fourier_front_f32 front;
     pvid_fourier_history_f32 history;
     pvid_fourier_watch_f32 watch;

@@ -88,10 +88,11 @@ def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
         weights = f"{prefix}_weights_{k}" if one.half else "NULL"
         if one.half:
             parts.append(_numbers("PVID_TABLE int32_t", weights, one.weights))
-        filters.append((one.half, one.bits, str(one.is_wide).lower(), _rescale(one.rescale), weights))
+        filters.append((one.half, one.bits, _rescale(one.rescale), weights))
     formats = [(one.value, one.own, one.plain, one.ramp) for one in design.format]
     tables = {
         "full_scale": _numbers("int32_t", f"{prefix}_full_scale", design.full_scale),
+        "down": _numbers("uint8_t", f"{prefix}_down", design.down),
         "filter": _structs("pvid_fourier_filter_q31", f"{prefix}_filter", filters),
         "run": _structs(
             "pvid_fourier_rescale_q31", f"{prefix}_run", [(x.down, x.shift, x.multiplier) for x in design.run]

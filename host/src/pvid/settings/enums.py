@@ -105,3 +105,5 @@ class SnapshotStatus(_Named):
     OTHER_LAYOUT = 6
     OTHER_CONFIG = 7
     NOT_READY = 8
+    OTHER_MODEL = 9
+    OTHER_DESIGN = 10

@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import inflation
-from pvid.oracle.fourier.front import weights_of
+from pvid.oracle.fourier.front import step_weights_of, weights_of
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.rows import EquationError, WeakRows
@@ -37,14 +37,15 @@ _STILL = 4.0
 
 
 def for_engine(design: FourierDesign) -> FourierDesign:
-    """The nearest design that the engine has: half windows of whole blocks, kinds of rows one by one, signs averaged.
+    """The nearest design that the engine has: half windows of whole blocks, block sums before a decimation, kinds of
+    rows one by one, signs averaged.
 
     A soft sign stays one. The engine does not locate reversals.
     """
     block = _STEPS_OF_A_BLOCK
     least = -(-(design.highest + 1) // block) * block
     hop = max(round(design.hop / block) * block, least)
-    found = replace(design, window_s=2 * hop * design.dt, joint=False)
+    found = replace(design, window_s=2 * hop * design.dt, joint=False, comb=design.decimation > 1)
     return found if design.reversals == "soft" else replace(found, reversals="averaged")
 
 
@@ -69,7 +70,8 @@ def design_tables(
         power=design.power,
         decimation=design.decimation,
         hop=design.hop,
-        filter=tuple(_filter(design, one.order) for one in model.jet),
+        filter=tuple(_filter(weights_of(design, one.order)) for one in model.jet),
+        compensator=tuple(_filter(step_weights_of(design, one.order)) for one in model.jet),
         circle=_as_float32(np.cos(np.pi * np.arange(2 * design.hop) / design.hop)),
         noise=tuple(entry for kind in range(rows.kinds) for entry in _noise(rows, kind, p)),
         error_order=np.array([one.order for one in found], np.uint8),
@@ -98,8 +100,7 @@ def _check(design: FourierDesign, rows: WeakRows) -> None:
         )
 
 
-def _filter(design: FourierDesign, order: int) -> FourierFilter:
-    weights = weights_of(design, order)
+def _filter(weights: Float) -> FourierFilter:
     return FourierFilter(_as_float32(weights[len(weights) // 2 + 1 :]))
 
 

@@ -24,7 +24,7 @@ def sizes_of_model(model: FourierModel) -> dict[str, int]:
 def sizes_of_design(design: FourierDesign32) -> dict[str, int]:
     """Those of its model among them."""
     return sizes_of_model(design.model) | {
-        "PVID_MAX_RING": design.model.signals * (2 * design.half + design.decimation),
+        "PVID_MAX_RING": design.model.signals * (4 * design.half_steps + 5),
         "PVID_MAX_HARMONICS": design.highest + 1,
         "PVID_MAX_FUNCTIONS": design.functions,
         "PVID_MAX_POWER": design.power,

@@ -2,7 +2,7 @@
 
 from math import pi
 
-from pvid.model import Model
+from pvid.model import Model, cos, sin
 
 model = Model("Kapitza pendulum, unknown zero")
 l1 = model.known("l1", "m", 0.3)
@@ -17,3 +17,12 @@ model.equation(phi.d(2) - G * x + (d1 - 1) * G * f)
 model.output("g", "m/s^2", w * l1)
 model.output("l2", "m", l1 * L2 / d2)
 model.output("rho2", "m", l1 * L2**0.5 / d2)
+
+# The refinement: the full equations in absolute angles, with the friction of both joints.
+a1, a2 = model.coordinate("a1", "rad"), model.coordinate("a2", "rad")
+k1, k2 = model.refined("k1", "1/s", sd=0.1), model.refined("k2", "1/s", sd=0.05)
+lam, sig = model.shape("lam", "", L2 / d2), model.shape("sig", "", 1 / L2)  # l2/l1, (rho2/l2)^2
+swing, turn = sin(a2 - a1), k2 * (a2.d() - a1.d())
+first = a1.d(2) + lam * (cos(a2 - a1) * a2.d(2) - swing * a2.d() ** 2) + G * sin(a1) + k1 * a1.d() - turn
+second = cos(a2 - a1) * a1.d(2) + (1 + sig) * lam * a2.d(2) + swing * a1.d() ** 2 + G * sin(a2) + turn / lam
+model.refine([first, second], outputs={phi: a2 - a1 + c}, region=[L2 - 0.02])

@@ -290,6 +290,7 @@ class RelativeEstimator(Estimator):
         self.row_weight = _lanes([c.row_weight for c in configs])
         self.noise_margin = _lanes([c.noise_margin for c in configs])
         self.noise = np.zeros((3, len(configs)), np.float32)
+        self.noise_alone: Float32 | None = None  # that a solve's S must exceed, in place of the model's
         self.rss = np.zeros(len(configs), np.float32)
         self.group_rss = self.rss
         self.group_weight = np.zeros(len(configs), np.float32)
@@ -402,12 +403,13 @@ class RelativeEstimator(Estimator):
         return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
 
     def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
-        if self.model.noise is None:
+        if self.model.noise is None and self.noise_alone is None:
             return self.everywhere
         gated = self.model.gated
         rest = np.zeros((gated, gated, s.shape[2]), np.float32)
         much = (self.noise_margin * variance) * weight
-        noise = self.model.noise(self.p, self.noise)
+        noise = self.noise_alone if self.model.noise is None else self.model.noise(self.p, self.noise)
+        assert noise is not None
         for a in range(gated):
             for b in range(a, gated):
                 rest[a, b] = s[a, b] - much * noise[a, b]

@@ -11,6 +11,7 @@ from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig
 from pvid.twin.f32.estimator import RelativeEstimator
 from pvid.twin.f32.fourier_columns import projected, sums_of_columns
+from pvid.twin.f32.fourier_noise import ENTRIES, Noise, shares
 from pvid.twin.f32.fourier_scores import Scores
 from pvid.twin.f32.fourier_white import Rows, White
 from pvid.twin.f32.gate import Gate
@@ -65,7 +66,18 @@ class Finish:
         vectors, nuisances = self.design.power // 2, own.nuisances
         project = nuisances * own.columns - nuisances * (nuisances - 1) // 2 if nuisances else 1
         residual = _parts(self.rows.count, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
-        return self._entries() + 1 + vectors * vectors + own.columns * (vectors + 1) + project + residual
+        noise = _parts(len(self.design.noise), ENTRIES) if self._checks_noise else 1
+        return self._entries() + 1 + noise + vectors * vectors + own.columns * (vectors + 1) + project + residual
+
+    @property
+    def _checks_noise(self) -> bool:
+        """S is compared with the information of the sensors' noise; lanes have one margin."""
+        return bool(self.estimator.noise_margin[0] > 0) and bool(self.design.noise)
+
+    @property
+    def _weight(self) -> Float32:
+        """Of a window's rows [lanes]."""
+        return np.asarray((_F(self.rows.count) * _F(self.design.model.kinds)) * self.estimator.row_weight, np.float32)
 
     @property
     def _stages_of_shares(self) -> int:
@@ -96,11 +108,14 @@ class Finish:
         nothing = np.zeros(lanes, np.float32)
         expected, free, square, used = nothing, nothing, nothing, 0
         first = 0
+        noise = Noise(estimator.model, estimator.p, self._weight)
         for kind, own in enumerate(self.design.model.kind):
             block = slice(first, first + own.thetas)
-            first += own.thetas
             theta = estimator.theta[block]
             white = White(self.rows, kind, theta)
+            if self._checks_noise:
+                self._add_noise(noise, white, first)
+            first += own.thetas
             columns, live = projected(white.columns(sums_of_columns(self.rows, kind, window)), own.thetas)
             e, rss = _residuals(columns, theta)
             for _ in range(self._stages_of_rows(kind) - 1):
@@ -133,7 +148,14 @@ class Finish:
         if used == 0:
             self.scores.skip()
             return
+        estimator.noise_alone = noise.s if self._checks_noise else None
         yield from self._steps(score, expected / _F(used), free, square)
+
+    def _add_noise(self, noise: Noise, white: White, first: int) -> None:
+        share = shares(white)
+        with np.errstate(all="ignore"):
+            for one in self.design.noise_of(white.kind):
+                noise.add(one, first, self.design.model.kind[white.kind].thetas, share)
 
     def _share(self, white: White, block: slice, score: Float32) -> Stages:
         """The stages of the noise's share, the last of which adds the compensation."""
@@ -164,6 +186,7 @@ class Finish:
                     reason = solved
             if not estimator.was_due:
                 break
+        estimator.noise_alone = None
         size, group_rss = estimator.size, estimator.group_rss
         for _ in range(estimator.assessment_stages + 1 + len(estimator.p)):
             yield None
@@ -180,8 +203,7 @@ class Finish:
         n_p = len(estimator.p)
         covariance = np.moveaxis(candidate["covariance"], 0, 2)[:n_p, :n_p].copy()
         wide = estimator.judged_variance * estimator.correlation
-        rows = (_F(self.rows.count) * _F(self.design.model.kinds)) * estimator.row_weight
-        windows = candidate["weight"] / rows
+        windows = np.asarray(candidate["weight"] / self._weight, np.float32)
         growth = np.ones((n_p, len(wide)), np.float32)
         for a in range(n_p):
             variance = self.scores.variance(a, covariance, wide, windows)
