@@ -15,10 +15,9 @@ from functools import cache
 from pathlib import Path
 
 from pvid.base.errors import PvidError
-from pvid.base.user_cache import built_under
 from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler
-from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, core_sources
+from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
 from pvid.settings.enums import Core
 
 NATIVE = ROOT / "host" / "native"
@@ -58,7 +57,7 @@ def model_library(
     compiler = host_compiler(_WHAT)
     definitions = [f"-D{macro}={size}" for macro, size in sorted(sizes.items())]
     key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
-    folder = built_under(ROOT / "build") / "cache" / "models" / f"{name}-{core}-{key.hexdigest()[:20]}"
+    folder = build_folder() / "cache" / "models" / f"{name}-{core}-{key.hexdigest()[:20]}"
     library = folder / f"lib{name}.so"
     if not library.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -56,7 +56,9 @@ def engine_config(
         Where the engine does not have what the model or the design needs.
     """
     made = engine_tables(compiled, run, design, p)
-    return config_of(made.tables, design.sample_rate, made.rows.compiled.parameters, made.p if start_there else None)
+    return config_of(
+        made.tables, design.sample_rate, made.rows.compiled.parameters, made.p if start_there else None, run
+    )
 
 
 @dataclass(frozen=True, eq=False)
