@@ -102,6 +102,7 @@ STRONG = {
     **ESTIMATOR,
     "estimator.correlation": Range(1.0, 1e6, Status.BAD_CORRELATION),
     "estimator.row_weight": Range(1.0, 1.0, Status.BAD_ROW_WEIGHT),
+    "exact_every": Range(0, 255, Status.BAD_DIVIDER),
 }
 WEAK = {
     **RIG_FIELDS,
@@ -217,7 +218,7 @@ RANGES = {
 }
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 SIZES = {
-    "strong": BANK,
+    "strong": {**BANK, "bank.block": Range(0, 314, Status.BAD_STRIDE)},
     "weak": DESIGN,
     "corrected": DESIGN,
     "weak q31": DESIGN_Q31,

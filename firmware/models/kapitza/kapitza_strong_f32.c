@@ -1,135 +1,365 @@
 #include "number/uncontracted.h"
 
-/* The strong form of Kapitza's pendulum (theory.md 2) as a model: row, theta, C. */
-#include "kapitza_strong_f32.h"
+#include "pvid/strong.h"
 
 #include <stddef.h>
+#include <string.h>
 
+#include "judge/gate_f32.h"
+#include "judge/misfit_f32.h"
+#include "kapitza_estimator_f32.h"
 #include "kapitza_row_f32.h"
 #include "kapitza_solve_f32.h"
 #include "kapitza_sums_f32.h"
+#include "kapitza_window_f32.h"
+#include "number/count.h"
+#include "number/finite_f32.h"
+#include "number/init.h"
 #include "number/unroll.h"
-#include "solve/row_f32.h"
-#include "solve/commit.h"
 
-enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
+/* The gate's scale averages over about a period of the faster mode, because row_sd is only a guess. */
+#define GATE_MEMORY_S 0.25f
+#define GATE_FLOOR 1.0e-6f
+
+/* Whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_strong_f32 *self)
+{
+    const bool ready = (self != NULL) && (self->window.length != 0u);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
+{
+    if (!pvid_within_f32(config->l1, 1.0e-6f, 1.0e6f)) {
+        return PVID_BAD_LENGTH;
+    }
+    if (!pvid_within_f32(config->drive_min, 0.0f, 1.0e9f)) {
+        return PVID_BAD_DRIVE_MIN;
+    }
+    memset(self, 0, sizeof *self);
+    pvid_status status = pvid_strong_window_init_f32(&self->window, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    self->drive_forgetting = (config->sample_rate_hz > 1.0f) ? (1.0f / config->sample_rate_hz) : 1.0f;
+    self->drive_min = config->drive_min * config->drive_min;
+    status = pvid_kapitza_estimator_init_f32(&self->estimator, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    pvid_misfit_init_f32(&self->misfit, config->sample_rate_hz, config->estimator.forgetting_s);
+    return pvid_gate_init_f32(&self->gate, &config->gate, config->sample_rate_hz,
+                              GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
+}
+
+pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
+{
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
+}
+
+void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen)
+{
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
+}
+
+void pvid_strong_gap_f32(pvid_strong_f32 *self)
+{
+    if (is_ready(self)) {
+        pvid_strong_window_reset_f32(&self->window);
+    }
+}
+
+void pvid_strong_assess_f32(const pvid_strong_f32 *self, pvid_estimate_f32 *estimate)
+{
+    if (estimate == NULL) {
+        return;
+    }
+    if (!is_ready(self)) {
+        memset(estimate, 0, sizeof *estimate);
+        return;
+    }
+    pvid_kapitza_assess_f32(&self->estimator, estimate);
+}
+
+void pvid_strong_read_sums_f32(const pvid_strong_f32 *self, float sums[])
+{
+    if (is_ready(self)) {
+        pvid_kapitza_read_f32(&self->estimator.sums, sums);
+    }
+}
+
+/* ---- the row of the theory page ---- */
 
 void pvid_kapitza_strong_row_f32(const float phi[5], const float u[3], float *y, float n[PVID_KAPITZA_STRONG_THETA])
 {
-    pvid_kapitza_row_f32(phi, u, y, n);
+    pvid_strong_row_f32 row;
+    pvid_kapitza_row_f32(phi, u, &row);
+    *y = row.y;
+    n[0] = row.a;
+    n[1] = row.e;
+    n[5] = row.f2;
+    n[4] = row.u * n[5];
+    n[3] = row.u * n[4];
+    n[2] = row.u * n[3];
+    n[10] = row.f0;
+    n[9] = row.u * n[10];
+    n[8] = row.u * n[9];
+    n[7] = row.u * n[8];
+    n[6] = row.u * n[7];
 }
 
-static void theta_of(const float p[], float theta[])
-{
-    const float w = p[W];
-    const float w2 = w * w;
-    const float w3 = w2 * w;
-    theta[0] = w;
-    theta[1] = w2;
-    theta[2] = p[D1];
-    theta[3] = 3.0f * (p[D1] * w);
-    theta[4] = 3.0f * (p[D1] * w2);
-    theta[5] = p[D1] * w3;
-    theta[6] = p[D2];
-    theta[7] = 4.0f * (p[D2] * w);
-    theta[8] = 6.0f * (p[D2] * w2);
-    theta[9] = 4.0f * (p[D2] * w3);
-    theta[10] = p[D2] * (w3 * w);
-}
+/* ---- the step of p ---- */
 
-static const uint8_t c_row[18] = {0, 1, 3, 4, 5, 7, 8, 9, 10, 2, 3, 4, 5, 6, 7, 8, 9, 10};
-static const uint8_t c_column[18] = {W, W, W, W, W, W, W, W, W, D1, D1, D1, D1, D2, D2, D2, D2, D2};
-
-static void jacobian_of(const float p[], float c[])
+/* Solves (S + H0) dp = rhs and moves p. */
+PVID_ALWAYS_INLINE pvid_reason solve(pvid_strong_estimator_f32 *self, const float s[6], const float rhs[3])
 {
-    const float w = p[W];
-    const float w2 = w * w;
-    const float w3 = w2 * w;
-    c[0] = 1.0f;
-    c[1] = 2.0f * w;
-    c[2] = 3.0f * p[D1];
-    c[3] = 6.0f * (p[D1] * w);
-    c[4] = 3.0f * (p[D1] * w2);
-    c[5] = 4.0f * p[D2];
-    c[6] = 12.0f * (p[D2] * w);
-    c[7] = 12.0f * (p[D2] * w2);
-    c[8] = 4.0f * (p[D2] * w3);
-    c[9] = 1.0f;
-    c[10] = 3.0f * w;
-    c[11] = 3.0f * w2;
-    c[12] = w3;
-    c[13] = 1.0f;
-    c[14] = 4.0f * w;
-    c[15] = 6.0f * w2;
-    c[16] = 4.0f * w3;
-    c[17] = w3 * w;
-}
-
-static float innovate_of(const float p[], const float n[], float y, float gradient[])
-{
-    const float w = p[W];
-    const float d1 = p[D1];
-    const float d2 = p[D2];
-    const float two_w = 2.0f * w;
-    const float w2 = w * w;
-    /* -G^2 phi'', -G^3 phi, and from them n_1 = -G^3 phi'', n_2 = -G^4 phi: G x = u x + w x */
-    const float g2_low = (n[3] + (two_w * n[4])) + (w2 * n[5]);
-    const float g2_high = (n[2] + (two_w * n[3])) + (w2 * n[4]);
-    const float g3_low = ((n[7] + (w * n[8])) + (two_w * (n[8] + (w * n[9])))) + (w2 * (n[9] + (w * n[10])));
-    const float g3_high = ((n[6] + (w * n[7])) + (two_w * (n[7] + (w * n[8])))) + (w2 * (n[8] + (w * n[9])));
-    const float n_1 = g2_high + (w * g2_low);
-    const float n_2 = g3_high + (w * g3_low);
-    gradient[W] = (n[PVID_N_A] + (two_w * n[PVID_N_E])) + (((3.0f * d1) * g2_low) + ((4.0f * d2) * g3_low));
-    gradient[D1] = n_1;
-    gradient[D2] = n_2;
-    return (y - (w * (n[PVID_N_A] + (w * n[PVID_N_E])))) - ((d1 * n_1) + (d2 * n_2));
-}
-
-/* pvid_row_squares_f32 of 11 entries. */
-static inline float sum_of_squares_strong(const float n[], float y)
-{
-    float squares = y * y;
-    PVID_UNROLL
-    for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
-        squares += n[i] * n[i];
+    pvid_kapitza_factor_f32 factor;
+    pvid_reason reason = pvid_kapitza_factorise_f32(self, s, &factor);
+    if (reason == PVID_UPDATED) {
+        float dp[PVID_KAPITZA_P];
+        pvid_kapitza_back_f32(&factor, rhs, dp);
+        reason = pvid_kapitza_move_f32(self, dp);
     }
-    return squares;
+    return (reason == PVID_UPDATED) ? reason : pvid_count_held(&self->counters, reason);
 }
 
-pvid_reason pvid_kapitza_take_row_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
-                                      const float gradient[], bool ends_group)
+/* The same as a function of its own, where it does not run at every row. */
+static PVID_SELDOM pvid_reason solve_apart(pvid_strong_estimator_f32 *self, const float s[6], const float rhs[3])
 {
-    pvid_reason reason = pvid_row_accept_f32(self, PVID_KAPITZA_STRONG_THETA, n, y, sum_of_squares_strong(n, y));
-    if (reason != PVID_ACCUMULATED) {
-        return reason;
+    return solve(self, s, rhs);
+}
+
+/* g F + (1 - g) sum C^T N e */
+static inline void mix(float gain, const float innovation[3], float force[3])
+{
+    const float rest = 1.0f - gain;
+    force[0] = (gain * force[0]) + (rest * innovation[0]);
+    force[1] = (gain * force[1]) + (rest * innovation[1]);
+    force[2] = (gain * force[2]) + (rest * innovation[2]);
+}
+
+/* A solve with a dead zone is always exact and needs the residuals. */
+static PVID_SELDOM pvid_reason solve_in_zone(pvid_strong_estimator_f32 *self, const float g[3], float e,
+                                             const float innovation[3])
+{
+    float s[6];
+    float force[PVID_KAPITZA_P];
+    float x[PVID_KAPITZA_P];
+    pvid_kapitza_residual_f32 residual;
+    pvid_kapitza_factor_f32 factor;
+    pvid_kapitza_gather_f32(self, s, force, &residual);
+    pvid_kapitza_add_squares_f32(g, s);
+    pvid_kapitza_add_products_f32(g, e, force);
+    residual.rss += e * e;
+    residual.weight += 1.0f;
+    if (pvid_kapitza_factorise_f32(self, s, &factor) == PVID_UPDATED) {
+        pvid_kapitza_back_f32(&factor, force, x);
+        const float square = ((force[0] * x[0]) + (force[1] * x[1])) + (force[2] * x[2]);
+        if (pvid_kapitza_is_at_rest_f32(self, square, &residual)) {
+            pvid_count_up(&self->counters.at_rest);
+            return PVID_UPDATED;
+        }
     }
-    if (self->settings.gain < 1.0f) {
-        pvid_row_accumulate_innovation_f32(self, PVID_KAPITZA_P, gradient, e);
+    mix(self->gain, innovation, force);
+    return solve_apart(self, s, force);
+}
+
+/* A row with divider 1: a solve, from all sums at every exact_every-th row. */
+PVID_ALWAYS_INLINE pvid_reason step_at_every_row(pvid_strong_estimator_f32 *self, const float g[3], float e)
+{
+    float rhs[PVID_KAPITZA_P] = {g[0] * e, g[1] * e, g[2] * e};
+    uint32_t phase = self->phase;
+    if (phase == 0u) {
+        phase = self->exact_every;
+        if (phase == 0u) {
+            const float innovation[PVID_KAPITZA_P] = {rhs[0], rhs[1], rhs[2]};
+            const float gradient[PVID_KAPITZA_P] = {g[0], g[1], g[2]};
+            return solve_in_zone(self, gradient, e, innovation);
+        }
+        float force[PVID_KAPITZA_P];
+        pvid_kapitza_gather_f32(self, self->s, force, NULL);
+        const float gain = self->gain;
+        const float rest = 1.0f - gain;
+        rhs[0] = (gain * (force[0] + rhs[0])) + (rest * rhs[0]);
+        rhs[1] = (gain * (force[1] + rhs[1])) + (rest * rhs[1]);
+        rhs[2] = (gain * (force[2] + rhs[2])) + (rest * rhs[2]);
     }
-    pvid_count_up(&self->counters.rows);
-    if (ends_group && pvid_solve_is_due(&self->phase, self->divider)) {
-        reason = pvid_kapitza_solve_f32(self, n, y);
+    self->phase = (uint16_t)(phase - 1u);
+    pvid_kapitza_add_squares_f32(g, self->s);
+    return solve(self, self->s, rhs);
+}
+
+/* Rows of a staged round, by their number from 1; the last has number 0. */
+#define PROJECTION 1u
+#define SOLUTION 2u
+#define FIRST_FOLD 5u
+#define FOLDS 3u
+
+/* Thirds of the sums, which staged rows fold one by one. */
+static inline size_t third(size_t i)
+{
+    return (PVID_STRONG_SUMS * i) / FOLDS;
+}
+
+/* A part of the fold at rows 4, 5, 6 of a staged round: between two blocks, after projection and solve. */
+static PVID_SELDOM void fold_in_stages(pvid_strong_estimator_f32 *self)
+{
+    const size_t place = self->in_block;
+    if ((self->staged != 0u) && (place < (PVID_STRONG_ROWS - 1u)) && (self->age >= self->fold_every)) {
+        pvid_kapitza_fold_f32(&self->sums, third(place), third(place + 1u));
+        self->age = (place == (PVID_STRONG_ROWS - 2u)) ? (uint8_t)(self->age - self->fold_every) : self->age;
+    }
+}
+
+/* S and F from all rows at this row; the sum of C^T N e begins anew. With a dead zone the solve as well. */
+static PVID_SELDOM pvid_reason project(pvid_strong_estimator_f32 *self, const float g[3], float e)
+{
+    const float innovation[PVID_KAPITZA_P] = {self->innovation[0], self->innovation[1], self->innovation[2]};
+    self->innovation[0] = 0.0f;
+    self->innovation[1] = 0.0f;
+    self->innovation[2] = 0.0f;
+    if (self->dead_zone > 0.0f) {
+        return solve_in_zone(self, g, e, innovation);
+    }
+    pvid_kapitza_gather_f32(self, self->s, self->force, NULL);
+    pvid_kapitza_add_squares_f32(g, self->s);
+    pvid_kapitza_add_products_f32(g, e, self->force);
+    mix(self->gain, innovation, self->force);
+    return (self->staged != 0u) ? PVID_ACCUMULATED : solve_apart(self, self->s, self->force);
+}
+
+/* A row with a divider above 1. */
+PVID_ALWAYS_INLINE pvid_reason step_at_divider(pvid_strong_estimator_f32 *self, const float g[3], float e)
+{
+    const uint32_t next = (uint32_t)self->phase + 1u;
+    const uint32_t phase = (next == self->divider) ? 0u : next;
+    self->phase = (uint16_t)phase;
+    if (self->mixes) {
+        pvid_kapitza_add_products_f32(g, e, self->innovation);
+    }
+    if (phase == self->projects_at) {
+        const float gradient[PVID_KAPITZA_P] = {g[0], g[1], g[2]};
+        return project(self, gradient, e);
+    }
+    if (phase == SOLUTION) {
+        return (self->staged != 0u) ? solve_apart(self, self->s, self->force) : PVID_ACCUMULATED;
+    }
+    if ((phase - FIRST_FOLD) < FOLDS) {
+        fold_in_stages(self);
+    }
+    return PVID_ACCUMULATED;
+}
+
+/* ---- rows ---- */
+
+/* Adds a complete block to the sums; folds them where no other row does. */
+static inline void end_block(pvid_strong_estimator_f32 *self)
+{
+    self->in_block = 0;
+    self->age = (uint8_t)(self->age + PVID_STRONG_ROWS);
+    pvid_kapitza_add_rows_f32(self->block, self->sums.low);
+    if ((self->staged == 0u) && (self->age >= self->fold_every)) {
+        self->age = 0;
+        pvid_kapitza_fold_f32(&self->sums, 0, PVID_STRONG_SUMS);
+    }
+}
+
+/* Why a row is refused whose squares exceed the limit; counts it. */
+static PVID_SELDOM pvid_reason refuse(pvid_counters *counters, const pvid_strong_row_f32 *row)
+{
+    const bool finite = pvid_finite_f32(row->y) && pvid_finite_f32(row->a) && pvid_finite_f32(row->e) &&
+                        pvid_finite_f32(row->f2) && pvid_finite_f32(row->f0) && pvid_finite_f32(row->u);
+    pvid_count_up(finite ? &counters->rejected_saturated : &counters->rejected_not_finite);
+    return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
+}
+
+/* Counts an update during the alarm. */
+static PVID_SELDOM pvid_reason misfit(pvid_counters *counters)
+{
+    pvid_count_up(&counters->misfits);
+    return PVID_MISFIT;
+}
+
+/* The verdict on the residuals, at the end of a block of misfit.h. */
+static inline void judge_misfit(pvid_strong_f32 *self)
+{
+    if (self->misfit.left == 0u) {
+        self->alarm = pvid_misfit_judge_f32(&self->misfit);
+    }
+}
+
+/* Judges a row, adds it if the gate accepts it, and solves. */
+PVID_ALWAYS_INLINE pvid_reason take(pvid_strong_f32 *self, const float phi[PVID_ORDERS], const float u[3])
+{
+    pvid_strong_estimator_f32 *estimator = &self->estimator;
+    const uint32_t place = estimator->in_block;
+    pvid_strong_row_f32 row;
+    float g[PVID_KAPITZA_P];
+    pvid_kapitza_row_f32(phi, u, &row);
+    estimator->block[place] = row;
+    const float squares = pvid_kapitza_row_squares_f32(&row);
+    const float e = pvid_kapitza_innovate_f32(estimator->p, &row, g);
+    pvid_misfit_add_f32(&self->misfit, e, g[PVID_KAPITZA_W] * estimator->p[PVID_KAPITZA_W]);
+    if (!pvid_gate_judges_f32(&self->gate, e * e)) {
+        pvid_count_up(&estimator->counters.rejected_outlier);
+        judge_misfit(self);
+        return PVID_REJECTED_OUTLIER;
+    }
+    if (!(squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT))) {
+        judge_misfit(self);
+        return refuse(&estimator->counters, &estimator->block[place]);
+    }
+    pvid_count_up(&estimator->counters.rows);
+    const pvid_reason reason =
+        (estimator->divider == 1u) ? step_at_every_row(estimator, g, e) : step_at_divider(estimator, g, e);
+    if (place < (PVID_STRONG_ROWS - 1u)) {
+        estimator->in_block = (uint8_t)(place + 1u);
+        judge_misfit(self);
     } else {
-        pvid_kapitza_add_f32(n, y, self->information.high, self->information.low);
+        end_block(estimator);
+        pvid_misfit_defer_f32(&self->misfit); /* to a row that does less */
     }
-    if (ends_group) {
-        pvid_information_end_group_f32(&self->information);
-    }
-    return reason;
+    return ((reason == PVID_UPDATED) && self->alarm) ? misfit(&estimator->counters) : reason;
 }
 
-const pvid_model_f32 pvid_kapitza_strong_f32 = {
-    .n_theta = PVID_KAPITZA_STRONG_THETA,
-    .n_p = PVID_KAPITZA_P,
-    .n_moments = PVID_KAPITZA_STRONG_MOMENTS,
-    .n_c = 18,
-    .positive = 7u,
-    .c_row = c_row,
-    .c_column = c_column,
-    .theta = theta_of,
-    .jacobian = jacobian_of,
-    .accumulate = pvid_kapitza_accumulate_f32,
-    .project = pvid_kapitza_project_f32,
-    .innovate = innovate_of,
-    .take_row = pvid_kapitza_take_row_f32,
-};
+pvid_reason pvid_strong_row_step_f32(pvid_strong_f32 *self, const float phi[PVID_ORDERS], const float u[3])
+{
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    return take(self, phi, u);
+}
+
+pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
+{
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
+    if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
+        pvid_strong_window_reset_f32(&self->window);
+        pvid_count_up(&self->estimator.counters.rejected_not_finite);
+        return PVID_REJECTED_NOT_FINITE;
+    }
+    float d_phi[PVID_ORDERS];
+    float u[3];
+    if (!pvid_strong_window_step_f32(&self->window, phi, y, d_phi, u)) {
+        return PVID_WARMING_UP;
+    }
+    const float drive = self->drive + (self->drive_forgetting * ((u[0] * u[0]) - self->drive));
+    self->drive = pvid_finite_f32(drive) ? drive : self->drive;
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    if (self->drive < self->drive_min) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    return take(self, d_phi, u);
+}

@@ -51,10 +51,12 @@ uint32_t pvid_fingerprint_strong_f32(const pvid_strong_config_f32 *config)
     hash = one(hash, config->drive_min);
     hash = pvid_fnv_word(hash, config->bank.half);
     hash = pvid_fnv_word(hash, config->bank.stride);
+    hash = pvid_fnv_word(hash, config->bank.block);
     hash = floats(hash, config->bank.weights, (size_t)PVID_ORDERS * config->bank.half);
     hash = gate_of(hash, &config->gate);
     hash = one(hash, config->estimator.correlation);
     hash = one(hash, config->estimator.row_weight);
+    hash = pvid_fnv_word(hash, config->exact_every);
     return estimator_of(hash, &config->estimator, PVID_KAPITZA_P);
 }
 
