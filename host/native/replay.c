@@ -68,6 +68,16 @@ void pvid_replay_weak_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[]
     }
 }
 
+void pvid_replay_rows_f32(pvid_estimator_f32 *self, uint32_t ticks, const float n[], const float y[],
+                          const pvid_record_f32 *record)
+{
+    const uint32_t n_theta = self->model->n_theta;
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_estimator_step_f32(self, &n[(size_t)tick * n_theta], y[tick]);
+        record_tick(record, tick, self, reason);
+    }
+}
+
 void pvid_replay_strong_rows_f32(uint32_t ticks, const float phi[], const float u[], float n[], float y[])
 {
     for (uint32_t tick = 0; tick < ticks; tick++) {

@@ -1,4 +1,4 @@
-"""Twin of kapitza_strong_f32.c: samples in, the state after every tick out."""
+"""Twin of strong_f32.c: samples in, the state after every tick out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Twin of kapitza_estimator_f32.c, kapitza_solve_f32.h and the step in kapitza_strong_f32.c: the estimator of the
+"""Twin of kapitza_estimator_f32.c, kapitza_solve_f32.h and the step in strong_f32.c: the estimator of the
 strong form, one tick of every lane at a time."""
 
 from __future__ import annotations

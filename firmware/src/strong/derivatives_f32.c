@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-#include "kapitza_window_f32.h"
+#include "strong/derivatives_f32.h"
 
 #include "number/finite_f32.h"
 

@@ -11,11 +11,11 @@
 #include "kapitza_row_f32.h"
 #include "kapitza_solve_f32.h"
 #include "kapitza_sums_f32.h"
-#include "kapitza_window_f32.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "number/init.h"
 #include "number/unroll.h"
+#include "strong/derivatives_f32.h"
 
 /* The gate's scale averages over about a period of the faster mode, because row_sd is only a guess. */
 #define GATE_MEMORY_S 0.25f
@@ -90,26 +90,6 @@ void pvid_strong_read_sums_f32(const pvid_strong_f32 *self, float sums[])
     if (is_ready(self)) {
         pvid_kapitza_read_f32(&self->estimator.sums, sums);
     }
-}
-
-/* ---- the row of the theory page ---- */
-
-void pvid_kapitza_strong_row_f32(const float phi[5], const float u[3], float *y, float n[PVID_KAPITZA_STRONG_THETA])
-{
-    pvid_strong_row_f32 row;
-    pvid_kapitza_row_f32(phi, u, &row);
-    *y = row.y;
-    n[0] = row.a;
-    n[1] = row.e;
-    n[5] = row.f2;
-    n[4] = row.u * n[5];
-    n[3] = row.u * n[4];
-    n[2] = row.u * n[3];
-    n[10] = row.f0;
-    n[9] = row.u * n[10];
-    n[8] = row.u * n[9];
-    n[7] = row.u * n[8];
-    n[6] = row.u * n[7];
 }
 
 /* ---- the step of p ---- */

@@ -1,7 +1,7 @@
 /* The derivatives of both channels of the strong form: one bank of filters, one place in both rings. Private to the
  * core, inlined: derivatives that no row uses are not computed. */
-#ifndef PVID_KAPITZA_WINDOW_F32_H
-#define PVID_KAPITZA_WINDOW_F32_H
+#ifndef PVID_STRONG_DERIVATIVES_F32_H
+#define PVID_STRONG_DERIVATIVES_F32_H
 
 #include <stdbool.h>
 #include <stddef.h>
