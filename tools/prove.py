@@ -257,7 +257,13 @@ PROOFS = (
         "fingerprint_q31",
         "any configuration of both forms, tables of any extent that fits; `pvid_fnv_estimator_q31`, any state",
         (
-            *("src/keep/fingerprint_q31.c", "src/keep/fnv_q31.c", "src/keep/fnv.c"),
+            *(
+                "src/keep/fingerprint_q31.c",
+                "src/keep/fingerprint_parts_q31.c",
+                "src/keep/fingerprint_tables.c",
+                "src/keep/fnv_q31.c",
+                "src/keep/fnv.c",
+            ),
             *("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
         ),
         ("-eva-auto-loop-unroll", "20"),
@@ -312,16 +318,20 @@ PROOFS = (
     ),
     Proof(
         "snapshot_q31",
-        "states of both forms saved into any room, any bytes of any length restored; their pointers stay",
+        "states of all forms saved into any room, any bytes of any length restored; their pointers stay",
         (
+            "src/keep/snapshot_fourier_q31.c",
             "src/keep/snapshot_strong_q31.c",
             "src/keep/snapshot_weak_q31.c",
             "src/keep/snapshot.c",
             "src/keep/crc32.c",
             "src/keep/fnv.c",
         ),
-        ("-eva-min-loop-unroll", "3", "-eva-auto-loop-unroll", "50"),
-        taken=("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31"),
+        ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
+        taken=(
+            *("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31", "pvid_fingerprint_fourier_q31"),
+            *("pvid_fingerprint_fourier_model_q31", "pvid_fingerprint_fourier_design_q31"),
+        ),
     ),
     Proof(
         "receiver",

@@ -11,10 +11,13 @@
 #include "number/count.h"
 #include "number/init.h"
 #include "number/integer_q31.h"
+#include "number/unroll.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
+#define OFFSET_LIMIT ((int32_t)1 << 30)
 #define STAGES_MAX 64u
-#define POWER_OF_ROW_WEIGHT 65536u /* 1 in Q16 */
+#define ONE_Q16 65536u
+#define LEAST_FUNCTIONS 4u
 
 static bool is_ready(const pvid_fourier_q31 *self)
 {
@@ -42,7 +45,8 @@ static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
     for (size_t i = 0; fits && (i < model->kinds); i++) {
         const pvid_fourier_kind *kind = &model->kind[i];
         thetas += kind->thetas;
-        columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS);
+        columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS) &&
+                  (kind->nuisances < LEAST_FUNCTIONS);
     }
     const bool same_kinds = (model->model->n_kinds == model->kinds) || (model->kinds == 1u);
     return (fits && columns && same_kinds && (thetas == model->model->n_theta)) ? PVID_OK : PVID_BAD_MODEL;
@@ -50,9 +54,10 @@ static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
 
 static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
 {
-    if ((design == NULL) || (design->full_scale == NULL) || (design->filter == NULL) || (design->format == NULL) ||
-        (design->factor == NULL) || (design->error_order == NULL) || (design->error_variance == NULL) ||
-        (design->circle == NULL) || ((design->noise == NULL) && (design->n_noise > 0u))) {
+    if ((design == NULL) || (design->full_scale == NULL) || (design->down == NULL) || (design->filter == NULL) ||
+        (design->format == NULL) || (design->factor == NULL) || (design->error_order == NULL) ||
+        (design->error_variance == NULL) || (design->circle == NULL) ||
+        ((design->noise == NULL) && (design->n_noise > 0u))) {
         return PVID_BAD_DESIGN;
     }
     const pvid_status status = model_is_valid(design->model);
@@ -60,7 +65,7 @@ static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
         return status;
     }
     const pvid_fourier_model_q31 *model = design->model;
-    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
+    if ((design->functions < LEAST_FUNCTIONS) || (design->functions > PVID_MAX_FUNCTIONS)) {
         return PVID_BAD_FUNCTIONS;
     }
     if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
@@ -74,8 +79,7 @@ static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
     if ((design->hop < harmonics) || ((design->hop % 4u) != 0u) || (design->hop < 8u) || (design->hop > 4096u)) {
         return PVID_BAD_WINDOW;
     }
-    const size_t length = (2u * (size_t)pvid_fourier_front_half_q31(design)) + design->decimation;
-    if ((length * model->signals) > PVID_MAX_RING) {
+    if (pvid_fourier_front_length_q31(design) > PVID_MAX_RING) {
         return PVID_BAD_TAPS;
     }
     bool shifts = (design->sum_shift >= 1u) && (design->sum_shift <= 30u);
@@ -108,6 +112,11 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
     if (config->offset == NULL) {
         return PVID_BAD_DESIGN;
     }
+    for (size_t i = 0; i < design->model->samples; i++) {
+        if ((config->offset[i] < -OFFSET_LIMIT) || (config->offset[i] > OFFSET_LIMIT)) {
+            return PVID_BAD_DESIGN;
+        }
+    }
     for (size_t i = 0; (config->drive_min != NULL) && (i < design->model->samples); i++) {
         if ((config->drive_min[i] < 0) || (config->drive_min[i] > COUNTS_LIMIT)) {
             return PVID_BAD_DRIVE_MIN;
@@ -116,9 +125,7 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
     memset(self, 0, sizeof *self);
     pvid_estimator_config_q31 estimator = config->estimator;
     estimator.model = design->model->model;
-    /* K + n rows span K dimensions */
-    estimator.row_weight =
-        (POWER_OF_ROW_WEIGHT * (uint32_t)design->functions) / ((uint32_t)design->functions + design->power);
+    estimator.row_weight = ONE_Q16;
     status = pvid_estimator_init_q31(&self->estimator, &estimator);
     if (status != PVID_OK) {
         return status;
@@ -135,10 +142,10 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
         return PVID_BAD_ITERATIONS;
     }
     self->design = design;
-    self->offset = config->offset;
     self->drive_min = config->drive_min;
+    self->driven = config->drive_min == NULL;
     self->iterations = (uint8_t)((self->estimator.settings.gain < PVID_ONE_Q30) ? 1u : config->iterations);
-    pvid_fourier_collect_init_q31(&self->collect, design);
+    pvid_fourier_collect_init_q31(&self->collect, design, config->offset);
     const uint32_t ticks = pvid_fourier_free_ticks_q31(design);
     const uint32_t stages = pvid_fourier_finish_stages_q31(self);
     const uint32_t each = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
@@ -153,12 +160,13 @@ pvid_status pvid_fourier_init_q31(pvid_fourier_q31 *self, const pvid_fourier_con
 }
 
 /* The counts of the tick in which the channels of step `index` of a half were made. */
-static void watch_drive(pvid_fourier_drive_q31 *self, size_t samples, size_t half, bool begins, const int32_t counts[])
+static void watch_drive(pvid_fourier_q31 *self, size_t half, bool begins, const int32_t reading[])
 {
-    for (size_t i = 0; i < samples; i++) {
-        const int64_t x = counts[i];
-        self->sum[half][i] = (begins ? 0 : self->sum[half][i]) + x;
-        self->square[half][i] = (begins ? 0 : self->square[half][i]) + (x * x);
+    pvid_fourier_drive_q31 *drive = &self->drive;
+    for (size_t i = 0; i < self->design->model->samples; i++) {
+        const int32_t x = pvid_fourier_count_q31(reading[i], self->collect.front.offset[i]);
+        drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
+        drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_square_q31(x);
     }
 }
 
@@ -191,22 +199,44 @@ static pvid_reason hand_over(pvid_fourier_q31 *self)
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
-    pvid_fourier_finish_begin_q31(&self->finish);
+    pvid_fourier_finish_begin_q31(&self->finish, self->design);
     return PVID_ACCUMULATED;
 }
 
-static void advance_finish(pvid_fourier_q31 *self, pvid_reason *reason)
-{
-    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_fourier_finish_is_busy_q31(&self->finish); i++) {
-        pvid_fourier_finish_step_q31(self, reason);
-    }
-}
-
-static pvid_reason reject(pvid_fourier_q31 *self)
+PVID_SELDOM static pvid_reason reject(pvid_fourier_q31 *self)
 {
     restart(self);
     pvid_count_up(&self->estimator.counters.rejected_saturated);
     return PVID_REJECTED_SATURATED;
+}
+
+static pvid_reason idle_reason(const pvid_fourier_q31 *self)
+{
+    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+}
+
+PVID_SELDOM static pvid_reason advance_finish(pvid_fourier_q31 *self)
+{
+    pvid_reason reason = idle_reason(self);
+    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_fourier_finish_is_busy_q31(&self->finish); i++) {
+        pvid_fourier_finish_step_q31(self, &reason);
+    }
+    return reason;
+}
+
+/* The last tick of a step. */
+PVID_SELDOM static pvid_fourier_tick end_step(pvid_fourier_q31 *self, const int32_t reading[])
+{
+    const uint16_t index = self->collect.values.index;
+    const uint8_t half = self->collect.values.half;
+    const pvid_fourier_tick tick = pvid_fourier_collect_end_q31(&self->collect);
+    if ((tick != PVID_FOURIER_REJECTED) && (self->drive_min != NULL) && (self->collect.values.index != index)) {
+        watch_drive(self, half, index == 0u, reading);
+        if (self->collect.values.index == 0u) { /* the half is complete */
+            self->driven = is_driven(self);
+        }
+    }
+    return tick;
 }
 
 pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[])
@@ -214,32 +244,28 @@ pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[
     if (!is_ready(self) || (reading == NULL)) {
         return PVID_NOT_READY;
     }
-    const size_t samples = self->design->model->samples;
-    const uint16_t index = self->collect.values.index;
-    const uint8_t half = self->collect.values.half;
-    int32_t counts[PVID_MAX_SAMPLES];
-    for (size_t i = 0; i < samples; i++) {
-        /* beyond full scale it stays beyond it */
-        counts[i] = (int32_t)pvid_clamp_q31((int64_t)reading[i] - self->offset[i], 2 * (int64_t)COUNTS_LIMIT);
-    }
-    const pvid_fourier_tick tick = pvid_fourier_collect_step_q31(&self->collect, counts);
-    if (tick == PVID_FOURIER_REJECTED) {
+    pvid_fourier_collect_q31 *collect = &self->collect;
+    if (!pvid_fourier_front_add_q31(&collect->front, self->design, reading)) {
         return reject(self);
     }
-    if ((self->collect.values.index != index) || (self->collect.values.half != half)) {
-        watch_drive(&self->drive, samples, half, index == 0u, counts);
-        if (self->collect.values.index == 0u) { /* the half is complete */
-            self->driven = is_driven(self);
-        }
-    }
-    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    if (tick == PVID_FOURIER_WINDOW) {
-        const pvid_reason dropped = hand_over(self);
-        reason = dropped;
-    } else if (tick == PVID_FOURIER_FREE) {
-        advance_finish(self, &reason);
+    pvid_fourier_tick tick = PVID_FOURIER_FREE;
+    collect->front.wait--;
+    if (collect->front.wait == 0u) {
+        tick = end_step(self, reading);
+    } else if (collect->sums.left > 0u) {
+        tick = pvid_fourier_collect_work_q31(collect);
     } else {
-        /* the tick is full */
+        /* free */
+    }
+    pvid_reason reason = idle_reason(self);
+    if (tick == PVID_FOURIER_REJECTED) {
+        reason = reject(self);
+    } else if (tick == PVID_FOURIER_WINDOW) {
+        reason = hand_over(self);
+    } else if ((tick == PVID_FOURIER_FREE) && pvid_fourier_finish_is_busy_q31(&self->finish)) {
+        reason = advance_finish(self);
+    } else {
+        /* the tick is full, or there is nothing to do */
     }
     return reason;
 }

@@ -29,7 +29,7 @@ static const uint32_t layout[] = {
     PVID_MAX_WINDOW,
 };
 
-static const uint32_t pointers[] = {PLACE(window.bank.weights)};
+static const pvid_snapshot_pointer pointers[] = {{PLACE(window.bank.weights), PVID_SNAPSHOT_OF_INIT}};
 static const pvid_snapshot_shape shape = {sizeof(pvid_strong_f32), pointers, sizeof pointers / sizeof pointers[0]};
 
 static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)

@@ -9,13 +9,24 @@ from pathlib import Path
 
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
-from pvid.codegen import files_design, files_f32, files_fourier, files_q31, files_strong, self_test, twin_file
+from pvid.codegen import (
+    files_design,
+    files_f32,
+    files_fourier,
+    files_q31,
+    files_refine,
+    files_strong,
+    refine_twin,
+    self_test,
+    twin_file,
+)
 from pvid.codegen.banner import banner
 from pvid.codegen.fixed_model import fixed_model
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches, reaches_of
+from pvid.codegen.refine import RefineFunctions, default_widths, has_skew, refine_functions_of
 from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
@@ -118,6 +129,11 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         files[f"{name}_strong.h"] = files_strong.header(named, command)
         files[f"{name}_strong_f32.c"] = files_strong.source(named, command)
         apart.append(f"{name}_strong_f32.c")
+    if refine_refusal(compiled) is None:
+        refined = refine_functions(compiled, chosen)
+        files["pvid/refine_shape.h"] = files_refine.shape(refined, command)
+        files["refine_model_f32.h"] = files_refine.header(refined, command)
+        files[f"{name}_refine_twin.py"] = refine_twin.text(refined, command)
     files[f"{name}_twin.py"] = twin_file.text(functions, command, fixed)
     files[f"{name}_test.c"] = self_test.source(functions, command, fixed)
     sources = " ".join(one for one in files if one.endswith(".c") and one not in apart)
@@ -139,6 +155,21 @@ def _weak_files(compiled: CompiledModel, command: str, options: Options) -> dict
         needed = sizes_of_design(design.design)
         files[f"{made.name}_design_f32.h"] = files_design.header(design, needed, command, compiled.title, names)
     return files
+
+
+def refine_functions(compiled: CompiledModel, options: Options | None = None) -> RefineFunctions:
+    """Of the refinement in float32, with the chosen widths of signs and those of the description."""
+    widths = {**default_widths(compiled), **(options or Options()).soft_signs}
+    return refine_functions_of(compiled, widths, has_skew(compiled))
+
+
+def refine_refusal(compiled: CompiledModel) -> str | None:
+    """Why a model gets no files for the refinement; None where it gets them."""
+    try:
+        files_refine.header(refine_functions(compiled), "")
+    except PvidError as error:
+        return str(error)
+    return None
 
 
 def weak_refusal(compiled: CompiledModel) -> str | None:
@@ -208,6 +239,7 @@ def build(
     directory.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, text in files.items():
+        (directory / name).parent.mkdir(exist_ok=True)
         with appearing(directory / name) as path:
             path.write_text(text, encoding="utf-8")
         paths.append(directory / name)
