@@ -47,7 +47,8 @@ class Configuration:
     @property
     def name(self) -> str:
         """Key of the budget."""
-        return f"{self.board.name} {self.form} {self.core}"
+        model = f" {self.model}" if self.form == ENGINE else ""
+        return f"{self.board.name} {self.form} {self.core}{model}"
 
 
 ENGINE = "fourier"
@@ -56,8 +57,9 @@ ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
 ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}
 
-CONFIGURATIONS = tuple(
-    Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)
+CONFIGURATIONS = (
+    *(Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)),
+    *(Configuration(board, ENGINE) for board in BOARDS.values() if board.name not in ON_AVR),
 )
 
 
