@@ -139,6 +139,17 @@
 #define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
 #define pvid_snapshot_restore_weak_q31 PVID_SIZED(pvid_snapshot_restore_weak_q31)
 
+/* refine.h */
+#define pvid_refine_init_f32 PVID_SIZED(pvid_refine_init_f32)
+#define pvid_refine_step_f32 PVID_SIZED(pvid_refine_step_f32)
+#define pvid_refine_latest_f32 PVID_SIZED(pvid_refine_latest_f32)
+#define pvid_refine_read_f32 PVID_SIZED(pvid_refine_read_f32)
+#define pvid_refine_gap_f32 PVID_SIZED(pvid_refine_gap_f32)
+#define pvid_refine_freeze_f32 PVID_SIZED(pvid_refine_freeze_f32)
+
+/* fnv_refine.h */
+#define pvid_fnv_refine_f32 PVID_SIZED(pvid_fnv_refine_f32)
+
 /* snapshot_fourier.h */
 #define pvid_snapshot_save_fourier_f32 PVID_SIZED(pvid_snapshot_save_fourier_f32)
 #define pvid_snapshot_restore_fourier_f32 PVID_SIZED(pvid_snapshot_restore_fourier_f32)

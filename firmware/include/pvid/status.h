@@ -74,8 +74,11 @@ typedef enum {
     PVID_HELD_OUT_OF_RANGE,   /* window dropped: the angle exceeded the range of the equations */
     PVID_MISFIT, /* p was updated, but the residuals exceed the sensors' noise: the model does not fit the mechanism */
     PVID_HELD_FROZEN, /* row or window not used: the identifier is frozen */
-    PVID_NOT_READY    /* not initialised, init refused, NULL instead of an object, or a kind of rows that the model does
+    PVID_NOT_READY,   /* not initialised, init refused, NULL instead of an object, or a kind of rows that the model does
                          not have: nothing was done */
+    PVID_HELD_SEARCHING, /* refinement: no block fits the equations yet */
+    PVID_HELD_BLOCK,     /* refinement: the block does not fit, or contradicts the blocks before it */
+    PVID_HELD_DISAGREES  /* refinement: the estimate differs from the weak form's by more than the errors of both */
 } pvid_reason;
 
 /* The law by which an estimator moves p; see estimator.h. */

@@ -53,11 +53,10 @@ static pvid_status init_estimator(pvid_fourier_f32 *self, const pvid_fourier_con
         nuisances += (float)model->kind[i].nuisances;
     }
     const float functions = (float)design->functions * (float)model->kinds;
-    const float rows = (float)pvid_fourier_rows(design) * (float)model->kinds;
     pvid_estimator_config_f32 estimator = config->estimator;
     estimator.model = model->model;
     estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)design->hop);
-    estimator.row_weight = (functions - nuisances) / rows;
+    estimator.row_weight = (functions - nuisances) / functions;
     estimator.correlation = design->overlap;
     return pvid_estimator_init_f32(&self->estimator, &estimator);
 }

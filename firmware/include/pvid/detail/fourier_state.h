@@ -80,19 +80,21 @@ typedef struct {
     float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_f32;
 
-/* Most rows of a window: parts of its sums. */
-#define PVID_FOURIER_ROWS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+/* Most parts of a window's sums that its rows are made of. */
+#define PVID_FOURIER_PARTS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
 
 /* The noise of a kind's rows: D_h, the directions that the test functions leave out, and what follows from the inverse.
  */
 typedef struct {
-    uint8_t cosines;                                    /* real parts; the other rows are imaginary parts */
-    uint8_t powers;                                     /* of omega^2 in use */
-    float omega;                                        /* 2 pi / T [rad/s] */
-    float weight[PVID_MAX_POWER];                       /* c_j of the sensors, variance at the power j of omega^2 */
-    float scale[PVID_MAX_HARMONICS];                    /* 1 / sqrt(D_h) */
-    float basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS]; /* orthonormal directions, one of each family in a row */
-    float share[PVID_MAX_POWER];                        /* Q_j = tr(R^-1 dR/dc_j) */
+    uint8_t cosines;                 /* real parts; the others are imaginary parts */
+    uint8_t parts;                   /* K + n */
+    uint8_t vectors;                 /* n/2: reflections of each family */
+    uint8_t powers;                  /* of omega^2 in use */
+    float omega;                     /* 2 pi / T [rad/s] */
+    float weight[PVID_MAX_POWER];    /* c_j of the sensors, variance at the power j of omega^2 */
+    float scale[PVID_MAX_HARMONICS]; /* 1 / sqrt(D_h) */
+    float reflection[PVID_MAX_POWER / 2][PVID_FOURIER_PARTS]; /* v of I - v v^T, one of each family in a row */
+    float share[PVID_MAX_POWER];                              /* Q_j = tr(R^-1 dR/dc_j) */
 } pvid_fourier_white_f32;
 
 /* Mean products of the windows' scores s = C^T (sum N e), of a window with itself and with the one before. */
@@ -113,26 +115,30 @@ typedef struct {
     bool shares; /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
     bool alone;  /* the next window has no neighbour before it */
     uint8_t stage;
-    uint8_t part; /* of a column's stages */
+    uint8_t phase; /* of a column's stages */
     uint8_t kind;
-    uint8_t theta;                    /* first one of the kind */
-    uint8_t used;                     /* kinds whose rows have been added */
-    uint8_t live;                     /* nuisances of the kind that are projected out */
-    uint8_t iteration;                /* solves done for this window */
-    uint16_t index;                   /* within the stage */
-    uint16_t term;                    /* next one of the kind */
-    pvid_reason reason;               /* of the last solve, then of the window */
-    float size;                       /* of the last step, relative */
-    float rss;                        /* of the kind's rows before the steps */
-    float expected;                   /* sum over the kinds of the rows' variance by the sensors alone */
-    float free;                       /* rows less nuisances of the kinds that were added */
-    float square;                     /* sum of squares of their residuals before the steps */
-    float own[PVID_MAX_COLUMNS];      /* square of each nuisance before projection, then inverse of what remains */
-    float pull[PVID_MAX_THETA];       /* g: what the sensors' noise takes from B */
-    float score[PVID_MAX_THETA];      /* sum N e + g of the window */
-    float sum[2][PVID_MAX_HARMONICS]; /* of the present column, real and imaginary parts */
-    float row[PVID_FOURIER_ROWS];     /* e of the kind's rows */
-    float column[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS]; /* white rows: theta's, Y, nuisances */
+    uint8_t theta;                      /* first one of the kind */
+    uint8_t used;                       /* kinds whose rows have been added */
+    uint8_t live;                       /* nuisances of the kind that are projected out */
+    uint8_t iteration;                  /* solves done for this window */
+    uint8_t other;                      /* column of the next product */
+    uint16_t index;                     /* within the stage */
+    uint16_t term;                      /* next one of the kind */
+    uint16_t moment;                    /* next one of the kind */
+    pvid_reason reason;                 /* of the last solve, then of the window */
+    float size;                         /* of the last step, relative */
+    float rss;                          /* of the kind's rows before the steps */
+    float expected;                     /* sum over the kinds of the rows' variance by the sensors alone */
+    float free;                         /* rows less nuisances of the kinds that were added */
+    float square;                       /* sum of squares of their residuals before the steps */
+    float own[PVID_MAX_COLUMNS];        /* square of each nuisance before projection, then inverse of what remains; then
+                                           squares of theta's columns */
+    float pull[PVID_MAX_THETA];         /* g: what the sensors' noise takes from B */
+    float score[PVID_MAX_THETA];        /* sum N e + g of the window */
+    float gradient[PVID_MAX_THETA];     /* sum N e of the kind */
+    float part[PVID_FOURIER_PARTS];     /* of a direction, then of the present column */
+    float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of the directions */
+    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
     pvid_gate_f32 gate[PVID_MAX_KINDS];
     pvid_fourier_white_f32 white;
     pvid_fourier_scores_f32 scores;

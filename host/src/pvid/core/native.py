@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.headers import Headers, Tables, default_library
+from pvid.core.headers import Filled, Headers, Tables, default_library
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Status
 from pvid.settings.f32 import EstimatorConfig
@@ -177,7 +177,7 @@ class Stepper:
         self.core = core
         self._name = name
         self._replay = replay
-        self._filled = native.headers.filled(f"pvid_{name}_config_{core}", config)
+        self._filled = self._filled_with(native, f"pvid_{name}_config_{core}", config)
         for field, value in given.items():
             setattr(self.config_struct, field, value)
         self._hash = np.array([0x811C9DC5], np.uint32)
@@ -188,6 +188,10 @@ class Stepper:
         self._arithmetic = _ARITHMETIC[core]
         self.n_p = int(self.estimator.model.n_p)
         self._n_sums = self._arithmetic.n_sums(self.estimator.information)
+
+    def _filled_with(self, native: Native, kind: str, config: Any) -> Filled:
+        """The configuration in C."""
+        return native.headers.filled(kind, config)
 
     def _call(self, verb: str, *arguments: Any) -> Any:
         """Its function pvid_<name>_<verb>_<core>."""

@@ -7,13 +7,14 @@ quantity gets the finest format in which its bound fits its type, so that no sum
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.settings.fourier import NONE, FourierChannel, FourierDesign32, FourierJet, Source
+from pvid.settings.fourier import NONE, FourierChannel, FourierDesign32, FourierJet, FourierSignal, Source
 from pvid.settings.fourier_q31 import (
     FourierDesignQ31,
     FourierFilterQ31,
@@ -83,6 +84,15 @@ class _Margins(dict[str, float]):
         if spare < 0:
             raise PvidError(f"the fixed-point weak form cannot hold {name}: {-spare:.2f} bits are missing")
         self[name] = min(spare, self.get(name, spare))
+
+
+def most_counts(signals: Sequence[FourierSignal], samples: int, decimation: int) -> list[int]:
+    """Largest full scale of each sample whose block sums fit a word [samples]."""
+    found = [2**24] * samples
+    for one in signals:
+        room = math.floor((2**31 - 1) / (_REACH[one.source] * decimation**2))
+        found[one.sample] = min(found[one.sample], room)
+    return found
 
 
 def shift_to(most: float, bits: float) -> int:

@@ -32,6 +32,9 @@ class Reason(_Named):
     MISFIT = 10
     HELD_FROZEN = 11
     NOT_READY = 12
+    HELD_SEARCHING = 13
+    HELD_BLOCK = 14
+    HELD_DISAGREES = 15
 
 
 class Status(_Named):

@@ -328,6 +328,47 @@ class RelativeEstimator(Estimator):
         self.counters["rejected_not_finite"] += not_finite
         return reason
 
+    def accept_rows(self, squares: Float32, rss: Float32) -> npt.NDArray[np.uint8]:
+        """pvid_products_accept_f32: squares of the columns of rows [theta of their kind, lanes]."""
+        limit = ROW_LIMIT * ROW_LIMIT
+        fits = (squares <= limit).all(axis=0) & (rss <= limit)
+        not_finite = ~fits & ~(np.isfinite(squares).all(axis=0) & np.isfinite(rss))
+        reason = np.full(len(rss), Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
+        reason[not_finite] = Reason.REJECTED_NOT_FINITE
+        self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
+        self.counters["rejected_not_finite"] += not_finite
+        return reason
+
+    def add_moment(self, kind: int, place: int, product: Float32) -> None:
+        """Adds to an entry of a kind's packed upper triangle of M."""
+        self._add_to_low(self.model.blocks.places_of_kind(kind)[0].start + place, product)
+
+    def add_gradient(self, kind: int, place: int, product: Float32) -> None:
+        """Adds sum N e to an entry of a kind's b."""
+        self._add_to_low(self.model.moments + self.model.blocks.of_kind[kind].start + place, product)
+
+    def _add_to_low(self, place: int, value: Float32) -> None:
+        with np.errstate(all="ignore"):
+            low = self.information.low.copy()
+            low[place] = low[place] + value
+            self.information.low = low
+            self.sums = self.information.read()
+
+    def end_rows(self, kind: int, gradient: Float32, rss: Float32, rows: int) -> None:
+        """pvid_products_end_f32: behind the products of so many rows; sum N e of the kind [theta, lanes], sum e^2."""
+        pattern = self.model
+        with np.errstate(all="ignore"):
+            weight = self.row_weight * np.float32(rows)
+            self._add_to_low(-2, rss)
+            self._add_to_low(-1, weight)
+            self.rss = self.rss + rss
+            self.group_weight = self.group_weight + weight
+            if self.is_rate:
+                slope = pattern.transpose_times(pattern.jacobian(self.p), gradient, kind)
+                self.innovation = self.innovation + slope
+        self.counters["rows"] += rows
+
     def add_to_b(self, g: Float32) -> npt.NDArray[np.uint8]:
         """pvid_estimator_add_to_b_f32: g [n_theta, lanes]."""
         finite = np.isfinite(g).all(axis=0)

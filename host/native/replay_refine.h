@@ -1,0 +1,19 @@
+/* What Python calls of the refinement. */
+#ifndef PVID_REPLAY_REFINE_H
+#define PVID_REPLAY_REFINE_H
+
+#include <stdint.h>
+
+#include "pvid/refine.h"
+
+/* Steps an initialised refinement through samples[ticks][n_samples]. weak_p, weak_se [ticks][PVID_REFINE_P]: the weak
+ * form's published estimate after each tick, NaN before the first one. Results, each NULL or [ticks]: the reason; the
+ * running hash (pvid/fnv_refine.h); r and standard errors [parameters] as published, 0 before the first publication. */
+void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_samples, const float samples[],
+                            const float weak_p[], const float weak_se[], uint32_t *running_hash, uint8_t reason[],
+                            uint32_t hash[], float r[], float se[]);
+
+/* Numbers of the model and of this build: order, coordinates, inputs, outputs, moving, parameters, skew, p. */
+void pvid_replay_refine_shape(uint32_t shape[8]);
+
+#endif
