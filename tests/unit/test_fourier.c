@@ -502,10 +502,10 @@ static void jets_are_those_of_the_filters_for_every_decimation(void **state)
         int steps = 0;
         for (int tick = 0; tick < 600; tick++) {
             const float sample[2] = {(float)sample_at(tick, 0), (float)sample_at(tick, 1)};
-            float jet[4];
+            const float *jet = front.jet;
             pvid_fourier_front_derive_f32(&front, &model, sample);
             front.wait--;
-            if ((front.wait > 0u) || !pvid_fourier_front_step_f32(&front, &design, jet)) {
+            if ((front.wait > 0u) || !pvid_fourier_front_step_f32(&front, &design)) {
                 continue;
             }
             const int at = pvid_fourier_front_lead_f32(&front) + (steps * d);

@@ -22,6 +22,7 @@ typedef struct {
     float ticks;                       /* D */
     float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
+    float jet[PVID_MAX_INPUTS];        /* of the newest step */
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
@@ -40,10 +41,12 @@ typedef struct {
     float run_low[PVID_MAX_INTEGRANDS];
     float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
                                                               the next ones */
-    float f[2][PVID_MAX_INTEGRANDS]; /* integrands at the two steps before that one, latest first */
-    float once[PVID_MAX_INTEGRANDS]; /* I^1 and I^2 since the start of the half */
-    float twice[PVID_MAX_INTEGRANDS];
-    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the half before, at its end */
+    float f[2][PVID_MAX_INTEGRANDS];               /* integrands at the two steps before that one, latest first */
+    uint8_t factor_of[PVID_MAX_CHANNELS];          /* what a channel's gain is multiplied by: 0 nothing, else one behind
+                                                      its place in `factor` */
+    float factor[2u + (2u * PVID_MAX_INTEGRANDS)]; /* t and t^2/2 since the start of the half, then I^1 and I^2 of each
+                                                      integrand */
+    float edge[2][PVID_MAX_INTEGRANDS];            /* I^1 and I^2 of the half before, at its end */
 } pvid_fourier_history_f32;
 
 /* What a half window has seen of a sample. */
@@ -149,11 +152,12 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
-    uint8_t rest;      /* reason of a tick that only adds its samples; BUSY: harmonics are to be added or joined, or a
-                          window is being processed */
-    bool warm;         /* a window has been complete since the restart */
-    bool frozen;       /* complete windows are dropped */
+    uint8_t plain; /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;  /* reason of a tick that only adds its samples; FORM: the channels of a step are due; BUSY: harmonics
+                      are to be added or joined, or a window is being processed */
+    bool warm;     /* a window has been complete since the restart */
+    bool frozen;   /* complete windows are dropped */
+    bool watches;  /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;
