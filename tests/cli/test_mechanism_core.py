@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -147,3 +148,59 @@ def test_without_a_compiler_there_is_one_sentence(
     monkeypatch.delenv("CC", raising=False)
     with pytest.raises(PvidError, match="--core f32: .* needs a C compiler"):
         pvid("identify", recorded["rigid_body"], "--core", "f32")
+
+
+def test_the_pendulum_s_own_rig_file_goes_through_the_engine(tmp_path: Path) -> None:
+    """--form fourier: columns, resolution, guess and gains come from the rig file, and the keys stay."""
+    run = tmp_path / "run.csv"
+    assert pvid("simulate", run, "--duration", "15", "--seed", "2").return_value == DONE
+    engine = json.loads(pvid("identify", run, "--form", "fourier", "--json").stdout)
+    own = json.loads(pvid("identify", run, "--json").stdout)
+    assert engine["identified"] and engine["core"] == "f32" and engine["samples"] == own["ticks"] == 15_000
+    assert list(engine["parameters"]) == list(own["parameters"]) == ["g", "l2", "rho2", "w", "d1", "d2", "c"]
+    for name, one in engine["parameters"].items():
+        assert engine[name] == one and one["unit"] == own[name]["unit"]
+        apart = abs(one["value"] - own[name]["value"])
+        assert apart < 3 * np.hypot(one["se"], own[name]["se"]), name
+    # Small angles are neglected: the largest is about 0.1 rad.
+    assert 0.003 < engine["w"]["se"] / engine["w"]["value"] < 0.02
+    assert pvid("compare", run, "--form", "fourier").return_value == DONE
+    with pytest.raises(PvidError, match="--core q31"):
+        pvid("compare", run, "--form", "fourier", "--core", "q31")
+
+
+def test_design_and_tune_show_the_engine_s_design_for_a_recording(recorded: dict[str, Path]) -> None:
+    run = recorded["rigid_body"]
+    design = json.loads(pvid("design", "--model", "rigid_body", "--run", run, "--json").stdout)
+    core = json.loads(pvid("identify", run, "--core", "f32", "--json").stdout)
+    assert design["identified"] and design["functions"] == core["functions"]
+    assert design["window_s"] == pytest.approx(core["window_s"]) and design["decimation"] == core["decimation"]
+    for name, one in design["parameters"].items():
+        found = core["parameters"][name]
+        assert one["unit"] == found["unit"] and abs(one["value"] - found["value"]) < 5 * found["se"]
+        assert 0.2 < one["se"] / found["se_noise"] < 5
+    tuned = pvid("tune", run)
+    assert tuned.return_value == DONE and "analysis" in tuned.stdout and "C core" in tuned.stdout
+    assert f"{design['window_s']:.4g}" in tuned.stdout
+
+
+def test_design_of_a_shipped_rig_needs_no_run() -> None:
+    done = pvid("design", "--model", "rigid_body")
+    assert done.return_value == DONE and "Ixx [kg*m^2]" in done.stdout and "test functions: " in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (
+            ("design", "--model", "rigid_body", "--duration", "5"),
+            "--tone, --release and --duration are for the pendulum",
+        ),
+        (("tune", "{run}", "-o", "x.toml"), "-o: nothing is written for a described mechanism"),
+    ],
+)
+def test_options_of_the_pendulum_s_design_are_refused(
+    arguments: tuple[str, ...], sentence: str, recorded: dict[str, Path]
+) -> None:
+    with pytest.raises(PvidError, match=sentence):
+        pvid(*(one.format(run=recorded["rigid_body"]) for one in arguments))

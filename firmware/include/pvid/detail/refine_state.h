@@ -89,6 +89,7 @@ struct pvid_refine_f32 {
     float h;                           /* a step of the motion [s] */
     float fade;                        /* forgetting of a full block, on the triangle */
     float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
+    bool renewed;                      /* the weak form has given an estimate since the search began from one */
     bool frozen;
     bool solved;         /* the last solution exists */
     bool restarted;      /* the block's start is not known from the one before */

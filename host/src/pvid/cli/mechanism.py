@@ -16,12 +16,15 @@ from pvid.base.console import DONE, NOTHING_IDENTIFIED, progress_bar, write_stde
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
-from pvid.cli.input import print_notes
+from pvid.cli.input import print_notes, read_input
 from pvid.log.rig import LOG_SUFFIX, recording_of_log
 from pvid.oracle.fourier.weights import Weights
 from pvid.rig.columns import parsed
+from pvid.rig.described import described
+from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
+from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.settings.enums import Core
 
@@ -29,14 +32,18 @@ if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
     from pvid.run.mechanism_core import CoreAnswer
 
+ENGINE = "fourier"  # as --form: the weak engine, for a mechanism that has a weak form of its own too
 _IN_C: dict[str | None, Core] = {"f32": "f32", "q31": "q31"}
-_POSSIBLE = (("core", "f64"), ("core", "f32"), ("core", "q31"), ("form", "weak"))
-_COMPARED = (("core", "f32"), ("core", "q31"), ("core", "all"), ("form", "weak"))
+_FORMS = (("form", "weak"), ("form", ENGINE))
+_POSSIBLE = (("core", "f64"), ("core", "f32"), ("core", "q31"), *_FORMS)
+_COMPARED = (("core", "f32"), ("core", "q31"), ("core", "all"), *_FORMS)
 _ARITHMETIC = {"f32": "float32", "q31": "fixed point"}
 
 
-def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Recording, CompiledModel]:
+def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
     """The longest stretch of a recording without a missing sample, and the model with the values of the rig."""
+    if isinstance(rig, RigFile):
+        return _recording_of_own(path, rig, columns)
     model = model_of(rig)
     if path.suffix == LOG_SUFFIX:
         if columns is not None:
@@ -52,9 +59,23 @@ def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Re
     return recording, model
 
 
+def _recording_of_own(path: Path, rig: RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
+    """The same of a mechanism that has a rig file of its own: its columns, its corrections, its resolution."""
+    run = read_input(path, rig, columns, whole=True)
+    found = resolved(rig, run)
+    notes = resolution_note(rig, found)
+    print_notes(notes)
+    signals = {one.name: getattr(run, one.name) for one in rig.mechanism.model.channels}
+    return Recording(run.t, signals, run.sample_rate, (*run.notes, *notes)), _model_of(found)
+
+
+def _model_of(rig: MechanismRig | RigFile) -> CompiledModel:
+    return model_of(described(rig) if isinstance(rig, RigFile) else rig)
+
+
 def identify_run(
     path: Path,
-    rig: MechanismRig,
+    rig: MechanismRig | RigFile,
     columns: str | None,
     *,
     as_json: bool,
@@ -69,7 +90,7 @@ def identify_run(
     weights : of the rows, as in pvid.oracle.fourier.identify
     only_in_c : options that the C core alone has, by name; a value is refused
     """
-    name = model_of(rig).name
+    name = _model_of(rig).name
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
@@ -107,7 +128,9 @@ def identify_run(
     return DONE
 
 
-def compare_recording(path: Path, rig: MechanismRig, columns: str | None, **given: str | None) -> list[Outcome]:
+def compare_recording(
+    path: Path, rig: MechanismRig | RigFile, columns: str | None, **given: str | None
+) -> list[Outcome]:
     """The C core against its twin on a recording of a described mechanism, in float32 by default.
 
     Parameters
@@ -116,7 +139,7 @@ def compare_recording(path: Path, rig: MechanismRig, columns: str | None, **give
     """
     from pvid.run.mechanism_compare import compare_recording as compared
 
-    name = model_of(rig).name
+    name = _model_of(rig).name
     for option, value in given.items():
         if value is not None and (option, value) not in _COMPARED:
             raise PvidError(

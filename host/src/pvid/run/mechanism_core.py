@@ -23,7 +23,7 @@ from pvid.oracle.fourier.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import engine_to_identify
 from pvid.run.identify import Publications
-from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, values_of
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, values_of
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.record import Record
@@ -109,12 +109,14 @@ class CoreAnswer:
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
+        parameters = {
+            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
+            for name, one in self.values.items()
+        }
         return self.oracle.as_json() | {
             "identified": self.identified,
-            "parameters": {
-                name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
-                for name, one in self.values.items()
-            },
+            "parameters": parameters,
+            **own_keys(self.oracle.model, parameters),
             "status": self.verdict.status,
             "warning": self.verdict.warning,
             "reasons": {one.name: one.text for one in self.verdict.reasons},
