@@ -19,6 +19,9 @@
 #include "number/init.h"
 #include "number/unroll.h"
 
+/* Bits of the largest finite number. */
+#define FINITE 0x7F7FFFFFu
+
 /* No reasons of a tick: there is work; the channels of a step are to be formed. */
 #define BUSY 255u
 #define FORM 254u
@@ -152,7 +155,10 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
                                (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
     self->watches = (config->range != NULL) || (config->drive_min != NULL);
-    self->plain = (self->front.plain && (config->range == NULL)) ? design->model->samples : 0u;
+    self->plain = self->front.plain ? design->model->samples : 0u;
+    for (size_t i = 0; i < design->model->samples; i++) {
+        self->front.limit[i] = (config->range != NULL) ? pvid_bits_f32(config->range[i]) : FINITE;
+    }
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
     self->stages_per_tick =
@@ -317,8 +323,12 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
     if ((plain == 0u) || (sample == NULL)) {
         return other_tick(self, sample);
     }
-    if (!pvid_fourier_front_add_f32(&self->front, plain, sample)) {
+    bool beyond = false;
+    if (!pvid_fourier_front_add_f32(&self->front, plain, sample, &beyond)) {
         return reject(self);
+    }
+    if (beyond) {
+        self->watch.beyond = self->watch.delay;
     }
     self->front.wait--;
     if (self->front.wait == 0u) {

@@ -22,6 +22,7 @@ typedef struct {
     float ticks;                       /* D */
     float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
+    uint32_t limit[PVID_MAX_SAMPLES];  /* bits of the largest absolute value of each sample that needs no attention */
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
