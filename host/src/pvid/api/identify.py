@@ -53,8 +53,8 @@ def identify(
     columns
         Names and units of the columns, as for `--columns`: "t=time_ms:ms,phi=angle:deg,y=h:mm".
     core
-        Arithmetic: float32 by default for the pendulum, float64 for other mechanisms, of which the C core is compiled for
-        f32 and q31.
+        Arithmetic: float32 by default for the pendulum, float64 for other mechanisms,
+        whose C core is compiled for f32 and q31.
     settings, keys
         Keys of the rig file, which come before the file: l1=0.25, settings={"sensor.phi_lsb": 0.0015}.
 
