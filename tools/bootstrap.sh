@@ -236,11 +236,8 @@ install_requirements() { # install_requirements PROFILE
     local packages
     packages=$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
     find "$packages"/{numpy,scipy,sympy,matplotlib} -type d -name tests -prune -exec rm -rf {} + 2>/dev/null || true
-    # From inside host/: a path is read as a URL, which spaces break.
-    logged pip-pvid env -C "$root/host" "${pip[@]}" --no-index --no-deps --no-build-isolation --editable . ||
-        die "$failed"
-    # tools/bench, behind the installed packages, so that no module of tools/ hides one of theirs.
-    printf '%s\n' "$root/tools" >"$packages/pvid-tools.pth"
+    # pvid itself, and tools/bench behind the installed packages, so that no module of tools/ hides one of theirs.
+    printf '%s\n' "$root/host/src" "$root/tools" >"$packages/pvid.pth"
     write_stamp "$venv/installed-$1" "$(requirements)"
 }
 

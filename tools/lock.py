@@ -19,7 +19,7 @@ LOCK = ROOT / "tools" / "requirements.txt"
 USE, MORE, TESTS = "# to use pvid", "# for parquet, mcap and campaigns", "# for the tests alone"
 USED_EXTRAS = ["models", "page", "plot", "serial"]
 MORE_EXTRAS = ["cluster", "mcap", "parquet"]
-BUILDERS = ("flit-core", "setuptools")
+BUILDERS = ("setuptools",)
 _WINDOWS = re.compile(r"os_name == 'nt'|sys_platform == 'win32'")
 HEADER = "# Written by tools/lock.py from host/pyproject.toml: do not edit.\n"
 

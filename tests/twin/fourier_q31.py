@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.files_fourier_q31 import configuration
-from pvid.codegen.files_fourier_q31 import source as tables_source
+from pvid.codegen import files_fourier_q31
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
 from pvid.codegen.fourier_twin import fourier_model_of
@@ -159,7 +158,9 @@ _DRIVER = """
 #include "fourier/sums_q31.h"
 #include "fourier/white_q31.h"
 
-extern const pvid_fourier_design_q31 rig_design_q31;
+extern const pvid_fourier_config_q31 *const rig_config;
+#define rig_config_q31 (*rig_config)
+#define rig_design_q31 (*rig_config->design)
 unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[]);
 
 /* S_h of the windows of a run, channel by channel; returns their number. */
@@ -187,7 +188,6 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
     return windows;
 }
 
-extern const pvid_fourier_config_q31 rig_config_q31;
 int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
              uint8_t exponent[], uint8_t reason[], unsigned ticks);
 
@@ -312,8 +312,17 @@ class Core:
 
     def library(self, one: Rig, config: FourierConfigQ31 | None = None) -> ctypes.CDLL:
         """With the tables of a rig, and this configuration or its own."""
-        tables = tables_source(one.fixed, one.parameters, one.design, "rig")
-        text = tables + "\n\n" + configuration(config or one.config, "rig")
+        name, own = one.made.name, config or one.config
+        header = files_fourier_q31.header(one.fixed, {"PVID_MAX_P": 3}, "a test")
+        (self.folder / f"{name}_weak_q31.h").write_text(header, encoding="utf-8")
+        text = "\n".join(
+            [
+                files_fourier_q31.source(one.fixed, one.parameters, "a test"),
+                files_fourier_q31.design_header(own, name, {"PVID_MAX_P": 3}, "a test", []),
+                "extern const pvid_fourier_config_q31 *const rig_config;",
+                f"const pvid_fourier_config_q31 *const rig_config = &{name}_config_q31;",
+            ]
+        )
         if text not in self.libraries:
             name = f"{one.name}_{len(self.libraries)}"
             code = self.folder / f"{name}.tables.c"

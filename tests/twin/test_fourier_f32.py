@@ -88,7 +88,7 @@ def test_laws_and_divider_equal_the_twin(law: Law, feedback_hz: float, divider: 
         ("cart_pendulum", 7, 120, 2),
         ("cart_pendulum", 11, 36, 8),
         ("kapitza", 5, 16, 16),
-        ("kapitza", 4, 20, 5),
+        ("kapitza", 6, 80, 5),
         ("kapitza", 9, 40, 16),
         ("battery_2rc", 13, 24, 1),
         ("dc_motor", 39, 100, 2),

@@ -151,24 +151,33 @@ PVID_SELDOM void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, con
 }
 
 /* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
-static float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order, const float *x, size_t stride)
+static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order, const float *x, size_t stride)
 {
     const float *weight = filter->weights;
+    const float *end = &weight[filter->half];
     const float *after = x;
     const float *before = x;
     const float centre = *x;
     float sum = 0.0f;
-    const bool odd = (order % 2u) != 0u;
-    for (size_t left = filter->half; left > 0u; left--) {
+    if ((order % 2u) != 0u) {
+        while (weight != end) {
+            after += stride;
+            before -= stride;
+            sum += *weight * (*after - *before);
+            weight++;
+        }
+        return sum;
+    }
+    while (weight != end) {
         after += stride;
         before -= stride;
-        sum += *weight * (odd ? (*after - *before) : ((*after - centre) + (*before - centre)));
+        sum += *weight * ((*after - centre) + (*before - centre));
         weight++;
     }
     return (order == 0u) ? (centre + sum) : sum;
 }
 
-bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[])
+bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
 {
     const pvid_fourier_model_f32 *model = design->model;
     const size_t signals = self->signals;
@@ -196,7 +205,7 @@ bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourie
     }
     const float *centre = &outputs[((size_t)self->head + self->half) * signals];
     for (size_t i = 0; i < model->jets; i++) {
-        jet[i] = jet_of(&design->compensator[i], model->jet[i].order, &centre[model->jet[i].signal], signals);
+        self->jet[i] = jet_of(&design->compensator[i], model->jet[i].order, &centre[model->jet[i].signal], signals);
     }
     return true;
 }

@@ -18,9 +18,15 @@
 
 #include "pvid/elementary.h"
 
-void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, float lead)
+void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model, size_t channels,
+                                float lead)
 {
     self->lead = lead;
+    for (size_t c = 0; c < channels; c++) {
+        const pvid_fourier_channel *one = &model->channel[c];
+        const size_t first = (one->integrand == PVID_FOURIER_NONE) ? 0u : (2u + (2u * (size_t)one->integrand));
+        self->factor_of[c] = (uint8_t)((one->fold == 0u) ? 0u : (first + one->fold));
+    }
     pvid_fourier_step_reset_f32(self);
 }
 
@@ -77,15 +83,18 @@ static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float d
     const float part = dt / 24.0f;
     const float half = 0.5f * dt;
     const float end = (dt * dt) / 12.0f;
+    const size_t known = self->known;
+    float *integral = &self->factor[2];
     for (size_t i = 0; i < integrands; i++) {
         const float last = self->f[0][i];
+        const float f = now[i];
         float once = 0.0f;
         float twice = 0.0f;
-        if (self->known > 2u) {
-            const float before = (self->known > 3u) ? self->f[1][i] : ((2.0f * last) - now[i]);
-            const float rise = part * (((-before + (13.0f * last)) + (13.0f * now[i])) - next[i]);
-            once = self->once[i] + rise;
-            twice = self->twice[i] + ((half * (self->once[i] + once)) - (end * (now[i] - last)));
+        if (known > 2u) {
+            const float before = (known > 3u) ? self->f[1][i] : ((2.0f * last) - f);
+            const float rise = part * (((-before + (13.0f * last)) + (13.0f * f)) - next[i]);
+            once = integral[0] + rise;
+            twice = integral[1] + ((half * (integral[0] + once)) - (end * (f - last)));
         }
         if (begins) {
             self->edge[0][i] = once;
@@ -93,30 +102,27 @@ static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float d
             once = 0.0f;
             twice = 0.0f;
         }
-        self->once[i] = once;
-        self->twice[i] = twice;
+        integral[0] = once;
+        integral[1] = twice;
+        integral += 2;
         self->f[1][i] = last;
-        self->f[0][i] = now[i];
+        self->f[0][i] = f;
     }
 }
 
-/* Values of the channels at a step with these gains, at this time since the start of its half. */
+/* Values of the channels at a step with these gains. */
 static inline void find_channels(const pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model,
-                                 size_t channels, float t, const float gain[], float channel[])
+                                 size_t channels, const float gain[], float channel[])
 {
+    const pvid_fourier_channel *one = model->channel;
+    const uint8_t *factor_of = self->factor_of;
     for (size_t c = 0; c < channels; c++) {
-        const pvid_fourier_channel *one = &model->channel[c];
         if (one->gain != PVID_FOURIER_NONE) {
-            float value = gain[one->gain];
-            if (one->fold == 1u) {
-                value *= (one->integrand == PVID_FOURIER_NONE) ? t : self->once[one->integrand];
-            } else if (one->fold == 2u) {
-                value *= (one->integrand == PVID_FOURIER_NONE) ? (0.5f * (t * t)) : self->twice[one->integrand];
-            } else {
-                /* the gain alone */
-            }
-            channel[c] = value;
+            const size_t place = factor_of[c];
+            const float value = gain[one->gain];
+            channel[c] = (place > 0u) ? (value * self->factor[place - 1u]) : value;
         }
+        one++;
     }
 }
 
@@ -146,7 +152,9 @@ bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fouri
         if (complete) {
             integrate(self, model->integrands, dt, index == 0u, &now[model->gains], &next[model->gains]);
             const float t = dt * (float)index;
-            find_channels(self, model, channels, t, now, channel);
+            self->factor[0] = t;
+            self->factor[1] = 0.5f * (t * t);
+            find_channels(self, model, channels, now, channel);
         }
         move_runs(self, model->runs, 0.5f * dt, arguments);
     } else if (!self->ran) {

@@ -8,7 +8,8 @@
 #include "pvid/fourier.h"
 
 /* No step is known. lead: from a run's first sample to its first step [s]. `self` is all zeros. */
-void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, float lead);
+void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model, size_t channels,
+                                float lead);
 
 /* No step is known; the integrals since the start of the run are kept. */
 void pvid_fourier_step_reset_f32(pvid_fourier_history_f32 *self);

@@ -19,7 +19,7 @@ from pvid.rig.file import Core, RigFile
 from pvid.rig.run import Recording
 from pvid.run.identify import Identification, Publications, identify
 from pvid.run.mechanism import identify_mechanism, model_of
-from pvid.run.mechanism_f32 import CoreAnswer, identify_in_c
+from pvid.run.mechanism_core import CoreAnswer, identify_in_c
 
 Float = npt.NDArray[np.float64]
 

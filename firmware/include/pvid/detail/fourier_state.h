@@ -22,6 +22,7 @@ typedef struct {
     float ticks;                       /* D */
     float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
+    float jet[PVID_MAX_INPUTS];        /* of the newest step */
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
@@ -40,10 +41,12 @@ typedef struct {
     float run_low[PVID_MAX_INTEGRANDS];
     float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
                                                               the next ones */
-    float f[2][PVID_MAX_INTEGRANDS]; /* integrands at the two steps before that one, latest first */
-    float once[PVID_MAX_INTEGRANDS]; /* I^1 and I^2 since the start of the half */
-    float twice[PVID_MAX_INTEGRANDS];
-    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the half before, at its end */
+    float f[2][PVID_MAX_INTEGRANDS];               /* integrands at the two steps before that one, latest first */
+    uint8_t factor_of[PVID_MAX_CHANNELS];          /* what a channel's gain is multiplied by: 0 nothing, else one behind
+                                                      its place in `factor` */
+    float factor[2u + (2u * PVID_MAX_INTEGRANDS)]; /* t and t^2/2 since the start of the half, then I^1 and I^2 of each
+                                                      integrand */
+    float edge[2][PVID_MAX_INTEGRANDS];            /* I^1 and I^2 of the half before, at its end */
 } pvid_fourier_history_f32;
 
 /* What a half window has seen of a sample. */
@@ -80,19 +83,21 @@ typedef struct {
     float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_f32;
 
-/* Most rows of a window: parts of its sums. */
-#define PVID_FOURIER_ROWS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+/* Most parts of a window's sums that its rows are made of. */
+#define PVID_FOURIER_PARTS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
 
 /* The noise of a kind's rows: D_h, the directions that the test functions leave out, and what follows from the inverse.
  */
 typedef struct {
-    uint8_t cosines;                                    /* real parts; the other rows are imaginary parts */
-    uint8_t powers;                                     /* of omega^2 in use */
-    float omega;                                        /* 2 pi / T [rad/s] */
-    float weight[PVID_MAX_POWER];                       /* c_j of the sensors, variance at the power j of omega^2 */
-    float scale[PVID_MAX_HARMONICS];                    /* 1 / sqrt(D_h) */
-    float basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS]; /* orthonormal directions, one of each family in a row */
-    float share[PVID_MAX_POWER];                        /* Q_j = tr(R^-1 dR/dc_j) */
+    uint8_t cosines;                 /* real parts; the others are imaginary parts */
+    uint8_t parts;                   /* K + n */
+    uint8_t vectors;                 /* n/2: reflections of each family */
+    uint8_t powers;                  /* of omega^2 in use */
+    float omega;                     /* 2 pi / T [rad/s] */
+    float weight[PVID_MAX_POWER];    /* c_j of the sensors, variance at the power j of omega^2 */
+    float scale[PVID_MAX_HARMONICS]; /* 1 / sqrt(D_h) */
+    float reflection[PVID_MAX_POWER / 2][PVID_FOURIER_PARTS]; /* v of I - v v^T, one of each family in a row */
+    float share[PVID_MAX_POWER];                              /* Q_j = tr(R^-1 dR/dc_j) */
 } pvid_fourier_white_f32;
 
 /* Mean products of the windows' scores s = C^T (sum N e), of a window with itself and with the one before. */
@@ -113,26 +118,30 @@ typedef struct {
     bool shares; /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
     bool alone;  /* the next window has no neighbour before it */
     uint8_t stage;
-    uint8_t part; /* of a column's stages */
+    uint8_t phase; /* of a column's stages */
     uint8_t kind;
-    uint8_t theta;                    /* first one of the kind */
-    uint8_t used;                     /* kinds whose rows have been added */
-    uint8_t live;                     /* nuisances of the kind that are projected out */
-    uint8_t iteration;                /* solves done for this window */
-    uint16_t index;                   /* within the stage */
-    uint16_t term;                    /* next one of the kind */
-    pvid_reason reason;               /* of the last solve, then of the window */
-    float size;                       /* of the last step, relative */
-    float rss;                        /* of the kind's rows before the steps */
-    float expected;                   /* sum over the kinds of the rows' variance by the sensors alone */
-    float free;                       /* rows less nuisances of the kinds that were added */
-    float square;                     /* sum of squares of their residuals before the steps */
-    float own[PVID_MAX_COLUMNS];      /* square of each nuisance before projection, then inverse of what remains */
-    float pull[PVID_MAX_THETA];       /* g: what the sensors' noise takes from B */
-    float score[PVID_MAX_THETA];      /* sum N e + g of the window */
-    float sum[2][PVID_MAX_HARMONICS]; /* of the present column, real and imaginary parts */
-    float row[PVID_FOURIER_ROWS];     /* e of the kind's rows */
-    float column[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS]; /* white rows: theta's, Y, nuisances */
+    uint8_t theta;                      /* first one of the kind */
+    uint8_t used;                       /* kinds whose rows have been added */
+    uint8_t live;                       /* nuisances of the kind that are projected out */
+    uint8_t iteration;                  /* solves done for this window */
+    uint8_t other;                      /* column of the next product */
+    uint16_t index;                     /* within the stage */
+    uint16_t term;                      /* next one of the kind */
+    uint16_t moment;                    /* next one of the kind */
+    pvid_reason reason;                 /* of the last solve, then of the window */
+    float size;                         /* of the last step, relative */
+    float rss;                          /* of the kind's rows before the steps */
+    float expected;                     /* sum over the kinds of the rows' variance by the sensors alone */
+    float free;                         /* rows less nuisances of the kinds that were added */
+    float square;                       /* sum of squares of their residuals before the steps */
+    float own[PVID_MAX_COLUMNS];        /* square of each nuisance before projection, then inverse of what remains; then
+                                           squares of theta's columns */
+    float pull[PVID_MAX_THETA];         /* g: what the sensors' noise takes from B */
+    float score[PVID_MAX_THETA];        /* sum N e + g of the window */
+    float gradient[PVID_MAX_THETA];     /* sum N e of the kind */
+    float part[PVID_FOURIER_PARTS];     /* of a direction, then of the present column */
+    float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of the directions */
+    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
     pvid_gate_f32 gate[PVID_MAX_KINDS];
     pvid_fourier_white_f32 white;
     pvid_fourier_scores_f32 scores;
@@ -143,11 +152,12 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
-    uint8_t rest;      /* reason of a tick that only adds its samples; BUSY: harmonics are to be added or joined, or a
-                          window is being processed */
-    bool warm;         /* a window has been complete since the restart */
-    bool frozen;       /* complete windows are dropped */
+    uint8_t plain; /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;  /* reason of a tick that only adds its samples; FORM: the channels of a step are due; BUSY: harmonics
+                      are to be added or joined, or a window is being processed */
+    bool warm;     /* a window has been complete since the restart */
+    bool frozen;   /* complete windows are dropped */
+    bool watches;  /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;

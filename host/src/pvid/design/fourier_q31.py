@@ -7,13 +7,14 @@ quantity gets the finest format in which its bound fits its type, so that no sum
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.settings.fourier import NONE, FourierChannel, FourierDesign32, FourierJet, Source
+from pvid.settings.fourier import NONE, FourierChannel, FourierDesign32, FourierJet, FourierSignal, Source
 from pvid.settings.fourier_q31 import (
     FourierDesignQ31,
     FourierFilterQ31,
@@ -83,6 +84,15 @@ class _Margins(dict[str, float]):
         if spare < 0:
             raise PvidError(f"the fixed-point weak form cannot hold {name}: {-spare:.2f} bits are missing")
         self[name] = min(spare, self.get(name, spare))
+
+
+def most_counts(signals: Sequence[FourierSignal], samples: int, decimation: int) -> list[int]:
+    """Largest full scale of each sample whose block sums fit a word [samples]."""
+    found = [2**24] * samples
+    for one in signals:
+        room = math.floor((2**31 - 1) / (_REACH[one.source] * decimation**2))
+        found[one.sample] = min(found[one.sample], room)
+    return found
 
 
 def shift_to(most: float, bits: float) -> int:
@@ -277,7 +287,7 @@ class _Channels:
         return size / 2.0**self.sum_shift + self.hop
 
     def format(self, k: int) -> FourierFormatQ31:
-        """Its shifts; the sums with shifted integrals fit 31 bits."""
+        """Its shifts; the sums with shifted integrals fit 30 bits."""
         one = self.model.channel[k]
         value, own = self.value(k), 0
         while True:
@@ -290,8 +300,8 @@ class _Channels:
                 once, twice = self.integral[one.integrand] if one.integrand != NONE else (0, 0)
                 ramp = twice - once + value + own - self.value(one.ramp)
                 total += self.edge(one, 1) * self.half_sum(one.ramp) / 2.0**ramp + 1
-            if plain >= 0 and ramp >= 0 and total < 2**31 - 1:
-                self.margins.take("the sums of a window", total, 31)
+            if plain >= 0 and ramp >= 0 and total < 2**30:
+                self.margins.take("the sums of a window", total, 30)
                 return FourierFormatQ31(value, own, plain, ramp)
             own += 1
 

@@ -13,6 +13,7 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
 from pvid.models.mechanisms import compiled_of
+from pvid.models.registry import MODELS
 from pvid.oracle.fourier.identify import Identified, given
 from pvid.oracle.fourier.identify import identify as identified_by
 from pvid.oracle.fourier.weights import Weights
@@ -70,6 +71,7 @@ class MechanismAnswer:
             "warning": found.verdict.warning,
             "reasons": {one.name: one.text for one in found.verdict.reasons},
             "parameters": parameters,
+            **own_keys(self.model, parameters),
             "chi2": found.chi2,
             "r2": found.r2,
             "window_s": found.design.window_s,
@@ -81,6 +83,12 @@ class MechanismAnswer:
             "core": "f64",
             "form": "weak",
         }
+
+
+def own_keys(model: CompiledModel, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters that are keys of the object of `identify --json` themselves: of the pendulum."""
+    own = MODELS.get(model.name)
+    return {} if own is None else {one.name: parameters[one.name] for one in own.answers if one.name in parameters}
 
 
 def model_of(rig: MechanismRig) -> CompiledModel:

@@ -89,9 +89,8 @@ class FourierTwin:
         design = self.design = config.design
         model = design.model
         functions = _F(design.functions) * _F(model.kinds)
-        rows = _F(design.functions + design.power) * _F(model.kinds)
         nuisances = _F(sum(one.nuisances for one in model.kind))
-        weight = (functions - nuisances) / rows
+        weight = (functions - nuisances) / functions
         rate = _F(config.sample_rate) / (_F(design.decimation) * _F(design.hop))
         lanes = [
             replace(e, row_weight=float(weight), correlation=design.overlap) for e in estimators or [config.estimator]

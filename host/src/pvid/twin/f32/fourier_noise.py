@@ -19,7 +19,7 @@ def shares(white: White) -> Float32:
     """Q_j of a kind's rows, at most [powers, lanes]."""
     rows = white.rows
     share = np.zeros((rows.powers, white.scale.shape[1]), np.float32)
-    sines = rows.count - rows.cosines
+    sines = rows.parts - rows.cosines
     for h, scale in enumerate(white.scale):
         parts = _F(2) * _F(rows.design.hop) if h <= sines else _F(rows.design.hop)
         weight = parts * (scale * scale)
