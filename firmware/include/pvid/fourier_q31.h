@@ -118,8 +118,8 @@ typedef struct {
     const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
     const pvid_fourier_filter_q31 *filter; /* [jets] */
     const pvid_fourier_rescale_q31 *run;   /* [runs] from twice the sum over the steps to the input of `values` */
-    const int32_t *sign_width;             /* [signs] of the soft sign, in the format of its argument; 0: the mean of
-                                              sgn over a step */
+    const int32_t *sign_width;             /* [signs] of the soft sign tanh(v / width), in the format of its argument;
+                                              0: the mean of sgn over a step */
     const pvid_fourier_integral_q31 *integral; /* [integrands] */
     const pvid_fourier_format_q31 *format;     /* [channels] */
     const PVID_TABLE int16_t *circle;          /* [2 hop] 32767 cos(pi j / hop) */
