@@ -398,10 +398,10 @@ def engine_design(folder: Path) -> None:
     sys.path.insert(0, str(ROOT / "tests" / "twin"))
     from fourier_q31 import rig
 
-    from pvid.codegen.files_fourier_q31 import source
+    from pvid.codegen.files_fourier_q31 import together
 
     one = rig("kapitza", 3000)
-    text = source(one.fixed, one.parameters, one.design, "engine")
+    text = together(one.fixed, one.parameters, one.design, "engine")
     reach = re.search(r"limits\[\d+\] = (\{[^}]*\})", text)
     assert reach is not None, "the generated function refuses no input"
     lines = [text, f"static const int32_t engine_reach[] = {reach[1]};", ""]
