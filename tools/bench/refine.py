@@ -1,4 +1,4 @@
-"""The refinement in C behind the pendulum's own weak form: errors beside the Cramer-Rao bound, standard errors, seconds."""
+"""The refinement in C behind the pendulum's own weak form: errors, standard errors, seconds, beside the bound."""
 
 from __future__ import annotations
 
@@ -87,9 +87,7 @@ def _angle(case: Case, change: Float) -> Float:
         damping2=case.damping[1] + change[4] * L1**2,
     )
     release = (STANDARD_RELEASE[0] * scale + change[7], STANDARD_RELEASE[1] * scale + change[8])
-    state = simulate(
-        pendulum, sensors=Sensors(), truth="full", release=release, duration=case.duration
-    ).state
+    state = simulate(pendulum, sensors=Sensors(), truth="full", release=release, duration=case.duration).state
     return np.asarray(state[:, 1] - state[:, 0] + change[6])
 
 
@@ -100,7 +98,9 @@ def bound_of(case: Case) -> Float:
     The start's rates are left out; that of the skew is the angle's own rate.
     """
     exact = _angle(case, np.zeros(len(_STEPS)))
-    columns = [(_angle(case, step * unit) - exact) / step for step, unit in zip(_STEPS, np.eye(len(_STEPS)), strict=True)]
+    columns = [
+        (_angle(case, step * unit) - exact) / step for step, unit in zip(_STEPS, np.eye(len(_STEPS)), strict=True)
+    ]
     columns[5] = np.gradient(exact, 1 / RATE_HZ)
     jacobian = np.stack(columns, axis=1)
     covariance = np.linalg.inv(jacobian.T @ jacobian) * sample_sd(case.bits) ** 2
