@@ -76,6 +76,7 @@ typedef struct {
 extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
 
 /* State: detail/estimator_state.h, not API. Only the functions below write to it. */
+typedef struct pvid_estimator_f32 pvid_estimator_f32;
 typedef struct pvid_estimator_solve_f32 pvid_estimator_solve_f32;
 
 /* An estimate; all numbers are finite. */

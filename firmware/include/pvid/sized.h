@@ -161,6 +161,10 @@
 /* strong.h */
 #define pvid_strong_init_f32 PVID_SIZED(pvid_strong_init_f32)
 #define pvid_strong_step_f32 PVID_SIZED(pvid_strong_step_f32)
+#define pvid_strong_row_step_f32 PVID_SIZED(pvid_strong_row_step_f32)
+#define pvid_strong_assess_f32 PVID_SIZED(pvid_strong_assess_f32)
+#define pvid_strong_read_sums_f32 PVID_SIZED(pvid_strong_read_sums_f32)
+#define pvid_fnv_strong_f32 PVID_SIZED(pvid_fnv_strong_f32)
 #define pvid_strong_gap_f32 PVID_SIZED(pvid_strong_gap_f32)
 #define pvid_strong_freeze_f32 PVID_SIZED(pvid_strong_freeze_f32)
 

@@ -41,7 +41,7 @@ typedef enum {
     PVID_BAD_GATE_PATIENCE, /* not finite or outside 0..1e12 s */
     PVID_BAD_DEAD_ZONE,     /* not finite or outside 0..100 */
     PVID_BAD_HALF,          /* of a bank: below 2, or a window over PVID_MAX_WINDOW for every stride */
-    PVID_BAD_STRIDE,        /* of a bank: 0, or a window over PVID_MAX_WINDOW */
+    PVID_BAD_STRIDE,        /* of a bank: 0, or a window with its block over PVID_MAX_WINDOW */
     PVID_BAD_CENTRE,        /* of a q31 bank: outside 1..2^30 */
     PVID_BAD_TAPS,          /* of a design: even, or outside 5..PVID_MAX_TAPS */
     PVID_BAD_DECIMATION,    /* of a design: outside 1..PVID_MAX_DECIMATION */
