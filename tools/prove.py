@@ -253,6 +253,7 @@ PROOFS = (
             *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
         ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
+        taken=("pvid_square_root_q31",),
     ),
     Proof(
         "fingerprint_q31",
@@ -393,7 +394,7 @@ def unexplained(proof: Proof, said: str) -> list[str]:
 
 
 def engine_design(folder: Path) -> None:
-    """Writes engine_design_q31.h: generated functions and tables of the pendulum's shipped rig, the reach of its jets."""
+    """Writes engine_design_q31.h: functions and tables of the pendulum's shipped rig, the reach of its jets."""
     from pvid.codegen import files_fourier_q31
     from pvid.models.mechanisms import compiled_of
     from pvid.run.engine_design_q31 import engine_for_simulated_rig
