@@ -1,4 +1,4 @@
-"""The fixed-point weak engine of described mechanisms on emulated boards: the bits of the twin after every 500 ticks."""
+"""The fixed-point weak engine of described mechanisms on emulated boards: the bits of the twin."""
 
 from __future__ import annotations
 

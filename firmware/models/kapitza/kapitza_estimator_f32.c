@@ -106,7 +106,7 @@ static PVID_SELDOM void add_residuals(const pvid_strong_estimator_f32 *self, pvi
         squares += e * e;
     }
     residual->rss = (yy + residual->rss) + squares;
-    residual->floor = RESIDUAL_FLOOR * (yy + squares);
+    residual->floor = RESIDUAL_FLOOR * yy;
     residual->weight = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_WEIGHT) + (float)self->in_block;
 }
 

@@ -148,7 +148,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->channels = summed_channels(design->model);
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_fourier_front_init_f32(&self->front, design, config->sample_rate_hz);
-    pvid_fourier_step_init_f32(&self->history, design->model, self->channels,
+    pvid_fourier_step_init_f32(&self->history,
                                (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
     self->watches = (config->range != NULL) || (config->drive_min != NULL);
@@ -226,8 +226,7 @@ PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[]
     const uint16_t index = self->sums.index;
     const size_t half = self->sums.half;
     pvid_reason dropped = PVID_ACCUMULATED;
-    if (pvid_fourier_step_take_f32(&self->history, design, self->channels, self->dt, self->front.jet, index,
-                                   pvid_fourier_sums_place_f32(&self->sums))) {
+    if (pvid_fourier_step_take_f32(&self->history, design, self->dt, index, pvid_fourier_sums_place_f32(&self->sums))) {
         if (self->watches) {
             pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
         }
@@ -282,7 +281,8 @@ PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
 PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sample[])
 {
     const uint8_t decimation = self->front.decimation;
-    const bool steps = pvid_fourier_front_step_f32(&self->front, self->design);
+    const bool steps =
+        pvid_fourier_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
     if (steps && (decimation >= PVID_FOURIER_TWO_TICKS)) {
         self->rest = FORM;
         return idle(self);

@@ -177,7 +177,7 @@ static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order,
     return (order == 0u) ? (centre + sum) : sum;
 }
 
-bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
+bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[])
 {
     const pvid_fourier_model_f32 *model = design->model;
     const size_t signals = self->signals;
@@ -205,7 +205,7 @@ bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourie
     }
     const float *centre = &outputs[((size_t)self->head + self->half) * signals];
     for (size_t i = 0; i < model->jets; i++) {
-        self->jet[i] = jet_of(&design->compensator[i], model->jet[i].order, &centre[model->jet[i].signal], signals);
+        jet[i] = jet_of(&design->compensator[i], model->jet[i].order, &centre[model->jet[i].signal], signals);
     }
     return true;
 }

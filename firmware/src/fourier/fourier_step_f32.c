@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 /* Signs need the arguments of both neighbours, and an integral the next step's integrand. So with the jets of step k
@@ -18,15 +19,9 @@
 
 #include "pvid/elementary.h"
 
-void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model, size_t channels,
-                                float lead)
+void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, float lead)
 {
     self->lead = lead;
-    for (size_t c = 0; c < channels; c++) {
-        const pvid_fourier_channel *one = &model->channel[c];
-        const size_t first = (one->integrand == PVID_FOURIER_NONE) ? 0u : (2u + (2u * (size_t)one->integrand));
-        self->factor_of[c] = (uint8_t)((one->fold == 0u) ? 0u : (first + one->fold));
-    }
     pvid_fourier_step_reset_f32(self);
 }
 
@@ -84,7 +79,7 @@ static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float d
     const float half = 0.5f * dt;
     const float end = (dt * dt) / 12.0f;
     const size_t known = self->known;
-    float *integral = &self->factor[2];
+    float *integral = self->integral;
     for (size_t i = 0; i < integrands; i++) {
         const float last = self->f[0][i];
         const float f = now[i];
@@ -110,51 +105,28 @@ static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float d
     }
 }
 
-/* Values of the channels at a step with these gains. */
-static inline void find_channels(const pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model,
-                                 size_t channels, const float gain[], float channel[])
-{
-    const pvid_fourier_channel *one = model->channel;
-    const uint8_t *factor_of = self->factor_of;
-    for (size_t c = 0; c < channels; c++) {
-        if (one->gain != PVID_FOURIER_NONE) {
-            const size_t place = factor_of[c];
-            const float value = gain[one->gain];
-            channel[c] = (place > 0u) ? (value * self->factor[place - 1u]) : value;
-        }
-        one++;
-    }
-}
-
-static inline void copy(size_t n, const float *restrict from, float *restrict to)
-{
-    for (size_t i = 0; i < n; i++) {
-        to[i] = from[i];
-    }
-}
-
-bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                                float dt, const float jet[], uint16_t index, float channel[])
+bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, float dt,
+                                uint16_t index, float channel[])
 {
     const pvid_fourier_model_f32 *model = design->model;
     float arguments[PVID_MAX_INPUTS] = {0.0f}; /* of the newest step: derivatives of the runs, then arguments of sgn */
     const float *v = &arguments[model->runs];
     const bool complete = self->known > 1u;
+    float *newest = self->inputs[self->newest];
+    self->newest ^= 1u;
+    float *before = self->inputs[self->newest];
     if (model->prepare != NULL) {
-        model->prepare(jet, arguments);
+        model->prepare(newest, arguments);
     }
     if (self->known > 0u) {
-        find_signs(self, design, v, &self->now[model->jets + model->runs]);
+        find_signs(self, design, v, &before[model->jets + model->runs]);
         const float *now = self->out[self->latest];
         self->latest ^= 1u;
         float *next = self->out[self->latest];
-        model->values(self->now, next);
+        model->values(before, next);
         if (complete) {
             integrate(self, model->integrands, dt, index == 0u, &now[model->gains], &next[model->gains]);
-            const float t = dt * (float)index;
-            self->factor[0] = t;
-            self->factor[1] = 0.5f * (t * t);
-            find_channels(self, model, channels, now, channel);
+            model->form(now, self->integral, dt * (float)index, channel);
         }
         move_runs(self, model->runs, 0.5f * dt, arguments);
     } else if (!self->ran) {
@@ -165,11 +137,14 @@ bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fouri
     } else {
         /* a gap: the runs stay */
     }
-    copy(model->signs, self->v[0], self->v[1]);
-    copy(model->signs, v, self->v[0]);
-    copy(model->runs, arguments, self->rate);
-    copy(model->jets, jet, self->now);
-    copy(model->runs, self->run, &self->now[model->jets]);
+    for (size_t i = 0; i < model->signs; i++) {
+        self->v[1][i] = self->v[0][i];
+        self->v[0][i] = v[i];
+    }
+    for (size_t i = 0; i < model->runs; i++) {
+        self->rate[i] = arguments[i];
+        newest[model->jets + i] = self->run[i];
+    }
     self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
     return complete;
 }

@@ -22,7 +22,6 @@ typedef struct {
     float ticks;                       /* D */
     float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
-    float jet[PVID_MAX_INPUTS];        /* of the newest step */
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
@@ -30,23 +29,21 @@ typedef struct {
 
 /* From the jets of a step to the values of its channels, two steps later. */
 typedef struct {
-    uint8_t known;                   /* steps since the restart, 0..4 */
-    uint8_t latest;                  /* place in `out` of the step before the last one */
-    bool ran;                        /* the runs have begun */
-    float lead;                      /* from a run's first sample to its first step [s] */
-    float now[PVID_MAX_INPUTS];      /* inputs of `values` at the last step but the newest */
-    float rate[PVID_MAX_INTEGRANDS]; /* derivatives of the runs there */
-    float v[2][PVID_MAX_INTEGRANDS]; /* arguments of sgn at that step and the one before it */
-    float run[PVID_MAX_INTEGRANDS];  /* integrals since the start of the run, and what rounding took off */
+    uint8_t known;  /* steps since the restart, 0..4 */
+    uint8_t latest; /* place in `out` of the step before the last one */
+    bool ran;       /* the runs have begun */
+    float lead;     /* from a run's first sample to its first step [s] */
+    uint8_t newest; /* place in `inputs` of the newest step; the other is of the last step before it */
+    float inputs[2][PVID_MAX_INPUTS]; /* of `values` */
+    float rate[PVID_MAX_INTEGRANDS];  /* derivatives of the runs there */
+    float v[2][PVID_MAX_INTEGRANDS];  /* arguments of sgn at that step and the one before it */
+    float run[PVID_MAX_INTEGRANDS];   /* integrals since the start of the run, and what rounding took off */
     float run_low[PVID_MAX_INTEGRANDS];
     float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
                                                               the next ones */
-    float f[2][PVID_MAX_INTEGRANDS];               /* integrands at the two steps before that one, latest first */
-    uint8_t factor_of[PVID_MAX_CHANNELS];          /* what a channel's gain is multiplied by: 0 nothing, else one behind
-                                                      its place in `factor` */
-    float factor[2u + (2u * PVID_MAX_INTEGRANDS)]; /* t and t^2/2 since the start of the half, then I^1 and I^2 of each
-                                                      integrand */
-    float edge[2][PVID_MAX_INTEGRANDS];            /* I^1 and I^2 of the half before, at its end */
+    float f[2][PVID_MAX_INTEGRANDS];         /* integrands at the two steps before that one, latest first */
+    float integral[2 * PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of each since the start of the half */
+    float edge[2][PVID_MAX_INTEGRANDS];      /* I^1 and I^2 of the half before, at its end */
 } pvid_fourier_history_f32;
 
 /* What a half window has seen of a sample. */

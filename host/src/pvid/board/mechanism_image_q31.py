@@ -13,9 +13,9 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with
 from pvid.board.replay_image import REPORT_EVERY
-from pvid.codegen import files_fourier_q31
 from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.models import mechanisms
+from pvid.run import engine_files_q31
 from pvid.run.engine_design import simulated_run_of
 from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.setup.fourier_sizes import sizes_of_q31
@@ -134,13 +134,7 @@ def header(run: FixedRun) -> str:
 
 def files_of(run: FixedRun) -> dict[str, str]:
     """What the image consists of besides the core: name -> text."""
-    engine = run.engine
-    return {
-        f"{run.name}_weak_q31.h": files_fourier_q31.header(engine.made, run.sizes, MADE_BY),
-        f"{run.name}_weak_q31.c": files_fourier_q31.source(engine.made, engine.parameters, MADE_BY),
-        f"{run.name}_design_q31.h": files_fourier_q31.design_header(engine.config, run.name, run.sizes, MADE_BY, []),
-        "replay_run.h": header(run),
-    }
+    return engine_files_q31.files_of(run.engine, MADE_BY) | {"replay_run.h": header(run)}
 
 
 def build_fixed_image(target: Board, run: FixedRun) -> tuple[Path, Path]:

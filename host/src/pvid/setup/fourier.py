@@ -87,9 +87,13 @@ def design_tables(
 
 def with_soft_signs(config: FourierConfig, widths: Mapping[str, float]) -> FourierConfig:
     """The settings with soft signs v / (|v| + width) of some arguments, as in phi_1; the others keep theirs."""
-    design = config.design
+    return replace(config, design=with_soft_widths(config.design, widths))
+
+
+def with_soft_widths(design: FourierDesign32, widths: Mapping[str, float]) -> FourierDesign32:
+    """The same of a design."""
     width = [widths.get(name, float(own)) for name, own in zip(design.model.sign_names, design.sign_width, strict=True)]
-    return replace(config, design=replace(design, sign_width=_as_float32(width)))
+    return replace(design, sign_width=_as_float32(width))
 
 
 def _check(design: FourierDesign, rows: WeakRows) -> None:

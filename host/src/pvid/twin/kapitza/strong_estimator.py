@@ -181,7 +181,7 @@ class StrongEstimator(Estimator):
             squares = np.where(self.in_block > i, squares + e * e, squares)
         yy = values[model.YY]
         weight = values[model.WEIGHT] + self.in_block.astype(np.float32)
-        return (yy + rss) + squares, RESIDUAL_FLOOR * (yy + squares), weight
+        return (yy + rss) + squares, RESIDUAL_FLOOR * yy, weight
 
     def _every_row(self, taken: Mask, g: Float32, e: Float32, reason: Reasons) -> None:
         if not taken.any():
