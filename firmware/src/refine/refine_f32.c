@@ -209,7 +209,7 @@ static void end_block(pvid_refine_f32 *self)
     self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
     if (taken) {
         take(self, square);
-        self->verdict = PVID_UPDATED;
+        self->verdict = (self->taken > 1u) ? PVID_UPDATED : PVID_HELD_UNCERTAIN; /* one block proves little */
     } else {
         self->verdict = (self->taken > 0u) ? PVID_HELD_BLOCK : PVID_HELD_SEARCHING;
         refuse(self, self->sane);

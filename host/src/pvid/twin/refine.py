@@ -202,7 +202,7 @@ class RefineTwin:
         self.begin += self.work.step * BIG_STEP
         if taken:
             self._take(square)
-            self.verdict = Reason.UPDATED
+            self.verdict = Reason.UPDATED if self.taken > 1 else Reason.HELD_UNCERTAIN
         else:
             self.verdict = Reason.HELD_BLOCK if self.taken > 0 else Reason.HELD_SEARCHING
             self._refuse()
