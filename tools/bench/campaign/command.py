@@ -21,6 +21,7 @@ _WIDTH = 220  # of tables that go into a file
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of the rigs.")
 @click.option("--core", default="f32", show_default=True, type=click.Choice(["f32", "q31", "f64"]), help="Identifier.")
 @click.option("--tune", "tuned", is_flag=True, help="Each run is tuned before it is identified.")
+@click.option("--refine", is_flag=True, help="Each answer is refined, as `identify --refine` does.")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a running dask.distributed, as tcp://host:8786.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine.  [default: its processors]")
 @click.option("--cache", type=click.Path(path_type=Path), help="Folder that keeps the simulated runs.")
@@ -32,6 +33,7 @@ def campaign(
     seed: int,
     core: str,
     tuned: bool,
+    refine: bool,
     scheduler: str | None,
     workers: int | None,
     cache: Path | None,
@@ -56,7 +58,7 @@ def campaign(
             raise PvidError(f"--by {name}: not a property; there are {', '.join(table.PROPERTIES)}")
     population = shipped() if population_path is None else load(population_path)
     kept = None if cache is None else cache.resolve()
-    task = Campaign(population, rigs, seed, cast(Core, core), tuned, kept)
+    task = Campaign(population, rigs, seed, cast(Core, core), tuned, refine, kept)
     store = Store(out, task.key)
     begun = sum(rig < rigs for rig in store.records)
     if begun:

@@ -14,6 +14,7 @@ from pvid.core.native import Native
 from pvid.models.kapitza import MODEL
 from pvid.rig.file import Core, RigFile
 from pvid.run.identify import Identification, Publications, identify
+from pvid.run.refined_identify import refined_identification
 
 Float = npt.NDArray[np.float64]
 
@@ -75,16 +76,20 @@ class Judgement:
 
 
 def identify_rig(
-    native: Native, simulated: SimulatedRig, core: Core = "f32", *, tuned: bool = False
+    native: Native, simulated: SimulatedRig, core: Core = "f32", *, tuned: bool = False, refine: bool = False
 ) -> tuple[Record, Identification | None]:
-    """Identifies a rig as `pvid identify` (and, before it, `pvid tune`) does; the record of `judge`, and the answer.
+    """Identifies a rig as `pvid identify` does, with `pvid tune` before it and --refine where they are asked for; the
+    record of `judge`, and the answer.
 
     A crash is no refusal: it is recorded as one, with its exception as the reason.
     """
     file = replace(simulated.file, identifier=replace(simulated.file.identifier, core=core))
     began = time.perf_counter()
     try:
-        result = identify(simulated.run, _tuned(native, simulated, file) if tuned else file, native)
+        used = _tuned(native, simulated, file) if tuned else file
+        result = identify(simulated.run, used, native)
+        if refine:
+            result = refined_identification(simulated.run, used, result)
     except PvidError as error:
         return judge(simulated, None, refusal=str(error), seconds=time.perf_counter() - began), None
     except Exception as error:  # one rig must not end the campaign, nor be taken for a refusal

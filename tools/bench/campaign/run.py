@@ -28,7 +28,7 @@ _WORKERS_S = 30  # until a running scheduler must have a worker
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is run: rigs 0 to `rigs` - 1 of a seed, identified by a core, tuned before or not.
+    """What is run: rigs 0 to `rigs` - 1 of a seed, identified by a core, tuned before or not, refined or not.
 
     `cache`: a folder that keeps the simulated runs; None: they are simulated anew.
     """
@@ -38,12 +38,22 @@ class Campaign:
     seed: int = 1
     core: Core = "f32"
     tuned: bool = False
+    refine: bool = False
     cache: Path | None = None
 
     @property
     def key(self) -> str:
         """What a record depends on beside the rig's index: population, settings, code."""
-        parts = (self.population.hash, GENERATOR, self.seed, self.core, self.tuned, code_version(), core_version())
+        parts = (
+            self.population.hash,
+            GENERATOR,
+            self.seed,
+            self.core,
+            self.tuned,
+            self.refine,
+            code_version(),
+            core_version(),
+        )
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
@@ -101,7 +111,7 @@ def _work(rig: int, *, campaign: Campaign, code: str) -> Record:
         simulated = simulate_rig(native, campaign.population, campaign.seed, rig)
     else:
         simulated = kept_rig(native, campaign.population, campaign.seed, rig, campaign.cache)
-    return identify_rig(native, simulated, campaign.core, tuned=campaign.tuned)[0]
+    return identify_rig(native, simulated, campaign.core, tuned=campaign.tuned, refine=campaign.refine)[0]
 
 
 @lru_cache(maxsize=1)
