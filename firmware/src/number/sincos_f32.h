@@ -21,8 +21,7 @@ PVID_ALWAYS_INLINE void pvid_sincos_f32(float x, float *sine, float *cosine)
     }
     const float z = r * r;
     const float s = r + ((r * z) * (-1.66666546e-1f + (z * (8.33216087e-3f - (z * 1.95152959e-4f)))));
-    const float c =
-        1.0f + (z * (-0.5f + (z * (4.16666456e-2f + (z * (-1.38873163e-3f + (z * 2.44331571e-5f)))))));
+    const float c = 1.0f + (z * (-0.5f + (z * (4.16666456e-2f + (z * (-1.38873163e-3f + (z * 2.44331571e-5f)))))));
     const float a = ((quarter & 1u) != 0u) ? c : s;
     const float b = ((quarter & 1u) != 0u) ? -s : c;
     *sine = ((quarter & 2u) != 0u) ? -a : a;

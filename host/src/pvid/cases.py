@@ -86,6 +86,11 @@ class Case(ABC):
         """Form and core as a frame numbers them."""
         return frames.Form[self.form.upper()], frames.Core[self.core.upper()]
 
+    @property
+    def hash_function(self) -> str:
+        """The function in C that continues the running hash over the estimator."""
+        return f"pvid_fnv_{'strong' if (self.form, self.core) == ('strong', 'f32') else 'estimator'}_{self.core}"
+
     # ---- settings
 
     @abstractmethod
@@ -123,7 +128,7 @@ class Case(ABC):
         exact: the smallest sizes that suffice, for a board with little memory.
         """
         if self.form == "strong":
-            return {"PVID_MAX_WINDOW": str(max(config.bank.window, 5))}
+            return {"PVID_MAX_WINDOW": str(max(config.bank.memory, 5))}
         design = config.design
         bounds = raised_bounds(design)
         if exact:

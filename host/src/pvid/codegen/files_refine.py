@@ -103,6 +103,7 @@ def shape(made: RefineFunctions, command: str) -> str:
         ("INPUTS", len(made.inputs), "entries of u"),
         ("OUTPUTS", len(made.outputs), "entries of z, which are measured"),
         ("OUTPUT_RATES", int(rates), "1: an output depends on v"),
+        ("OUTPUT_LINEAR", int(_is_linear(made)), "1: the derivatives of the outputs are constants"),
         ("MOVING", made.moving, "first entries of r: they change the motion"),
         ("PARAMETERS", len(made.parameters), "entries of r"),
         ("CONSTANTS", len(made.constants), "that the equations need of r"),
@@ -167,6 +168,12 @@ def _check_outputs(made: RefineFunctions) -> None:
                     f"{made.model.name}: {made.parameters[k].name} changes the motion and is in {made.outputs[row]} "
                     "too, which the refinement in C does not have: make what is measured a coordinate"
                 )
+
+
+def _is_linear(made: RefineFunctions) -> bool:
+    """Whether the derivatives of the outputs are constants."""
+    program = made.functions["output_jacobian"].program
+    return all(isinstance(program.values[place], Literal) for place in program.results)
 
 
 def _is_nonzero(made: RefineFunctions, key: str) -> list[bool]:

@@ -30,6 +30,9 @@ class Signal:
     hold : "zoh": the value set at t_k holds until t_(k+1); "sampled": the value at t_k
     driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
     gain_sd : relative standard deviation of its gain; part of the standard errors, because a run seldom shows it
+    neglected
+        the equations are linearised: their relative error is up to this many times the square of the signal, from its
+        mean; part of the standard errors [1/unit^2]
     """
 
     jet: Jet
@@ -41,6 +44,7 @@ class Signal:
     hold: Literal["zoh", "sampled"] = "sampled"
     driven: bool = False
     gain_sd: float = 0.0
+    neglected: float = 0.0
 
     @property
     def name(self) -> str:

@@ -56,6 +56,7 @@ class Model:
         reach: float = 1.0,
         driven: bool = False,
         gain_sd: float | None = None,
+        neglected: float = 0.0,
     ) -> Jet:
         """A measured signal.
 
@@ -66,9 +67,14 @@ class Model:
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
         gain_sd : relative standard deviation of its gain, which most runs do not show; 0.01 if it is driven, else 0
+        neglected
+            of equations for small values: relative error over the square of the signal, from its mean [1/unit^2]; part
+            of the standard errors
         """
         if resolution < 0 or not math.isfinite(resolution):
             raise self._refused(f"{name}: resolution must not be negative")
+        if not 0 <= neglected < math.inf:
+            raise self._refused(f"{name}: neglected must be a number of at least 0, not {neglected}")
         if noise is None and resolution == 0:
             raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
         level = 0.5 if noise is None else noise
@@ -84,6 +90,7 @@ class Model:
                 float(reach),
                 driven=driven,
                 gain_sd=gain,
+                neglected=float(neglected),
             )
         )
         return jet

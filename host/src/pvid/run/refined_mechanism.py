@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.refine import LOG_SD, signs_of, width_name
+from pvid.codegen.refine import LOG_SD, has_skew, signs_of, width_name
 from pvid.model.compiled import CompiledModel
 from pvid.run.mechanism import MechanismAnswer, gains_of, values_of
 from pvid.run.refined import Measured, Prior, Problem, Refined, refined, without_outliers
@@ -112,6 +112,8 @@ def refine_mechanism(
     block_s : length of a block [s]
     widths : of signs, by argument; from the sampling by default
     """
+    if has_skew(model):
+        raise PvidError(f"{model.name} is refined from its own weak form: omit --form and --model")
     problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
     sd = np.array([LOG_SD if one.log else one.prior_sd for one in problem.kernel.made.parameters])
     prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), np.ones(problem.n, bool))

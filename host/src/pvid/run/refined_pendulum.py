@@ -12,6 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.refine import LOG_SD
 from pvid.design.second_derivative import second_derivative
 from pvid.models.mechanisms import compiled_of
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.oracle.weak import sample_sd
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -31,7 +32,7 @@ _SD = {"k1": 0.5, "k2": 0.5, "tau": 5e-3, "c": 1.0, "f1": 1.0, "f2": 1.0, "slant
 _SAME = 0.02  # two searches agree: relative difference of all parameters
 _SIGN_COARSE = 8  # steps in a smooth one where dry friction may reverse
 _WIDTH = 0.02  # of the sign of a dry friction: share of the joint's speed, over the steps
-_FIRST = ("w", "d1", "d2", "c")
+_FIRST = tuple(one.name for one in MODELS[DEFAULT].published)
 _OPTIONS = (("slant",), ("f1", "f2"), ("slant", "f1", "f2"))
 _OPTION_PASSES = 10
 _SHORTER = (0.5, 0.25)  # of a block: tried where the residuals are larger than the sensors' noise
@@ -101,7 +102,7 @@ class _Search:
             inputs = _inputs(*self._track, rate, sub, self.samples)
             phi, grown = averages(self.run.phi[self.first :][: self.samples * self.mean], self.mean)
             sd = np.array([sample_sd(self.rig.sensor.phi_lsb, 0.5) / np.sqrt(self.mean)])
-            kernel = kernel_of(compiled_of("kapitza"), optional)
+            kernel = kernel_of(compiled_of(DEFAULT), optional)
             self._problems[optional] = Problem(kernel, Measured(phi[:, None], sd, inputs, rate, sub, grown, coarse))
         return self._problems[optional]
 
