@@ -61,7 +61,6 @@ def test_data_that_say_nothing_have_an_answer_without_parameters() -> None:
         ({"t": [0, 1], "phi": ["a", "b"], "y": [0, 1]}, {"l1": 0.3}, "column phi: real numbers are wanted"),
         ({"t": np.arange(9) / 1e3, "phi": np.zeros(8), "y": np.zeros(9)}, {"l1": 0.3}, "have"),
         ("nowhere.csv", {"l1": 0.3}, "nowhere.csv does not exist"),
-        ({"t": [0, 1]}, {"model": "dc_motor", "core": "q31"}, "identified in float64"),
     ],
 )
 def test_bad_input_is_one_sentence(data: object, keys: dict[str, object], sentence: str) -> None:
@@ -76,6 +75,8 @@ def test_a_mechanism_of_the_list_is_identified(tmp_path: Path) -> None:
     result = pvid.identify(path)
     assert result.identified and {"R", "L", "k", "J", "b"} <= set(result.parameters)
     assert result.plot(tmp_path / "motor.png").exists()
+    in_c = pvid.identify(path, core="f32")
+    assert in_c.identified and in_c.details["core"] == "f32" and in_c["R"].value == pytest.approx(1.2, rel=1e-3)
 
 
 def test_the_estimator_takes_a_model_of_ones_own() -> None:

@@ -165,8 +165,6 @@ def test_the_pendulum_s_own_rig_file_goes_through_the_engine(tmp_path: Path) -> 
     # Small angles are neglected: the largest is about 0.1 rad.
     assert 0.003 < engine["w"]["se"] / engine["w"]["value"] < 0.02
     assert pvid("compare", run, "--form", "fourier").return_value == DONE
-    with pytest.raises(PvidError, match="--core q31"):
-        pvid("compare", run, "--form", "fourier", "--core", "q31")
 
 
 def test_design_and_tune_show_the_engine_s_design_for_a_recording(recorded: dict[str, Path]) -> None:

@@ -1,4 +1,4 @@
-"""The refinement in C behind the pendulum's own weak form: errors beside the Cramer-Rao bound, standard errors, seconds."""
+"""The refinement in C behind the pendulum's own weak form: errors, standard errors, seconds, beside the bound."""
 
 from __future__ import annotations
 

@@ -227,7 +227,7 @@ static void pass_job(pvid_refine_f32 *self)
     uint32_t first = 0;
     if (pvid_refine_pass_needs_f32(&self->work, &first)) {
         const uint32_t entry = self->begin + first;
-        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < 3) {
+        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < (3 + PVID_REFINE_REACH)) {
             self->waiting = true;
             return;
         }

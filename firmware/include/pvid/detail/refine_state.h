@@ -43,8 +43,11 @@ typedef struct {
 
 /* One pass over one block: the motion from a start, the derivatives of the motion, and the sums of the rows. */
 typedef struct {
-    float h;    /* a step [s] */
-    float skew; /* of the sensors [s] */
+    float h; /* a step [s] */
+#if PVID_REFINE_SKEW
+    float late[5];  /* weights of five steps that give an input at the time of the outputs */
+    float slope[5]; /* and its derivative there */
+#endif
     float gate; /* largest |residual| that is used; 0: no gate */
     float constants[PVID_REFINE_CONSTANTS];
     float state[PVID_REFINE_STATES];                       /* q, then v */

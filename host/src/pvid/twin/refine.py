@@ -247,7 +247,7 @@ class RefineTwin:
         signals = None
         if first is not None:
             entry = self.begin + first
-            if self.front.end - entry < 3:
+            if self.front.end - entry < 3 + self.shape.reach:
                 self.waiting = True
                 return
             signals = self.front.read(entry)
@@ -283,7 +283,7 @@ class RefineTwin:
 
     def _wait(self) -> None:
         if self.renewed:
-            self.begin = max(self.front.end - _RECENT, self.front.behind)
+            self.begin = max(self.front.end - _RECENT, self.front.first)
             self._begin_search()
             self._begin_anew()
             self._begin_block()
@@ -326,7 +326,7 @@ class RefineTwin:
     def gap(self) -> None:
         """pvid_refine_gap_f32."""
         self.front.reset()
-        self.begin = self.front.behind
+        self.begin = self.front.first
         self._forget_state()
         if self.phase is not Phase.WAIT:
             self._begin_block()
