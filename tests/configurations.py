@@ -265,7 +265,9 @@ class Subject:
         sizes = {name: table.size for name, table in self.identifier.tables.items()}
         self.tables: dict[str, Any] = {}
         self.fields = {field.name: field for field in headers.scalars(config, prefix)}
-        model = getattr(self.identifier.estimator, "model", None)  # the strong form in float32 has an estimator of its own
+        model = getattr(
+            self.identifier.estimator, "model", None
+        )  # the strong form in float32 has an estimator of its own
         self.n_theta = int(model.n_theta) if model is not None else 0
         self.design: Any = config.design[0] if "design.taps" in self.fields else None
         self.entries = {name: sizes[name.rpartition(".")[2]] for name, field in self.fields.items() if is_table(field)}
