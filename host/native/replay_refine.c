@@ -33,6 +33,19 @@ void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_sa
     }
 }
 
+void pvid_replay_weak_candidates_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[], const float y[], float p[],
+                                     float se[])
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_weak_step_f32(self, phi[tick], y[tick]);
+        if ((reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN)) {
+            const pvid_estimate_f32 *estimate = &self->finish.candidate;
+            memcpy(&p[(size_t)tick * PVID_REFINE_P], estimate->p, PVID_REFINE_P * sizeof p[0]);
+            memcpy(&se[(size_t)tick * PVID_REFINE_P], estimate->se, PVID_REFINE_P * sizeof se[0]);
+        }
+    }
+}
+
 void pvid_replay_refine_shape(uint32_t shape[8])
 {
     const uint32_t numbers[8] = {PVID_REFINE_ORDER,  PVID_REFINE_COORDINATES, PVID_REFINE_INPUTS, PVID_REFINE_OUTPUTS,

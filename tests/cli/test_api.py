@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from conftest import ROOT
 
 import pvid
 from pvid.cli.main import commands
 from pvid.models.kapitza.physical import linear
+
+PAGE = ROOT / "host" / "docs" / "python.md"
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +61,6 @@ def test_data_that_say_nothing_have_an_answer_without_parameters() -> None:
         ({"t": [0, 1], "phi": ["a", "b"], "y": [0, 1]}, {"l1": 0.3}, "column phi: real numbers are wanted"),
         ({"t": np.arange(9) / 1e3, "phi": np.zeros(8), "y": np.zeros(9)}, {"l1": 0.3}, "have"),
         ("nowhere.csv", {"l1": 0.3}, "nowhere.csv does not exist"),
-        ({"t": [0, 1]}, {"model": "dc_motor", "core": "q31"}, "identified in float64"),
     ],
 )
 def test_bad_input_is_one_sentence(data: object, keys: dict[str, object], sentence: str) -> None:
@@ -71,6 +75,8 @@ def test_a_mechanism_of_the_list_is_identified(tmp_path: Path) -> None:
     result = pvid.identify(path)
     assert result.identified and {"R", "L", "k", "J", "b"} <= set(result.parameters)
     assert result.plot(tmp_path / "motor.png").exists()
+    in_c = pvid.identify(path, core="f32")
+    assert in_c.identified and in_c.details["core"] == "f32" and in_c["R"].value == pytest.approx(1.2, rel=1e-3)
 
 
 def test_the_estimator_takes_a_model_of_ones_own() -> None:
@@ -123,3 +129,21 @@ def test_rows_of_another_shape_are_refused_and_bad_ones_have_a_reason() -> None:
     with pytest.raises(pvid.PvidError, match="a row has 1 entries"):
         estimator.step([1.0, 2.0], 0.0)
     assert estimator.step([np.nan], 0.0) == "rejected not finite"
+
+
+def test_the_page_about_python_runs_as_it_is_printed(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(run, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    arguments = ["model", "simulate", "dc_motor", "motor.csv", "--duration", "10"]
+    CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
+    names: dict[str, object] = {}
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+    assert len(blocks) == 6
+    for block in blocks:
+        exec(compile(block, str(PAGE), "exec"), names)
+    told = capsys.readouterr().out
+    assert "g = 9." in told and "'chi2'" in told and (tmp_path / "run.png").exists()
+    checked = CliRunner().invoke(commands, ["model", "check", "own.py"], standalone_mode=False, catch_exceptions=False)
+    assert checked.return_value in (0, None)

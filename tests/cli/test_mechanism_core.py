@@ -165,5 +165,40 @@ def test_the_pendulum_s_own_rig_file_goes_through_the_engine(tmp_path: Path) -> 
     # Small angles are neglected: the largest is about 0.1 rad.
     assert 0.003 < engine["w"]["se"] / engine["w"]["value"] < 0.02
     assert pvid("compare", run, "--form", "fourier").return_value == DONE
-    with pytest.raises(PvidError, match="--core q31"):
-        pvid("compare", run, "--form", "fourier", "--core", "q31")
+
+
+def test_design_and_tune_show_the_engine_s_design_for_a_recording(recorded: dict[str, Path]) -> None:
+    run = recorded["rigid_body"]
+    design = json.loads(pvid("design", "--model", "rigid_body", "--run", run, "--json").stdout)
+    core = json.loads(pvid("identify", run, "--core", "f32", "--json").stdout)
+    assert design["identified"] and design["functions"] == core["functions"]
+    assert design["window_s"] == pytest.approx(core["window_s"]) and design["decimation"] == core["decimation"]
+    for name, one in design["parameters"].items():
+        found = core["parameters"][name]
+        assert one["unit"] == found["unit"] and abs(one["value"] - found["value"]) < 5 * found["se"]
+        assert 0.2 < one["se"] / found["se_noise"] < 5
+    tuned = pvid("tune", run)
+    assert tuned.return_value == DONE and "analysis" in tuned.stdout and "C core" in tuned.stdout
+    assert f"{design['window_s']:.4g}" in tuned.stdout
+
+
+def test_design_of_a_shipped_rig_needs_no_run() -> None:
+    done = pvid("design", "--model", "rigid_body")
+    assert done.return_value == DONE and "Ixx [kg*m^2]" in done.stdout and "test functions: " in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (
+            ("design", "--model", "rigid_body", "--duration", "5"),
+            "--tone, --release and --duration are for the pendulum",
+        ),
+        (("tune", "{run}", "-o", "x.toml"), "-o: nothing is written for a described mechanism"),
+    ],
+)
+def test_options_of_the_pendulum_s_design_are_refused(
+    arguments: tuple[str, ...], sentence: str, recorded: dict[str, Path]
+) -> None:
+    with pytest.raises(PvidError, match=sentence):
+        pvid(*(one.format(run=recorded["rigid_body"]) for one in arguments))

@@ -40,6 +40,16 @@ static void values_of(const float in[], float out[])
     out[3] = in[1]; /* the integrand */
 }
 
+static void form_of(const float gain[], const float integral[], float t, float channel[])
+{
+    channel[U] = gain[0];
+    channel[U_I1] = gain[0] * integral[0];
+    channel[U_T] = gain[0] * t;
+    channel[U_I2] = gain[0] * integral[1];
+    channel[X] = gain[1];
+    channel[SIGN] = gain[2];
+}
+
 static void theta_of(const float p[], float theta[])
 {
     memcpy(theta, p, 4u * sizeof theta[0]);
@@ -98,6 +108,7 @@ static const pvid_fourier_model_f32 mechanism = {
     .kind = kinds,
     .prepare = prepare_of,
     .values = values_of,
+    .form = form_of,
     .model = &parameters,
 };
 
@@ -781,6 +792,7 @@ static void init_names_what_is_out_of_range(void **state)
     REFUSES(model.kinds = 0, PVID_BAD_MODEL);
     REFUSES(model.prepare = NULL, PVID_BAD_MODEL);
     REFUSES(model.values = NULL, PVID_BAD_MODEL);
+    REFUSES(model.form = NULL, PVID_BAD_MODEL);
     REFUSES(model.term = of_high_order, PVID_BAD_MODEL);
     REFUSES(model.term = unsorted, PVID_BAD_MODEL);
     REFUSES(model.kind = one_theta_less, PVID_BAD_MODEL);

@@ -102,10 +102,10 @@ static void run_pass(pvid_refine_pass_f32 *pass, const double r[], const double 
         uint32_t first = 0;
         memset(&signals, 0, sizeof signals);
         if (pvid_refine_pass_needs_f32(pass, &first)) {
-            for (uint32_t k = 0; k < 3u; k++) {
-                signals.u[k][0] = (float)input_at((double)(first + k) * STEP_S);
-                signals.z[k][0] = measured[first + k];
+            for (uint32_t k = 0; k < (3u + (2u * PVID_REFINE_REACH)); k++) {
+                signals.u[k][0] = (float)input_at(((double)(first + k) - (double)PVID_REFINE_REACH) * STEP_S);
             }
+            memcpy(signals.z, &measured[first], sizeof signals.z);
         }
         pvid_refine_pass_job_f32(pass, linear, weight, &signals);
     }

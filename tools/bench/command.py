@@ -72,6 +72,7 @@ TABLES = (
     ("strong", "strong", "Errors of the strong form by encoder resolution and differentiator."),
     ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
     ("pendulum", "pendulum", "The pendulum through the weak engine, beside its own weak form: errors over 80 seeds."),
+    ("refine", "refine", "The refinement behind the weak form: errors beside the Cramer-Rao bound, 80 seeds."),
     ("tune", "tuning", "Errors against the truth with the default settings and with those that `tune` picks."),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
 )

@@ -78,9 +78,6 @@ RIGS = (
 )
 STEPS = SEEDS * len(RIGS)
 
-# Window, decimation and filter of values grow with the period of the slow mode.
-_TAPS_A_STEP = 7.6
-
 
 @dataclass(frozen=True)
 class Errors:
@@ -93,13 +90,13 @@ class Errors:
 
 
 def design_for(rig: Rig) -> FourierDesign:
-    """That of the shipped rig, with windows in proportion to the period of the slow mode."""
+    """That of the shipped rig, with window, decimation and filters in proportion to the period of the slow mode."""
     shipped = simulated_rig("kapitza")
     design = FourierDesign(RATE_HZ, shipped.window_s, **shipped.design)  # type: ignore[arg-type]
     slower = modes_hz(STANDARD_PENDULUM.linear)[0] / modes_hz(rig.pendulum.linear)[0]
     decimation = max(1, round(design.decimation * slower))
-    taps = round(_TAPS_A_STEP * decimation) | 1
-    return replace(design, window_s=design.window_s * slower, decimation=decimation, taps=taps)
+    taps, rates = (round(one * decimation / design.decimation) | 1 for one in (design.taps, design.rate_taps))
+    return replace(design, window_s=design.window_s * slower, decimation=decimation, taps=taps, rate_taps=rates)
 
 
 def errors_of(native: Native, rig: Rig, seeds: int, progress: Callable[[], object] | None = None) -> Errors:

@@ -68,6 +68,9 @@ typedef struct {
     void (*prepare)(const float jet[], float out[]);
     /* From jets, runs and signs: the gains, then the integrands. */
     void (*values)(const float in[], float out[]);
+    /* From the gains of a step, I^1 and I^2 of each integrand, and the time since the start of its half [s]: the values
+     * of the channels that are summed. */
+    void (*form)(const float gain[], const float integral[], float t, float channel[]);
     const pvid_model_f32 *model; /* theta and C of all kinds */
 } pvid_fourier_model_f32;
 

@@ -12,8 +12,8 @@
  *
  *   static pvid_refine_f32 refinement;
  *   if (pvid_refine_init_f32(&refinement, &config) != PVID_OK) ...
- *   each tick:     (void)pvid_weak_step_f32(&identifier, phi, y);
- *                  weak = a copy or the address of its published estimate, NULL before the first one
+ *   each tick:     reason = pvid_weak_step_f32(&identifier, phi, y);
+ *                  weak = address of an estimate that is new at this tick, trusted or not yet; else NULL
  *                  reason = pvid_refine_step_f32(&refinement, sample, weak);
  *   same context:  estimate = pvid_refine_latest_f32(&refinement);
  *   other context: if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
@@ -96,8 +96,8 @@ typedef struct pvid_refine_f32 pvid_refine_f32;
  *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config);
 
-/* One tick: the samples of signal[].sample, taken at the same time, and the newest estimate of the weak form (NULL:
- * none yet). Returns
+/* One tick: the samples of signal[].sample, taken at the same time, and an estimate of the weak form that is new at
+ * this tick, with its standard errors, whether the weak form trusts it already or not (NULL: none). Returns
  *   - PVID_WARMING_UP until there is an estimate of the weak form,
  *   - PVID_REJECTED_NOT_FINITE if a sample of an input is not finite, at the end of its step: the block restarts.
  *     (An output that is not finite is a missing row.)

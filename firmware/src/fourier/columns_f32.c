@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 /* A column of a test function chi is sum_k chi psi of terms factor D^m[channel] with the derivatives moved to chi. It

@@ -19,8 +19,9 @@
 #include "number/init.h"
 #include "number/unroll.h"
 
-/* No reason of a tick. */
+/* No reasons of a tick: there is work; the channels of a step are to be formed. */
 #define BUSY 255u
+#define FORM 254u
 
 static inline bool all_finite(const float values[], size_t n)
 {
@@ -86,13 +87,18 @@ static inline bool is_ready(const pvid_fourier_f32 *self)
     return ready;
 }
 
+/* Reason of a tick without anything else to report. */
+static inline pvid_reason idle(const pvid_fourier_f32 *self)
+{
+    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+}
+
 /* What a tick without a step does from now on. */
 static void rest(pvid_fourier_f32 *self)
 {
     const bool busy =
         pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics) || pvid_fourier_finish_is_busy_f32(&self->finish);
-    const pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    self->rest = busy ? BUSY : (uint8_t)reason;
+    self->rest = busy ? BUSY : (uint8_t)idle(self);
 }
 
 static void restart(pvid_fourier_f32 *self)
@@ -145,6 +151,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     pvid_fourier_step_init_f32(&self->history,
                                (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
+    self->watches = (config->range != NULL) || (config->drive_min != NULL);
     self->plain = (self->front.plain && (config->range == NULL)) ? design->model->samples : 0u;
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
@@ -195,20 +202,11 @@ static pvid_reason drop_reason(pvid_fourier_f32 *self)
     return PVID_ACCUMULATED;
 }
 
-/* A step: its channels to the present block. If it completes a window that is dropped, returns the reason; else
+/* Behind the channels of a step, the block's end; if they complete a window that is dropped, returns the reason; else
  * PVID_ACCUMULATED. */
-static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[], const float jet[])
+PVID_SELDOM static pvid_reason end_half(pvid_fourier_f32 *self)
 {
-    const pvid_fourier_design_f32 *design = self->design;
-    const uint16_t index = self->sums.index;
-    const size_t half = self->sums.half;
-    if (!pvid_fourier_step_take_f32(&self->history, design, self->channels, self->dt, jet, index,
-                                    pvid_fourier_sums_place_f32(&self->sums))) {
-        return PVID_ACCUMULATED;
-    }
-    pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
-    const bool ends = pvid_fourier_sums_count_f32(&self->sums, design->hop);
-    if (!ends || (self->sums.halves < 2u)) {
+    if (self->sums.halves < 2u) {
         return PVID_ACCUMULATED;
     }
     self->warm = true;
@@ -219,6 +217,25 @@ static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[], const
         pvid_fourier_finish_skip_f32(&self->finish);
     }
     return reason;
+}
+
+/* The channels of a step to the present block. */
+PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    const uint16_t index = self->sums.index;
+    const size_t half = self->sums.half;
+    pvid_reason dropped = PVID_ACCUMULATED;
+    if (pvid_fourier_step_take_f32(&self->history, design, self->dt, index, pvid_fourier_sums_place_f32(&self->sums))) {
+        if (self->watches) {
+            pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
+        }
+        if (pvid_fourier_sums_count_f32(&self->sums, design->hop)) {
+            dropped = end_half(self);
+        }
+    }
+    rest(self);
+    return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
 }
 
 /* Harmonics of the last block; a window that is joined begins. */
@@ -250,7 +267,7 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
 /* Work on the sums, else on the last whole window. */
 PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
 {
-    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+    pvid_reason reason = idle(self);
     if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
         advance_sums(self);
     } else {
@@ -263,15 +280,25 @@ PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
 /* The last tick of a block. */
 PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sample[])
 {
-    float jet[PVID_MAX_INPUTS];
-    const bool steps = pvid_fourier_front_step_f32(&self->front, self->design, jet);
-    const pvid_reason dropped = steps ? next_step(self, sample, jet) : PVID_ACCUMULATED;
-    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    rest(self);
-    if ((self->rest == BUSY) && (self->front.decimation == 1u)) {
-        reason = work(self);
+    const uint8_t decimation = self->front.decimation;
+    const bool steps =
+        pvid_fourier_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
+    if (steps && (decimation >= PVID_FOURIER_TWO_TICKS)) {
+        self->rest = FORM;
+        return idle(self);
     }
-    return (dropped != PVID_ACCUMULATED) ? dropped : reason;
+    const pvid_reason formed = steps ? form(self, sample) : idle(self);
+    if ((decimation > 1u) || (self->rest != BUSY)) {
+        return formed;
+    }
+    const pvid_reason worked = work(self);
+    return (formed == idle(self)) ? worked : formed;
+}
+
+/* A tick with something to do. */
+static inline pvid_reason due(pvid_fourier_f32 *self, const float sample[])
+{
+    return (self->rest == BUSY) ? work(self) : form(self, sample);
 }
 
 /* A tick whose samples need more than to be added. */
@@ -292,7 +319,7 @@ PVID_SELDOM static pvid_reason other_tick(pvid_fourier_f32 *self, const float sa
     if (self->front.wait == 0u) {
         return end_block(self, sample);
     }
-    return (self->rest == BUSY) ? work(self) : (pvid_reason)self->rest;
+    return (self->rest >= FORM) ? due(self, sample) : (pvid_reason)self->rest;
 }
 
 pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
@@ -309,7 +336,7 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
         return end_block(self, sample);
     }
     const uint32_t rested = self->rest;
-    return (rested == BUSY) ? work(self) : (pvid_reason)rested;
+    return (rested >= FORM) ? due(self, sample) : (pvid_reason)rested;
 }
 
 const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self)

@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 #include "fourier/fourier_finish_f32.h"
@@ -40,7 +41,7 @@ enum {
 
 /* Entries of the noise table, and products of the residuals and of columns, in a stage. */
 #define ENTRIES_PER_STAGE 8u
-#define PRODUCTS_PER_STAGE 48u
+#define PRODUCTS_PER_STAGE 36u
 
 /* Parts whose share a stage forms. */
 #define SHARES_PER_STAGE 4u
@@ -278,7 +279,7 @@ static bool project_stage(pvid_fourier_f32 *self)
 /* Rows whose residuals a stage forms. */
 static size_t rows_per_stage(const pvid_fourier_kind *kind)
 {
-    return PRODUCTS_PER_STAGE / (kind->thetas + 1u); /* at least 1: PVID_MAX_COLUMNS is at most 48 */
+    return (kind->thetas < PRODUCTS_PER_STAGE) ? (PRODUCTS_PER_STAGE / (kind->thetas + 1u)) : 1u;
 }
 
 /* Products of columns that a stage forms. */

@@ -151,18 +151,27 @@ PVID_SELDOM void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, con
 }
 
 /* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
-static float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order, const float *x, size_t stride)
+static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order, const float *x, size_t stride)
 {
     const float *weight = filter->weights;
+    const float *end = &weight[filter->half];
     const float *after = x;
     const float *before = x;
     const float centre = *x;
     float sum = 0.0f;
-    const bool odd = (order % 2u) != 0u;
-    for (size_t left = filter->half; left > 0u; left--) {
+    if ((order % 2u) != 0u) {
+        while (weight != end) {
+            after += stride;
+            before -= stride;
+            sum += *weight * (*after - *before);
+            weight++;
+        }
+        return sum;
+    }
+    while (weight != end) {
         after += stride;
         before -= stride;
-        sum += *weight * (odd ? (*after - *before) : ((*after - centre) + (*before - centre)));
+        sum += *weight * ((*after - centre) + (*before - centre));
         weight++;
     }
     return (order == 0u) ? (centre + sum) : sum;

@@ -28,8 +28,9 @@ void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self);
 void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
                                    const float sample[]);
 
-/* At the end of a block: its outputs to the line. Returns true if the line is full: then jet[] contains the step's
- * jets. */
+/* At the end of a block: its outputs to the line. Returns true if the line is full: then `jet` contains the step's
+ * jets.
+ */
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[]);
 
 /* Adds this number of samples of a tick, at least 1, to the block. Returns false if one is not finite; the front end

@@ -6,7 +6,7 @@
 #include "fourier/collect_q31.h"
 #include "fourier/fourier_finish_q31.h"
 #include "fourier/fourier_front_q31.h"
-#include "fourier/sums_q31.h"
+#include "fourier/valid_q31.h"
 #include "judge/publication.h"
 #include "number/count.h"
 #include "number/init.h"
@@ -17,83 +17,12 @@
 #define OFFSET_LIMIT ((int32_t)1 << 30)
 #define STAGES_MAX 64u
 #define ONE_Q16 65536u
-#define LEAST_FUNCTIONS 4u
 
 static bool is_ready(const pvid_fourier_q31 *self)
 {
     const bool ready = (self != NULL) && (self->design != NULL);
     PVID_ASSERT(ready);
     return ready;
-}
-
-static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
-{
-    if ((model == NULL) || (model->signal == NULL) || (model->jet == NULL) || (model->channel == NULL) ||
-        (model->term == NULL) || (model->kind == NULL) || (model->values == NULL) || (model->model == NULL)) {
-        return PVID_BAD_MODEL;
-    }
-    const size_t inputs = (size_t)model->jets + model->runs + model->signs;
-    const bool fits = (model->samples >= 1u) && (model->samples <= PVID_MAX_SAMPLES) && (model->signals >= 1u) &&
-                      (model->jets >= 1u) && (inputs <= PVID_MAX_INPUTS) && (model->runs <= PVID_MAX_INTEGRANDS) &&
-                      (model->signs <= PVID_MAX_INTEGRANDS) && (model->integrands <= PVID_MAX_INTEGRANDS) &&
-                      (model->gains <= PVID_MAX_CHANNELS) && (model->channels >= 1u) &&
-                      (model->channels <= PVID_MAX_CHANNELS) && (model->kinds >= 1u) &&
-                      (model->kinds <= PVID_MAX_KINDS) &&
-                      ((model->prepare != NULL) || ((model->runs + model->signs) == 0u));
-    size_t thetas = 0;
-    bool columns = true;
-    for (size_t i = 0; fits && (i < model->kinds); i++) {
-        const pvid_fourier_kind *kind = &model->kind[i];
-        thetas += kind->thetas;
-        columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS) &&
-                  (kind->nuisances < LEAST_FUNCTIONS);
-    }
-    const bool same_kinds = (model->model->n_kinds == model->kinds) || (model->kinds == 1u);
-    return (fits && columns && same_kinds && (thetas == model->model->n_theta)) ? PVID_OK : PVID_BAD_MODEL;
-}
-
-static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
-{
-    if ((design == NULL) || (design->full_scale == NULL) || (design->down == NULL) || (design->filter == NULL) ||
-        (design->format == NULL) || (design->factor == NULL) || (design->error_order == NULL) ||
-        (design->error_variance == NULL) || (design->circle == NULL) ||
-        ((design->noise == NULL) && (design->n_noise > 0u))) {
-        return PVID_BAD_DESIGN;
-    }
-    const pvid_status status = model_is_valid(design->model);
-    if (status != PVID_OK) {
-        return status;
-    }
-    const pvid_fourier_model_q31 *model = design->model;
-    if ((design->functions < LEAST_FUNCTIONS) || (design->functions > PVID_MAX_FUNCTIONS)) {
-        return PVID_BAD_FUNCTIONS;
-    }
-    if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
-        return PVID_BAD_DECIMATION;
-    }
-    const size_t harmonics = pvid_fourier_harmonics_q31(design);
-    if ((design->power < 2u) || ((design->power % 2u) != 0u) || (design->power > PVID_MAX_POWER) ||
-        (harmonics > PVID_MAX_HARMONICS)) {
-        return PVID_BAD_FUNCTIONS;
-    }
-    if ((design->hop < harmonics) || ((design->hop % 4u) != 0u) || (design->hop < 8u) || (design->hop > 4096u)) {
-        return PVID_BAD_WINDOW;
-    }
-    if (pvid_fourier_front_length_q31(design) > PVID_MAX_RING) {
-        return PVID_BAD_TAPS;
-    }
-    bool shifts = (design->sum_shift >= 1u) && (design->sum_shift <= 30u);
-    bool scales = true;
-    for (size_t i = 0; i < model->samples; i++) {
-        scales = scales && (design->full_scale[i] > 0) && (design->full_scale[i] <= COUNTS_LIMIT);
-    }
-    for (size_t i = 0; i < model->channels; i++) {
-        shifts = shifts && (design->format[i].value >= 1u);
-    }
-    if (!scales) {
-        return PVID_BAD_FULL_SCALE;
-    }
-    return shifts ? PVID_OK : PVID_BAD_SHIFT;
 }
 
 static void restart(pvid_fourier_q31 *self)
@@ -105,7 +34,7 @@ static void restart(pvid_fourier_q31 *self)
 static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config)
 {
     const pvid_fourier_design_q31 *design = config->design;
-    pvid_status status = design_is_valid(design);
+    pvid_status status = pvid_fourier_valid_q31(design);
     if (status != PVID_OK) {
         return status;
     }

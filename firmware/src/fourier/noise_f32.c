@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 /* An entry of the noise table is a share of the variance D_h of the rows, and likewise the covariance that noise alone

@@ -7,7 +7,7 @@
 #include "pvid/fourier.h"
 
 /* Entries of the noise table that are added at a time. */
-#define PVID_FOURIER_NOISE_ENTRIES 2u
+#define PVID_FOURIER_NOISE_ENTRIES 1u
 
 /* Q_j of a kind's rows, at most. */
 void pvid_fourier_noise_shares_f32(const pvid_fourier_white_f32 *white, const pvid_fourier_design_f32 *design,

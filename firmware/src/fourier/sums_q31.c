@@ -114,9 +114,9 @@ static int32_t edge_of(const pvid_fourier_values_q31 *values, const pvid_fourier
 }
 
 /* I^n at the end of the first half times B_h. */
-static int32_t shifted(int32_t end, int32_t b, uint32_t shift)
+static inline int64_t shifted(int32_t end, int32_t b, uint32_t shift)
 {
-    return (int32_t)pvid_floor_shift_q31(pvid_product_q31(end, b), shift);
+    return pvid_floor_shift_q31(pvid_product_q31(end, b), shift);
 }
 
 /* S_h = A_h + (-1)^h B_h; the integrals of B are shifted to the start of A: by I^fold, and by I^1 t where fold is 2. */
@@ -139,10 +139,10 @@ static void join(const pvid_fourier_sums_q31 *self, const pvid_fourier_design_q3
         uint32_t bits = (h == 0u) ? 0u : window->bits[k];
         for (size_t part = 0; part < 2u; part++) {
             const int32_t other = b[k][part];
-            int32_t shift = folds ? shifted(end, b[channel->plain][part], format.plain) : 0;
+            int64_t shift = folds ? shifted(end, b[channel->plain][part], format.plain) : 0;
             shift += ramps ? shifted(once, b[channel->ramp][part], format.ramp) : 0;
             const int32_t own = pvid_floor_shift_32_q31(a[k][part] + (even ? other : -other), format.own);
-            const int32_t total = own + (even ? shift : -shift);
+            const int32_t total = (int32_t)pvid_clamp_q31(own + (even ? shift : -shift), PVID_ONE_Q30);
             window->s[k][h][part] = total;
             bits |= (uint32_t)((total < 0) ? -total : total);
         }

@@ -1,8 +1,9 @@
 /* The schedule of the weak form of any mechanism in float32. Private to the core.
  *
- * The last tick of a step's D forms its channels. The others add a block of four steps to the sums, some harmonics a
- * tick, and at the end of a window join these; when nothing is to be added, they run stages of the last whole window.
- * With D = 1 every tick does both. All other ticks only add their samples to the front end's block.
+ * The last tick of a step's D forms its jets, the tick behind it the channels. The others add a block of four steps to
+ * the sums, some harmonics a tick, and at the end of a window join these; when nothing is to be added, they run stages
+ * of the last whole window. Below 4 ticks jets and channels are of one tick; with D = 1 every tick does all. All other
+ * ticks only add their samples to the front end's block.
  */
 #ifndef PVID_FOURIER_TICKS_F32_H
 #define PVID_FOURIER_TICKS_F32_H
@@ -12,10 +13,14 @@
 /* Largest number of stages per tick. */
 #define PVID_FOURIER_MOST_STAGES 64u
 
+/* Least D whose jets and channels have a tick each. */
+#define PVID_FOURIER_TWO_TICKS 4u
+
 /* Ticks of a block of four steps that add harmonics or run stages. */
 static inline uint32_t pvid_fourier_free_ticks_f32(uint32_t decimation)
 {
-    return 4u * ((decimation > 1u) ? (decimation - 1u) : 1u);
+    const uint32_t used = (decimation >= PVID_FOURIER_TWO_TICKS) ? 2u : 1u;
+    return 4u * ((decimation > 1u) ? (decimation - used) : 1u);
 }
 
 /* Harmonics that a tick adds or joins, such that a block that ends a window is added and joined before the next one. */

@@ -32,7 +32,7 @@ static bool tables_are_given(const pvid_fourier_model_f32 *model)
 {
     const bool prepares = ((uint32_t)model->runs + model->signs) > 0u;
     return (model->signal != NULL) && (model->jet != NULL) && (model->channel != NULL) && (model->term != NULL) &&
-           (model->kind != NULL) && (model->values != NULL) && (model->model != NULL) &&
+           (model->kind != NULL) && (model->values != NULL) && (model->form != NULL) && (model->model != NULL) &&
            (!prepares || (model->prepare != NULL));
 }
 

@@ -84,10 +84,11 @@ static void take_newest(pvid_fourier_values_q31 *self, const pvid_fourier_design
     self->ran = true;
 }
 
-/* x 2^-s rounded half up, s >= 1, below 2^30. */
+/* x 2^-s rounded half up, s >= 1, within 2^30, beyond which the tables of the design tool let nothing. */
 static inline int32_t rounded(int64_t x, uint32_t s)
 {
-    return pvid_floor_shift_32_q31((int32_t)pvid_floor_shift_q31(x, s - 1u) + 1, 1);
+    const int64_t twice = pvid_clamp_q31(pvid_floor_shift_q31(x, s - 1u), INT32_MAX - 1);
+    return pvid_floor_shift_32_q31((int32_t)twice + 1, 1);
 }
 
 /* Integrals at the step before that of the integrands f; at the first step of a half they begin anew. */
@@ -138,11 +139,15 @@ static void write_channels(const pvid_fourier_values_q31 *self, const pvid_fouri
         const pvid_fourier_channel *one = &design->model->channel[k];
         const int32_t gain = self->gain[one->gain];
         const uint32_t shift = design->format[k].value;
-        if (one->fold == 0u) { /* |gain| <= 2^30: its shift is 2 at least */
-            channel[k] = pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(gain, shift - 1u) + 1, 1);
+        int32_t value = 0;
+        if (one->fold == 0u) {
+            value = rounded(gain, shift);
         } else {
-            channel[k] = rounded(pvid_product_q31(gain, integral_of(self, design, one)), shift);
+            value = rounded(pvid_product_q31(gain, integral_of(self, design, one)), shift);
         }
+        channel[k] = (value > PVID_FOURIER_LIMIT_Q31)
+                         ? PVID_FOURIER_LIMIT_Q31
+                         : ((value < -PVID_FOURIER_LIMIT_Q31) ? -PVID_FOURIER_LIMIT_Q31 : value);
     }
 }
 

@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 /* The sums S_h of a kind's residual Y - sum theta_j N_j have independent noise in their real and imaginary parts, of

@@ -37,6 +37,9 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
 /* Lost blocks until the search begins again from the weak form's estimate; a block that is not sane counts twice. */
 #define LOST_MOST 6u
 
+/* Entries of the ring before an estimate of the weak form that the search may use. */
+#define RECENT 200u
+
 /* Part of the difference by which the level follows a block's. */
 #define LEVEL_GAIN 0.2f
 
@@ -90,17 +93,16 @@ static void begin_search(pvid_refine_f32 *self)
     self->level = 0.0f;
 }
 
-/* Takes the weak form's newest estimate; what it does not have is kept. Returns whether it is in the region. */
-static bool take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
+/* Takes a new estimate of the weak form if it is in the region; until a block has been taken it is the prior's mean. */
+PVID_SELDOM static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
 {
     float r[N];
     pvid_refine_from_p(weak->p, r);
-    if (!pvid_refine_region(r)) {
-        return false;
+    if (pvid_refine_region(r)) {
+        memcpy(self->weak, r, sizeof self->weak);
+        memcpy(self->weak_se, weak->se, sizeof self->weak_se);
+        self->renewed = true;
     }
-    memcpy(self->weak, r, sizeof self->weak);
-    memcpy(self->weak_se, weak->se, sizeof self->weak_se);
-    return true;
 }
 
 static void begin_anew(pvid_refine_f32 *self)
@@ -108,6 +110,7 @@ static void begin_anew(pvid_refine_f32 *self)
     memcpy(self->r, self->weak, sizeof self->r);
     memcpy(self->next, self->weak, sizeof self->next);
     forget_state(self);
+    self->renewed = false;
     self->lost = 0;
     self->length = self->config.first_block;
 }
@@ -224,7 +227,7 @@ static void pass_job(pvid_refine_f32 *self)
     uint32_t first = 0;
     if (pvid_refine_pass_needs_f32(&self->work, &first)) {
         const uint32_t entry = self->begin + first;
-        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < 3) {
+        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < (3 + PVID_REFINE_REACH)) {
             self->waiting = true;
             return;
         }
@@ -295,19 +298,25 @@ static void publish(pvid_refine_f32 *self)
     }
 }
 
-/* The next block; in the search the weak form's newest estimate is the next one to begin from. */
-static void next_block(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
+/* Where the first block begins: it need not wait for new samples. */
+static uint32_t recent(const pvid_refine_front_f32 *front)
 {
-    if (weak != NULL) {
-        (void)take_weak(self, weak);
-    }
-    if ((self->taken == 0u) && (self->lost >= LOST_MOST)) {
+    const uint32_t first = pvid_refine_front_first_f32(front);
+    const uint32_t end = pvid_refine_front_end_f32(front);
+    return (end > (first + RECENT)) ? (end - RECENT) : first;
+}
+
+/* The next block. A search begins anew from the weak form's newest estimate when it is lost. */
+static void next_block(pvid_refine_f32 *self)
+{
+    const bool astray = (self->length == self->config.first_block) && self->renewed;
+    if ((self->taken == 0u) && ((self->lost >= LOST_MOST) || ((self->lost > 0u) && astray))) {
         begin_anew(self);
     }
     begin_block(self);
 }
 
-PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
+PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
     switch (self->phase) {
@@ -343,12 +352,12 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self, const pvid_estimate_f
         break;
     case NEXT:
         reason = self->verdict;
-        next_block(self, weak);
+        next_block(self);
         break;
     default:
         reason = PVID_WARMING_UP;
-        if ((weak != NULL) && take_weak(self, weak)) {
-            self->begin = pvid_refine_front_first_f32(&self->front);
+        if (self->renewed) {
+            self->begin = recent(&self->front);
             begin_search(self);
             begin_anew(self);
             begin_block(self);
@@ -412,6 +421,9 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
     if (!is_ready(self) || (sample == NULL)) {
         return PVID_NOT_READY;
     }
+    if (weak != NULL) {
+        take_weak(self, weak);
+    }
     const pvid_refine_entry entry = pvid_refine_front_step_f32(&self->front, &self->config, sample);
     if (entry == PVID_REFINE_BROKEN) {
         restart(self);
@@ -425,7 +437,7 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
     }
     const bool works = (entry == PVID_REFINE_NOTHING) || (self->config.ratio == 1u);
     if (works && !self->waiting) {
-        return work(self, weak);
+        return work(self);
     }
     return (self->phase == (uint8_t)WAIT) ? PVID_WARMING_UP : PVID_ACCUMULATED;
 }

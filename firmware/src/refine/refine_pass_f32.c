@@ -35,11 +35,34 @@ static const float position_weights[2 * AB] = {POSITION, POSITION};
 #endif
 static const float velocity_weights[2 * AB] = {VELOCITY, VELOCITY};
 
+#if PVID_REFINE_SKEW
+/* Weights of five steps that give a signal `skew` seconds after the middle one, and its derivative there: the
+ * polynomial of degree 4 through them. */
+static void delay(pvid_refine_pass_f32 *self, float skew)
+{
+    const float s = skew / self->h;
+    const float z = s * s;
+    const float scale = 1.0f / self->h;
+    self->late[0] = ((s * (z - 1.0f)) * (s - 2.0f)) / 24.0f;
+    self->late[1] = ((s * (s - 1.0f)) * (4.0f - z)) / 6.0f;
+    self->late[2] = ((1.0f - z) * (4.0f - z)) * 0.25f;
+    self->late[3] = ((s * (s + 1.0f)) * (4.0f - z)) / 6.0f;
+    self->late[4] = ((s * (z - 1.0f)) * (s + 2.0f)) / 24.0f;
+    self->slope[0] = (scale / 12.0f) * ((s * ((2.0f * z) - (3.0f * s))) - (s - 1.0f));
+    self->slope[1] = (scale / 6.0f) * ((s * ((3.0f * s) - (4.0f * z))) + ((8.0f * s) - 4.0f));
+    self->slope[2] = (scale * s) * ((2.0f * z) - 5.0f) * 0.5f;
+    self->slope[3] = (scale / 6.0f) * ((4.0f + (8.0f * s)) - (s * ((3.0f * s) + (4.0f * z))));
+    self->slope[4] = (scale / 12.0f) * ((s * ((2.0f * z) + (3.0f * s))) - (s + 1.0f));
+}
+#endif
+
 void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[], float h, float gate)
 {
     self->h = h;
     self->gate = gate;
-    self->skew = (PVID_REFINE_SKEW != 0) ? r[PVID_REFINE_MOVING - 1] : 0.0f;
+#if PVID_REFINE_SKEW
+    delay(self, r[PVID_REFINE_MOVING - 1]);
+#endif
     pvid_refine_constants(r, self->constants);
     memcpy(self->state, start, sizeof self->state);
     self->job = CLEAR;
@@ -107,27 +130,21 @@ PVID_SELDOM static void accelerations(const float m[], const float state[], cons
     pvid_refine_motion(m, state, &state[V], u, a);
 }
 
-/* u at the time of the outputs, by the parabola through three steps: `at` 0, 1, 2. */
+/* u at the time of the outputs; `at`: of the three steps. */
 PVID_ALWAYS_INLINE void input(const pvid_refine_pass_f32 *self, const pvid_refine_signals_f32 *signals, size_t at,
                               float u[])
 {
     PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_INPUTS; i++)
     {
-        const float b = signals->u[1][i];
 #if PVID_REFINE_SKEW
-        const float a = signals->u[0][i];
-        const float d = signals->u[2][i];
-        const float f = self->skew / (2.0f * self->h);
-        const float bend = (2.0f * (f * f)) * ((a - (2.0f * b)) + d);
-        if (at == 0u) {
-            u[i] = (a + (f * (((4.0f * b) - (3.0f * a)) - d))) + bend;
-        } else if (at == 1u) {
-            u[i] = (b + (f * (d - a))) + bend;
-        } else {
-            u[i] = (d + (f * (((3.0f * d) - (4.0f * b)) + a))) + bend;
+        float sum = self->late[0] * signals->u[at][i];
+        PVID_UNROLL for (size_t k = 1; k < PVID_REFINE_POINTS; k++)
+        {
+            sum += self->late[k] * signals->u[at + k][i];
         }
+        u[i] = sum;
 #else
-        u[i] = (at == 1u) ? b : signals->u[at][i];
+        u[i] = signals->u[at][i];
         (void)self;
 #endif
     }
@@ -355,13 +372,16 @@ PVID_ALWAYS_INLINE void derivatives(pvid_refine_pass_f32 *self, const float r[],
     const float *x = self->state;
     pvid_refine_jacobian(self->constants, x, &x[V], u, a, K, D, U, B);
 #if PVID_REFINE_SKEW
-    const float scale = 1.0f / (2.0f * self->h);
     PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
     {
         float sum = 0.0f;
         PVID_UNROLL for (size_t j = 0; j < PVID_REFINE_INPUTS; j++)
         {
-            const float rate = scale * (((3.0f * signals->u[2][j]) - (4.0f * signals->u[1][j])) + signals->u[0][j]);
+            float rate = self->slope[0] * signals->u[2][j];
+            PVID_UNROLL for (size_t k = 1; k < PVID_REFINE_POINTS; k++)
+            {
+                rate += self->slope[k] * signals->u[2u + k][j];
+            }
             sum += U[(i * PVID_REFINE_INPUTS) + j] * rate;
         }
         B[((PVID_REFINE_MOVING - 1) * N_Q) + i] = sum;

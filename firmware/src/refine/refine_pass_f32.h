@@ -6,9 +6,13 @@
 
 #include "pvid/detail/refine_state.h"
 
-/* Signals of three neighbouring steps: inputs, and outputs (NaN: missing). */
+/* Steps before and behind three neighbouring ones whose inputs a skew needs. */
+#define PVID_REFINE_REACH (2 * PVID_REFINE_SKEW)
+#define PVID_REFINE_POINTS ((2 * PVID_REFINE_REACH) + 1)
+
+/* Signals of three neighbouring steps: inputs, with those of the reach, and outputs (NaN: missing). */
 typedef struct {
-    float u[3][PVID_REFINE_INPUTS];
+    float u[3 + (2 * PVID_REFINE_REACH)][PVID_REFINE_INPUTS];
     float z[3][PVID_REFINE_OUTPUTS];
 } pvid_refine_signals_f32;
 

@@ -34,9 +34,8 @@ void pvid_products_end_f32(pvid_estimator_f32 *self, const pvid_block *block, co
     tail[1] += weight;
     self->group_rss += rss;
     self->group_weight += weight;
-    for (uint32_t i = 0; i < rows; i++) {
-        pvid_count_up(&self->counters.rows);
-    }
+    const uint32_t room = UINT32_MAX - self->counters.rows;
+    self->counters.rows += (rows < room) ? rows : room;
     if (self->settings.gain < 1.0f) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         float innovation[PVID_MAX_P];

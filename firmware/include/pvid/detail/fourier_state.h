@@ -29,21 +29,21 @@ typedef struct {
 
 /* From the jets of a step to the values of its channels, two steps later. */
 typedef struct {
-    uint8_t known;                   /* steps since the restart, 0..4 */
-    uint8_t latest;                  /* place in `out` of the step before the last one */
-    bool ran;                        /* the runs have begun */
-    float lead;                      /* from a run's first sample to its first step [s] */
-    float now[PVID_MAX_INPUTS];      /* inputs of `values` at the last step but the newest */
-    float rate[PVID_MAX_INTEGRANDS]; /* derivatives of the runs there */
-    float v[2][PVID_MAX_INTEGRANDS]; /* arguments of sgn at that step and the one before it */
-    float run[PVID_MAX_INTEGRANDS];  /* integrals since the start of the run, and what rounding took off */
+    uint8_t known;  /* steps since the restart, 0..4 */
+    uint8_t latest; /* place in `out` of the step before the last one */
+    bool ran;       /* the runs have begun */
+    float lead;     /* from a run's first sample to its first step [s] */
+    uint8_t newest; /* place in `inputs` of the newest step; the other is of the last step before it */
+    float inputs[2][PVID_MAX_INPUTS]; /* of `values` */
+    float rate[PVID_MAX_INTEGRANDS];  /* derivatives of the runs there */
+    float v[2][PVID_MAX_INTEGRANDS];  /* arguments of sgn at that step and the one before it */
+    float run[PVID_MAX_INTEGRANDS];   /* integrals since the start of the run, and what rounding took off */
     float run_low[PVID_MAX_INTEGRANDS];
     float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
                                                               the next ones */
-    float f[2][PVID_MAX_INTEGRANDS]; /* integrands at the two steps before that one, latest first */
-    float once[PVID_MAX_INTEGRANDS]; /* I^1 and I^2 since the start of the half */
-    float twice[PVID_MAX_INTEGRANDS];
-    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the half before, at its end */
+    float f[2][PVID_MAX_INTEGRANDS];         /* integrands at the two steps before that one, latest first */
+    float integral[2 * PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of each since the start of the half */
+    float edge[2][PVID_MAX_INTEGRANDS];      /* I^1 and I^2 of the half before, at its end */
 } pvid_fourier_history_f32;
 
 /* What a half window has seen of a sample. */
@@ -149,11 +149,12 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
-    uint8_t rest;      /* reason of a tick that only adds its samples; BUSY: harmonics are to be added or joined, or a
-                          window is being processed */
-    bool warm;         /* a window has been complete since the restart */
-    bool frozen;       /* complete windows are dropped */
+    uint8_t plain; /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;  /* reason of a tick that only adds its samples; FORM: the channels of a step are due; BUSY: harmonics
+                      are to be added or joined, or a window is being processed */
+    bool warm;     /* a window has been complete since the restart */
+    bool frozen;   /* complete windows are dropped */
+    bool watches;  /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;

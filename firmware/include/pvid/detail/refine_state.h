@@ -43,8 +43,11 @@ typedef struct {
 
 /* One pass over one block: the motion from a start, the derivatives of the motion, and the sums of the rows. */
 typedef struct {
-    float h;    /* a step [s] */
-    float skew; /* of the sensors [s] */
+    float h; /* a step [s] */
+#if PVID_REFINE_SKEW
+    float late[5];  /* weights of five steps that give an input at the time of the outputs */
+    float slope[5]; /* and its derivative there */
+#endif
     float gate; /* largest |residual| that is used; 0: no gate */
     float constants[PVID_REFINE_CONSTANTS];
     float state[PVID_REFINE_STATES];                       /* q, then v */
@@ -89,6 +92,7 @@ struct pvid_refine_f32 {
     float h;                           /* a step of the motion [s] */
     float fade;                        /* forgetting of a full block, on the triangle */
     float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
+    bool renewed;                      /* the weak form has given an estimate since the search began from one */
     bool frozen;
     bool solved;         /* the last solution exists */
     bool restarted;      /* the block's start is not known from the one before */

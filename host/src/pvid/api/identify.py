@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 
-from pvid.api.result import Result, of_mechanism, of_pendulum
+from pvid.api.result import Result, of_core, of_mechanism, of_pendulum
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
@@ -22,7 +22,9 @@ from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advice import advice, advice_on_refusal, behind
 from pvid.run.identify import identify as identify_pendulum
 from pvid.run.mechanism import identify_mechanism, model_of
+from pvid.run.mechanism_core import identify_in_c
 from pvid.run.skew import aligned
+from pvid.settings.engine_cores import ENGINE_CORES
 
 Data = str | os.PathLike[str] | Mapping[str, npt.ArrayLike] | Any
 
@@ -51,7 +53,8 @@ def identify(
     columns
         Names and units of the columns, as for `--columns`: "t=time_ms:ms,phi=angle:deg,y=h:mm".
     core
-        Arithmetic of the pendulum's identifier; float32 by default. Other mechanisms are identified in float64.
+        Arithmetic: float32 by default for the pendulum, float64 for other mechanisms,
+        whose C core is compiled for f32 and q31.
     settings, keys
         Keys of the rig file, which come before the file: l1=0.25, settings={"sensor.phi_lsb": 0.0015}.
 
@@ -73,11 +76,11 @@ def identify(
     rig_path = None if rig is None else Path(rig)
     described = mechanism_rig(path, rig_path, texts, None if model is None else os.fspath(model))
     if described is not None:
-        if core not in (None, "f64"):
-            raise PvidError(f"core={core!r}: {described.model} is identified in float64; omit core")
         compiled = model_of(described)
         recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
-        return of_mechanism(identify_mechanism(recording.whole(), compiled))
+        answer = identify_mechanism(recording.whole(), compiled)
+        engine = ENGINE_CORES.get(core or "")
+        return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)
     if core is not None:
         file = replace(file, identifier=replace(file.identifier, core=core))

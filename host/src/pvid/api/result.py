@@ -12,6 +12,7 @@ from pvid.base.rounding import with_error
 from pvid.run import answer
 from pvid.run.identify import Identification
 from pvid.run.mechanism import MechanismAnswer
+from pvid.run.mechanism_core import CoreAnswer
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,14 @@ def of_mechanism(found: MechanismAnswer) -> Result:
     verdict = found.found.verdict
     notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
     return _result(found, found.as_json(), found.identified, verdict.status, verdict.warning, notes)
+
+
+def of_core(found: CoreAnswer) -> Result:
+    """Of a described mechanism by the C core."""
+    verdict = found.verdict
+    notes = (*found.oracle.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
+    status = verdict.status if found.published else found.reason.text
+    return _result(found.oracle, found.as_json(), found.identified, status, verdict.warning, notes)
 
 
 def _result(

@@ -26,18 +26,17 @@ from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
-from pvid.settings.enums import Core
+from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 
 if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
     from pvid.run.mechanism_core import CoreAnswer
 
 ENGINE = "fourier"  # as --form: the weak engine, for a mechanism that has a weak form of its own too
-_IN_C: dict[str | None, Core] = {"f32": "f32", "q31": "q31"}
 _FORMS = (("form", "weak"), ("form", ENGINE))
-_POSSIBLE = (("core", "f64"), ("core", "f32"), ("core", "q31"), *_FORMS)
-_COMPARED = (("core", "f32"), ("core", "q31"), ("core", "all"), *_FORMS)
-_ARITHMETIC = {"f32": "float32", "q31": "fixed point"}
+_IN_C = tuple(("core", name) for name in ENGINE_CORES)
+_POSSIBLE = (("core", "f64"), *_IN_C, *_FORMS)
+_COMPARED = (("core", "all"), *_IN_C, *_FORMS)
 
 
 def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
@@ -97,16 +96,16 @@ def identify_run(
                 f"--{option} {value}: {name} is identified in float64, or in C by --core f32 or q31, by the weak form; "
                 f"omit --{option}"
             )
-    in_c = _IN_C.get(only_in_c.get("core"))
+    in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
     if weights != "residuals" and in_c:
-        raise PvidError(f"--weights {weights} is for float64; omit --core {in_c}")
+        raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
     answer = identify_mechanism(recording, model, weights)
     core: CoreAnswer | None = None
     if in_c:
         from pvid.run.mechanism_core import identify_in_c
 
-        core = identify_in_c(answer, in_c)
+        core = identify_in_c(answer, in_c.name)
     shown = core or answer
     if as_json:
         click.echo(json.dumps(shown.as_json()))
@@ -148,7 +147,8 @@ def compare_recording(
             )
     recording, model = recording_of(path, rig, columns)
     outcomes = []
-    for core in _IN_C.values() if given.get("core") == "all" else [_IN_C[given.get("core") or "f32"]]:
+    chosen = given.get("core") or FLOAT.name
+    for core in [one.name for one in ENGINE_CORES.values() if chosen in (one.name, "all")]:
         with progress_bar(core, len(recording)) as advance:
             found = compared(model, recording, core, advance)
         verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
@@ -169,7 +169,7 @@ def _print(answer: MechanismAnswer) -> None:
 
 def _print_core(core: CoreAnswer) -> None:
     if core.identified:
-        _table(core.values, f"{core.oracle.model.title}: weak form, C in {_ARITHMETIC[core.core]}")
+        _table(core.values, f"{core.oracle.model.title}: weak form, C in {ENGINE_CORES[core.core].words}")
     misfit = "not judged" if core.misfit is None else f"{core.misfit:.2g}"
     click.echo(
         f"status {core.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "

@@ -18,16 +18,12 @@ from pvid.base.errors import PvidError
 from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler
 from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
+from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
 _ROOMS = ("number", "solve", "judge", "fourier", "keep")
-_NOT = {  # ends of names that the weak engine of a core does without
-    "f32": ("_q31", "_strong_f32", "_weak_f32"),
-    "q31": ("_f32", "_strong_q31", "_weak_q31", "fingerprint_q31"),
-}
-_REPLAY = {"f32": "replay_fourier", "q31": "replay_fourier_q31"}
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"
 
@@ -73,7 +69,10 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
 
 def _sources(core: Core) -> list[Path]:
     rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in _ROOMS]
-    return [*(path for path in rooms if not path.stem.endswith(_NOT[core])), NATIVE / f"{_REPLAY[core]}.c"]
+    return [
+        *(path for path in rooms if not path.stem.endswith(ENGINE_CORES[core].without)),
+        NATIVE / f"{ENGINE_CORES[core].replay}.c",
+    ]
 
 
 @cache
@@ -131,7 +130,7 @@ def _declarations(compiler: str, headers: Sequence[str], options: list[str], fol
         (empty / f"{name}.h").write_text("", encoding="utf-8")
     own = [f'#include "{name}"' for name in headers]
     top = folder / "native.h"
-    top.write_text("\n".join([f'#include "{_REPLAY[core]}.h"', *own, ""]), encoding="utf-8")
+    top.write_text("\n".join([f'#include "{ENGINE_CORES[core].replay}.h"', *own, ""]), encoding="utf-8")
     return _run([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])
 
 

@@ -287,7 +287,7 @@ class _Channels:
         return size / 2.0**self.sum_shift + self.hop
 
     def format(self, k: int) -> FourierFormatQ31:
-        """Its shifts; the sums with shifted integrals fit 31 bits."""
+        """Its shifts; the sums with shifted integrals fit 30 bits."""
         one = self.model.channel[k]
         value, own = self.value(k), 0
         while True:
@@ -300,8 +300,8 @@ class _Channels:
                 once, twice = self.integral[one.integrand] if one.integrand != NONE else (0, 0)
                 ramp = twice - once + value + own - self.value(one.ramp)
                 total += self.edge(one, 1) * self.half_sum(one.ramp) / 2.0**ramp + 1
-            if plain >= 0 and ramp >= 0 and total < 2**31 - 1:
-                self.margins.take("the sums of a window", total, 31)
+            if plain >= 0 and ramp >= 0 and total < 2**30:
+                self.margins.take("the sums of a window", total, 30)
                 return FourierFormatQ31(value, own, plain, ramp)
             own += 1
 

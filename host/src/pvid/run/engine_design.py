@@ -29,7 +29,6 @@ Run = Mapping[str, npt.ArrayLike]
 # A design that costs less is taken if its score is at most this many times the best one's.
 _COST = 1.1
 _DECIMATIONS = (2, 4, 8, 16, 32)
-_RING = 512  # numbers in the ring of signals, 4 bytes each
 _FEWER = (24, 16, 12)
 
 # Length and degree of the polynomials before decimation, as in the designs of the shipped rigs.
@@ -119,13 +118,12 @@ def design_for_recording(model: Compiled, run: Run, sample_rate: float) -> Score
     A model with corners keeps its sample rate: filters before decimation blur them (measured: 0.2 % of a motor's L).
     """
     best = ranked(model, run, sample_rate, reversals="averaged")[0]
-    signals = len({jet.of for jet in model.channels.needed})
 
     def scored(designs: Iterable[FourierDesign]) -> list[Scored]:
         tried = (score_of(model, run, one, best.p, best.chi2 > MODEL_ERROR) for one in designs)
         return [one for one in tried if one is not None]
 
-    slower = [] if model.jumps else scored(_decimated(best.design, signals))
+    slower = [] if model.jumps else scored(_decimated(best.design))
     found = _cheapest([best, *slower], best)
     return _cheapest([found, *scored(_with_fewer_functions(found.design))], best)
 
@@ -142,14 +140,12 @@ def _cheapest(tried: Sequence[Scored], best: Scored) -> Scored:
     return good[-1] if good else min(possible, key=lambda one: one.score)
 
 
-def _decimated(design: FourierDesign, signals: int) -> Iterator[FourierDesign]:
+def _decimated(design: FourierDesign) -> Iterator[FourierDesign]:
     """With fewer steps a second, behind filters that let nothing fold into the band of the test functions."""
     for decimation in _DECIMATIONS:
         taps = round(_TAPS_A_STEP * decimation) | 1
         degree = _DEGREE if taps > _SHORT else _LOW_DEGREE
         rates = (taps, degree) if design.rate_taps < taps else (design.rate_taps, design.rate_degree)
-        if signals * (rates[0] + decimation) > _RING:
-            return
         try:
             found = replace(design, decimation=decimation, taps=taps, degree=degree)
             yield for_engine(replace(found, rate_taps=rates[0], rate_degree=rates[1]))

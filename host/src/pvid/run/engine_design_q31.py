@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.run import Recording
 from pvid.run.engine_design import Run, design_and_p, engine_tables, simulated_run_of
 from pvid.settings.fourier_q31 import FourierConfigQ31
+from pvid.setup.fourier import with_soft_widths
 from pvid.setup.fourier_q31 import config_of_q31, row_formats
 
 _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
@@ -81,7 +83,13 @@ class FixedEngine:
 
 
 def fixed_engine(
-    compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None, *, start_there: bool = False
+    compiled: CompiledModel,
+    run: Run,
+    design: FourierDesign,
+    p: Float | None = None,
+    *,
+    start_there: bool = False,
+    soft_signs: Mapping[str, float] | None = None,
 ) -> FixedEngine:
     """The engine for a rig, from a run of it.
 
@@ -90,6 +98,7 @@ def fixed_engine(
     design : of the oracle; the engine gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
     start_there : the engine starts at the parameters of this run; False: at the guesses
+    soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
 
     Raises
     ------
@@ -116,7 +125,8 @@ def fixed_engine(
         for one, x in zip(parameters_of.model.unknowns, parameters_of.guess, strict=True)
     ]
     parameters = fixed_parameters(functions.functions, bounds)
-    tables = fixed_design(made.model, found.tables, Sensing(lsb, full_scale, design.sample_rate), made.formats)
+    sizes = with_soft_widths(found.tables, soft_signs or {})
+    tables = fixed_design(made.model, sizes, Sensing(lsb, full_scale, design.sample_rate), made.formats)
     formats = row_formats(found.rows, found.p, found.errors)
     config = config_of_q31(
         tables,
@@ -130,15 +140,21 @@ def fixed_engine(
     return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
 
 
-def engine_for_recording(compiled: CompiledModel, recording: Recording, functions: int | None = None) -> FixedEngine:
+def engine_for_recording(
+    compiled: CompiledModel,
+    recording: Recording,
+    functions: int | None = None,
+    soft_signs: Mapping[str, float] | None = None,
+) -> FixedEngine:
     """For the rig that made a recording, with the design that float32 gets.
 
     Parameters
     ----------
     functions : K; None: chosen
+    soft_signs : as of fixed_engine
     """
     design, p, known = design_and_p(compiled, recording, functions)
-    return fixed_engine(compiled, recording.signals, design, p, start_there=known)
+    return fixed_engine(compiled, recording.signals, design, p, start_there=known, soft_signs=soft_signs)
 
 
 def engine_to_identify(compiled: CompiledModel, recording: Recording) -> FixedEngine:
@@ -148,6 +164,9 @@ def engine_to_identify(compiled: CompiledModel, recording: Recording) -> FixedEn
     return replace(engine, config=replace(engine.config, trust=trust))
 
 
-def engine_for_simulated_rig(compiled: CompiledModel, functions: int | None = None) -> FixedEngine:
+def engine_for_simulated_rig(
+    compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
+) -> FixedEngine:
     """For the shipped rig of a mechanism, with its own design."""
-    return fixed_engine(compiled, *simulated_run_of(compiled, functions))
+    run, design, p = simulated_run_of(compiled, functions)
+    return fixed_engine(compiled, run, design, p, soft_signs=soft_signs)

@@ -14,6 +14,7 @@ from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, first_difference
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import FixedEngine, engine_to_identify
+from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 from pvid.settings.fourier import FourierConfig
 from pvid.setup.fourier_sizes import sizes_of_model
@@ -34,11 +35,20 @@ def compare_recording(
     PvidError
         When there is no C compiler, or the engine does not have what the model needs.
     """
-    if core == "q31":
-        engine = engine_to_identify(compiled, recording)
-        return compare_counts(engine, engine.counts_of(recording.signals), progress)
+    return _COMPARISONS[core](compiled, recording, progress)
+
+
+def _in_float(compiled: CompiledModel, recording: Recording, progress: Progress | None) -> Comparison:
     config = config_to_identify(compiled, recording)
     return compare_samples(compiled, config, samples_of(config, recording.signals), progress)
+
+
+def _in_fixed_point(compiled: CompiledModel, recording: Recording, progress: Progress | None) -> Comparison:
+    engine = engine_to_identify(compiled, recording)
+    return compare_counts(engine, engine.counts_of(recording.signals), progress)
+
+
+_COMPARISONS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
 
 
 def compare_samples(

@@ -24,6 +24,7 @@ from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import engine_to_identify
 from pvid.run.identify import Publications
 from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, values_of
+from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.record import Record
@@ -160,7 +161,7 @@ def identify_in_c(answer: MechanismAnswer, core: Core = "f32") -> CoreAnswer:
         When there is no C compiler, or the engine does not have what the model needs.
     """
     try:
-        run = _in_float(answer) if core == "f32" else _in_fixed_point(answer)
+        run = _RUNS[core](answer)
     except PvidError as error:
         raise PvidError(f"--core {core}: {error}") from error
     return _answer(answer, run)
@@ -206,6 +207,9 @@ def _in_fixed_point(answer: MechanismAnswer) -> _Run:
         correlation * np.outer(se, se),
         (engine.values(record.published), engine.values(record.published_se)),
     )
+
+
+_RUNS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
 
 
 def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:

@@ -69,7 +69,7 @@ class RefineConfig:
     clash_max: float = 25.0
     step_max: float = 0.02
     step_limit: float = 2.0
-    se_max: float = 0.05
+    se_max: float = 0.01
     distance: float = 0.03
 
 

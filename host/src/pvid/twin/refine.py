@@ -22,6 +22,7 @@ _ABSURD = _F(1e3)
 _MAY_GROW = _F(3)
 _HOPELESS = _F(30)
 _LOST_MOST = 6
+_RECENT = 200
 _LEVEL_GAIN = _F(0.2)
 _ERRORS = _F(5)
 
@@ -88,7 +89,7 @@ class RefineTwin:
         self.work, self.solve = Pass(model), Solve(model)
         n = shape.parameters
         self.phase = Phase.WAIT
-        self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
+        self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
         self.passed = self.taken = self.refused = self.lost = self.length = self.begin = 0
         self.level = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
@@ -127,16 +128,16 @@ class RefineTwin:
         self.taken = self.refused = 0
         self.level = _F(0)
 
-    def _take_weak(self, p: Float32, se: Float32) -> bool:
+    def _take_weak(self, p: Float32, se: Float32) -> None:
         r = self.model.from_p(p)
-        if not self.model.region(r):
-            return False
-        self.weak, self.weak_se = r, se.copy()
-        return True
+        if self.model.region(r):
+            self.weak, self.weak_se = r, se.copy()
+            self.renewed = True
 
     def _begin_anew(self) -> None:
         self.r, self.next = self.weak.copy(), self.weak.copy()
         self._forget_state()
+        self.renewed = False
         self.lost = 0
         self.length = self.config.first_block
 
@@ -246,7 +247,7 @@ class RefineTwin:
         signals = None
         if first is not None:
             entry = self.begin + first
-            if self.front.end - entry < 3:
+            if self.front.end - entry < 3 + self.shape.reach:
                 self.waiting = True
                 return
             signals = self.front.read(entry)
@@ -274,24 +275,23 @@ class RefineTwin:
         else:
             self._begin_pass()
 
-    def _next_block(self, p: Float32, se: Float32) -> None:
-        if np.isfinite(p[0]):
-            self._take_weak(p, se)
-        if self.taken == 0 and self.lost >= _LOST_MOST:
+    def _next_block(self) -> None:
+        astray = self.length == self.config.first_block and self.renewed
+        if self.taken == 0 and (self.lost >= _LOST_MOST or (self.lost > 0 and astray)):
             self._begin_anew()
         self._begin_block()
 
-    def _wait(self, p: Float32, se: Float32) -> None:
-        if np.isfinite(p[0]) and self._take_weak(p, se):
-            self.begin = self.front.behind
+    def _wait(self) -> None:
+        if self.renewed:
+            self.begin = max(self.front.end - _RECENT, self.front.first)
             self._begin_search()
             self._begin_anew()
             self._begin_block()
 
-    def _do(self, p: Float32, se: Float32) -> Reason:
+    def _do(self) -> Reason:
         match self.phase:
             case Phase.WAIT:
-                self._wait(p, se)
+                self._wait()
                 return Reason.WARMING_UP
             case Phase.PASS:
                 self._pass_job()
@@ -317,7 +317,7 @@ class RefineTwin:
                 self.phase = Phase.NEXT
             case Phase.NEXT:
                 reason = self.verdict
-                self._next_block(p, se)
+                self._next_block()
                 return reason
         return Reason.ACCUMULATED
 
@@ -326,7 +326,7 @@ class RefineTwin:
     def gap(self) -> None:
         """pvid_refine_gap_f32."""
         self.front.reset()
-        self.begin = self.front.behind
+        self.begin = self.front.first
         self._forget_state()
         if self.phase is not Phase.WAIT:
             self._begin_block()
@@ -336,7 +336,9 @@ class RefineTwin:
         self.frozen = frozen
 
     def step(self, sample: Float32, p: Float32, se: Float32) -> Reason:
-        """A tick; p and se [p] of the weak form, NaN before its first estimate."""
+        """A tick; p and se [p] of the weak form if they are new, else NaN."""
+        if np.isfinite(p[0]):
+            self._take_weak(p, se)
         entry = self.front.step(sample)
         if entry is Entry.BROKEN:
             self.gap()
@@ -347,7 +349,7 @@ class RefineTwin:
             self.waiting = False
         works = entry is Entry.NOTHING or self.config.ratio == 1
         if works and not self.waiting:
-            return self._do(p, se)
+            return self._do()
         return Reason.WARMING_UP if self.phase is Phase.WAIT else Reason.ACCUMULATED
 
     def _fold(self, reason: Reason) -> None:
@@ -356,7 +358,7 @@ class RefineTwin:
         self.hash = fold_bytes(self.hash, words.astype("<u4").tobytes() + int(reason).to_bytes(4, "little"))
 
     def run(self, samples: npt.ArrayLike, weak_p: npt.ArrayLike, weak_se: npt.ArrayLike) -> TwinRefineRecord:
-        """Steps through samples [ticks, samples] with the weak form's published estimate after each tick [ticks, p]."""
+        """Steps through samples [ticks, samples] with the weak form's new estimates, else NaN [ticks, p]."""
         given, p, se = (np.asarray(x, _F) for x in (samples, weak_p, weak_se))
         ticks, n = len(given), self.shape.parameters
         record = TwinRefineRecord(

@@ -23,7 +23,7 @@ Float32 = npt.NDArray[np.float32]
 Stages = Iterator[Reasons | None]
 
 _F = np.float32
-_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 48, 4
+_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 36, 4
 _GATE_MEMORY = _F(4)
 _VARIANCE_MAX = _F(1e36)
 

@@ -14,6 +14,7 @@ Places = npt.NDArray[np.int64]
 
 _F = np.float32
 _HELD_SCALE = _F(1) / _F(24)
+_TWO_TICKS = 4  # least D whose jets and channels have a tick each
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,16 @@ class FrontTicks:
     @property
     def free_ticks(self) -> int:
         """Ticks of a block of four steps that add harmonics or run stages."""
-        return 4 * max(self.decimation - 1, 1)
+        return 4 * max(self.decimation - 1 - self._apart, 1)
+
+    @property
+    def _apart(self) -> int:
+        """Ticks from a step's jets to its channels."""
+        return int(self.decimation >= _TWO_TICKS)
 
     def tick_of(self, step: int) -> int:
-        """Tick that takes the jets of a step."""
-        return self.decimation * (self.lost + 2 * self.half + 1 + step) - 1 + self.held
+        """Tick that takes the jets of a step to the channels."""
+        return self.decimation * (self.lost + 2 * self.half + 1 + step) - 1 + self.held + self._apart
 
     def steps(self, ticks: int) -> int:
         """Steps whose jets have been taken after a stretch of so many ticks."""
@@ -64,7 +70,11 @@ class FrontTicks:
     def free(self, ticks: int) -> npt.NDArray[np.bool_]:
         """Which ticks add harmonics or run stages [ticks]."""
         place = np.arange(1, ticks + 1) - self.held
-        return np.asarray((self.decimation == 1) | (place <= 0) | (place % self.decimation != 0))
+        used = (place > 0) & (place % self.decimation == 0)
+        forms = np.zeros_like(used)
+        if self._apart:
+            forms[self.tick_of(0) :: self.decimation] = True
+        return np.asarray((self.decimation == 1) | ~(used | forms))
 
 
 def signals(samples: Float32, model: FourierModel, sample_rate: float) -> Float32:

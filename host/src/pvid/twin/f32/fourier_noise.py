@@ -11,7 +11,7 @@ from pvid.twin.f32.pattern import PatternModel
 
 Float32 = npt.NDArray[np.float32]
 
-ENTRIES = 2  # of the noise table in a stage
+ENTRIES = 1  # of the noise table in a stage
 _F = np.float32
 
 

@@ -35,7 +35,7 @@ class Front:
     """pvid_refine_front_f32."""
 
     def __init__(self, config: RefineConfig, shape: RefineShape) -> None:
-        self.config, self.inputs = config, shape.inputs
+        self.config, self.inputs, self.reach = config, shape.inputs, shape.reach
         signals = config.signal
         ratio = _F(config.ratio)
         self.share = _F(1) / ratio
@@ -61,6 +61,11 @@ class Front:
     def end(self) -> int:
         """Entries that are complete."""
         return max(self.next - self.behind, 0)
+
+    @property
+    def first(self) -> int:
+        """First entry that a block may begin at."""
+        return self.behind + self.reach
 
     @property
     def room(self) -> int:
@@ -115,8 +120,9 @@ class Front:
         return Entry.NOTHING if self.wait > 0 else self._end_block()
 
     def read(self, entry: int) -> Signals:
-        """Signals of an entry and the next two."""
-        value = self.ring[(entry + np.arange(3)) % RING]
+        """Signals of an entry and the next two; of inputs those of the reach as well."""
+        value = self.ring[(entry - self.reach + np.arange(3 + 2 * self.reach)) % RING]
         found = value.astype(_F) * self.from_counts
-        found[:, self.inputs :][value[:, self.inputs :] == _MISSING] = np.nan
-        return found[:, : self.inputs], found[:, self.inputs :]
+        outputs = found[self.reach : self.reach + 3, self.inputs :]
+        outputs[value[self.reach : self.reach + 3, self.inputs :] == _MISSING] = np.nan
+        return found[:, : self.inputs], outputs

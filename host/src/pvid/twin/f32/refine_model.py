@@ -26,6 +26,11 @@ class RefineShape:
     place_of_p: tuple[int, ...]
 
     @property
+    def reach(self) -> int:
+        """Steps before and behind whose inputs a skew needs."""
+        return 2 if self.skew else 0
+
+    @property
     def states(self) -> int:
         """q and v."""
         return 2 * self.coordinates

@@ -16,7 +16,7 @@ _VELOCITY = "198721/60480 -18637/2520 235183/20160 -10754/945 135713/20160 -5603
 _STARTS = 3
 
 Signals = tuple[Float32, Float32]
-"""Inputs [3, inputs] and outputs [3, outputs] of three neighbouring steps."""
+"""Inputs [3 + 2 reach, inputs] and outputs [3, outputs] of three neighbouring steps."""
 
 
 class Job(IntEnum):
@@ -72,7 +72,8 @@ class Pass:
     def begin(self, r: Float32, start: Float32, h: np.float32, gate: np.float32) -> None:
         """pvid_refine_pass_begin_f32."""
         self.h, self.gate = h, gate
-        self.skew = r[self.shape.moving - 1] if self.shape.skew else _F(0)
+        if self.shape.skew:
+            self._delay(r[self.shape.moving - 1])
         self.constants = self.model.constants(r)
         self.state = start.copy()
         self.job, self.head, self.rows, self.starts, self.step, self.used = Job.CLEAR, 0, 0, _STARTS, 0, 0
@@ -113,17 +114,33 @@ class Pass:
     def _motion(self, state: Float32, u: Float32) -> Float32:
         return self.model.motion(self.constants, state[: self.q], state[self.q :], u)
 
+    def _delay(self, skew: np.float32) -> None:
+        s, scale = skew / self.h, _F(1) / self.h
+        z = s * s
+        one, two, three, four = _F(1), _F(2), _F(3), _F(4)
+        self.late = (
+            ((s * (z - one)) * (s - two)) / _F(24),
+            ((s * (s - one)) * (four - z)) / _F(6),
+            ((one - z) * (four - z)) * _F(0.25),
+            ((s * (s + one)) * (four - z)) / _F(6),
+            ((s * (z - one)) * (s + two)) / _F(24),
+        )
+        self.slope = (
+            (scale / _F(12)) * ((s * (two * z - three * s)) - (s - one)),
+            (scale / _F(6)) * ((s * (three * s - four * z)) + (_F(8) * s - four)),
+            ((scale * s) * (two * z - _F(5))) * _F(0.5),
+            (scale / _F(6)) * ((four + _F(8) * s) - s * (three * s + four * z)),
+            (scale / _F(12)) * ((s * (two * z + three * s)) - (s + one)),
+        )
+
+    def _weighted(self, weights: tuple[np.float32, ...], signals: Signals, at: int) -> Float32:
+        total = weights[0] * signals[0][at]
+        for k, weight in enumerate(weights[1:], 1):
+            total = total + weight * signals[0][at + k]
+        return np.asarray(total, _F)
+
     def _input(self, signals: Signals, at: int) -> Float32:
-        a, b, d = signals[0]
-        if not self.shape.skew:
-            return np.asarray(signals[0][at])
-        f = self.skew / (_F(2) * self.h)
-        bend = (_F(2) * (f * f)) * ((a - _F(2) * b) + d)
-        if at == 0:
-            return np.asarray((a + f * ((_F(4) * b - _F(3) * a) - d)) + bend)
-        if at == 1:
-            return np.asarray((b + f * (d - a)) + bend)
-        return np.asarray((d + f * ((_F(3) * d - _F(4) * b) + a)) + bend)
+        return self._weighted(self.late, signals, at) if self.shape.skew else np.asarray(signals[0][at])
 
     def _first_half(self, r: Float32, signals: Signals) -> None:
         h, q = self.h, self.q
@@ -162,11 +179,10 @@ class Pass:
         found = self.model.jacobian(self.constants, x, v, u)
         B = found.B.copy()
         if shape.skew:
-            scale = _F(1) / (_F(2) * self.h)
+            rate = self._weighted(self.slope, signals, 2)
             total: Float32 = np.zeros(q, _F)
             for j in range(shape.inputs):
-                a, b, d = signals[0][:, j]
-                total = total + found.U[:, j] * (scale * ((_F(3) * d - _F(4) * b) + a))
+                total = total + found.U[:, j] * rate[j]
             B[-1] = total
         big = _F(BIG_STEP) * self.h
         g = (big * big) * (_F(1) / _F(12))
