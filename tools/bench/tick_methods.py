@@ -131,7 +131,8 @@ def baseline_report(on: Board, run: ReplayRun, name: str) -> ReplayReport:
         "    memcpy(&word, &value, sizeof word);\n    return pvid_fnv_word(hash, word);\n}\n"
         "#define REPLAY_TYPE baseline\n#define REPLAY_INIT baseline_init\n"
         "#define REPLAY_STEP(self, sample) baseline_step(self, (sample)[0], (sample)[1])\n"
-        f"#define REPLAY_HASH(hash, estimator, reason) baseline_hash((hash) + (uint32_t)(reason), (estimator)->{first}[0])"
+        "#define REPLAY_HASH(hash, estimator, reason) "
+        f"baseline_hash((hash) + (uint32_t)(reason), (estimator)->{first}[0])"
     )
     defined = ("#define REPLAY_TYPE", "#define REPLAY_INIT", "#define REPLAY_STEP", "#define REPLAY_HASH")
     lines = [line for line in header(run).splitlines() if not line.startswith(defined)]
