@@ -185,6 +185,18 @@ def bench_cell(folder: Path | None, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="tick-methods")
+@UPDATE
+def bench_tick_methods(update: Path | None) -> int:
+    """A tick of recursive least squares, U-D, a Kalman filter and the strong form, on a Cortex-M4F."""
+    from bench import tick_methods
+
+    with progress_bar("methods", tick_methods.STEPS) as advance:
+        rows = list(tick_methods.rows_of(Native(), progress=advance))
+    put_table(update, "tick-methods", markdown(tick_methods.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="compare-methods")
 @UPDATE
 def bench_compare_methods(update: Path | None) -> int:
