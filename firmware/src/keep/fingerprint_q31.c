@@ -83,7 +83,7 @@ static uint32_t estimator_of(uint32_t hash, const pvid_estimator_config_q31 *con
     running = words(running, config->upper, n_p);
     running = formats(running, config->p_bits, n_p);
     running = formats(running, config->n_bits, n_theta);
-    running = formats(running, &config->y_bits, 1);
+    running = formats(running, &config->y_bits, (n_theta > 0u) ? 1u : 0u);
     running = words(running, &config->row_sd, 1);
     running = pvid_fnv_word(running, config->forgetting_groups);
     running = words(running, &config->gain, 1);
@@ -124,22 +124,22 @@ static uint32_t bank_of(uint32_t hash, const pvid_fir_bank_q31 *bank)
 
 static uint32_t row_of(uint32_t hash, const pvid_strong_row_q31 *row)
 {
-    const uint8_t single[] = {row->n_a, row->n_e, row->part, row->y};
-    uint32_t running = shifts(hash, single, sizeof single);
-    running = shifts(running, row->n_phi2, sizeof row->n_phi2);
-    return shifts(running, row->n_phi0, sizeof row->n_phi0);
+    const uint32_t running = formats(hash, row->phi_shift, sizeof row->phi_shift);
+    const int32_t single[] = {row->phi3, row->reference};
+    return words(formats(running, row->finer, sizeof row->finer), single, sizeof single / sizeof single[0]);
 }
 
 uint32_t pvid_fingerprint_strong_q31(const pvid_strong_config_q31 *config)
 {
-    const int32_t scalars[] = {config->u_multiplier, config->phi_offset, config->y_offset, config->drive_min};
+    const int32_t scalars[] = {config->phi_offset, config->y_offset, config->drive_min};
     uint32_t hash = words(PVID_FNV_START, scalars, sizeof scalars / sizeof scalars[0]);
+    hash = words(hash, config->u_multiplier, PVID_Y_ORDERS_Q31);
     hash = bank_of(hash, &config->bank);
     hash = row_of(hash, &config->row);
-    hash = pvid_fnv_word(hash, config->u_shift);
+    hash = shifts(hash, config->u_shift, sizeof config->u_shift);
     hash = pvid_fnv_word(hash, config->drive_ticks);
     hash = gate_of(hash, &config->gate);
-    return estimator_of(hash, &config->estimator, PVID_KAPITZA_STRONG_THETA, PVID_KAPITZA_P);
+    return estimator_of(hash, &config->estimator, 0, PVID_KAPITZA_P);
 }
 
 uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)

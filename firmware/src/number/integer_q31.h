@@ -29,14 +29,22 @@ static inline int64_t pvid_product_q31(int32_t a, int32_t b)
 #endif
 }
 
+/* a b where |a| and |b| are 2^30 at most, or |a| 2^28 and |b| 3 2^29: ten instructions less on such a core. */
+int64_t pvid_short_product_in_halves_q31(int32_t a, int32_t b);
+
+static inline int64_t pvid_short_product_q31(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_6M__)
+    return pvid_short_product_in_halves_q31(a, b);
+#else
+    return (int64_t)a * b;
+#endif
+}
+
 /* a a. */
 static inline int64_t pvid_square_q31(int32_t a)
 {
-#if defined(__ARM_ARCH_6M__)
-    return pvid_product_in_halves_q31(a, a);
-#else
-    return (int64_t)a * a;
-#endif
+    return pvid_product_q31(a, a);
 }
 
 /* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0; |x| < INT64_MAX. */
@@ -54,8 +62,20 @@ static inline uint64_t pvid_magnitude_q31(int64_t x)
     return (x < 0) ? (uint64_t)-x : (uint64_t)x;
 }
 
-/* Number of bits of x: 0 for 0, 64 for 2^63 and above. */
+/* Number of bits of x: 0 for 0, 64 for 2^63 and above. One instruction counts zeros on cores that have it. */
+#if defined(__ARM_FEATURE_CLZ) && defined(__GNUC__)
+static inline uint32_t pvid_bit_length_q31(uint64_t x)
+{
+    const uint32_t high = (uint32_t)(x >> 32);
+    const uint32_t low = (uint32_t)(x & 0xFFFFFFFFu);
+    if (high != 0u) {
+        return 64u - (uint32_t)__builtin_clz(high);
+    }
+    return (low != 0u) ? (32u - (uint32_t)__builtin_clz(low)) : 0u;
+}
+#else
 uint32_t pvid_bit_length_q31(uint64_t x);
+#endif
 
 /* Greatest r with r^2 <= x, x <= 2^62. 32 turns. */
 uint32_t pvid_square_root_q31(uint64_t x);

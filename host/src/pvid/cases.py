@@ -140,6 +140,21 @@ class Case(ABC):
         settled = 3 * period + config.design.taps
         return int(ticks - max((ticks - settled) // period, 1) * period)
 
+    @property
+    def _estimator(self) -> str:
+        """The name of its estimator in C: the strong form in fixed point has its own."""
+        return f"{DEFAULT}_estimator" if (self.form, self.core) == ("strong", "q31") else "estimator"
+
+    @property
+    def hash_function(self) -> str:
+        """The C function that continues a hash with its estimator."""
+        return f"pvid_fnv_{self._estimator}_{self.core}"
+
+    @property
+    def assess_function(self) -> str:
+        """The C function that assesses its estimator."""
+        return f"pvid_{self._estimator}_assess_{self.core}"
+
     # ---- samples
 
     @abstractmethod
