@@ -159,8 +159,8 @@ COUNTS = Range(1, 2**24, Status.BAD_FULL_SCALE)
 STRONG_Q31 = {
     **ESTIMATOR_Q31,
     "estimator.p_bits": Range(-64, 64, Status.BAD_FORMAT, (Status.BAD_FORMAT,)),
-    "row.phi_shift": Range(-31, 31, Status.BAD_SHIFT),
-    "row.finer": Range(-31, 31, Status.BAD_SHIFT, (Status.BAD_FORMAT,)),
+    "row.phi_shift": Range(-31, 31, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
+    "row.finer": Range(-31, 31, Status.BAD_SHIFT, (Status.BAD_FORMAT, Status.BAD_SHIFT)),
     "row.phi3": Range(1, 2**31 - 1, Status.BAD_SHIFT),
     "row.reference": Range(0, 2**29, Status.BAD_SHIFT),
     "u_multiplier": Range(1, 2**31 - 1, Status.BAD_U_MULTIPLIER),

@@ -75,9 +75,11 @@ static inline int32_t pvid_moved_q31(int32_t x, int32_t shift)
 /* x, and whether it is within +-limit; 0 if not. */
 static inline int32_t pvid_within_q31(int64_t x, int32_t limit, bool *fits)
 {
-    const bool within = (uint64_t)(x + limit) <= (2u * (uint64_t)limit);
-    *fits = *fits && within;
-    return within ? (int32_t)x : 0;
+    if ((x > limit) || (x < -(int64_t)limit)) {
+        *fits = false;
+        return 0;
+    }
+    return (int32_t)x;
 }
 
 #endif

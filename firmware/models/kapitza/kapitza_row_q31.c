@@ -13,7 +13,8 @@ static inline int32_t shifted_entry(int32_t x, int32_t shift, bool *fits)
     if (shift <= 0) {
         return pvid_within_q31(pvid_round_shift_q31(x, (uint32_t)-shift), PVID_ROW_LIMIT_Q31, fits);
     }
-    return pvid_within_q31(x * ((int64_t)1 << (uint32_t)shift), PVID_ROW_LIMIT_Q31, fits);
+    const uint32_t up = (shift < 31) ? (uint32_t)shift : 31u;
+    return pvid_within_q31(x * ((int64_t)1 << up), PVID_ROW_LIMIT_Q31, fits);
 }
 
 static inline int32_t entry(int64_t x, bool *fits)

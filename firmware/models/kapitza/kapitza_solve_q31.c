@@ -32,7 +32,8 @@ static bool is_shift(int32_t shift)
 static bool rows_are_valid(const pvid_strong_row_q31 *rows)
 {
     bool valid = (rows->phi3 > 0) && (rows->reference >= 0) && (rows->reference <= PVID_KAPITZA_RATE_LIMIT_Q31) &&
-                 is_shift(rows->finer[0]) && is_shift(rows->finer[1]);
+                 is_shift(rows->finer[0]) && is_shift(rows->finer[1]) &&
+                 is_shift((int32_t)rows->phi_shift[2] + rows->finer[0]);
     for (size_t k = 0; k < PVID_ORDERS; k++) {
         valid = valid && is_shift(rows->phi_shift[k]);
     }

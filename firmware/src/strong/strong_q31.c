@@ -129,7 +129,8 @@ static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int3
 {
     for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
         const int64_t exact = pvid_round_shift_q31(pvid_product_q31(d_y[k], self->u_multiplier[k]), self->u_shift[k]);
-        if (!is_within(exact, (k == 0u) ? PVID_KAPITZA_RATE_LIMIT_Q31 : PVID_DERIVATIVE_LIMIT_Q31)) {
+        const int64_t limit = (k == 0u) ? PVID_KAPITZA_RATE_LIMIT_Q31 : PVID_DERIVATIVE_LIMIT_Q31;
+        if ((exact > limit) || (exact < -limit)) {
             return false;
         }
         u[k] = (int32_t)exact;
